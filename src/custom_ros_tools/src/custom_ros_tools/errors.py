@@ -1,0 +1,114 @@
+"""Errors by whose fault they are; every one of them is an `InterfaceError`.
+
+Each takes data and writes its own sentence, so that the wording lives in one place.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+
+def closest(name: str, known: Iterable[str]) -> str | None:
+    """Return the known name that looks most like `name`, or None when none is near (case is ignored)."""
+    by_lower_case = {candidate.lower(): candidate for candidate in known}
+    match = difflib.get_close_matches(name.lower(), by_lower_case, n=1)
+    return by_lower_case[match[0]] if match else None
+
+
+def hint(name: str, known: Iterable[str]) -> str:
+    """Return `"; did you mean 'x'?"`, or the list of known names, to be put after "unknown ..."."""
+    names = sorted(set(known))
+    match = closest(name, names)
+    if match is not None:
+        return f"; did you mean '{match}'?"
+    return f"; known are {', '.join(names)}" if names else ""
+
+
+class InterfaceError(Exception):
+    """Base of every error this workspace raises on purpose."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One fault in one configuration file.
+
+    Attributes:
+        file: Path of the YAML file as the user wrote it; `"~config"` when it came from the parameter server.
+        key: Dotted key path with list indices, such as `intrinsics.range[1]`; empty for the file as a whole.
+        message: What was expected, what was found and what to write instead.
+    """
+
+    file: str
+    key: str
+    message: str
+
+    def __str__(self) -> str:
+        return ": ".join(part for part in (self.file, self.key, self.message) if part)
+
+
+class ConfigError(InterfaceError):
+    """The author of the configuration has to change something.
+
+    Args:
+        problems: All faults that were found, in the order of the files.
+    """
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__(self.problems)
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.problems))
+
+
+class UnknownNameError(InterfaceError):
+    """The caller named something that does not exist.
+
+    Args:
+        kind: What sort of thing was named, such as `"joint"`.
+        name: The name that is not known.
+        known: The names that are.
+    """
+
+    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+        self.kind = kind
+        self.name = name
+        self.known = tuple(known)
+        super().__init__(kind, name, self.known)
+
+    def __str__(self) -> str:
+        known = f"known are {', '.join(self.known)}" if self.known else "there is none"
+        match = closest(self.name, self.known)
+        question = f"; did you mean '{match}'?" if match else ""
+        return f"unknown {self.kind} '{self.name}': {known}{question}"
+
+
+class MissingDependency(InterfaceError):  # noqa: N818 (the name says what is the matter)
+    """An optional library is not installed.
+
+    Args:
+        package: Name of what is missing.
+        how: What to do about it, such as a command to type.
+    """
+
+    def __init__(self, package: str, how: str) -> None:
+        self.package = package
+        self.how = how
+        super().__init__(package, how)
+
+    def __str__(self) -> str:
+        return f"'{self.package}' is not installed: {self.how}"
+
+
+class PhysicsError(InterfaceError):
+    """PyBullet refused a call that the configuration allows.
+
+    Args:
+        message: What was asked for, and what PyBullet said.
+    """
+
+    def __init__(self, message: str) -> None:
+        self.message = message
+        super().__init__(message)

@@ -1,0 +1,37 @@
+"""Sends what the core logs to the console and to /rosout."""
+
+from __future__ import annotations
+
+import logging
+from typing import Callable
+
+import rospy
+
+
+class _RosHandler(logging.Handler):
+    """Hands log records to rospy."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        levels: tuple[tuple[int, Callable[[str], None]], ...] = (
+            (logging.CRITICAL, rospy.logfatal),
+            (logging.ERROR, rospy.logerr),
+            (logging.WARNING, rospy.logwarn),
+            (logging.INFO, rospy.loginfo),
+            (logging.DEBUG, rospy.logdebug),
+        )
+        text = self.format(record).replace("%", "%%")
+        next(send for level, send in levels if record.levelno >= level)(text)
+
+
+def attach_logging(*modules: str) -> None:
+    """Attaches the loggers of some modules to /rosout; call it once, after `rospy.init_node`.
+
+    Args:
+        modules: Top-level Python modules, such as `rpbi`.
+    """
+    handler = _RosHandler(level=logging.DEBUG)
+    for module in modules:
+        logger = logging.getLogger(module)
+        logger.setLevel(logging.INFO)
+        logger.propagate = False
+        logger.addHandler(handler)

@@ -1,0 +1,90 @@
+"""Files that a configuration names: where they are looked for, and field types that insist on them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import pybullet_data
+from pydantic import AfterValidator, ValidationInfo
+
+from custom_ros_tools.config import replace_package
+from custom_ros_tools.errors import ConfigError
+from custom_ros_tools.schema import Expects, Text
+
+ROBOT_DESCRIPTION = "robot_description"
+"""The word that stands for the robot description on the parameter server in place of a file name."""
+PYBULLET_DATA_PATH = "pybullet_data_path"
+"""The word that stands for the folder of PyBullet's data in search paths."""
+
+
+def find_file(name: str, file: str, search_paths: Sequence[str] = ()) -> str:
+    """Return the absolute path of a file that a YAML file names.
+
+    Looked for beside the YAML file, in the search paths and in PyBullet's data, in this order.
+
+    Args:
+        name: What the YAML file says; `{package}/path` and `package://package/path` are resolved.
+        file: The YAML file; without folder if it came from the parameter server (`~config`).
+        search_paths: Further folders.
+
+    Raises:
+        ValueError: if there is no such file, or the package is unknown.
+    """
+    path = _resolve_package(name)
+    folders = [*search_paths, pybullet_data.getDataPath()]
+    if not file.startswith("~"):
+        folders.insert(0, str(Path(file).resolve().parent))
+    candidates = [path] if path.is_absolute() else [Path(folder) / path for folder in folders]
+    for candidate in candidates:
+        if candidate.is_file():
+            return str(candidate.resolve() if ".." in candidate.parts else candidate.absolute())
+    if any(candidate.is_dir() for candidate in candidates):
+        raise ValueError(f"expected a file, got the folder {name}")
+    where = "" if path.is_absolute() else f" (looked in {', '.join(map(str, folders))})"
+    raise ValueError(f"no such file: {path if path.is_absolute() else name}{where}")
+
+
+def _existing(name: str, info: ValidationInfo) -> str:
+    context = info.context or {}
+    return find_file(name, context.get("file", "~"), context.get("search_paths", ()))
+
+
+def _existing_or_description(name: str, info: ValidationInfo) -> str:
+    if name == ROBOT_DESCRIPTION:
+        return str((info.context or {}).get(ROBOT_DESCRIPTION) or name)
+    return _existing(name, info)
+
+
+def find_folder(name: str, file: str) -> str:
+    """Return the absolute path of a folder that a YAML file names; `find_file` tells how.
+
+    Args:
+        name: What the YAML file says; `pybullet_data_path` is the folder of PyBullet's data.
+        file: The YAML file.
+
+    Raises:
+        ValueError: if there is no such folder, or the package is unknown.
+    """
+    if name == PYBULLET_DATA_PATH:
+        return str(pybullet_data.getDataPath())
+    folder = _resolve_package(name)
+    if not folder.is_absolute() and not file.startswith("~"):
+        folder = Path(file).resolve().parent / folder
+    if not folder.is_dir():
+        raise ValueError(f"no such folder: {folder}")
+    return str(folder.absolute())
+
+
+def _resolve_package(name: str) -> Path:
+    try:
+        return Path(replace_package(name))
+    except ConfigError as error:
+        raise ValueError(str(error)) from None
+
+
+ExistingFile = Annotated[Text, AfterValidator(_existing), Expects("a file name")]
+"""A file that exists, as an absolute path; `file` and `search_paths` come from the validation's context."""
+RobotFile = Annotated[Text, AfterValidator(_existing_or_description), Expects("a file name")]
+"""The same, or the word `robot_description`, which becomes the file that the context has for it, if any."""

@@ -1,0 +1,19 @@
+"""The types of bodies; a new one is a class in a file of its own and a line here."""
+
+from __future__ import annotations
+
+from .body import Body
+from .collision import CollisionObject
+from .dynamic import DynamicObject
+from .robot import Robot
+from .visual import VisualObject
+
+BODY_TYPES: dict[str, type[Body]] = {
+    "visual": VisualObject,
+    "collision": CollisionObject,
+    "dynamic": DynamicObject,
+    "robot": Robot,
+}
+"""In the order in which a world loads them."""
+
+__all__ = ["BODY_TYPES", "Body", "CollisionObject", "DynamicObject", "Robot", "VisualObject"]

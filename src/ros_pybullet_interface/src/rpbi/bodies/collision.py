@@ -1,0 +1,36 @@
+"""Collision objects: felt by others, moved by nobody but TF."""
+
+from __future__ import annotations
+
+from typing import Optional
+
+from custom_ros_tools.schema import ConfigModel, Name
+from pydantic import Field
+
+from ..client import Client
+from ..pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ObjectTf
+from .shape_object import ShapeObject
+
+
+class CollisionObjectConfig(ConfigModel):
+    """YAML of a collision object."""
+
+    name: Name
+    createVisualShape: CreateVisualShape
+    createCollisionShape: CreateCollisionShape
+    changeDynamics: Optional[ChangeDynamics] = Field(None, description="Friction, restitution and the like.")
+    object_tf: Optional[ObjectTf] = Field(None, description="TF frame to follow; without it, it stays at the origin.")
+
+
+class CollisionObject(ShapeObject):
+    """An object of infinite mass that follows a TF frame or stays at the origin."""
+
+    Config = CollisionObjectConfig
+    section = "collision_objects"
+
+    def __init__(self, pb: Client, config: CollisionObjectConfig) -> None:
+        super().__init__(
+            pb, config.name, config.createVisualShape, config.createCollisionShape, object_tf=config.object_tf
+        )
+        if config.changeDynamics is not None:
+            pb.changeDynamics(self.body_id, -1, **config.changeDynamics.kwargs())

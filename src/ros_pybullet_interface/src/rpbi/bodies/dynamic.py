@@ -1,0 +1,54 @@
+"""Dynamic objects: moved by physics."""
+
+from __future__ import annotations
+
+from typing import Optional
+
+from custom_ros_tools.schema import ConfigModel, Name, HzOrOff, Positive, Position, Quat
+from pydantic import Field
+
+from ..client import Client
+from ..pose import Pose
+from ..pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ResetBaseVelocity
+from ..sensors.link_pose import LinkPoseSensor
+from ..sensors.sensor import Sensor
+from .shape_object import ShapeObject
+
+
+class DynamicObjectConfig(ConfigModel):
+    """YAML of a dynamic object."""
+
+    name: Name
+    createVisualShape: CreateVisualShape
+    createCollisionShape: CreateCollisionShape
+    changeDynamics: ChangeDynamics = Field(description="Friction, restitution and the like.")
+    baseMass: Positive = Field(description="Mass.", json_schema_extra={"unit": "kg"})
+    basePosition: Position = Field((0.0, 0.0, 0.0), description="Start position.")
+    baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Start orientation, x, y, z, w.")
+    resetBaseVelocity: Optional[ResetBaseVelocity] = Field(None, description="Start velocity.")
+    broadcast_hz: HzOrOff = Field(0.0, description="Rate of its pose on TF; 0 is off.")
+
+
+class DynamicObject(ShapeObject):
+    """An object that falls, slides and is pushed."""
+
+    Config = DynamicObjectConfig
+    section = "dynamic_objects"
+
+    def __init__(self, pb: Client, config: DynamicObjectConfig) -> None:
+        super().__init__(
+            pb,
+            config.name,
+            config.createVisualShape,
+            config.createCollisionShape,
+            config.baseMass,
+            Pose(config.basePosition, config.baseOrientation),
+        )
+        pb.changeDynamics(self.body_id, -1, **config.changeDynamics.kwargs())
+        if config.resetBaseVelocity is not None:
+            pb.resetBaseVelocity(self.body_id, **config.resetBaseVelocity.kwargs())
+        self._broadcast_hz = config.broadcast_hz
+
+    def sensors(self) -> tuple[Sensor, ...]:
+        """Its pose, if it is to be broadcast."""
+        return (LinkPoseSensor(self, self._broadcast_hz, links=False),) if self._broadcast_hz else ()

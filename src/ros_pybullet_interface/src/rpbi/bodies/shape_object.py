@@ -1,0 +1,50 @@
+"""Objects made of one visual and perhaps one collision shape."""
+
+from __future__ import annotations
+
+from typing import Any, Mapping, Optional
+
+from ..client import Client
+from ..inputs import Input, PoseInput
+from ..pose import Pose
+from ..pybullet_models import CreateCollisionShape, CreateVisualShape, ObjectTf
+from .body import Body
+
+
+class ShapeObject(Body):
+    """An object whose shape comes from `createVisualShape` and `createCollisionShape`.
+
+    Args:
+        pb: The client to create it in.
+        name: Unique name.
+        visual: Visual shape.
+        collision: Collision shape, None for an object that nothing can touch.
+        mass_kg: Mass [kg]; 0 keeps it in place whatever pushes it.
+        pose: Pose in the world.
+        object_tf: TF frame that it follows, if any.
+    """
+
+    def __init__(
+        self,
+        pb: Client,
+        name: str,
+        visual: CreateVisualShape,
+        collision: Optional[CreateCollisionShape] = None,
+        mass_kg: float = 0.0,
+        pose: Pose = Pose(),
+        object_tf: Optional[ObjectTf] = None,
+    ) -> None:
+        shapes: dict[str, Any] = {"baseVisualShapeIndex": pb.createVisualShape(**visual.kwargs())}
+        if collision is not None:
+            shapes["baseCollisionShapeIndex"] = pb.createCollisionShape(**collision.kwargs())
+        body_id = pb.createMultiBody(
+            baseMass=mass_kg, basePosition=pose.position, baseOrientation=pose.quat_xyzw, **shapes
+        )
+        super().__init__(pb, name, body_id)
+        self._object_tf = object_tf
+
+    def inputs(self) -> Mapping[str, Input]:
+        """Takes `pose`, the pose of the TF frame that it follows, if it follows one."""
+        return {} if self._object_tf is None else {
+            "pose": PoseInput.following(self._object_tf, self.set_base_pose)
+        }

@@ -1,0 +1,33 @@
+"""Visual objects: seen, never felt."""
+
+from __future__ import annotations
+
+from typing import Optional
+
+from custom_ros_tools.schema import ConfigModel, Name
+from pydantic import Field
+
+from ..client import Client
+from ..pybullet_models import CreateCollisionShape, CreateVisualShape, ObjectTf
+from .shape_object import ShapeObject
+
+
+class VisualObjectConfig(ConfigModel):
+    """YAML of a visual object."""
+
+    name: Name
+    createVisualShape: CreateVisualShape
+    createCollisionShape: Optional[CreateCollisionShape] = Field(
+        None, description="Accepted and ignored, so that a collision object can be turned into a visual one."
+    )
+    object_tf: Optional[ObjectTf] = Field(None, description="TF frame to follow; without it, it stays at the origin.")
+
+
+class VisualObject(ShapeObject):
+    """An object without collision shape that follows a TF frame or stays at the origin."""
+
+    Config = VisualObjectConfig
+    section = "visual_objects"
+
+    def __init__(self, pb: Client, config: VisualObjectConfig) -> None:
+        super().__init__(pb, config.name, config.createVisualShape, object_tf=config.object_tf)

@@ -1,0 +1,38 @@
+"""One connection to PyBullet."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import pybullet
+from custom_ros_tools.errors import PhysicsError
+
+
+class Client:
+    """PyBullet's functions and constants as attributes, bound to one connection.
+
+    The binding is made once per function: at a thousand ticks a second, making it at every call would show.
+
+    Args:
+        mode: PyBullet's connection mode, such as `pybullet.DIRECT`.
+        options: Further arguments of `pybullet.connect`.
+
+    Raises:
+        PhysicsError: If PyBullet does not connect.
+    """
+
+    def __init__(self, mode: int = pybullet.DIRECT, **options: Any) -> None:
+        try:
+            self.client_id: int = pybullet.connect(mode, **options)
+        except pybullet.error as error:
+            raise PhysicsError(f"PyBullet did not connect: {error}") from error
+        if self.client_id < 0:
+            raise PhysicsError("PyBullet did not connect (GUI mode needs a screen: is DISPLAY set?)")
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(pybullet, name)
+        if callable(value):
+            value = partial(value, physicsClientId=self.client_id)
+        setattr(self, name, value)
+        return value

@@ -1,0 +1,84 @@
+"""Integer simulated time: ticks, nanoseconds, and when a rate is due."""
+
+from __future__ import annotations
+
+import time
+from fractions import Fraction
+from typing import Optional
+
+NS_PER_S = 1_000_000_000
+
+
+class Clock:
+    """Counts ticks and gives each its stamp.
+
+    Stamps never repeat and never go back while the clock lives. Simulated stamps are exact: tick `n` is stamped
+    `(n + 1) * dt`, so the initial state has the stamp dt, since ROS takes a stamp of 0 for "no time yet".
+
+    Args:
+        time_step_s: Length of a tick [s], rounded to whole nanoseconds.
+        simulated: Whether stamps are simulated time; otherwise they are wall time (Unix epoch).
+
+    Raises:
+        ValueError: If the time step is shorter than a nanosecond.
+    """
+
+    def __init__(self, time_step_s: float, simulated: bool = True) -> None:
+        self.dt_ns = round(time_step_s * NS_PER_S)
+        if self.dt_ns < 1:
+            raise ValueError(f"time step must be at least 1e-9 [s], got {time_step_s}")
+        self.simulated = simulated
+        self.tick = 0
+        self.stamp_ns = self.dt_ns if simulated else time.time_ns()
+
+    @property
+    def dt_s(self) -> float:
+        """Length of a tick [s], exactly what PyBullet steps by."""
+        return self.dt_ns / NS_PER_S
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time since the world was built [s]."""
+        return self.tick * self.dt_ns / NS_PER_S
+
+    def advance(self) -> None:
+        """Goes on to the next tick."""
+        self.tick += 1
+        if self.simulated:
+            self.stamp_ns += self.dt_ns
+        else:
+            self.restamp()
+
+    def restamp(self) -> None:
+        """Renews a wall-time stamp within the same tick, for state that is sent again while stopped."""
+        if not self.simulated:
+            self.stamp_ns = max(self.stamp_ns + 1, time.time_ns())
+
+
+class Schedule:
+    """The ticks at which something of a given rate is due.
+
+    It is due at tick `n` when `floor(n * dt * hz)` is greater than at tick `n - 1`: the mean rate is exact and the
+    jitter at most one tick. All in integers, so nothing drifts.
+
+    Args:
+        hz: Rate [Hz]; at most `1 / dt` has an effect (see `clamped`).
+        dt_ns: Length of a tick [ns].
+    """
+
+    def __init__(self, hz: float, dt_ns: int) -> None:
+        wanted = Fraction(hz).limit_denominator(1_000_000) * dt_ns / NS_PER_S
+        self.clamped = wanted > 1
+        self._per_tick = min(wanted, Fraction(1))
+
+    def is_due(self, tick: int, since: Optional[int] = None) -> bool:
+        """Tells whether it is due at `tick`, or was at any tick after `since`; at tick 0 it always is."""
+        numerator, denominator = self._per_tick.numerator, self._per_tick.denominator
+        last = tick - 1 if since is None else since
+        return tick * numerator // denominator > last * numerator // denominator
+
+    def next_due(self, tick: int) -> int:
+        """Returns the first tick after `tick` at which it is due."""
+        numerator, denominator = self._per_tick.numerator, self._per_tick.denominator
+        count = tick * numerator // denominator + 1
+        return -(-count * denominator // numerator)

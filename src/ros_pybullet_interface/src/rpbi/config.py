@@ -1,0 +1,165 @@
+"""Reading a world: the main YAML file and all files that it names, with all of their problems at once."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from custom_ros_tools.config import load_config, replace_package
+from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.schema import ConfigModel
+
+from .asset_files import ROBOT_DESCRIPTION, find_file, find_folder
+from .legacy import MAIN
+from .object_config import BodyType, ObjectConfig, load_object, name_in, parse_section
+from .world_config import WorldConfig
+
+__all__ = ["LoadedWorld", "ObjectConfig", "WorldConfig", "load_object", "load_world", "load_world_dict"]
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class LoadedWorld:
+    """A world that has been read and found valid; picklable.
+
+    Attributes:
+        config: What the main file says.
+        objects: The objects, in the order in which they are loaded.
+        file: The main file, `"~config"` if it came from the parameter server.
+    """
+
+    config: WorldConfig
+    objects: tuple[ObjectConfig, ...]
+    file: str
+
+
+def load_world(
+    path: str, body_types: Mapping[str, BodyType], robot_description: str | None = None
+) -> LoadedWorld:
+    """Read a main YAML file and all files that it names.
+
+    Args:
+        path: The main file; `{package}/path` and `package://package/path` are resolved.
+        body_types: The classes of bodies by type, in the order of loading.
+        robot_description: File that the word `robot_description` stands for; without it, the word stays.
+
+    Raises:
+        ConfigError: with all problems of all files.
+    """
+    return _Reader(load_config(path), path, replace_package(path), body_types, robot_description).read()
+
+
+def load_world_dict(
+    data: Mapping[str, Any],
+    file: str,
+    body_types: Mapping[str, BodyType],
+    robot_description: str | None = None,
+) -> LoadedWorld:
+    """Do the same as `load_world` with a main file that has been read already.
+
+    Args:
+        data: What the main file says; it is not changed.
+        file: Its name; `"~config"`, which has no folder, if it came from the parameter server.
+        body_types: The classes of bodies by type, in the order of loading.
+        robot_description: File that the word `robot_description` stands for; without it, the word stays.
+
+    Raises:
+        ConfigError: with all problems of all files.
+    """
+    return _Reader(data, file, file, body_types, robot_description).read()
+
+
+class _Reader:
+    """Reads one world and collects the problems.
+
+    Args:
+        data: What the main file says.
+        file: Name of the main file, for messages.
+        path: Where it is.
+        body_types: The classes of bodies by type.
+        robot_description: File of the robot description, if there is one.
+    """
+
+    def __init__(
+        self,
+        data: Mapping[str, Any],
+        file: str,
+        path: str,
+        body_types: Mapping[str, BodyType],
+        robot_description: str | None,
+    ) -> None:
+        self._data = data
+        self._file = file
+        self._path = path
+        self._body_types = body_types
+        self._robot_description = robot_description
+        self._problems: list[Problem] = []
+        self._owner_of: dict[str, str] = {}
+
+    def read(self) -> LoadedWorld:
+        """Return the world, or raise a ConfigError with all problems."""
+        try:
+            config = parse_section(MAIN, self._data, self._file, WorldConfig, {"file": self._path})
+        except ConfigError as error:
+            self._problems += error.problems
+        objects = tuple(self._objects()) if isinstance(self._data, Mapping) else ()
+        if self._problems:
+            raise ConfigError(self._problems)
+        if config.step_pybullet_manually:
+            log.info("%s: step_pybullet_manually: has no effect: every step is explicit", self._file)
+        return LoadedWorld(config, objects, self._file)
+
+    def _objects(self) -> Iterator[ObjectConfig]:
+        search_paths = self._search_paths()
+        for kind, body_type in self._body_types.items():
+            for index, entry in _texts(self._data.get(body_type.section)):
+                try:
+                    path = find_file(entry, self._path, search_paths)
+                except ValueError as error:
+                    self._problems.append(Problem(self._file, f"{body_type.section}[{index}]", str(error)))
+                    continue
+                context = {
+                    "file": path,
+                    "search_paths": search_paths,
+                    ROBOT_DESCRIPTION: self._robot_description,
+                }
+                try:
+                    yield ObjectConfig(kind, self._object(kind, entry, context), entry)
+                except ConfigError as error:
+                    self._problems += [
+                        Problem(entry, problem.key, problem.message) for problem in error.problems
+                    ]
+        self._claim_name(self._data.get("rgbd_sensor"), self._file, "rgbd_sensor.name")
+
+    def _object(self, kind: str, file: str, context: Mapping[str, Any]) -> ConfigModel:
+        data = load_config(context["file"])
+        self._claim_name(data, file, "name")
+        return load_object(kind, data, file, self._body_types, context)
+
+    def _claim_name(self, data: Any, file: str, key: str) -> None:
+        """Note the name of an object, so that no other has it."""
+        name = name_in(data)
+        if name in self._owner_of:
+            message = f"'{name}' is taken by {self._owner_of[name]}; names are unique in a world"
+            self._problems.append(Problem(file, key, message))
+        elif name is not None:
+            self._owner_of[name] = file
+
+    def _search_paths(self) -> tuple[str, ...]:
+        """Return the search paths that exist, also when something else in the main file is wrong."""
+        given = self._data.get("setAdditionalSearchPath")
+        found: list[str] = []
+        for _, name in _texts([given] if isinstance(given, str) else given):
+            with contextlib.suppress(ValueError):  # it is reported with the main file
+                found.append(find_folder(name, self._path))
+        return tuple(found)
+
+
+def _texts(given: Any) -> list[tuple[int, str]]:
+    """Return the texts in a list with their indices; what is neither is reported by the model."""
+    entries = given if isinstance(given, (list, tuple)) else []
+    return [(index, entry) for index, entry in enumerate(entries) if isinstance(entry, str) and entry]

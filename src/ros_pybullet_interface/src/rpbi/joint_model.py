@@ -1,0 +1,135 @@
+"""What is known of a robot's joints."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple, Sequence
+
+import pybullet
+from custom_ros_tools.errors import UnknownNameError
+
+_TYPE_NAMES = {
+    pybullet.JOINT_REVOLUTE: "JOINT_REVOLUTE",
+    pybullet.JOINT_PRISMATIC: "JOINT_PRISMATIC",
+    pybullet.JOINT_SPHERICAL: "JOINT_SPHERICAL",
+    pybullet.JOINT_PLANAR: "JOINT_PLANAR",
+    pybullet.JOINT_FIXED: "JOINT_FIXED",
+}
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint, as the URDF describes it.
+
+    Attributes:
+        index: PyBullet's index of the joint and of its child link.
+        name: Name of the joint.
+        type: PyBullet's joint type.
+        link: Name of the child link.
+        lower: Lower position limit [rad or m], -inf if there is none.
+        upper: Upper position limit [rad or m], inf if there is none.
+        max_effort: Largest torque or force [N m or N], inf if there is none.
+        max_velocity: Largest speed [rad/s or m/s], inf if there is none.
+    """
+
+    index: int
+    name: str
+    type: int
+    link: str
+    lower: float
+    upper: float
+    max_effort: float
+    max_velocity: float
+
+    @classmethod
+    def from_info(cls, info: Sequence) -> Joint:
+        """Takes over what PyBullet's `getJointInfo` returned; 0 and inverted ranges mean that there is no limit."""
+        limited = info[8] < info[9]
+        return cls(
+            index=info[0],
+            name=info[1].decode(),
+            type=info[2],
+            link=info[12].decode(),
+            lower=info[8] if limited else -math.inf,
+            upper=info[9] if limited else math.inf,
+            max_effort=info[10] if info[10] > 0 else math.inf,
+            max_velocity=info[11] if info[11] > 0 else math.inf,
+        )
+
+    @property
+    def type_name(self) -> str:
+        """PyBullet's name of the joint type, such as `JOINT_REVOLUTE`."""
+        return _TYPE_NAMES.get(self.type, str(self.type))
+
+    @property
+    def is_revolute(self) -> bool:
+        """Whether it turns about one axis."""
+        return self.type == pybullet.JOINT_REVOLUTE
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether it does not move at all."""
+        return self.type == pybullet.JOINT_FIXED
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether it has one axis that a motor can move."""
+        return self.type in (pybullet.JOINT_REVOLUTE, pybullet.JOINT_PRISMATIC)
+
+
+class JointTarget(NamedTuple):
+    """Values for some of a robot's joints; the others keep theirs.
+
+    Attributes:
+        names: n joint names.
+        values: n numbers [rad or m for positions].
+    """
+
+    names: Sequence[str]
+    values: Sequence[float]
+
+
+class JointModel:
+    """The joints of one robot, by index and by name.
+
+    Args:
+        joints: All joints in PyBullet's index order.
+    """
+
+    def __init__(self, joints: Sequence[Joint]) -> None:
+        self.joints = tuple(joints)
+        self.driven = tuple(joint for joint in self.joints if joint.is_driven)
+        self._by_name = {joint.name: joint for joint in self.joints}
+
+    def __getitem__(self, name: str) -> Joint:
+        """Returns a joint by name.
+
+        Raises:
+            UnknownNameError: If the robot has no such joint.
+        """
+        try:
+            return self._by_name[name]
+        except KeyError:
+            raise UnknownNameError("joint", name, list(self._by_name)) from None
+
+    def resolve(self, target: JointTarget) -> dict[int, float]:
+        """Checks a target and returns its values by joint index; fixed joints are known but not driven.
+
+        Raises:
+            UnknownNameError: If the robot lacks one of the joints.
+            ValueError: If lengths differ, a joint is named twice or a value is not finite.
+        """
+        names, values = target
+        if len(names) != len(values):
+            raise ValueError(f"expected one value for each of the {len(names)} joints named, got {len(values)}")
+        if len(set(names)) != len(names):
+            raise ValueError(f"joints must be named once each, got {', '.join(names)}")
+        resolved: dict[int, float] = {}
+        for name, value in zip(names, values, strict=True):
+            joint = self[name]
+            if not math.isfinite(value):
+                raise ValueError(f"values must be finite, got {value} for joint '{name}'")
+            if joint.is_driven:
+                resolved[joint.index] = float(value)
+        return resolved

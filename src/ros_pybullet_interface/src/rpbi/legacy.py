@@ -1,0 +1,117 @@
+"""Keys of older worlds that still load: other spellings, and keys without effect."""
+
+from __future__ import annotations
+
+import copy
+import logging
+from collections.abc import Mapping
+from typing import Any
+
+from custom_ros_tools.errors import Problem
+from custom_ros_tools.schema import ConfigModel
+
+log = logging.getLogger(__name__)
+
+MAIN = "main"
+"""The section of the main YAML file itself; object files go by the list that names them, such as `robots`."""
+
+LEGACY_KEYS: dict[str, dict[str, str]] = {
+    "robots": {
+        "publish_joint_state_frequency": "joint_state_publisher_hz",
+        "broadcast_link_states_frequency": "broadcast_link_states_hz",
+        "brodcast_link_states_frequency": "broadcast_link_states_hz",
+        "initial_joint_positions": "initial_joint_position",
+    },
+}
+"""By section: an old spelling and the key that it means."""
+
+NO_EFFECT: dict[str, dict[str, str]] = {
+    MAIN: {
+        "gravity": "write setGravity: {gravZ: -9.81}",
+        "visual_object": "write visual_objects with a list of files",
+        "setPhysicsEngineParameter.fixedTimeStep": "write timeStep",
+    },
+    "robots": {
+        "object_tf.offset": "publish a TF frame with the offset in it",
+        "self.broadcast_link_states_hz": "write broadcast_link_states_hz",
+        "setJointMotorControlArray.forces": "efforts are limited by the URDF",
+        "setJointMotorControlArray.targetPositions": "targets come by topic",
+        "setJointMotorControlArray.targetVelocities": "targets come by topic",
+    },
+    "visual_objects": {"object_tf.offset": "publish a TF frame with the offset in it"},
+    "collision_objects": {"object_tf.offset": "publish a TF frame with the offset in it"},
+}
+"""By section: a key that older worlds carry and that never did anything, and what to do instead."""
+
+ANY = object()
+PLANNED_KEYS: dict[str, dict[str, Any]] = {
+    MAIN: {
+        "soft_objects": [],
+        "urdfs": [],
+        "enable_keyboard_publisher": False,
+        "enable_mouse_publisher": False,
+        "publish_visualizer_image_hz": 0,
+        "visualizer_image_width": ANY,
+        "visualizer_image_height": ANY,
+    },
+    "robots": {
+        "is_visual_robot": False,
+        "object_tf": {},
+        "enabled_joint_force_torque_sensors": [],
+        "move_to_initial_joint_state_on_startup": False,
+        "start_ik_callback": False,
+        "do_log_joint_limit_violations": ANY,
+        "log_joint_limit_violations_hz": ANY,
+    },
+}
+"""By section: a key that does nothing yet, and the value that asks for nothing (ANY if every value does)."""
+
+
+def modernise(
+    section: str, data: Mapping[str, Any], file: str, model: type[ConfigModel]
+) -> tuple[dict[str, Any], dict[str, str], list[Problem]]:
+    """Bring a mapping up to date, with a logged warning for each key that was changed or has no effect.
+
+    A planned key that the model has by now is left alone.
+
+    Args:
+        section: `"main"`, or the list of the main file that names the object's file.
+        data: What the file says; it is not changed.
+        file: Name of the file.
+        model: The model that the result is for.
+
+    Returns:
+        The mapping with today's keys, the old spelling of each renamed key, and the problems found.
+    """
+    current = copy.deepcopy(dict(data))
+    spellings: dict[str, str] = {}
+    problems: list[Problem] = []
+    for old, new in LEGACY_KEYS.get(section, {}).items():
+        if old not in current:
+            continue
+        value = current.pop(old)
+        if new in current:
+            problems.append(
+                Problem(file, old, f"means {spellings.get(new, new)}, which is given too: remove one")
+            )
+            continue
+        current[new] = value
+        spellings[new] = old
+        log.warning("%s: %s: is an old spelling: write %s", file, old, new)
+    for key, advice in NO_EFFECT.get(section, {}).items():
+        if _take(current, key) is not None:
+            log.warning("%s: %s: has no effect: %s", file, key, advice)
+    for key, nothing in PLANNED_KEYS.get(section, {}).items():
+        if key in current and key not in model.model_fields:
+            value = current.pop(key)
+            if nothing is not ANY and value != nothing and value is not None:
+                log.warning("%s: %s: has no effect yet", file, key)
+    return current, spellings, problems
+
+
+def _take(data: dict[str, Any], key: str) -> Any:
+    """Remove a key, or one of an inner mapping (`object_tf.offset`), and return its value, None if absent."""
+    if key in data:
+        return data.pop(key)
+    outer, _, inner = key.partition(".")
+    return data[outer].pop(inner, None) if inner and isinstance(data.get(outer), dict) else None

@@ -1,0 +1,86 @@
+"""The log of all that came into a world, and its replay."""
+
+from __future__ import annotations
+
+from typing import Any, Iterable, NamedTuple
+
+import pybullet
+from custom_ros_tools.errors import PhysicsError, UnknownNameError
+
+from .bodies import BODY_TYPES, Body
+from .client import Client
+from .world_config import WorldConfig
+
+
+class LogEntry(NamedTuple):
+    """One thing that was done to a world; picklable.
+
+    Attributes:
+        name: The body it was done to, empty for the world itself.
+        what: `world` (set it up), `add` or `remove`.
+        arguments: The WorldConfig of `world`; type and configuration of a body for `add`; None for `remove`.
+    """
+
+    name: str
+    what: str
+    arguments: Any = None
+
+
+def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:
+    """Does to a world what an entry says; when it raises, the world is as it was.
+
+    Args:
+        pb: The client.
+        bodies: The world's bodies by name, which is changed.
+        entry: What to do.
+
+    Raises:
+        ConfigError: If a configuration does not fit.
+        PhysicsError: If PyBullet refuses.
+        UnknownNameError: If there is no body to remove.
+    """
+    if entry.what == "world":
+        _set_up(pb, entry.arguments)
+    elif entry.what == "remove":
+        if entry.name not in bodies:
+            raise UnknownNameError("object", entry.name, list(bodies))
+        bodies.pop(entry.name).remove()
+    else:
+        kind, config = entry.arguments
+        before = _body_ids(pb)
+        try:
+            bodies[entry.name] = BODY_TYPES[kind](pb, config)
+        except BaseException as error:
+            for body_id in _body_ids(pb) - before:
+                pb.removeBody(body_id)
+            if isinstance(error, pybullet.error):
+                raise PhysicsError(f"{entry.name}: {error}") from error
+            raise
+
+
+def replay(pb: Client, entries: Iterable[LogEntry]) -> dict[str, Body]:
+    """Rebuilds a world on a client.
+
+    Returns:
+        Its bodies by name.
+    """
+    bodies: dict[str, Body] = {}
+    for entry in entries:
+        apply(pb, bodies, entry)
+    return bodies
+
+
+def _set_up(pb: Client, config: WorldConfig) -> None:
+    """Clears the client and sets gravity, time step and the engine's parameters."""
+    pb.resetSimulation(**config.resetSimulation.kwargs())
+    for path in config.search_paths():
+        pb.setAdditionalSearchPath(path)
+    gravity = config.setGravity
+    pb.setGravity(gravity.gravX, gravity.gravY, gravity.gravZ)
+    pb.setTimeStep(round(config.timeStep * 1e9) / 1e9)
+    # Without it the order of contacts depends on what the broad phase has seen before.
+    pb.setPhysicsEngineParameter(**{"deterministicOverlappingPairs": 1, **config.setPhysicsEngineParameter.kwargs()})
+
+
+def _body_ids(pb: Client) -> set[int]:
+    return {pb.getBodyUniqueId(index) for index in range(pb.getNumBodies())}

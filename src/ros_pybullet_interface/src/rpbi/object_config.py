@@ -1,0 +1,110 @@
+"""One object of a world: its type and its validated configuration."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
+from custom_ros_tools.schema import ConfigModel
+
+from .legacy import modernise
+
+_Model = TypeVar("_Model", bound=ConfigModel)
+
+RESERVED_NAME = "world"
+"""No object may have it: `rpbi/world` is the frame that all poses are in."""
+
+
+class BodyType(Protocol):
+    """What this module asks of a class of bodies."""
+
+    @property
+    def Config(self) -> type[ConfigModel]:  # noqa: N802
+        """Model of its YAML file."""
+
+    @property
+    def section(self) -> str:
+        """List of the main file that names its files."""
+
+
+@dataclass(frozen=True)
+class ObjectConfig:
+    """One object to be put into a world.
+
+    Attributes:
+        type: Key of its class in the table of body types.
+        config: Its validated configuration.
+        file: The file it came from, as the user wrote it.
+    """
+
+    type: str
+    config: ConfigModel
+    file: str
+
+
+def load_object(
+    kind: str,
+    data: Mapping[str, Any],
+    file: str,
+    body_types: Mapping[str, BodyType],
+    context: Mapping[str, Any] | None = None,
+) -> ConfigModel:
+    """Validate one object.
+
+    Args:
+        kind: Key of its class in `body_types`.
+        data: What its file says; it is not changed.
+        file: Name of that file.
+        body_types: The classes of bodies by type.
+        context: For files: `file` (the path, if `file` is not it), `search_paths`, `robot_description`.
+
+    Raises:
+        ConfigError: with all of its problems.
+        UnknownNameError: if there is no such type.
+    """
+    if kind not in body_types:
+        raise UnknownNameError("object type", kind, body_types)
+    body_type = body_types[kind]
+    problems = (
+        [Problem(file, "name", f"'{RESERVED_NAME}' is reserved")] if name_in(data) == RESERVED_NAME else []
+    )
+    try:
+        config = parse_section(body_type.section, data, file, body_type.Config, context or {})
+    except ConfigError as error:
+        problems += error.problems
+    if problems:
+        raise ConfigError(problems)
+    return config
+
+
+def parse_section(
+    section: str, data: Mapping[str, Any], file: str, model: type[_Model], context: Mapping[str, Any]
+) -> _Model:
+    """Validate a mapping, old spellings included; problems name the key as the user spelt it."""
+    if not isinstance(data, Mapping):
+        return model.parse(data, file)
+    current, spellings, problems = modernise(section, data, file, model)
+    try:
+        result = model.parse(current, file, context)
+    except ConfigError as error:
+        for problem in error.problems:
+            key = _respelt(problem.key, spellings)
+            problems.append(Problem(problem.file, key, problem.message))
+    if problems:
+        raise ConfigError(problems)
+    return result
+
+
+def _respelt(key: str, spellings: Mapping[str, str]) -> str:
+    match = re.match(r"[^.\[]*", key)
+    first = match[0] if match else ""
+    return spellings.get(first, first) + key[len(first) :]
+
+
+def name_in(data: Any) -> str | None:
+    """Return the name that an object goes by, if it has any."""
+    name = data.get("name") if isinstance(data, Mapping) else None
+    return name if isinstance(name, str) else None

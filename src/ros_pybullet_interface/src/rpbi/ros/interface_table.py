@@ -1,0 +1,60 @@
+"""Which topics and services a world has, without starting anything."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ..bodies.robot import Robot
+from ..inputs import PoseInput
+from ..sensors import JointStateSensor, LinkPoseSensor
+from ..world import World
+from .inputs import TOPIC_INPUTS
+
+
+class Endpoint(NamedTuple):
+    """A topic or service.
+
+    Attributes:
+        kind: `publishes`, `subscribes`, `serves` or `listens to TF`.
+        name: Its relative name, or the TF frame.
+        type: Its ROS type.
+        note: Rate or purpose.
+    """
+
+    kind: str
+    name: str
+    type: str
+    note: str = ""
+
+
+def endpoints(world: World, simulated_time: bool = True) -> list[Endpoint]:
+    """Lists what the node would open for a world."""
+    config = world.config
+    listed = [
+        Endpoint("publishes", "rpbi/status", "std_msgs/Int64", f"{config.status_hz:g} Hz; 1 running, 0 stopped"),
+        Endpoint("publishes", "/diagnostics", "diagnostic_msgs/DiagnosticArray", "1 Hz"),
+    ]
+    if simulated_time:
+        listed.append(Endpoint("publishes", "/clock", "rosgraph_msgs/Clock", "if use_sim_time"))
+    for name, body in world.bodies.items():
+        for sensor in body.sensors():
+            if isinstance(sensor, JointStateSensor):
+                topic = f"rpbi/{name}/joint_states"
+                listed.append(Endpoint("publishes", topic, "sensor_msgs/JointState", f"{sensor.hz:g} Hz"))
+            elif isinstance(sensor, LinkPoseSensor):
+                listed.append(Endpoint("publishes", "/tf", "tf2_msgs/TFMessage", f"{sensor.hz:g} Hz; {name}"))
+    for camera in world.cameras.values():
+        listed += [Endpoint("publishes", *topic, f"{camera.hz:g} Hz") for topic in CAMERA_TOPICS]
+    for slot, taken in world.inputs.items():
+        name, key = slot.split("/")
+        if isinstance(taken, PoseInput):
+            listed.append(Endpoint("listens to TF", taken.tf_id, "", f"{taken.hz:g} Hz; {name}"))
+        else:
+            topic_input = TOPIC_INPUTS[key]
+            type_name = topic_input.message_type._type
+            listed.append(Endpoint("subscribes", topic_input.topic.format(name=name), type_name))
+    listed += [Endpoint("serves", *service) for service in NODE_SERVICES]
+    for name, body in world.bodies.items():
+        if isinstance(body, Robot):
+            listed.append(Endpoint("serves", f"rpbi/{name}/robot_info", "ros_pybullet_interface/RobotInfo"))
+    return listed

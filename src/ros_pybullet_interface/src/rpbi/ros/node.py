@@ -1,0 +1,143 @@
+"""The simulator node: a world with ROS around it."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import tempfile
+import threading
+from pathlib import Path
+from typing import Any
+
+import rospy
+from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
+from custom_ros_tools.ros.logging_bridge import attach_logging
+
+from ..bodies import BODY_TYPES
+from ..bodies.robot import Robot
+from ..config import load_world_dict
+from ..samples import JointStateSample, LinkPoseSample
+from ..world import World
+from .inputs import Inputs
+from .outlets import JointStateOutlet, Outlet, TransformOutlet
+from .requests import Requests
+from .robot_info import RobotInfoService
+from .services import NodeServices
+from .simulation import Simulation
+from .status import FREE_RUNNING_CLOCK_HZ, ClockOutlet
+
+log = logging.getLogger(__name__)
+
+MAX_CLOCK_HZ = 1000.0
+
+# A thread that waits for Python's lock gets it after this long at most [s]; Python's own 5 ms are five ticks at 1 kHz.
+sys.setswitchinterval(0.0005)
+
+
+class SimulatorNode:
+    """Builds the world of `~config` and connects everything in it to ROS.
+
+    Raises:
+        ConfigError: If the configuration is wrong; it tells everything that is.
+        PhysicsError: If PyBullet cannot do what is asked.
+    """
+
+    def __init__(self) -> None:
+        loaded = load_world_dict(_config_parameter(), "~config", BODY_TYPES)
+        config = loaded.config
+        simulated = bool(_parameter_above("use_sim_time", False))
+        if config.real_time_factor != 1 and not simulated:
+            log.warning(
+                "real_time_factor is %g but /use_sim_time is not true: stamps are wall time and tell nothing of it",
+                config.real_time_factor,
+            )
+        self._world = World(loaded, simulated)
+        self._joint_states, self._transforms = JointStateOutlet(), TransformOutlet()
+        outlets: dict[type, Outlet] = {JointStateSample: self._joint_states, LinkPoseSample: self._transforms}
+        clock = ClockOutlet(self._world.clock, _clock_hz(config)) if simulated else None
+        self._simulation = Simulation(self._world, outlets, config.real_time_factor, config.status_hz, clock)
+        self._inputs = Inputs(self._world)
+        self._ask = Requests(self._simulation)
+        self._robot_infos: dict[str, RobotInfoService] = {}
+        self._objects_lock = threading.Lock()  # one object comes or goes at a time
+        for name in self._world.bodies:
+            self._open(name)
+        NodeServices(self._simulation, self._ask, self._add, self._remove)
+        if config.start_pybullet_after_initialization:
+            self._simulation.start()
+
+    def run(self) -> None:
+        """Simulates until ROS shuts down."""
+        try:
+            self._simulation.run(rospy.is_shutdown)
+        finally:
+            self._world.close()
+
+    def _add(self, kind: str, config: Any) -> None:
+        with self._objects_lock:
+            self._ask(lambda: self._world.add(kind, config))
+            try:
+                self._open(config.name)
+            except Exception:
+                self._close(config.name)
+                self._ask(lambda: self._world.remove(config.name))
+                raise
+
+    def _remove(self, name: str) -> None:
+        with self._objects_lock:
+            self._ask(lambda: self._world.remove(name))
+            self._close(name)
+
+    def _open(self, name: str) -> None:
+        """Opens the topics and services of a body."""
+        body = self._world.bodies[name]
+        self._inputs.open(name, body.inputs())
+        if isinstance(body, Robot):
+            self._joint_states.open(name)
+            self._robot_infos[name] = RobotInfoService(body, self._world, self._ask)
+
+    def _close(self, name: str) -> None:
+        """Ends the topics and services of a body."""
+        self._inputs.close(name)
+        self._joint_states.forget(name)
+        self._transforms.forget(name)
+        info = self._robot_infos.pop(name, None)
+        if info is not None:
+            info.close()
+
+
+def main() -> None:
+    """Runs the node; exits with 1 if it cannot start."""
+    # Without ROS time: the simulator is the source of /clock and must never wait for it.
+    rospy.init_node("ros_pybullet_interface", disable_rostime=True)
+    attach_logging("rpbi", "custom_ros_tools")
+    try:
+        node = SimulatorNode()
+    except InterfaceError as error:
+        for line in str(error).splitlines():
+            rospy.logfatal(line.replace("%", "%%"))
+        rospy.signal_shutdown("the configuration is wrong")
+        sys.exit(1)
+    node.run()
+
+
+def _config_parameter() -> dict[str, Any]:
+    config = rospy.get_param("~config", None)
+    if config is None:
+        how = 'load it with <rosparam param="config" file="WORLD.yaml"/> inside the <node>'
+        raise ConfigError([Problem("~config", "", f"missing: expected the main configuration; {how}")])
+    return config
+
+
+def _parameter_above(name: str, default: Any) -> Any:
+    """Returns a parameter of this namespace or, failing that, of the nearest one around it."""
+    found = rospy.search_param(name)
+    return default if found is None else rospy.get_param(found)
+
+
+def _clock_hz(config: Any) -> float:
+    if not config.real_time_factor:
+        limit = FREE_RUNNING_CLOCK_HZ
+    else:
+        limit = min(config.real_time_factor / config.timeStep, MAX_CLOCK_HZ)
+    return min(config.clock_hz or limit, limit)

@@ -1,0 +1,45 @@
+"""Requests to the simulation thread that never wait for ever."""
+
+from __future__ import annotations
+
+import time
+from concurrent.futures import wait
+from typing import Callable, TypeVar
+
+import rospy
+from custom_ros_tools.errors import InterfaceError
+
+from .simulation import Simulation
+
+T = TypeVar("T")
+
+GIVE_UP_AFTER_S = 30.0
+"""After this long without a pass of the loop a request is given up [s] of wall time."""
+
+
+class Requests:
+    """Has the simulation thread make calls and waits for their results.
+
+    Args:
+        simulation: Whose loop makes the calls.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+
+    def __call__(self, call: Callable[[], T]) -> T:
+        """Returns what the call returns, or raises what it raises.
+
+        Raises:
+            InterfaceError: If the node shuts down or the loop makes no progress.
+        """
+        future = self._simulation.world.mailbox.request(call)
+        passes, progress_s = self._simulation.passes, time.monotonic()
+        while not wait([future], timeout=0.2).done:
+            if self._simulation.passes != passes:
+                passes, progress_s = self._simulation.passes, time.monotonic()
+            if rospy.is_shutdown() and future.cancel():
+                raise InterfaceError("the node is shutting down")
+            if time.monotonic() - progress_s > GIVE_UP_AFTER_S and future.cancel():
+                raise InterfaceError(f"the simulation made no progress for {GIVE_UP_AFTER_S:g} s")
+        return future.result()

@@ -1,0 +1,122 @@
+"""The node's services; a handler never touches PyBullet, it asks the simulation thread."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any, Callable
+
+import rospy
+from custom_ros_tools.config import load_config, load_configs, replace_package
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.srv import SetString, SetStringRequest, SetStringResponse
+from ros_pybullet_interface.msg import PybulletObject
+from ros_pybullet_interface.srv import (
+    AddPybulletObject,
+    AddPybulletObjectRequest,
+    AddPybulletObjectResponse,
+    ListObjects,
+    ListObjectsRequest,
+    ListObjectsResponse,
+)
+from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
+
+from ..bodies import BODY_TYPES
+from ..clock import NS_PER_S
+from ..config import load_object
+from ..mailbox import Closed
+from .requests import Requests
+from .simulation import Simulation
+
+log = logging.getLogger(__name__)
+
+OBJECT_TYPES = {
+    PybulletObject.VISUAL: "visual",
+    PybulletObject.COLLISION: "collision",
+    PybulletObject.DYNAMIC: "dynamic",
+    PybulletObject.ROBOT: "robot",
+}
+"""Key of BODY_TYPES for each number in PybulletObject."""
+
+
+class NodeServices:
+    """Start, stop, step; add, remove and list objects.
+
+    Args:
+        simulation: What to control.
+        ask: Reaches the simulation thread.
+        add: Adds an object, by type and configuration, and all that belongs to it.
+        remove: Removes an object, by name, and all that belongs to it.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        ask: Requests,
+        add: Callable[[str, Any], None],
+        remove: Callable[[str], None],
+    ) -> None:
+        self._simulation, self._ask, self._add, self._remove = simulation, ask, add, remove
+        rospy.Service("rpbi/start", Trigger, self._start)
+        rospy.Service("rpbi/stop", Trigger, self._stop)
+        rospy.Service("rpbi/step", Trigger, self._step)
+        rospy.Service("rpbi/add_pybullet_object", AddPybulletObject, self._add_object)
+        rospy.Service("rpbi/remove_pybullet_object", SetString, self._remove_object)
+        rospy.Service("rpbi/list_objects", ListObjects, self._list_objects)
+
+    def _start(self, _: TriggerRequest) -> TriggerResponse:
+        return self._switch(self._simulation.start, "started", "already running")
+
+    def _stop(self, _: TriggerRequest) -> TriggerResponse:
+        return self._switch(self._simulation.stop, "stopped", "already stopped")
+
+    def _switch(self, switch: Callable[[], bool], done: str, refused: str) -> TriggerResponse:
+        try:
+            changed = self._ask(switch)
+        except (InterfaceError, Closed) as error:
+            return TriggerResponse(success=False, message=str(error))
+        return TriggerResponse(success=changed, message=done if changed else refused)
+
+    def _step(self, _: TriggerRequest) -> TriggerResponse:
+        def step() -> tuple[int, int]:
+            if self._simulation.running:
+                raise InterfaceError("the simulation is running: stop it before stepping")
+            return self._simulation.step()
+
+        try:
+            tick, stamp_ns = self._ask(step)
+        except (InterfaceError, Closed) as error:
+            return TriggerResponse(success=False, message=str(error))
+        seconds, nanoseconds = divmod(stamp_ns, NS_PER_S)
+        return TriggerResponse(success=True, message=f"tick {tick}, stamp {seconds}.{nanoseconds:09d}")
+
+    def _add_object(self, request: AddPybulletObjectRequest) -> AddPybulletObjectResponse:
+        asked = request.pybullet_object
+        try:
+            kind = OBJECT_TYPES.get(asked.object_type)
+            if kind is None:
+                known = ", ".join(f"{number} ({name})" for number, name in OBJECT_TYPES.items())
+                raise InterfaceError(f"object_type: expected one of {known}; got {asked.object_type}")
+            if asked.filename:
+                file = replace_package(asked.filename)
+                data = load_config(file)
+            elif asked.config:
+                file, data = "config", load_configs(asked.config)
+            else:
+                raise InterfaceError("expected a filename or a config; got neither")
+            config = load_object(kind, data, file, BODY_TYPES)
+            self._add(kind, config)
+        except (InterfaceError, Closed) as error:
+            return AddPybulletObjectResponse(success=False, message=str(error))
+        return AddPybulletObjectResponse(success=True, message=f"added '{config.name}'")
+
+    def _remove_object(self, request: SetStringRequest) -> SetStringResponse:
+        try:
+            self._remove(request.data)
+        except (InterfaceError, Closed) as error:
+            return SetStringResponse(success=False, message=str(error))
+        return SetStringResponse(success=True, message=f"removed '{request.data}'")
+
+    def _list_objects(self, _: ListObjectsRequest) -> ListObjectsResponse:
+        kinds = {body_type: kind for kind, body_type in BODY_TYPES.items()}
+        bodies = self._ask(lambda: [(name, kinds[type(body)]) for name, body in self._simulation.world.bodies.items()])
+        return ListObjectsResponse(names=[name for name, _ in bodies], types=[kind for _, kind in bodies])

@@ -1,0 +1,112 @@
+"""The node's own state: /clock, `rpbi/status` and /diagnostics."""
+
+from __future__ import annotations
+
+import time
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rosgraph_msgs.msg import Clock as ClockMessage
+from std_msgs.msg import Int64
+
+from ..clock import Clock
+from ..pacer import Pacer
+from .stamps import to_ros_time
+
+DIAGNOSTICS_PERIOD_S = 1.0
+STOPPED_CLOCK_PERIOD_S = 0.05
+FREE_RUNNING_CLOCK_HZ = 250.0
+FALLING_BEHIND = 0.98
+"""Share of the asked real-time factor below which the diagnostics warn."""
+
+
+class ClockOutlet:
+    """Simulated time on /clock, of which the simulator is the only source.
+
+    Args:
+        clock: The world's clock.
+        hz: Most messages a second of wall time.
+    """
+
+    def __init__(self, clock: Clock, hz: float) -> None:
+        self._clock = clock
+        self._period_s = 1.0 / hz
+        self._publisher = rospy.Publisher("/clock", ClockMessage, queue_size=1000)
+        self._due_s = 0.0
+
+    def publish_tick(self) -> None:
+        """Tells a new tick, unless the rate is used up."""
+        now_s = time.monotonic()
+        if now_s >= self._due_s:
+            # Counting on from the last deadline keeps the mean rate; a pause must not be made up for.
+            self._due_s = max(self._due_s + self._period_s, now_s - self._period_s)
+            self._send()
+
+    def publish_now(self) -> None:
+        """Tells the present tick in any case, for the last one before standing still."""
+        self._due_s = time.monotonic() + STOPPED_CLOCK_PERIOD_S
+        self._send()
+
+    def repeat(self) -> None:
+        """Tells the same tick again now and then while the world stands still, for those who come late."""
+        if time.monotonic() >= self._due_s:
+            self.publish_now()
+
+    def _send(self) -> None:
+        self._publisher.publish(ClockMessage(to_ros_time(self._clock.stamp_ns)))
+
+
+class StatusOutlet:
+    """Whether the world runs, and how well.
+
+    Args:
+        clock: The world's clock.
+        pacer: What keeps it in step with the wall clock.
+        hz: Rate of `rpbi/status` [Hz] of wall time.
+        real_time_factor: The factor asked for; 0 is as fast as it goes.
+    """
+
+    def __init__(self, clock: Clock, pacer: Pacer, hz: float, real_time_factor: float) -> None:
+        self._clock, self._pacer, self._wanted_factor = clock, pacer, real_time_factor
+        self._period_s = 1.0 / hz
+        self._status = rospy.Publisher("rpbi/status", Int64, queue_size=10)
+        self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
+        self._due_s = 0.0
+        self._diagnostics_due_s = time.monotonic() + DIAGNOSTICS_PERIOD_S
+        self._overruns = 0
+
+    def spin(self, running: bool) -> None:
+        """Publishes what is due by the wall clock."""
+        now_s = time.monotonic()
+        if now_s >= self._due_s:
+            self._due_s = max(self._due_s + self._period_s, now_s)
+            self.publish(running)
+        if now_s >= self._diagnostics_due_s:
+            self._diagnostics_due_s = max(self._diagnostics_due_s + DIAGNOSTICS_PERIOD_S, now_s)
+            self._publish_diagnostics(running)
+
+    def publish(self, running: bool) -> None:
+        """Publishes 1 for running, 0 for stopped."""
+        self._status.publish(Int64(int(running)))
+
+    def _publish_diagnostics(self, running: bool) -> None:
+        factor = self._pacer.measure()
+        overruns = self._pacer.overruns - self._overruns
+        self._overruns = self._pacer.overruns
+        status = DiagnosticStatus(name=f"{rospy.get_name()}: simulation", hardware_id="rpbi", level=DiagnosticStatus.OK)
+        status.message = "running" if running else "stopped"
+        if running and factor < FALLING_BEHIND * self._wanted_factor:
+            status.level = DiagnosticStatus.WARN
+            status.message = f"too slow: real-time factor {factor:.3f} instead of {self._wanted_factor:g}"
+        values = {
+            "real_time_factor": f"{factor if running else 0.0:.4f}",
+            "overruns_total": str(self._pacer.overruns),
+            "overruns_in_last_period": str(overruns),
+            "lost_s_total": f"{self._pacer.lost_s:.3f}",
+            "tick": str(self._clock.tick),
+            "time_s": f"{self._clock.time_s:.6f}",
+        }
+        status.values = [KeyValue(key, value) for key, value in values.items()]
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = to_ros_time(self._clock.stamp_ns)
+        self._diagnostics.publish(message)

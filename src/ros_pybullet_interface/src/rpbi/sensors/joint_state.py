@@ -1,0 +1,36 @@
+"""Joint states of a robot."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from custom_ros_tools.errors import PhysicsError
+
+from ..samples import JointStateSample
+from .sensor import Sensor
+
+if TYPE_CHECKING:
+    from ..bodies.robot import Robot
+
+
+class JointStateSensor(Sensor):
+    """Positions, velocities and motor efforts of all joints of a robot.
+
+    Args:
+        robot: The robot.
+        hz: Rate [Hz].
+    """
+
+    def __init__(self, robot: Robot, hz: float) -> None:
+        super().__init__(robot.name, hz)
+        self._robot = robot
+        self._names = tuple(joint.name for joint in robot.joints)
+
+    def read(self, tick: int) -> JointStateSample:
+        """Reads all joints, fixed ones included, in index order."""
+        states = self._robot.pb.getJointStates(self._robot.body_id, self._robot.joint_indices)
+        position, velocity, _, effort = zip(*states) if states else ((), (), (), ())
+        if not math.isfinite(sum(position) + sum(velocity)):
+            raise PhysicsError(f"{self.name}: joint state is not finite any more at tick {tick}: {position}")
+        return JointStateSample(self.name, self._names, position, velocity, effort)

@@ -1,0 +1,49 @@
+"""RGB-D cameras, as far as the world is concerned: what they see, not how it looks."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Mapping, Optional
+
+from ..clock import Clock
+from ..inputs import Input, PoseInput
+from ..pose import Pose
+from ..rgbd_config import RgbdSensorConfig
+from ..samples import SceneSample
+from .sensor import Sensor
+
+if TYPE_CHECKING:
+    from ..bodies.body import Body
+
+
+class RgbdSensor(Sensor):
+    """Collects the scene for the renderer while somebody looks at the camera's images.
+
+    Args:
+        config: Its part of the main YAML file.
+        bodies: The world's bodies by name.
+        clock: The world's clock.
+    """
+
+    Config = RgbdSensorConfig
+
+    def __init__(self, config: RgbdSensorConfig, bodies: Mapping[str, Body], clock: Clock) -> None:
+        super().__init__(config.name, config.hz)
+        self.config = config
+        self.wanted = False
+        self._bodies = bodies
+        self._clock = clock
+        self._pose: Optional[Pose] = None
+
+    def inputs(self) -> Mapping[str, Input]:
+        """Takes `pose`, the pose of the optical frame in the world."""
+        return {"pose": PoseInput.following(self.config.object_tf, self._set_pose)}
+
+    def read(self, tick: int) -> Optional[SceneSample]:
+        """Returns where everything is, None as long as the camera's own pose is unknown."""
+        if self._pose is None:
+            return None
+        bodies = tuple(body.state() for body in self._bodies.values())
+        return SceneSample(self.name, tick, self._clock.stamp_ns, self._pose, bodies)
+
+    def _set_pose(self, pose: Pose) -> None:
+        self._pose = pose

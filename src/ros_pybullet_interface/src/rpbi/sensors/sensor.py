@@ -1,0 +1,36 @@
+"""What every sensor has in common."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, Mapping
+
+from ..inputs import Input
+
+
+class Sensor(ABC):
+    """Reads something from the world at a rate; it owns neither timer nor thread.
+
+    Attributes:
+        name: The body or sensor that its topics are named after.
+        hz: How often it is read [Hz] of the world's time.
+        wanted: Whether anybody looks at its samples; it is not read while nobody does.
+    """
+
+    wanted: bool = True
+
+    def __init__(self, name: str, hz: float) -> None:
+        self.name = name
+        self.hz = hz
+
+    @abstractmethod
+    def read(self, tick: int) -> Any:
+        """Returns a sample of the world at `tick`, None if there is nothing to tell yet.
+
+        Raises:
+            PhysicsError: If the world holds something that is not finite.
+        """
+
+    def inputs(self) -> Mapping[str, Input]:
+        """Returns what the sensor takes while the world runs, by name."""
+        return {}

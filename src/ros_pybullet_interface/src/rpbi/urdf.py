@@ -1,0 +1,62 @@
+"""Robot description files."""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import re
+import tempfile
+from functools import lru_cache
+from pathlib import Path
+
+from custom_ros_tools.config import replace_package
+from custom_ros_tools.errors import ConfigError, Problem
+
+_FILENAME = re.compile(r"""(?P<before>filename\s*=\s*)(?P<quote>["'])(?P<path>.*?)(?P=quote)""")
+
+
+@lru_cache(maxsize=1)
+def _folder() -> Path:
+    """Returns a folder for this process's rewritten files; it goes when the process ends."""
+    folder = tempfile.TemporaryDirectory(prefix="rpbi-urdf-")
+    atexit.register(folder.cleanup)
+    return Path(folder.name)
+
+
+def resolve_meshes(path: str) -> str:
+    """Makes the meshes of a URDF file loadable by PyBullet, which knows nothing of ROS packages.
+
+    Args:
+        path: The URDF file.
+
+    Returns:
+        The file itself if it needs nothing, else that of a copy in which every `package://` path, and with them
+        every relative one, is absolute.
+
+    Raises:
+        ConfigError: If a mesh belongs to an unknown package or does not exist.
+    """
+    source = Path(path)
+    text = source.read_text(encoding="utf-8")
+    if "package://" not in text:
+        return path
+    problems: list[Problem] = []
+
+    def absolute(match: re.Match[str]) -> str:
+        mesh = match["path"]
+        try:
+            resolved = Path(replace_package(mesh))
+        except ConfigError as error:
+            problems.extend(Problem(str(source), mesh, problem.message) for problem in error.problems)
+            return match[0]
+        resolved = source.parent / resolved
+        if not resolved.is_file():
+            problems.append(Problem(str(source), mesh, f"no such file: {resolved}"))
+        return f"{match['before']}{match['quote']}{resolved}{match['quote']}"
+
+    resolved_text = _FILENAME.sub(absolute, text)
+    if problems:
+        raise ConfigError(problems)
+    copy = _folder() / f"{source.stem}-{hashlib.sha256(resolved_text.encode()).hexdigest()[:12]}.urdf"
+    copy.write_text(resolved_text, encoding="utf-8")
+    return str(copy)

@@ -1,0 +1,236 @@
+"""A simulated world: it owns one PyBullet client, the bodies in it and the tick."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any, Iterator, Optional
+
+import pybullet
+from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
+from custom_ros_tools.schema import ConfigModel
+
+from .bodies import BODY_TYPES, Body
+from .client import Client
+from .clock import Clock, Schedule
+from .config import LoadedWorld, load_world
+from .inputs import Input
+from .load_log import LogEntry, apply
+from .mailbox import Mailbox
+from .sensors import RgbdSensor
+from .sensors.sensor import Sensor
+
+log = logging.getLogger(__name__)
+
+
+class _Scheduled:
+    """A sensor and when it is due."""
+
+    def __init__(self, sensor: Sensor, dt_ns: int, tick: int) -> None:
+        self.sensor = sensor
+        self.schedule = Schedule(sensor.hz, dt_ns)
+        if self.schedule.clamped:
+            log.warning("%s: %s Hz is more than a sample a tick; it gets one a tick", sensor.name, sensor.hz)
+        self.next_tick = self.schedule.next_due(tick)
+        self.read_tick = -1
+        """Tick of the last sample, -1 before the first."""
+
+    def read(self, tick: int) -> Any:
+        self.read_tick = tick
+        return self.sensor.read(tick)
+
+
+class World:
+    """A world of bodies and sensors that moves by ticks.
+
+    Only the thread that made the world calls its methods; the exceptions are `put` and the mailbox, through which
+    other threads reach it.
+
+    Args:
+        loaded: The validated configuration of the world and of all that is in it at the start.
+        simulated_time: Whether stamps are simulated time, else wall time.
+        connection_mode: PyBullet's connection mode; without it, what the configuration says.
+
+    Raises:
+        ConfigError: If a configuration does not fit, for instance names a joint that the robot lacks.
+        PhysicsError: If PyBullet does not connect or cannot load something.
+    """
+
+    def __init__(
+        self, loaded: LoadedWorld, simulated_time: bool = True, connection_mode: Optional[int] = None
+    ) -> None:
+        self.config = loaded.config
+        self.clock = Clock(self.config.timeStep, simulated_time)
+        self.mailbox = Mailbox()
+        self.bodies: dict[str, Body] = {}
+        self.cameras: dict[str, RgbdSensor] = {}
+        self.log: list[LogEntry] = []
+        self._inputs: dict[str, Input] = {}
+        self._scheduled: dict[str, list[_Scheduled]] = {}
+        self._stepping: list[Body] = []
+        self._next_due = 0
+        connect = self.config.connect.kwargs()
+        configured_mode = connect.pop("connection_mode")
+        self.pb = Client(configured_mode if connection_mode is None else connection_mode, **connect)
+        try:
+            self._build(loaded)
+        except BaseException:
+            self.close()
+            raise
+
+    @classmethod
+    def from_file(cls, path: str, **options: Any) -> World:
+        """Builds the world that a main YAML file describes.
+
+        Args:
+            path: The file.
+            options: Further arguments of the constructor.
+
+        Raises:
+            ConfigError: If anything in the file, or in a file that it names, is wrong; it tells all of it at once.
+        """
+        return cls(load_world(path, BODY_TYPES), **options)
+
+    def add(self, kind: str, config: ConfigModel) -> Body:
+        """Adds a body; when it raises, the world is as it was.
+
+        Args:
+            kind: A key of BODY_TYPES.
+            config: Configuration of that type.
+
+        Raises:
+            ConfigError: If the name is taken or the configuration does not fit.
+            PhysicsError: If PyBullet refuses.
+        """
+        name: str = config.name  # type: ignore[attr-defined]
+        if name in self._scheduled:
+            raise ConfigError([Problem(name, "name", f"'{name}' is taken already; names are unique in a world")])
+        self._append(LogEntry(name, "add", (kind, config)))
+        body = self.bodies[name]
+        self._register(name, body.sensors(), body.inputs())
+        if type(body).before_step is not Body.before_step:
+            self._stepping.append(body)
+        return body
+
+    def remove(self, name: str) -> None:
+        """Removes a body.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        body = self.bodies.get(name)
+        self._append(LogEntry(name, "remove"))
+        if body in self._stepping:
+            self._stepping.remove(body)
+        del self._scheduled[name]
+        self._inputs = {slot: taken for slot, taken in self._inputs.items() if slot.split("/")[0] != name}
+
+    def put(self, slot: str, value: Any) -> None:
+        """Hands a value to a body or sensor before the next tick; any thread may call it.
+
+        Args:
+            slot: `NAME/INPUT`, such as `kuka_lwr/target`.
+            value: What that input takes.
+
+        Raises:
+            UnknownNameError: If there is no such input, or the value names something unknown.
+            ValueError: If the value is refused, for instance because it is not finite.
+        """
+        taken = self._inputs.get(slot)
+        if taken is None:
+            raise UnknownNameError("input", slot, list(self._inputs))
+        self.mailbox.put(slot, taken.check(value), taken.merge)
+
+    @property
+    def inputs(self) -> dict[str, Input]:
+        """What the world takes while it runs, by slot."""
+        return self._inputs
+
+    def step(self) -> list[Any]:
+        """Goes one tick on.
+
+        Returns:
+            The samples that are due at the new tick.
+
+        Raises:
+            PhysicsError: If something in the world is not finite any more.
+        """
+        for slot, value in self.mailbox.take().items():
+            if slot in self._inputs:  # its body may have gone since
+                self._inputs[slot].apply(value)
+        for body in self._stepping:
+            body.before_step(self.clock.tick)
+        self.pb.stepSimulation()
+        self.clock.advance()
+        return self._read_due() if self.clock.tick >= self._next_due else []
+
+    def read_rest(self) -> list[Any]:
+        """Returns samples of the sensors that were not read at this tick yet."""
+        tick = self.clock.tick
+        return _present(each.read(tick) for each in self._all() if each.read_tick != tick and each.sensor.wanted)
+
+    def read_idle(self, tick: int, since: int) -> list[Any]:
+        """Returns the samples that would have come due between two ticks, had the world not stood still."""
+        now = self.clock.tick
+        return _present(
+            each.read(now) for each in self._all() if each.sensor.wanted and each.schedule.is_due(tick, since)
+        )
+
+    def close(self) -> None:
+        """Disconnects from PyBullet and fails the requests that wait."""
+        self.mailbox.close()
+        try:
+            self.pb.disconnect()
+        except pybullet.error:
+            log.debug("PyBullet had disconnected before")
+
+    def _build(self, loaded: LoadedWorld) -> None:
+        self._append(LogEntry("", "world", self.config))
+        problems: list[Problem] = []
+        for item in loaded.objects:
+            try:
+                self.add(item.type, item.config)
+            except (ConfigError, UnknownNameError) as error:
+                problems.extend(_in_file(error, item.file))
+        if problems:
+            raise ConfigError(problems)
+        if self.config.rgbd_sensor is not None:
+            camera = RgbdSensor(self.config.rgbd_sensor, self.bodies, self.clock)
+            self.cameras[camera.name] = camera
+            self._register(camera.name, (camera,), camera.inputs())
+
+    def _append(self, entry: LogEntry) -> None:
+        """The one way into the world: does what the entry says and logs it."""
+        apply(self.pb, self.bodies, entry)
+        self.log.append(entry)
+
+    def _register(self, name: str, sensors: tuple[Sensor, ...], inputs: Any) -> None:
+        self._scheduled[name] = [_Scheduled(sensor, self.clock.dt_ns, self.clock.tick) for sensor in sensors]
+        self._inputs = {**self._inputs, **{f"{name}/{key}": value for key, value in inputs.items()}}
+        self._next_due = 0
+
+    def _all(self) -> Iterator[_Scheduled]:
+        for scheduled in self._scheduled.values():
+            yield from scheduled
+
+    def _read_due(self) -> list[Any]:
+        tick = self.clock.tick
+        samples: list[Any] = []
+        for each in self._all():
+            if each.next_tick <= tick:
+                each.next_tick = each.schedule.next_due(tick)
+                if each.sensor.wanted:
+                    samples.append(each.read(tick))
+        self._next_due = min((each.next_tick for each in self._all()), default=tick + 1)
+        return _present(samples)
+
+
+def _present(samples: Any) -> list[Any]:
+    """Leaves out sensors that had nothing to tell."""
+    return [sample for sample in samples if sample is not None]
+
+
+def _in_file(error: ConfigError | UnknownNameError, file: str) -> list[Problem]:
+    """Names the file in which the user can mend what only showed when the body was made."""
+    if isinstance(error, UnknownNameError):
+        return [Problem(file, "", str(error))]
+    return [Problem(file, problem.key, problem.message) for problem in error.problems]

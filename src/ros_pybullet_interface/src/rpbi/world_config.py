@@ -1,0 +1,96 @@
+"""What the main YAML file may say."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
+
+from custom_ros_tools.schema import ConfigModel, Hz, ListOf, Name, NonNegative, Seconds, Switch, Text
+
+from .asset_files import find_folder
+from .pybullet_world_models import (
+    ConfigureDebugVisualizer,
+    Connect,
+    ResetDebugVisualizerCamera,
+    ResetSimulation,
+    SetGravity,
+    SetPhysicsEngineParameter,
+)
+from .rgbd_config import RgbdSensorConfig
+
+
+def _existing_folder(name: str, info: ValidationInfo) -> str:
+    return find_folder(name, (info.context or {}).get("file", "~"))
+
+
+def _as_list(given: Any) -> Any:
+    return [given] if isinstance(given, str) else given
+
+
+def _whole_nanoseconds(seconds: float) -> float:
+    if round(seconds * 1e9) < 1:
+        raise ValueError(f"must be at least 1.0e-9 [s], got {seconds:g}")
+    return seconds
+
+
+Folders = Annotated[
+    ListOf[Annotated[Text, AfterValidator(_existing_folder)]],
+    BeforeValidator(_as_list),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
+]
+
+
+class ControlsConfig(ConfigModel):
+    """What the control window works on."""
+
+    robot_name: Name = Field(description="Robot that the sliders move.")
+
+
+class WorldConfig(ConfigModel):
+    """The main YAML file."""
+
+    connect: Connect = Field(Connect(), description="How to reach PyBullet.")
+    setAdditionalSearchPath: Folders = Field(
+        (), description="Folders to look for files in; `pybullet_data_path` is that of PyBullet's data."
+    )
+    resetSimulation: ResetSimulation = Field(ResetSimulation(), description="What kind of world it is.")
+    setGravity: SetGravity = Field(SetGravity(), description="Gravity; there is none unless given.")
+    timeStep: Annotated[Seconds, AfterValidator(_whole_nanoseconds)] = Field(
+        0.02, description="Length of a step."
+    )
+    setPhysicsEngineParameter: SetPhysicsEngineParameter = Field(
+        SetPhysicsEngineParameter(), description="How contacts and joints are solved."
+    )
+    real_time_factor: NonNegative = Field(
+        1.0, description="Simulated seconds in a second of wall time; 0 is as fast as it goes."
+    )
+    clock_hz: Hz | None = Field(None, description="Most /clock messages in a second of wall time.")
+    target_timeout_s: Seconds = Field(
+        0.5, description="Age at which velocity and torque targets expire; position targets never do."
+    )
+    step_pybullet_manually: Switch = Field(
+        False, description="Accepted without effect: the interface does every step itself."
+    )
+    start_pybullet_after_initialization: Switch = Field(
+        True, description="Whether the world runs at once, else from the first `rpbi/start`."
+    )
+    status_hz: Hz = Field(50.0, description="Rate of `rpbi/status`.")
+    configureDebugVisualizer: ConfigureDebugVisualizer = Field(
+        ConfigureDebugVisualizer(), description="What PyBullet's window shows."
+    )
+    resetDebugVisualizerCamera: ResetDebugVisualizerCamera = Field(
+        ResetDebugVisualizerCamera(), description="Where PyBullet's window looks from."
+    )
+    visual_objects: ListOf[Text] = Field((), description="Files of objects that are seen and never felt.")
+    collision_objects: ListOf[Text] = Field((), description="Files of objects that nothing moves.")
+    dynamic_objects: ListOf[Text] = Field((), description="Files of objects that physics moves.")
+    robots: ListOf[Text] = Field((), description="Files of robots.")
+    rgbd_sensor: RgbdSensorConfig | None = Field(
+        None, description="Camera of colour, depth and segmentation."
+    )
+    controls: ControlsConfig | None = Field(None, description="What the control window works on.")
+
+    def search_paths(self) -> tuple[str, ...]:
+        """Return the folders to look for files in, as absolute paths."""
+        return self.setAdditionalSearchPath

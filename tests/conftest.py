@@ -1,0 +1,62 @@
+"""What all tests share: the workspace on the path, and a private ROS master on a free port."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Iterator
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "tests"))
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+# rospy reads these when it is imported, so they must stand before any test module is.
+_HOME = tempfile.TemporaryDirectory(prefix="rpbi-tests-")
+os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{_free_port()}"
+os.environ["ROS_IP"] = "127.0.0.1"
+os.environ["ROS_HOME"] = _HOME.name
+os.environ.pop("ROS_HOSTNAME", None)
+os.environ.pop("ROS_NAMESPACE", None)
+
+
+@pytest.fixture(scope="session")
+def ros_master() -> Iterator[str]:
+    """A ROS master of our own; its URI. It ends with the tests."""
+    uri = os.environ["ROS_MASTER_URI"]
+    log = open(Path(_HOME.name) / "roscore.log", "w")
+    roscore = subprocess.Popen(
+        ["roscore", "-p", uri.rsplit(":", 1)[1]], stdout=log, stderr=subprocess.STDOUT, start_new_session=True
+    )
+    from ros_system import stop_group, wait_until
+
+    import rosgraph
+
+    wait_until(rosgraph.is_master_online, "the ROS master answers", 30.0)
+    wait_until(lambda: rosgraph.Master("/tests").lookupNode("/rosout"), "rosout is up", 30.0)
+    yield uri
+    stop_group(roscore)
+    log.close()
+
+
+@pytest.fixture
+def ros(ros_master: str, tmp_path: Path) -> Iterator["RosSystem"]:  # noqa: F821
+    """Starts nodes, talks to them and stops them after the test."""
+    from ros_system import RosSystem
+
+    system = RosSystem(tmp_path)
+    try:
+        yield system
+    finally:
+        system.close()
