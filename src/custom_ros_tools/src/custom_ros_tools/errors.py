@@ -45,7 +45,8 @@ class Problem:
     message: str
 
     def __str__(self) -> str:
-        return ": ".join(part for part in (self.file, self.key, self.message) if part)
+        text = ": ".join(part for part in (self.file, self.key, self.message) if part)
+        return " ".join(text.splitlines())  # one line each, whatever the user's text holds
 
 
 class ConfigError(InterfaceError):

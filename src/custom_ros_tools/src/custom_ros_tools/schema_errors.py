@@ -70,7 +70,7 @@ def _real_location(details: ErrorDetails, data: Any) -> tuple[str | int, ...]:
             here = here[part]
         elif isinstance(here, (list, tuple)) and isinstance(part, int) and part < len(here):
             here = here[part]
-        elif details["type"] != "missing" or len(kept) + 1 < len(details["loc"]):
+        elif details["type"] not in ("missing", "invalid_key") or part != details["loc"][-1]:
             continue
         kept.append(part)
     return tuple(kept)

@@ -12,6 +12,12 @@ from .client import Client
 from .world_config import WorldConfig
 
 
+_SAME_EVERY_TIME = {
+    "deterministicOverlappingPairs": 1,  # else the order of contacts depends on what the broad phase has seen before
+    "contactBreakingThreshold": 0.02,  # [m] PyBullet's default; one global of the process that outlives its client
+}
+
+
 class LogEntry(NamedTuple):
     """One thing that was done to a world; picklable.
 
@@ -78,8 +84,7 @@ def _set_up(pb: Client, config: WorldConfig) -> None:
     gravity = config.setGravity
     pb.setGravity(gravity.gravX, gravity.gravY, gravity.gravZ)
     pb.setTimeStep(round(config.timeStep * 1e9) / 1e9)
-    # Without it the order of contacts depends on what the broad phase has seen before.
-    pb.setPhysicsEngineParameter(**{"deterministicOverlappingPairs": 1, **config.setPhysicsEngineParameter.kwargs()})
+    pb.setPhysicsEngineParameter(**{**_SAME_EVERY_TIME, **config.setPhysicsEngineParameter.kwargs()})
 
 
 def _body_ids(pb: Client) -> set[int]:

@@ -145,8 +145,12 @@ class ChangeDynamics(PybulletModel):
     )
     linearDamping: NonNegative | None = Field(None, description="Share of linear velocity lost.")
     angularDamping: NonNegative | None = Field(None, description="Share of angular velocity lost.")
-    contactStiffness: Annotated[float, Unit("N/m")] | None = Field(None, description="Stiffness of contacts.")
-    contactDamping: Annotated[float, Unit("N s/m")] | None = Field(None, description="Damping of contacts.")
+    contactStiffness: Annotated[NonNegative, Unit("N/m")] | None = Field(
+        None, description="Stiffness of contacts."
+    )
+    contactDamping: Annotated[NonNegative, Unit("N s/m")] | None = Field(
+        None, description="Damping of contacts."
+    )
     frictionAnchor: Switch | None = Field(None, description="Whether friction drift is corrected.")
     localInertiaDiagonal: (
         Annotated[tuple[NonNegative, NonNegative, NonNegative], Field(strict=False), Unit("kg m^2")] | None
@@ -170,6 +174,14 @@ class ChangeDynamics(PybulletModel):
     jointUpperLimit: float | None = Field(None, description="Upper limit of the joint.")
     jointLimitForce: NonNegative | None = Field(None, description="Largest force at the joint's limits.")
     sleepThreshold: NonNegative | None = Field(None, description="Motion below which the body may sleep.")
+
+    @model_validator(mode="after")
+    def _stiffness_and_damping_together(self) -> ChangeDynamics:
+        pair = {"contactStiffness": self.contactStiffness, "contactDamping": self.contactDamping}
+        absent = [key for key, value in pair.items() if value is None]
+        if len(absent) == 1:
+            raise KeyedError(absent[0], f"missing, PyBullet wants {' and '.join(pair)} together")
+        return self
 
 
 class ResetBaseVelocity(PybulletModel):

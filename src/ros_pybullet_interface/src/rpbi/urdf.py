@@ -57,6 +57,19 @@ def resolve_meshes(path: str) -> str:
     resolved_text = _FILENAME.sub(absolute, text)
     if problems:
         raise ConfigError(problems)
-    copy = _folder() / f"{source.stem}-{hashlib.sha256(resolved_text.encode()).hexdigest()[:12]}.urdf"
-    copy.write_text(resolved_text, encoding="utf-8")
-    return str(copy)
+    return _write(source.stem, resolved_text)
+
+
+def write_description(text: str) -> str:
+    """Writes a robot description that has no file, such as that of the parameter server, into one of its own.
+
+    Returns:
+        The file, which lasts as long as the process.
+    """
+    return _write("robot_description", text)
+
+
+def _write(stem: str, text: str) -> str:
+    path = _folder() / f"{stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}.urdf"
+    path.write_text(text, encoding="utf-8")
+    return str(path)

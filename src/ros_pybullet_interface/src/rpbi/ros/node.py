@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import logging
 import sys
-import tempfile
 import threading
-from pathlib import Path
-from typing import Any
+from typing import Any, Optional
 
 import rospy
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
 from custom_ros_tools.ros.logging_bridge import attach_logging
 
+from ..asset_files import ROBOT_DESCRIPTION
 from ..bodies import BODY_TYPES
 from ..bodies.robot import Robot
 from ..config import load_world_dict
 from ..samples import JointStateSample, LinkPoseSample
+from ..urdf import write_description
 from ..world import World
 from .inputs import Inputs
 from .outlets import JointStateOutlet, Outlet, TransformOutlet
@@ -43,7 +43,8 @@ class SimulatorNode:
     """
 
     def __init__(self) -> None:
-        loaded = load_world_dict(_config_parameter(), "~config", BODY_TYPES)
+        description = _robot_description()
+        loaded = load_world_dict(_config_parameter(), "~config", BODY_TYPES, description)
         config = loaded.config
         simulated = bool(_parameter_above("use_sim_time", False))
         if config.real_time_factor != 1 and not simulated:
@@ -62,7 +63,8 @@ class SimulatorNode:
         self._objects_lock = threading.Lock()  # one object comes or goes at a time
         for name in self._world.bodies:
             self._open(name)
-        NodeServices(self._simulation, self._ask, self._add, self._remove)
+        context = {"search_paths": config.search_paths(), ROBOT_DESCRIPTION: description}
+        NodeServices(self._simulation, self._ask, self._add, self._remove, context)
         if config.start_pybullet_after_initialization:
             self._simulation.start()
 
@@ -127,6 +129,12 @@ def _config_parameter() -> dict[str, Any]:
         how = 'load it with <rosparam param="config" file="WORLD.yaml"/> inside the <node>'
         raise ConfigError([Problem("~config", "", f"missing: expected the main configuration; {how}")])
     return config
+
+
+def _robot_description() -> Optional[str]:
+    """Returns a file with the robot description of the parameter server, None if there is none."""
+    text = _parameter_above("robot_description", None)
+    return None if text is None else write_description(text)
 
 
 def _parameter_above(name: str, default: Any) -> Any:

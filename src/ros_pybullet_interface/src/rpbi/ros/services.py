@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from typing import Any, Callable
+from typing import Any, Callable, Mapping
 
 import rospy
 from custom_ros_tools.config import load_config, load_configs, replace_package
@@ -46,6 +46,7 @@ class NodeServices:
         ask: Reaches the simulation thread.
         add: Adds an object, by type and configuration, and all that belongs to it.
         remove: Removes an object, by name, and all that belongs to it.
+        context: What reading an object's file needs to know of the world, see `load_object`.
     """
 
     def __init__(
@@ -54,8 +55,10 @@ class NodeServices:
         ask: Requests,
         add: Callable[[str, Any], None],
         remove: Callable[[str], None],
+        context: Mapping[str, Any],
     ) -> None:
         self._simulation, self._ask, self._add, self._remove = simulation, ask, add, remove
+        self._context = context
         rospy.Service("rpbi/start", Trigger, self._start)
         rospy.Service("rpbi/stop", Trigger, self._stop)
         rospy.Service("rpbi/step", Trigger, self._step)
@@ -103,7 +106,7 @@ class NodeServices:
                 file, data = "config", load_configs(asked.config)
             else:
                 raise InterfaceError("expected a filename or a config; got neither")
-            config = load_object(kind, data, file, BODY_TYPES)
+            config = load_object(kind, data, file, BODY_TYPES, self._context)
             self._add(kind, config)
         except (InterfaceError, Closed) as error:
             return AddPybulletObjectResponse(success=False, message=str(error))

@@ -1,0 +1,46 @@
+"""Entry point of the renderer process: `python -m rpbi.render --socket FD --sink module:factory`.
+
+The simulator starts it. Further arguments are the sink's, who finds them in `sys.argv`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import signal
+import socket
+from functools import partial
+
+from .channel import Channel
+from .frame import make_sink
+from .process import RenderProcess, ReportHandler
+
+
+def main() -> None:
+    """Runs the process until the simulator ends it."""
+    parser = argparse.ArgumentParser(prog="rpbi.render")
+    parser.add_argument("--socket", type=int, required=True, help="file descriptor of the connection")
+    parser.add_argument("--sink", required=True, help="module:factory of what takes the frames")
+    arguments, _ = parser.parse_known_args()
+    _give_way()
+    # Ctrl-C goes to the whole process group; the simulator decides when we end.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    channel = Channel(socket.socket(fileno=arguments.socket))
+    logger = logging.getLogger("rpbi")
+    logger.setLevel(logging.INFO)
+    logger.propagate = False
+    logger.addHandler(ReportHandler(channel))
+    RenderProcess(channel, partial(make_sink, arguments.sink)).run()
+
+
+def _give_way() -> None:
+    """Lets physics go first: what is idle gets only what nobody else needs."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+    except OSError:  # some containers do not allow it
+        os.nice(19)
+
+
+if __name__ == "__main__":
+    main()

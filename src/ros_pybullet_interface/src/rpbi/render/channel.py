@@ -1,0 +1,84 @@
+"""Python objects over a socket, without ever waiting for the other side."""
+
+from __future__ import annotations
+
+import pickle
+import select
+import socket
+import struct
+from typing import Any
+
+_LENGTH = struct.Struct("<I")
+_CHUNK = 1 << 18
+
+
+class Channel:
+    """Sends and receives picklable objects, each with its length before it.
+
+    What the other side does not take yet waits here, so whoever sends has to see to it that this stays
+    bounded. It is for one thread.
+
+    Args:
+        connection: A connected stream socket.
+    """
+
+    def __init__(self, connection: socket.socket) -> None:
+        connection.setblocking(False)
+        self._socket = connection
+        self._outgoing = bytearray()
+        self._incoming = bytearray()
+        self.closed = False
+        """Whether the other side has gone."""
+
+    def send(self, item: Any) -> None:
+        """Sends an object as soon as the other side takes it."""
+        data = pickle.dumps(item, protocol=pickle.HIGHEST_PROTOCOL)
+        self._outgoing += _LENGTH.pack(len(data))
+        self._outgoing += data
+        self.flush()
+
+    def flush(self) -> None:
+        """Hands on what still waits, as far as the other side takes it now."""
+        try:
+            while self._outgoing and not self.closed:
+                del self._outgoing[: self._socket.send(self._outgoing)]
+        except BlockingIOError:
+            pass
+        except OSError:
+            self.closed = True
+
+    def receive(self) -> list[Any]:
+        """Returns the objects that have come since the last time."""
+        try:
+            while not self.closed:
+                data = self._socket.recv(_CHUNK)
+                self._incoming += data
+                self.closed = not data
+        except BlockingIOError:
+            pass
+        except OSError:
+            self.closed = True
+        return self._take_complete() if self._incoming else []
+
+    def wait(self, timeout_s: float | None) -> None:
+        """Waits until there is something to receive, or to send on, for at most so long [s]."""
+        if not self.closed:
+            select.select([self._socket], [self._socket] if self._outgoing else [], [], timeout_s)
+
+    def close(self) -> None:
+        """Ends the connection; the other side is told."""
+        self.closed = True
+        self._socket.close()
+
+    def _take_complete(self) -> list[Any]:
+        items = []
+        begin = 0
+        while len(self._incoming) - begin >= _LENGTH.size:
+            (length,) = _LENGTH.unpack_from(self._incoming, begin)
+            end = begin + _LENGTH.size + length
+            if end > len(self._incoming):
+                break
+            items.append(pickle.loads(memoryview(self._incoming)[begin + _LENGTH.size : end]))
+            begin = end
+        del self._incoming[:begin]
+        return items

@@ -1,0 +1,91 @@
+"""What the renderer process makes, and for whom."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from ..camera import Intrinsics
+
+
+class Camera(NamedTuple):
+    """A camera, as the renderer knows it.
+
+    Attributes:
+        name: Its unique name.
+        frame_id: TF frame of its optical frame.
+        intrinsics: What it sees of the space before it.
+    """
+
+    name: str
+    frame_id: str
+    intrinsics: Intrinsics
+
+
+class Frame(NamedTuple):
+    """What a camera saw at one tick; images that nobody asked for are None.
+
+    Attributes:
+        camera: The camera.
+        tick: The tick shown.
+        stamp_ns: Its stamp [ns].
+        colour: Red, green and blue, shape (height, width, 3), uint8.
+        depth: Distance along the optical axis [m], shape (height, width), float32; the far plane where
+            nothing is.
+        segmentation: Body ids of the simulator, -1 where nothing is, shape (height, width), int32.
+    """
+
+    camera: Camera
+    tick: int
+    stamp_ns: int
+    colour: npt.NDArray[np.uint8] | None = None
+    depth: npt.NDArray[np.float32] | None = None
+    segmentation: npt.NDArray[np.int32] | None = None
+
+
+class Demand(NamedTuple):
+    """Who looks at a camera.
+
+    Attributes:
+        streams: What is looked at, out of `colour`, `depth`, `segmentation` and `info`.
+        seen: How many viewers have ever come; a larger number than before means that somebody is new.
+    """
+
+    streams: frozenset[str] = frozenset()
+    seen: int = 0
+
+
+NO_DEMAND = Demand()
+
+
+class Sink(Protocol):
+    """Takes the frames, in the renderer process.
+
+    A sink is made by a factory that gets the cameras: `--sink module:factory`.
+    """
+
+    def demands(self) -> Mapping[str, Demand]:
+        """Returns who looks at which camera, by its name; cameras left out are not looked at."""
+
+    def write(self, frame: Frame) -> None:
+        """Takes a frame; it must not wait for anybody."""
+
+    def close(self) -> None:
+        """Ends it."""
+
+
+def make_sink(factory: str, cameras: Sequence[Camera]) -> Sink:
+    """Makes a sink.
+
+    Args:
+        factory: `module:factory`.
+        cameras: The cameras, the first one first.
+    """
+    module, _, name = factory.partition(":")
+    make: Any = getattr(importlib.import_module(module), name)
+    sink: Sink = make(cameras)
+    return sink

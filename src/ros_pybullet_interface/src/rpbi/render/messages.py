@@ -1,0 +1,74 @@
+"""What simulator and renderer process tell each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from ..load_log import LogEntry
+from ..samples import SceneSample
+from .frame import Camera, Demand
+
+
+class SetUp(NamedTuple):
+    """To the renderer, first of all.
+
+    Attributes:
+        cameras: All cameras, the first one first.
+        use_egl: Whether to try the fast renderer.
+    """
+
+    cameras: tuple[Camera, ...]
+    use_egl: bool
+
+
+class WorldChanged(NamedTuple):
+    """To the renderer: what was done to the world since the last time."""
+
+    entries: tuple[LogEntry, ...]
+
+
+class Scene(NamedTuple):
+    """To the renderer: a tick to draw.
+
+    Attributes:
+        sample: Where everything is.
+        body_ids: PyBullet's ids in the simulator, by name: what the segmentation tells.
+    """
+
+    sample: SceneSample
+    body_ids: Mapping[str, int]
+
+
+class Ready(NamedTuple):
+    """To the simulator: the renderer draws.
+
+    Attributes:
+        renderer: `EGL` or `TinyRenderer`, with what is known of it.
+    """
+
+    renderer: str
+
+
+class Taken(NamedTuple):
+    """To the simulator: the scene of this camera is being drawn, the next one may come."""
+
+    camera: str
+
+
+class Demanded(NamedTuple):
+    """To the simulator: who looks at which camera."""
+
+    demands: Mapping[str, Demand]
+
+
+class Report(NamedTuple):
+    """To the simulator: something for its log.
+
+    Attributes:
+        level: As in `logging`.
+        text: The sentence.
+    """
+
+    level: int
+    text: str

@@ -1,0 +1,142 @@
+"""The renderer process: takes scenes from the simulator, draws them and hands the frames to a sink."""
+
+from __future__ import annotations
+
+import faulthandler
+import logging
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..camera import depth_in_metres
+from .channel import Channel
+from .frame import NO_DEMAND, Camera, Demand, Frame, Sink
+from .messages import Demanded, Ready, Report, Scene, SetUp, Taken, WorldChanged
+from .mirror import Mirror
+from .renderers import Renderer, open_renderer
+
+log = logging.getLogger(__name__)
+
+DEMAND_PERIOD_S = 0.05
+"""How often to look who looks at the images [s]."""
+
+STUCK_AFTER_S = 300.0
+"""After so long in one go something hangs, in a driver perhaps, and the process ends itself to be started again [s].
+At idle priority on a busy machine a lot may take long."""
+
+
+class RenderProcess:
+    """Does what the simulator tells until the simulator has gone.
+
+    Args:
+        channel: To the simulator.
+        make_sink: Makes the sink once the cameras are known.
+    """
+
+    def __init__(self, channel: Channel, make_sink: Callable[[Sequence[Camera]], Sink]) -> None:
+        self._channel = channel
+        self._make_sink = make_sink
+        self._cameras: dict[str, Camera] = {}
+        self._demands: dict[str, Demand] = {}
+        self._looked_s = 0.0
+        self._parent = os.getppid()
+        self._renderer: Renderer | None = None
+        self._mirror: Mirror | None = None
+        self._sink: Sink | None = None
+        self._do: dict[type, Callable[[Any], None]] = {
+            SetUp: self._set_up,
+            WorldChanged: self._change_world,
+            Scene: self._show,
+        }
+
+    def run(self) -> None:
+        """Works until the simulator has closed the connection or ended."""
+        try:
+            while not self._channel.closed and os.getppid() == self._parent:
+                faulthandler.dump_traceback_later(STUCK_AFTER_S, exit=True)
+                for message in self._channel.receive():
+                    self._do[type(message)](message)
+                self._tell_demands()
+                self._channel.flush()
+                self._channel.wait(DEMAND_PERIOD_S)
+        finally:
+            if self._sink is not None:
+                self._sink.close()
+
+    def _set_up(self, message: SetUp) -> None:
+        self._cameras = {camera.name: camera for camera in message.cameras}
+        self._renderer = open_renderer(message.cameras, message.use_egl)
+        self._mirror = Mirror(self._renderer.pb)
+        self._channel.send(Ready(self._renderer.name))
+        self._sink = self._make_sink(message.cameras)
+
+    def _change_world(self, message: WorldChanged) -> None:
+        assert self._mirror is not None
+        for entry in message.entries:
+            self._mirror.apply(entry)
+
+    def _show(self, scene: Scene) -> None:
+        """Draws a scene, as far as anybody looks at it."""
+        sample = scene.sample
+        self._channel.send(Taken(sample.name))
+        assert self._mirror is not None and self._sink is not None
+        streams = self._sink.demands().get(sample.name, NO_DEMAND).streams
+        if not streams:
+            return
+        camera = self._cameras[sample.name]
+        frame = Frame(camera, sample.tick, sample.stamp_ns)
+        if streams - {"info"}:
+            for state in sample.bodies:
+                self._mirror.pose(state)
+            frame = frame._replace(**self._draw(scene, camera, streams))
+        self._sink.write(frame)
+
+    def _draw(self, scene: Scene, camera: Camera, streams: frozenset[str]) -> Mapping[str, Any]:
+        assert self._renderer is not None and self._mirror is not None and scene.sample.camera is not None
+        segmentation = "segmentation" in streams
+        drawing = self._renderer.draw(camera.intrinsics, scene.sample.camera, segmentation)
+        images: dict[str, npt.NDArray[Any]] = {}
+        if "colour" in streams:
+            images["colour"] = _without_alpha(drawing.rgba)
+        if "depth" in streams:
+            images["depth"] = depth_in_metres(drawing.depth_buffer, camera.intrinsics)
+        if segmentation:
+            images["segmentation"] = self._mirror.to_simulator_ids(drawing.body_ids, scene.body_ids)
+        return images
+
+    def _tell_demands(self) -> None:
+        now_s = time.monotonic()
+        if self._sink is None or now_s - self._looked_s < DEMAND_PERIOD_S:
+            return
+        self._looked_s = now_s
+        demands = dict(self._sink.demands())
+        if demands != self._demands:
+            self._demands = demands
+            self._channel.send(Demanded(demands))
+
+
+class ReportHandler(logging.Handler):
+    """Sends what is logged here to the simulator's log.
+
+    Args:
+        channel: To the simulator.
+    """
+
+    def __init__(self, channel: Channel) -> None:
+        super().__init__(logging.INFO)
+        self._channel = channel
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Sends a record."""
+        self._channel.send(Report(record.levelno, self.format(record)))
+
+
+def _without_alpha(rgba: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    rgb = np.empty((*rgba.shape[:2], 3), np.uint8)
+    for channel in range(3):  # four times as fast as copying pixel by pixel
+        rgb[..., channel] = rgba[..., channel]
+    return rgb

@@ -1,0 +1,1 @@
+"""Worlds, robots, launch files and the short programs that go with them."""

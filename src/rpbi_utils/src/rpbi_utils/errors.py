@@ -1,0 +1,41 @@
+"""What can go wrong with bags and recordings; every one of them is an `InterfaceError`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from custom_ros_tools.errors import InterfaceError
+
+
+class BagError(InterfaceError):
+    """A bag cannot be read, or what is in it cannot be written as asked.
+
+    Args:
+        path: The bag.
+        message: What is wrong, and what to do about it.
+    """
+
+    def __init__(self, path: Path, message: str) -> None:
+        self.path = path
+        self.message = message
+        super().__init__(path, message)
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.message}"
+
+
+class RecordingError(InterfaceError):
+    """A recording could not be started, or is not complete.
+
+    Args:
+        path: The bag that was to be written.
+        message: What is wrong, and what to do about it.
+    """
+
+    def __init__(self, path: Path, message: str) -> None:
+        self.path = path
+        self.message = message
+        super().__init__(path, message)
+
+    def __str__(self) -> str:
+        return f"recording {self.path}: {self.message}"

@@ -1,0 +1,1 @@
+"""The parts of `rpbi_utils` that use ROS."""

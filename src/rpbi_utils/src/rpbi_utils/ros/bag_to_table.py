@@ -1,0 +1,89 @@
+"""The command `bag_to_table`: a bag to one file a topic."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pandas as pd
+import rospy
+
+from custom_ros_tools.errors import InterfaceError
+from rpbi_utils.errors import BagError
+from rpbi_utils.ros.bags import bag_to_dataframes
+from rpbi_utils.table_files import FORMATS, file_stems, write_table
+
+_NAME = "bag_to_table"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs the command.
+
+    Args:
+        argv: Its arguments; by default those of the process.
+
+    Returns:
+        The exit code: 0, or 1 with one line on stderr that says what is wrong.
+    """
+    arguments = _parser().parse_args(rospy.myargv(sys.argv)[1:] if argv is None else argv)
+    _log_to_stderr(logging.WARNING if arguments.quiet else logging.INFO)
+    try:
+        written = _convert(arguments)
+    except (InterfaceError, OSError) as error:
+        print(f"{_NAME}: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    if not arguments.quiet:
+        print(written.to_string(index=False) if len(written) else "no topic to write")
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog=_NAME, description="Writes each topic of a bag as a table.")
+    parser.add_argument("bag", type=Path, metavar="BAG")
+    parser.add_argument("--topics", nargs="+", metavar="TOPIC", help="default: all that hold no binary data")
+    parser.add_argument("--format", choices=FORMATS, default=FORMATS[0], help="default: %(default)s")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="default: BAG_tables, beside BAG.bag")
+    parser.add_argument("--images", action="store_true", help="topics with binary data too (Parquet only)")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar and no list of files")
+    return parser
+
+
+def _log_to_stderr(level: int) -> None:
+    """Shows what this package logs; the root logger would show what rospy says about itself as well."""
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter(f"{_NAME}: %(message)s"))
+    log = logging.getLogger("rpbi_utils")
+    log.addHandler(handler)
+    log.setLevel(level)
+
+
+def _convert(arguments: argparse.Namespace) -> pd.DataFrame:
+    """Reads the bag, writes the files and returns what was written, one row a file."""
+    bag: Path = arguments.bag
+    progress = not arguments.quiet
+    tables = bag_to_dataframes(bag, arguments.topics, images=arguments.images, progress=progress)
+    folder: Path = arguments.out or bag.with_name(f"{bag.stem}_tables")
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = []
+    for topic, stem in file_stems(tables).items():
+        path = folder / f"{stem}.{arguments.format}"
+        try:
+            write_table(tables[topic], path)
+        except ValueError as error:
+            raise BagError(bag, f"{topic}: {error}") from error
+        rows.append((topic, *tables[topic].shape, _size(path), path))
+    return pd.DataFrame(rows, columns=["topic", "rows", "columns", "size", "file"])
+
+
+def _size(path: Path) -> str:
+    size = float(path.stat().st_size)
+    for unit in ("B", "kB", "MB"):
+        if size < 1000:
+            return f"{size:.3g} {unit}"
+        size /= 1000
+    return f"{size:.3g} GB"

@@ -1,0 +1,88 @@
+"""Bags to pandas tables."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+
+import pandas as pd
+from tqdm import tqdm
+
+from rpbi_utils.ros.bag_reader import BagMessage, BagReader
+from rpbi_utils.tables import TableBuilder
+
+Progress = Callable[[int, int], None]
+_REPORT_EVERY = 1000  # messages
+
+_log = logging.getLogger(__name__)
+
+
+def bag_to_dataframes(
+    path: str | Path,
+    topics: str | Iterable[str] | None = None,
+    *,
+    images: bool = False,
+    progress: bool | Progress = False,
+) -> dict[str, pd.DataFrame]:
+    """Reads a bag into pandas tables, one a topic.
+
+    The index `time` is the stamp of the message's header in seconds of ROS time (float64, as `stamp.to_sec()`
+    gives it), or the time of recording where a message has no header or its stamp is 0. Tables of one bag
+    share this clock, so they can be joined by it. Rows are in the order of `time`; the column `record_time`
+    [s] keeps when each was recorded.
+
+    The other columns are the fields, named by their path: `pose/position/x`, `data/0`, `header/frame_id`.
+    Those of joint states are `position/JOINT`, `velocity/JOINT` and `effort/JOINT`, by name. A value that a
+    message does not have is NaN, or None for text. Transforms (`/tf`) have a row each, with `parent` and
+    `child`; diagnostics have a row a status, with `values/KEY`. `time` and `duration` fields are in seconds.
+
+    Args:
+        path: A `.bag` file, of any compression. No master and no message packages are needed.
+        topics: Names of topics, or one name; by default all but those with binary data, such as images.
+        images: Whether to include these by default. Their data are columns of `bytes`.
+        progress: `True` for a progress bar, or a function to be called with the number of messages read so
+            far and that of all.
+
+    Returns:
+        Tables by topic, sorted by name.
+
+    Raises:
+        BagError: If there is no such file, or it is no complete bag.
+        UnknownNameError: If the bag does not have a topic that was named.
+    """
+    with BagReader(path) as bag:
+        chosen = _choose(bag, [topics] if isinstance(topics, str) else topics, images)
+        builders = {topic: TableBuilder(topic, images or topics is not None) for topic in chosen}
+        total = sum(bag.counts[topic] for topic in chosen)
+        for topic, message_type, raw, record_time_s in _watched(bag.messages(chosen), total, progress):
+            builders[topic].add(message_type, raw, record_time_s)
+    return {topic: builder.table() for topic, builder in builders.items()}
+
+
+def _choose(bag: BagReader, topics: Iterable[str] | None, images: bool) -> list[str]:
+    """Returns the topics to read, sorted and each once."""
+    if topics is not None:
+        chosen = sorted(set(topics))
+        bag.check(chosen)
+        return chosen
+    if images:
+        return list(bag.types)
+    binary = [topic for topic, types in bag.types.items() if any(each.holds_bytes for each in types)]
+    if binary:
+        _log.info("left out, as they hold binary data: %s", ", ".join(binary))
+    return [topic for topic in bag.types if topic not in binary]
+
+
+def _watched(messages: Iterator[BagMessage], total: int, progress: bool | Progress) -> Iterator[BagMessage]:
+    """Yields the messages, and shows or reports how many there were."""
+    if not callable(progress):
+        yield from tqdm(
+            messages, total=total, unit=" messages", unit_scale=True, leave=False, disable=not progress
+        )
+        return
+    for count, message in enumerate(messages):
+        if count % _REPORT_EVERY == 0:
+            progress(count, total)
+        yield message
+    progress(total, total)

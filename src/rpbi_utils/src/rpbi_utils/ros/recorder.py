@@ -1,0 +1,208 @@
+"""Starts and stops `rosbag record` so that nothing is lost in between, and says so when it was."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import os
+import re
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+
+import rosgraph
+import roslib.packages
+from rosgraph.names import get_ros_namespace, resolve_name
+
+from custom_ros_tools.errors import MissingDependency
+from rpbi_utils.errors import RecordingError
+from rpbi_utils.ros.connections import unconnected, unsubscribed
+
+_POLL_S = 0.02
+_GRACE_S = 0.2  # for what was published just before the end and is on its way
+_NOT_WRITING = ("Disabling recording", "Error writing", "Unknown exception")
+_DECORATION = re.compile(r"^(\x1b\[[\d;]*m)?\[ *[A-Z]+\] \[[\d., ]+\]: |\x1b\[[\d;]*m", re.MULTILINE)
+_numbers = itertools.count()
+
+_log = logging.getLogger(__name__)
+
+
+class Recorder:
+    """A `rosbag record` of some topics, as a context: what is published inside it is in the bag.
+
+    On entry it waits until the recorder has subscribed to every topic and every publisher that is there
+    sends to it; on exit it stops the recorder and waits until the bag is closed. It waits in wall time,
+    never ROS time.
+
+        with Recorder("out/run.bag", ["/rpbi/kuka/joint_states", "/tf"]):
+            ...
+
+    Args:
+        path: The bag to write, ending with `.bag`. Its folder is created, and a bag of that name is replaced.
+        topics: What to record; relative names are resolved in the namespace of this process.
+        lz4: Whether to compress (fast, lossless).
+        timeout_s: Wall time to wait for the subscriptions, and for the bag to be closed [s].
+        min_space: What is to stay free on the disk (`"1G"`, `"200M"`); with less, `rosbag record` does not
+            write.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        topics: Sequence[str],
+        *,
+        lz4: bool = True,
+        timeout_s: float = 30.0,
+        min_space: str = "1G",
+    ) -> None:
+        self.path = Path(path)
+        if self.path.suffix != ".bag":
+            raise ValueError(f"the name of a bag ends with '.bag', got '{path}'")
+        if isinstance(topics, str) or not topics:
+            raise ValueError(f"a list of at least one topic is needed, got {topics!r}")
+        self.topics = sorted({resolve_name(topic, get_ros_namespace()) for topic in topics})
+        self._lz4 = lz4
+        self._timeout_s = timeout_s
+        self._min_space = min_space
+        self._node = f"/recorder_{os.getpid()}_{next(_numbers)}"
+        self._process: subprocess.Popen[bytes] | None = None
+        self._output = tempfile.TemporaryFile()
+
+    def __enter__(self) -> Recorder:
+        self.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.stop()
+            return
+        try:
+            self.stop()
+        except RecordingError as second:  # what happened inside is the news; Ctrl-C goes to the recorder too
+            _log.log(logging.INFO if isinstance(error, KeyboardInterrupt) else logging.WARNING, "%s", second)
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the recorder is alive."""
+        return self._process is not None and self._process.poll() is None
+
+    def start(self) -> None:
+        """Starts recording and returns when everything that is published from now on will be recorded.
+
+        Raises:
+            RecordingError: If there is no master, the recorder ends or cannot write, or does not subscribe
+                in time.
+            MissingDependency: If `rosbag record` is not installed.
+        """
+        if self.is_running:
+            raise RecordingError(self.path, "is going on already")
+        if not rosgraph.is_master_online():
+            raise RecordingError(self.path, f"no ROS master at {rosgraph.get_master_uri()}")
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        self.path.unlink(missing_ok=True)  # so that it cannot be taken for the new one
+        self._output = tempfile.TemporaryFile()
+        self._process = subprocess.Popen(self._command(), stdout=self._output, stderr=subprocess.STDOUT)
+        try:
+            self._wait_until_connected()
+        except BaseException:  # Ctrl-C included: leave no process behind
+            self._end()
+            raise
+
+    def stop(self) -> Path:
+        """Stops recording and returns the path of the bag, closed and complete.
+
+        Raises:
+            RecordingError: If the recorder had ended before, could not write, or did not close the bag.
+        """
+        if self._process is None:
+            raise RecordingError(self.path, "has not been started")
+        time.sleep(_GRACE_S if self.is_running else 0.0)
+        died = not self.is_running
+        closed = self._end()
+        active = self.path.with_name(self.path.name + ".active")
+        self._raise_if_not_writing()
+        if died:
+            raise RecordingError(
+                self.path, f"the recorder ended early{self._last_words()}{_what_is_left(active)}"
+            )
+        if not active.exists() and not self.path.exists():
+            raise RecordingError(
+                self.path, "no bag was begun; with use_sim_time the recorder waits for /clock"
+            )
+        if not closed or active.exists():
+            raise RecordingError(
+                self.path, f"the bag was not closed{self._last_words()}{_what_is_left(active)}"
+            )
+        return self.path
+
+    def _command(self) -> list[str]:
+        """Returns the command line of the recorder itself; the script `rosbag` would keep signals from it."""
+        found = roslib.packages.find_node("rosbag", "record")
+        if not found:
+            raise MissingDependency("rosbag record", "apt install python3-rosbag")
+        options = [
+            "--output-name",
+            str(self.path),
+            "--min-space",
+            self._min_space,
+            *(["--lz4"] if self._lz4 else []),
+        ]
+        return [found[0], *options, *self.topics, f"__name:={self._node.removeprefix('/')}", "__ns:=/"]
+
+    def _wait_until_connected(self) -> None:
+        deadline = time.monotonic() + self._timeout_s
+        while True:
+            if not self.is_running:
+                raise RecordingError(self.path, f"the recorder ended at once{self._last_words()}")
+            self._raise_if_not_writing()
+            missing = unsubscribed(self._node, self.topics)
+            silent = [] if missing else unconnected(self._node, self.topics)
+            if not missing and not silent:
+                return
+            if time.monotonic() > deadline:
+                break
+            time.sleep(_POLL_S)
+        if missing:
+            raise RecordingError(
+                self.path, f"no subscription to {', '.join(missing)} after {self._timeout_s} s"
+            )
+        _log.warning("recording %s: not connected to %s", self.path, ", ".join(silent))
+
+    def _end(self) -> bool:
+        """Ends the process; returns whether it did so by itself."""
+        assert self._process is not None
+        if self._process.poll() is None:
+            self._process.send_signal(signal.SIGINT)
+        try:
+            return self._process.wait(self._timeout_s) == 0
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+            return False
+
+    def _raise_if_not_writing(self) -> None:
+        for line in self._lines():
+            if any(words in line for words in _NOT_WRITING):
+                free = shutil.disk_usage(self.path.parent).free / 1e9
+                raise RecordingError(self.path, f"the recorder does not write ({free:.1f} GB free): {line}")
+
+    def _last_words(self) -> str:
+        lines = self._lines()
+        return f": {lines[-1]}" if lines else ""
+
+    def _lines(self) -> list[str]:
+        """Returns what the recorder has written to its terminal."""
+        file = self._output.fileno()  # the recorder shares its position, so that it must not be moved
+        text = os.pread(file, os.fstat(file).st_size, 0).decode("utf-8", "replace")
+        return [line for line in _DECORATION.sub("", text).splitlines() if line.strip()]
+
+
+def _what_is_left(active: Path) -> str:
+    return f"; what was recorded can be saved with 'rosbag reindex {active}'" if active.exists() else ""

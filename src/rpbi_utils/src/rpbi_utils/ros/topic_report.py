@@ -1,0 +1,63 @@
+"""What is in a bag and how regularly it came."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from rpbi_utils.ros.bag_reader import BagMessage, BagReader
+
+_STAMP = struct.Struct("<4xII")  # behind the `seq` of a header
+_COLUMNS = ("type", "messages", "bytes", "rate_hz", "max_gap_s", "first", "last")
+
+
+def topic_report(path: str | Path) -> pd.DataFrame:
+    """Measures every topic of a bag.
+
+    Args:
+        path: A `.bag` file.
+
+    Returns:
+        One row a topic (the index), sorted by name, with the columns `type`, `messages`, `bytes` (serialised,
+        before compression), `rate_hz` (mean, from the first to the last message; NaN if they have the same
+        time), `max_gap_s` (longest time without a message in between), `first` and `last` [s of ROS time].
+        Times are the stamps of headers, or of recording where there is none, as for `/tf`.
+
+    Raises:
+        BagError: If there is no such file, or it is no complete bag.
+    """
+    with BagReader(path) as bag:
+        times: dict[str, list[float]] = {topic: [] for topic in bag.types}
+        sizes = dict.fromkeys(bag.types, 0)
+        for message in bag.messages(list(bag.types)):
+            times[message.topic].append(_time(message))
+            sizes[message.topic] += len(message.raw)
+        rows = [
+            (
+                "|".join(sorted(each.name for each in types)),
+                len(times[topic]),
+                sizes[topic],
+                *_rhythm(times[topic]),
+            )
+            for topic, types in bag.types.items()
+        ]
+        return pd.DataFrame(rows, index=pd.Index(list(bag.types), name="topic"), columns=_COLUMNS)
+
+
+def _time(message: BagMessage) -> float:
+    """Returns the stamp of a message [s], or where it has none the time of its recording."""
+    if not message.type.has_header or len(message.raw) < _STAMP.size:
+        return message.record_time_s
+    seconds, nanoseconds = _STAMP.unpack_from(message.raw)
+    return seconds + nanoseconds / 1e9 or message.record_time_s
+
+
+def _rhythm(times: list[float]) -> tuple[float, float, float, float]:
+    """Returns mean rate [Hz], longest gap, first and last time [s]."""
+    ordered = np.sort(times)
+    first, last = ordered[0], ordered[-1]
+    rate_hz = (len(ordered) - 1) / (last - first) if last > first else np.nan
+    return rate_hz, np.diff(ordered).max(initial=0.0), first, last

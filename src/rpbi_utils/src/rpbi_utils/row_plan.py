@@ -1,0 +1,120 @@
+"""Which rows and columns a message becomes: one row a message, save for the types listed in `PLANS`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+from rpbi_utils.layout import MAX_ARRAY_COLUMNS, Layout, Leaf, lay_out
+from rpbi_utils.message_type import MessageType
+
+STAMP = "header/stamp"
+INDEX = "time"
+RECORD_TIME = "record_time"
+Columns = dict[str, Leaf]
+_TRANSFORM = (*(f"translation/{axis}" for axis in "xyz"), *(f"rotation/{axis}" for axis in "xyzw"))
+
+
+class RowPlan(NamedTuple):
+    """How messages of one layout are turned into rows.
+
+    Attributes:
+        rows: The columns of each row that a message gives; a stamp is the column `STAMP`.
+        fixed: Spans whose bytes another message must share for this plan to hold for it.
+        notes: What could not be put into the table, for the log.
+    """
+
+    rows: list[Columns]
+    fixed: list[tuple[int, int]]
+    notes: list[str]
+
+
+def plan_rows(message_type: MessageType, raw: bytes) -> RowPlan:
+    """Finds rows and columns for a serialised message and all that share its layout.
+
+    Raises:
+        ValueError: If the message does not fit its type.
+    """
+    layout = lay_out(message_type, raw)
+    rows, names, notes = PLANS.get(message_type.name, _one_row)(layout, raw)
+    fixed = layout.fixed + [leaf.span for leaf in names]
+    return RowPlan([_rename_reserved(row) for row in rows], _merge(fixed), notes)
+
+
+Plan = tuple[list[Columns], Iterable[Leaf], list[str]]  # rows, leaves that name columns, notes
+
+
+def _one_row(layout: Layout, raw: bytes) -> Plan:
+    """One row with every value; long arrays of messages or strings are left out."""
+    counts = layout.counts.items()
+    long = [path for path, count in counts if count > MAX_ARRAY_COLUMNS and path not in layout.leaves]
+    inside = tuple(f"{path}/" for path in long)
+    columns = {path: leaf for path, leaf in layout.leaves.items() if not path.startswith(inside)}
+    return [columns], [], [f"'{path}' has over {MAX_ARRAY_COLUMNS} elements: left out" for path in long]
+
+
+def _joint_state(layout: Layout, raw: bytes) -> Plan:
+    """One row with a column for each joint that is named; without names, for each index."""
+    leaves, counts, notes = layout.leaves, layout.counts, []
+    names = [leaves[f"name/{index}"] for index in range(counts["name"])]
+    columns = {path: leaf for path, leaf in leaves.items() if path.startswith("header/")}
+    for array in ("position", "velocity", "effort"):
+        count = counts[array]
+        if names and count not in (0, len(names)):  # which value belongs to which joint cannot be known
+            notes.append(f"{count} values of '{array}' for {len(names)} joints: left out")
+            continue
+        for index in range(count):
+            joint = names[index].text(raw) if names else str(index)
+            columns[f"{array}/{joint}"] = leaves[f"{array}/{index}"]
+    return [columns], names, notes
+
+
+def _transforms(layout: Layout, raw: bytes) -> Plan:
+    """One row a transform, each with its own stamp."""
+    leaves, rows = layout.leaves, []
+    for index in range(layout.counts["transforms"]):
+        prefix = f"transforms/{index}/"
+        row = {STAMP: leaves[prefix + STAMP]}
+        row |= {"parent": leaves[f"{prefix}header/frame_id"], "child": leaves[f"{prefix}child_frame_id"]}
+        row |= {value: leaves[f"{prefix}transform/{value}"] for value in _TRANSFORM}
+        rows.append(row)
+    return rows, [], []
+
+
+def _diagnostics(layout: Layout, raw: bytes) -> Plan:
+    """One row a status, with a column for each of its keys."""
+    leaves, counts, rows, keys = layout.leaves, layout.counts, [], []
+    for index in range(counts["status"]):
+        prefix = f"status/{index}/"
+        row = {STAMP: leaves[STAMP]}
+        row |= {field: leaves[prefix + field] for field in ("name", "level", "message", "hardware_id")}
+        for value in range(counts[prefix + "values"]):
+            key = leaves[f"{prefix}values/{value}/key"]
+            row[f"values/{key.text(raw)}"] = leaves[f"{prefix}values/{value}/value"]
+            keys.append(key)
+        rows.append(row)
+    return rows, keys, []
+
+
+PLANS: dict[str, Callable[[Layout, bytes], Plan]] = {
+    "sensor_msgs/JointState": _joint_state,
+    "tf2_msgs/TFMessage": _transforms,
+    "tf/tfMessage": _transforms,
+    "diagnostic_msgs/DiagnosticArray": _diagnostics,
+}
+
+
+def _rename_reserved(row: Columns) -> Columns:
+    """Keeps fields apart from the index and the column that every table has."""
+    return {f"{name}_" if name in (INDEX, RECORD_TIME) else name: leaf for name, leaf in row.items()}
+
+
+def _merge(spans: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Joins spans that touch, so that there are few to compare."""
+    merged: list[tuple[int, int]] = []
+    for start, stop in sorted(spans):
+        if merged and start <= merged[-1][1]:
+            merged[-1] = (merged[-1][0], max(stop, merged[-1][1]))
+        else:
+            merged.append((start, stop))
+    return merged

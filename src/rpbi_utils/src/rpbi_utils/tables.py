@@ -1,0 +1,142 @@
+"""Serialised messages to pandas tables, many at a time and free of ROS."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from rpbi_utils.columns import Array, Pieces, read_leaf
+from rpbi_utils.layout import BYTES
+from rpbi_utils.message_type import MessageType
+from rpbi_utils.row_plan import INDEX, RECORD_TIME, STAMP, Columns, plan_rows
+
+BATCH_MESSAGES = 16_384
+BATCH_BYTES = 32 * 1024 * 1024
+
+_log = logging.getLogger(__name__)
+
+
+class _Block(NamedTuple):
+    """Messages of one layout.
+
+    Attributes:
+        rows: The columns of each row that one of them gives.
+        matrix: The messages, shape (n, size), uint8.
+        indices: Their places in the batch, shape (n,), ascending.
+    """
+
+    rows: list[Columns]
+    matrix: Array
+    indices: Array
+
+
+class TableBuilder:
+    """Collects the serialised messages of one topic and turns them into one table.
+
+    Messages are read in batches, those of one layout (see `rpbi_utils.layout`) at once. Strings and numbers
+    come out as they went in; a value that a message does not have is NaN (None in columns of text).
+
+    Args:
+        topic: Name of the topic, for the log.
+        keep_binary: Whether binary arrays become columns of `bytes`; else they are left out.
+    """
+
+    def __init__(self, topic: str, keep_binary: bool = False) -> None:
+        self._topic = topic
+        self._keep_binary = keep_binary
+        self._batch: list[tuple[MessageType, bytes, float]] = []
+        self._batch_bytes = 0
+        self._messages = 0
+        self._rows = 0
+        self._time: list[Array] = []
+        self._record_time: list[Array] = []
+        self._message: list[Array] = []
+        self._columns: dict[str, Pieces] = {}
+        self._notes: Counter[str] = Counter()
+
+    def add(self, message_type: MessageType, raw: bytes, record_time_s: float) -> None:
+        """Adds a serialised message with the time at which it was recorded [s]."""
+        self._batch.append((message_type, raw, record_time_s))
+        self._batch_bytes += len(raw)
+        if len(self._batch) >= BATCH_MESSAGES or self._batch_bytes >= BATCH_BYTES:
+            self._read_batch()
+
+    def table(self) -> pd.DataFrame:
+        """Returns all rows in the order of time; to be called once, after the last message.
+
+        The index `time` is the stamp of the header [s], or the record time where there is none or it is 0.
+        The column `record_time` [s] is the first; the others are grouped by field.
+        """
+        self._read_batch()
+        for note, count in self._notes.items():
+            _log.warning("%s: %s (messages: %d)", self._topic, note, count)
+        time = np.concatenate([*self._time, np.empty(0)])
+        record_time = np.concatenate([*self._record_time, np.empty(0)])
+        order = np.lexsort((np.concatenate([*self._message, np.empty(0, int)]), time))  # stable
+        fields = list(dict.fromkeys(name.split("/")[0] for name in self._columns))
+        names = sorted(self._columns, key=lambda name: fields.index(name.split("/")[0]))  # stable
+        columns = {name: self._columns.pop(name).join(self._rows)[order] for name in names}
+        return pd.DataFrame(
+            {RECORD_TIME: record_time[order], **columns}, index=pd.Index(time[order], name=INDEX)
+        )
+
+    def _read_batch(self) -> None:
+        """Reads the messages that are waiting, sorted by type and size."""
+        groups: dict[tuple[MessageType, int], list[int]] = {}
+        for index, (message_type, raw, _) in enumerate(self._batch):
+            groups.setdefault((message_type, len(raw)), []).append(index)
+        blocks: list[_Block] = []
+        for (message_type, size), indices in groups.items():
+            joined = b"".join(self._batch[index][1] for index in indices)
+            matrix = np.frombuffer(joined, np.uint8).reshape(len(indices), size)
+            blocks += self._split_by_layout(message_type, matrix, np.array(indices))
+        blocks.sort(key=lambda block: int(block.indices[0]))  # columns come in the order of appearance
+        for block in blocks:
+            for row in block.rows:
+                self._read_rows(row, block.matrix, block.indices)
+        self._messages += len(self._batch)
+        self._batch, self._batch_bytes = [], 0
+
+    def _split_by_layout(self, message_type: MessageType, matrix: Array, indices: Array) -> Iterator[_Block]:
+        """Yields messages of one type and size, one layout at a time; `_Block` tells the arguments."""
+        while len(indices):
+            try:
+                plan = plan_rows(message_type, self._batch[indices[0]][1])
+            except ValueError as error:
+                _log.debug("%s: message %d: %s", self._topic, self._messages + indices[0], error)
+                self._notes["a message does not fit its type: left out"] += 1
+                matrix, indices = matrix[1:], indices[1:]
+                continue
+            same = np.ones(len(indices), bool)
+            for start, stop in plan.fixed:
+                same &= (matrix[:, start:stop] == matrix[0, start:stop]).all(axis=1)
+            for note in plan.notes:
+                self._notes[note] += int(same.sum())
+            if same.all():
+                yield _Block(plan.rows, matrix, indices)
+                return
+            yield _Block(plan.rows, matrix[same], indices[same])
+            matrix, indices = matrix[~same], indices[~same]
+
+    def _read_rows(self, row: Columns, matrix: Array, indices: Array) -> None:
+        """Reads one row of each message; `_Block` tells the arguments."""
+        record_time = np.array([self._batch[index][2] for index in indices])
+        time = record_time
+        for name, leaf in row.items():
+            if leaf.kind == BYTES and not self._keep_binary:
+                self._notes[f"'{name}' is binary or long: left out, unless asked for"] += len(indices)
+                continue
+            values = read_leaf(leaf, matrix)
+            if name == STAMP:
+                time = np.where(values == 0.0, record_time, values)  # 0 is ROS for "no time"
+            else:
+                self._columns.setdefault(name, Pieces()).append(self._rows, values)
+        self._time.append(time)
+        self._record_time.append(record_time)
+        self._message.append(self._messages + indices)
+        self._rows += len(indices)

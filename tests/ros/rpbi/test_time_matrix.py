@@ -1,0 +1,128 @@
+"""Time, in all its combinations: nothing hangs, no stamp repeats or goes back, no message is missing in a bag."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import rosbag
+import yaml
+from ros_system import wait_until
+from rosgraph_msgs.msg import Clock
+from rpbi_utils import Recorder
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from tf2_msgs.msg import TFMessage
+from worlds import ball, iiwa, write_world
+
+STATES = {
+    "running": {},
+    "stopped": {"start_pybullet_after_initialization": False},
+    "stepped": {"start_pybullet_after_initialization": False},
+    "as fast as it goes": {"real_time_factor": 0},
+    "slow": {"real_time_factor": 0.1},
+    "real time": {"real_time_factor": 1},
+}
+STEPS = 60
+PERIOD_NS = 20_000_000  # of joint states and TF
+
+
+@pytest.fixture(params=STATES)
+def state(request):
+    return request.param
+
+
+@pytest.fixture(params=[True, False], ids=["sim time", "wall time"])
+def simulated(request):
+    return request.param
+
+
+@pytest.fixture
+def scene(ros, tmp_path, state, simulated):
+    """The simulator, listeners from the start, and then those that come late: a tf2 listener and a recorder."""
+    path = write_world(tmp_path, dynamic=(ball(broadcast_hz=50),), robots=(iiwa(),), **STATES[state])
+    world = yaml.safe_load(Path(path).read_text())
+    for section in ("dynamic_objects", "robots"):
+        world[section] = [str(tmp_path / name) for name in world[section]]
+    clock = ros.listen("/clock", Clock)
+    joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
+    tf = ros.listen("/tf", TFMessage)
+    ros.simulator(world, use_sim_time=simulated)
+    time.sleep(0.5)
+    client = ros.start([sys.executable, str(Path(__file__).with_name("late_client.py")), "rpbi/ball"])
+    bag = tmp_path / "late.bag"
+    recorder = Recorder(bag, ["/rpbi/iiwa/joint_states", "/tf"])
+    recorder.start()
+    time.sleep(0.3)  # what it is owed for coming late is on its way
+    yield dict(clock=clock, joint_states=joint_states, tf=tf, client=client, bag=bag, recorder=recorder)
+    if recorder.is_running:
+        recorder.stop()
+
+
+def _drive(ros, state):
+    """Lets the world live for a while, in the way of its state."""
+    if state == "stepped":
+        return [ros.call("/rpbi/step", Trigger).message for _ in range(STEPS)]
+    time.sleep(2.5 if state == "slow" else 1.0)
+    return []
+
+
+def test_time_behaves(ros, scene, state, simulated):
+    answers = _drive(ros, state)
+    client = scene["client"]
+    stands_still = state == "stopped" and simulated
+    wait_until(lambda: "transform" in ros.output(client), f"tf2 knows the ball: {ros.output(client)}")
+    if stands_still:
+        assert "slept" not in ros.output(client)
+        ros.call("/rpbi/start", Trigger)
+        wait_until(lambda: "slept" in ros.output(client), "ROS time goes on after a start")
+        ros.call("/rpbi/stop", Trigger)
+    else:
+        wait_until(lambda: "slept" in ros.output(client), "the client's sleep in ROS time ends")
+    assert client.wait(20) == 0, ros.output(client)
+
+    scene["recorder"].stop()
+    recorded = _recorded(scene["bag"])
+
+    for stamps in (scene["joint_states"].stamps_ns, _ball_stamps(scene["tf"].messages), *recorded.values()):
+        assert stamps, "nothing came"
+        assert stamps[0] > 0
+        assert all(before < after for before, after in zip(stamps, stamps[1:])), "a stamp repeated or went back"
+
+    clock_ns = [message.clock.to_nsec() for message in scene["clock"].messages]
+    if simulated:
+        assert clock_ns and clock_ns[0] > 0
+        assert all(before <= after for before, after in zip(clock_ns, clock_ns[1:])), "the clock went back"
+    else:
+        assert clock_ns == []
+
+    if simulated and state in ("running", "real time", "slow", "as fast as it goes"):
+        for topic, stamps in recorded.items():
+            gaps = {after - before for before, after in zip(stamps, stamps[1:])}
+            assert gaps <= {PERIOD_NS}, f"{topic}: messages are missing in the bag: {gaps}"
+    if state == "stepped" and simulated:
+        told = [int(answer.split("stamp ")[1].replace(".", "")) for answer in answers]
+        for stamps in (scene["joint_states"].stamps_ns, _ball_stamps(scene["tf"].messages)):
+            assert stamps[-STEPS:] == told, "every step is told once"
+
+
+def _ball_stamps(messages):
+    return [
+        transform.header.stamp.to_nsec()
+        for message in messages
+        for transform in message.transforms
+        if transform.child_frame_id == "rpbi/ball"
+    ]
+
+
+def _recorded(path):
+    joint_states, tf = [], []
+    with rosbag.Bag(str(path)) as bag:
+        for topic, message, _ in bag.read_messages(topics=["/rpbi/iiwa/joint_states", "/tf"]):
+            if topic == "/tf":
+                tf += _ball_stamps([message])
+            else:
+                joint_states.append(message.header.stamp.to_nsec())
+    return {"joint states": joint_states, "tf": tf}

@@ -1,0 +1,88 @@
+"""Files that cannot be read, or not to the end, are named with the reason and the remedy."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import rosbag
+from std_msgs.msg import Float64
+
+from rpbi_utils import bag_to_dataframes, topic_report
+from rpbi_utils.errors import BagError
+
+WriteBag = Callable[..., Path]
+
+
+def _refused(path: Path) -> str:
+    with pytest.raises(BagError) as report:
+        topic_report(path)
+    with pytest.raises(BagError) as tables:
+        bag_to_dataframes(path)
+    assert str(report.value) == str(tables.value)
+    message = str(tables.value)
+    assert message.startswith(f"{path}: ")
+    assert "\n" not in message
+    return message
+
+
+@pytest.fixture
+def bag(write_bag: WriteBag) -> Path:
+    return write_bag([("/a", Float64(index)) for index in range(1000)])
+
+
+def test_a_missing_file(tmp_path: Path) -> None:
+    assert "there is no such file" in _refused(tmp_path / "missing.bag")
+
+
+def test_a_folder(tmp_path: Path) -> None:
+    assert "not a file" in _refused(tmp_path)
+
+
+@pytest.mark.parametrize("content", [b"", b"a text\n", bytes(range(256)), b"\xff\xfe\n"])
+def test_a_file_that_is_no_bag(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "other.bag"
+    path.write_bytes(content)
+    assert "not a ROS 1 bag" in _refused(path)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
+def test_a_file_that_may_not_be_read(bag: Path) -> None:
+    bag.chmod(0)
+    assert "Permission denied" in _refused(bag)
+
+
+def test_an_unindexed_bag_can_be_read_once_it_is_reindexed(tmp_path: Path) -> None:
+    active = tmp_path / "run.bag.active"
+    with rosbag.Bag(str(active), "w", chunk_threshold=1000) as writer:
+        for index in range(1000):
+            writer.write("/a", Float64(index))
+        writer.flush()
+        shutil.copy(active, tmp_path / "cut.bag")
+        message = _refused(active)
+    assert "still being recorded" in message
+    path = tmp_path / "cut.bag"
+    assert f"rosbag reindex {path}" in _refused(path)
+    subprocess.run(["rosbag", "reindex", "-q", str(path)], check=True)
+    assert 900 < len(bag_to_dataframes(path)["/a"]) <= 1000  # the chunk that was being written is lost
+
+
+@pytest.mark.parametrize("part", [0.2, 0.5, 0.9, 0.99])
+def test_a_bag_that_is_cut_off(bag: Path, part: float) -> None:
+    os.truncate(bag, int(bag.stat().st_size * part))
+    assert "cut off: repair it with 'rosbag reindex" in _refused(bag)
+
+
+@pytest.mark.parametrize("compression", ["none", "bz2", "lz4"])
+def test_a_bag_that_is_damaged_inside(write_bag: WriteBag, compression: str) -> None:
+    path = write_bag([("/a", Float64(index)) for index in range(2000)], compression=compression)
+    with rosbag.Bag(str(path)) as bag:
+        chunk = list(bag._chunk_headers.values())[1]
+    with open(path, "r+b") as file:
+        file.seek(chunk.data_pos)
+        file.write(b"\xff" * chunk.compressed_size)
+    assert "damaged" in _refused(path)

@@ -1,0 +1,247 @@
+"""Recordings lose nothing at either end, and say so when they failed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rosgraph
+import rospy
+from ros_system import stop_group, wait_until
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Float64
+
+from rpbi_utils import Recorder, bag_to_dataframes
+from rpbi_utils.errors import RecordingError
+
+TALKER = """
+import rospy, sys
+from std_msgs.msg import Float64
+rospy.init_node("talker", anonymous=True, disable_rostime=True)
+publisher = rospy.Publisher(sys.argv[1], Float64, queue_size=10)
+while not rospy.is_shutdown():
+    publisher.publish(1.0)
+    rospy.rostime.wallsleep(0.01)
+"""
+
+SCRIPT = """
+import sys, time
+from rpbi_utils import Recorder
+with Recorder(sys.argv[1], ["/a"]):
+    print("recording")
+    time.sleep(60)
+"""
+
+
+def _recorders() -> list[str]:
+    """Returns the command lines of this process's recorders that still run."""
+    listing = subprocess.run(
+        ["ps", "--ppid", str(os.getpid()), "-o", "args="], capture_output=True, text=True
+    )
+    return [line for line in listing.stdout.splitlines() if "rosbag/record" in line]
+
+
+@pytest.fixture(autouse=True)
+def _no_recorder_is_left() -> Iterator[None]:
+    yield
+    assert _recorders() == []
+
+
+class Counter:
+    """Publishes 0, 1, 2, ... on several topics as fast as it is let, and knows what it published last."""
+
+    def __init__(self, topics: list[str]) -> None:
+        self.publishers = [rospy.Publisher(topic, Float64, queue_size=1000) for topic in topics]
+        self.last = -1
+        self._is_ended = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+
+    def __enter__(self) -> Counter:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self._is_ended.set()
+        self._thread.join()
+        for publisher in self.publishers:
+            publisher.unregister()
+
+    def _run(self) -> None:
+        while not self._is_ended.wait(0.002):
+            for publisher in self.publishers:
+                publisher.publish(self.last + 1)
+            self.last += 1
+
+
+def test_all_that_is_published_inside_is_in_the_bag_on_every_topic(ros: Any, tmp_path: Path) -> None:
+    topics = [f"/counted_{index}" for index in range(5)]
+    with Counter(topics) as counter:
+        wait_until(lambda: counter.last > 0, "something is published")
+        for attempt in range(3):
+            with Recorder(tmp_path / "out" / f"{attempt}.bag", topics) as recorder:
+                first = counter.last + 1
+                wait_until(lambda first=first: counter.last > first + 50, "50 messages are published")
+                last = counter.last
+            tables = bag_to_dataframes(recorder.path)
+            assert list(tables) == topics
+            for table in tables.values():
+                assert set(range(first, last + 1)) <= set(table["data"])
+                assert (table["data"].diff().dropna() == 1).all()
+
+
+def test_what_is_published_at_the_very_end_is_in_the_bag(ros: Any, tmp_path: Path) -> None:
+    publisher = rospy.Publisher("/burst", Float64, queue_size=100)
+    for _ in range(5):
+        with Recorder(tmp_path / "a.bag", ["/burst"]):
+            for number in range(50):
+                publisher.publish(number)
+        assert list(bag_to_dataframes(tmp_path / "a.bag")["/burst"]["data"]) == list(range(50))
+    publisher.unregister()
+
+
+def test_a_topic_that_nobody_publishes_yet_is_recorded_from_its_first_message(
+    ros: Any, tmp_path: Path
+) -> None:
+    with Recorder(tmp_path / "a.bag", ["/late"], lz4=False):
+        publisher = rospy.Publisher("/late", Float64, queue_size=10, latch=True)
+        publisher.publish(7.0)
+        wait_until(publisher.get_num_connections, "the recorder connects")
+    publisher.unregister()
+    assert list(bag_to_dataframes(tmp_path / "a.bag")["/late"]["data"]) == [7.0]
+
+
+def test_the_bag_before_is_replaced_and_nothing_else_is_left(ros: Any, tmp_path: Path) -> None:
+    path = tmp_path / "a.bag"
+    for topic in ("/first", "/second"):
+        with Counter([topic]) as counter, Recorder(path, [topic]):
+            start = counter.last
+            wait_until(
+                lambda counter=counter, start=start: counter.last > start + 5, "something is published"
+            )
+        assert list(bag_to_dataframes(path)) == [topic]
+        assert os.listdir(tmp_path) == ["a.bag"]
+
+
+def test_relative_topics_are_those_of_the_namespace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_NAMESPACE", "left")
+    assert Recorder(tmp_path / "a.bag", ["tf", "/tf", "/left/tf"]).topics == ["/left/tf", "/tf"]
+
+
+@pytest.mark.parametrize(("name", "topics"), [("a", ["/tf"]), ("a.bag", []), ("a.bag", "/tf")])
+def test_what_cannot_be_recorded_is_refused_at_once(tmp_path: Path, name: str, topics: Any) -> None:
+    with pytest.raises(ValueError):
+        Recorder(tmp_path / name, topics)
+
+
+def test_a_full_disk_is_an_error(ros: Any, tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="Less than 999999G of space free"):
+        with Recorder(tmp_path / "a.bag", ["/a"], min_space="999999G"):
+            pass
+
+
+def test_a_folder_that_cannot_be_written_is_an_error(ros: Any) -> None:
+    with pytest.raises(RecordingError, match="does not write .*Error opening file"):
+        with Recorder("/proc/a.bag", ["/a"]):
+            pass
+
+
+def test_a_recorder_that_died_is_an_error_that_tells_how_to_save_the_rest(ros: Any, tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"ended early.*rosbag reindex .*a\.bag\.active"):
+        with Counter(["/a"]), Recorder(tmp_path / "a.bag", ["/a"]) as recorder:
+            wait_until((tmp_path / "a.bag.active").exists, "the bag is begun")
+            recorder._process.kill()
+            wait_until(lambda: not recorder.is_running, "it is dead")
+
+
+def test_what_went_wrong_inside_is_what_is_raised_and_the_bag_is_closed(ros: Any, tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError):
+        with Counter(["/a"]) as counter, Recorder(tmp_path / "a.bag", ["/a"]):
+            wait_until(lambda: counter.last > 5, "something is published")
+            raise ZeroDivisionError
+    assert len(bag_to_dataframes(tmp_path / "a.bag")["/a"]) > 0
+
+
+def test_ctrl_c_closes_the_bag_and_leaves_no_process(ros: Any, tmp_path: Path) -> None:
+    path = tmp_path / "a.bag"
+    with Counter(["/a"]):
+        process = ros.start([sys.executable, "-c", SCRIPT, str(path)])
+        wait_until(lambda: "recording" in ros.output(process), "it records")
+        assert stop_group(process) != 0  # SIGINT goes to the script and to its recorder, as from a terminal
+    assert len(bag_to_dataframes(path)["/a"]) > 0
+    assert "Traceback" in ros.output(process) and "KeyboardInterrupt" in ros.output(process)
+    with pytest.raises(ProcessLookupError):
+        os.killpg(process.pid, 0)
+
+
+def test_without_a_master_it_does_not_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
+    with pytest.raises(RecordingError, match="no ROS master at http://127.0.0.1:1"):
+        Recorder(tmp_path / "a.bag", ["/a"]).start()
+
+
+def test_start_and_stop_out_of_order_are_refused(ros: Any, tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.bag", ["/a"])
+    with pytest.raises(RecordingError, match="has not been started"):
+        recorder.stop()
+    recorder.start()
+    with pytest.raises(RecordingError, match="going on already"):
+        recorder.start()
+    assert recorder.stop() == tmp_path / "a.bag"
+
+
+def test_simulated_time_without_a_clock_is_named(ros: Any, tmp_path: Path) -> None:
+    rospy.set_param("/use_sim_time", True)
+    (tmp_path / "a.bag").write_text("from before")  # not to be taken for the recording
+    with pytest.raises(RecordingError, match="with use_sim_time the recorder waits for /clock"):
+        with Recorder(tmp_path / "a.bag", ["/a"]):
+            pass
+
+
+def test_a_frozen_clock_stops_neither_start_nor_end(ros: Any, tmp_path: Path) -> None:
+    rospy.set_param("/use_sim_time", True)
+    clock = rospy.Publisher("/clock", Clock, queue_size=1, latch=True)
+    clock.publish(rospy.Time(5))
+    with Counter(["/a"]) as counter, Recorder(tmp_path / "a.bag", ["/a", "/clock"]):
+        wait_until(lambda: counter.last > 5, "something is published")
+    clock.unregister()
+    tables = bag_to_dataframes(tmp_path / "a.bag")
+    assert set(tables["/a"].index) == {5.0}
+    assert list(tables["/clock"]["clock"]) == [5.0]
+
+
+def test_a_publisher_that_hangs_is_named_and_the_others_are_recorded(
+    ros: Any, tmp_path: Path, caplog: pytest.LogCaptureFixture, stopped: Callable[[str], str]
+) -> None:
+    node = stopped("/hung")
+    with Counter(["/a"]) as counter, Recorder(tmp_path / "a.bag", ["/hung", "/a"], timeout_s=3.0):
+        first = counter.last
+        wait_until(lambda: counter.last > first + 5, "something is published")
+    assert f"not connected to {node} (/hung)" in caplog.text
+    assert len(bag_to_dataframes(tmp_path / "a.bag")["/a"]) >= 5
+
+
+@pytest.fixture
+def stopped(ros: Any) -> Iterator[Callable[[str], str]]:
+    """Starts a publisher, stops it with SIGSTOP and returns the name of its node."""
+    talkers = []
+
+    def stop(topic: str) -> str:
+        talkers.append(ros.start([sys.executable, "-c", TALKER, topic]))
+
+        def publishers() -> list[str]:
+            return dict(rosgraph.Master("/tests").getSystemState()[0]).get(topic, [])
+
+        (node,) = wait_until(publishers, f"{topic} is published")
+        talkers[-1].send_signal(signal.SIGSTOP)
+        return node
+
+    yield stop
+    for talker in talkers:
+        talker.send_signal(signal.SIGCONT)

@@ -1,0 +1,46 @@
+"""What is in a bag, counted and timed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import genpy
+import numpy as np
+import pytest
+from geometry_msgs.msg import WrenchStamped
+from std_msgs.msg import Float64, Header
+
+from rpbi_utils import topic_report
+
+WriteBag = Callable[..., Path]
+
+
+def test_rates_and_gaps_are_measured_by_stamps_and_sizes_are_those_of_the_messages(
+    write_bag: WriteBag,
+) -> None:
+    stamps_s = [1.0, 1.1, 1.2, 1.5, 1.4]  # one comes late
+    wrenches = [WrenchStamped(header=Header(stamp=genpy.Time.from_sec(stamp_s))) for stamp_s in stamps_s]
+    row = topic_report(write_bag(("/wrench", wrench) for wrench in wrenches)).loc["/wrench"]
+    assert (row["type"], row["messages"], row["bytes"]) == ("geometry_msgs/WrenchStamped", 5, 5 * (16 + 48))
+    assert row["rate_hz"] == pytest.approx(8.0)
+    assert row["max_gap_s"] == pytest.approx(0.2)
+    assert (row["first"], row["last"]) == (1.0, 1.5)
+
+
+def test_without_stamps_the_times_of_recording_count(write_bag: WriteBag) -> None:
+    row = topic_report(write_bag([("/a", Float64())] * 11 + [("/unstamped", WrenchStamped())] * 11)).loc
+    for topic in ("/a", "/unstamped"):
+        assert row[topic]["rate_hz"] == pytest.approx(1000.0)
+    assert row["/a"]["first"] == 100.0
+
+
+def test_one_message_has_no_rate(write_bag: WriteBag) -> None:
+    row = topic_report(write_bag([("/a", Float64())])).loc["/a"]
+    assert np.isnan(row["rate_hz"])
+    assert row["max_gap_s"] == 0.0
+
+
+def test_topics_are_sorted_and_an_empty_bag_has_none(write_bag: WriteBag) -> None:
+    assert list(topic_report(write_bag([("/b", Float64()), ("/a", Float64())])).index) == ["/a", "/b"]
+    assert len(topic_report(write_bag([], name="empty.bag"))) == 0

@@ -1,0 +1,32 @@
+"""The code is clean by the settings in pyproject.toml."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Runs a Python module at the root of the workspace."""
+    return subprocess.run([sys.executable, "-m", *arguments], cwd=ROOT, capture_output=True, text=True)
+
+
+def test_ruff_finds_nothing() -> None:
+    result = run("ruff", "check", "--no-cache", "--output-format", "concise", ".")
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
+def test_mypy_finds_nothing_in_the_cores() -> None:
+    result = run("mypy", "--cache-dir", str(ROOT / ".rpbi" / "mypy"))
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
+@pytest.mark.parametrize("node", sorted(ROOT.glob("src/*/nodes/*")), ids=lambda node: node.name)
+def test_node_runs_with_the_interpreter_that_has_ros(node: Path) -> None:
+    """Installed, a node keeps its first line; with `env python3` another Python first on PATH would run it."""
+    assert node.read_text().startswith("#!/usr/bin/python3\n")
+    assert os.access(node, os.X_OK)

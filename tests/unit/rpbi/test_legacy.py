@@ -1,0 +1,124 @@
+"""Worlds written for the authors' release still load, with a warning for each key that changed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from custom_ros_tools.errors import ConfigError
+from custom_ros_tools.schema import ConfigModel, Hz
+from rpbi.bodies import BODY_TYPES
+from rpbi.config import load_object, load_world_dict
+from rpbi.legacy import LEGACY_KEYS, PLANNED_KEYS, modernise
+
+ROBOT: dict[str, Any] = {
+    "name": "iiwa",
+    "loadURDF": {"fileName": "kuka_iiwa/model.urdf"},
+    "setJointMotorControlArray": {"controlMode": "POSITION_CONTROL"},
+}
+
+
+def robot(**more: Any) -> ConfigModel:
+    """Loads a robot with these further keys."""
+    return load_object("robot", {**ROBOT, **more}, "iiwa.yaml", BODY_TYPES)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "value", "expected"),
+    [
+        ("publish_joint_state_frequency", "joint_state_publisher_hz", 100, 100.0),
+        ("broadcast_link_states_frequency", "broadcast_link_states_hz", 30, 30.0),
+        ("brodcast_link_states_frequency", "broadcast_link_states_hz", 30, 30.0),
+        (
+            "initial_joint_positions",
+            "initial_joint_position",
+            {"joint_1": 10},
+            {"joint_1": 10.0},
+        ),
+    ],
+)
+def test_old_spelling_works_with_a_warning_that_says_what_to_write(
+    caplog: pytest.LogCaptureFixture, old: str, new: str, value: Any, expected: Any
+) -> None:
+    assert getattr(robot(**{old: value}), new) == expected
+    assert caplog.messages == [f"iiwa.yaml: {old}: is an old spelling: write {new}"]
+
+
+def test_every_old_spelling_means_a_key_that_exists() -> None:
+    for section, table in LEGACY_KEYS.items():
+        (model,) = (body.Config for body in BODY_TYPES.values() if body.section == section)
+        assert set(table.values()) <= set(model.model_fields)
+
+
+def test_old_and_new_spelling_together_are_refused() -> None:
+    with pytest.raises(ConfigError) as caught:
+        robot(publish_joint_state_frequency=100, joint_state_publisher_hz=50)
+    assert str(caught.value) == (
+        "iiwa.yaml: publish_joint_state_frequency: means joint_state_publisher_hz, "
+        "which is given too: remove one"
+    )
+
+
+def test_two_old_spellings_of_one_key_are_refused() -> None:
+    with pytest.raises(ConfigError, match="means broadcast_link_states_frequency, which is given too"):
+        robot(broadcast_link_states_frequency=30, brodcast_link_states_frequency=30)
+
+
+def test_fault_in_an_old_spelling_is_told_as_the_user_spelt_it() -> None:
+    with pytest.raises(ConfigError) as caught:
+        robot(publish_joint_state_frequency=0)
+    assert str(caught.value) == "iiwa.yaml: publish_joint_state_frequency: must be > 0 [Hz], got 0"
+
+
+@pytest.mark.parametrize(
+    ("main", "told"),
+    [
+        ({"gravity": -9.81}, "~config: gravity: has no effect: write setGravity"),
+        ({"visual_object": ["a.yaml"]}, "~config: visual_object: has no effect: write visual_objects"),
+        (
+            {"setPhysicsEngineParameter": {"fixedTimeStep": 0.01}},
+            "~config: setPhysicsEngineParameter.fixedTimeStep: has no effect: write timeStep",
+        ),
+        ({"enable_keyboard_publisher": True}, "~config: enable_keyboard_publisher: has no effect yet"),
+        ({"soft_objects": ["torus.yaml"]}, "~config: soft_objects: has no effect yet"),
+        ({"publish_visualizer_image_hz": 10}, "~config: publish_visualizer_image_hz: has no effect yet"),
+    ],
+)
+def test_key_without_effect_is_warned_of(
+    caplog: pytest.LogCaptureFixture, main: dict[str, Any], told: str
+) -> None:
+    load_world_dict(main, "~config", BODY_TYPES)
+    (message,) = caplog.messages
+    assert message.startswith(told)
+
+
+def test_planned_key_that_asks_for_nothing_is_silent(caplog: pytest.LogCaptureFixture) -> None:
+    nothing = {
+        "soft_objects": [],
+        "urdfs": [],
+        "enable_keyboard_publisher": False,
+        "enable_mouse_publisher": False,
+        "publish_visualizer_image_hz": 0,
+        "visualizer_image_width": 320,
+    }
+    load_world_dict(nothing, "~config", BODY_TYPES)
+    robot(start_ik_callback=False, enabled_joint_force_torque_sensors=[], log_joint_limit_violations_hz=10)
+    assert caplog.messages == []
+
+
+def test_ignored_motor_arguments_are_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    robot(setJointMotorControlArray={"controlMode": "POSITION_CONTROL", "forces": [1.0]})
+    assert caplog.messages == [
+        "iiwa.yaml: setJointMotorControlArray.forces: has no effect: efforts are limited by the URDF"
+    ]
+
+
+def test_planned_key_is_left_alone_once_the_model_has_it(caplog: pytest.LogCaptureFixture) -> None:
+    class Later(ConfigModel):
+        publish_visualizer_image_hz: Hz
+
+    assert "publish_visualizer_image_hz" in PLANNED_KEYS["main"]
+    current, _, _ = modernise("main", {"publish_visualizer_image_hz": 10}, "f", Later)
+    assert current == {"publish_visualizer_image_hz": 10}
+    assert caplog.messages == []

@@ -1,0 +1,80 @@
+"""Tables to files and back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rpbi_utils.table_files import file_stems, write_table
+
+
+def test_file_names_are_readable_unique_and_stay_in_the_folder() -> None:
+    topics = [
+        "/kuka/joint_states",
+        "/kuka.joint_states",
+        "kuka/joint_states",
+        "/",
+        "/../../etc",
+        "/a b",
+        "/ä",
+    ]
+    assert list(file_stems(topics).values()) == [
+        "kuka.joint_states",
+        "kuka.joint_states-2",
+        "kuka.joint_states-3",
+        "_",
+        "etc",
+        "a_b",
+        "_-2",
+    ]
+
+
+@pytest.fixture
+def table() -> pd.DataFrame:
+    columns = {
+        "record_time": [1700000000.1, 1700000000.2],
+        "position/arm.joint 1": [0.1, np.nan],
+        "header/seq": np.array([1, 2], np.uint32),
+        "text": ["ä", None],
+        "late text": [None, "b"],
+        "flag": [True, None],
+        "mixed": [1.5, "x"],
+    }
+    return pd.DataFrame(columns, index=pd.Index([1700000000.000000001, 1700000000.1], name="time"))
+
+
+def test_parquet_gives_back_what_went_in(table: pd.DataFrame, tmp_path: Path) -> None:
+    table["data"] = [b"\0\xff", b""]
+    write_table(table, tmp_path / "t.parquet")
+    back = pd.read_parquet(tmp_path / "t.parquet", engine="fastparquet")
+    assert list(back.columns) == list(table.columns)
+    pd.testing.assert_index_equal(back.index, table.index)
+    for name in table.columns.drop("mixed"):
+        assert [None if pd.isna(x) else x for x in back[name]] == [
+            None if pd.isna(x) else x for x in table[name]
+        ]
+    assert list(back["mixed"]) == ["1.5", "x"]  # Parquet has one type a column
+
+
+def test_csv_gives_back_the_numbers_bit_for_bit(table: pd.DataFrame, tmp_path: Path) -> None:
+    write_table(table, tmp_path / "t.csv")
+    back = pd.read_csv(tmp_path / "t.csv", index_col="time", float_precision="round_trip")
+    assert list(back.index) == list(table.index)
+    np.testing.assert_array_equal(back["position/arm.joint 1"], table["position/arm.joint 1"])
+
+
+def test_binary_columns_do_not_go_into_text_files(table: pd.DataFrame, tmp_path: Path) -> None:
+    table["data"] = [b"a", b"b"]
+    with pytest.raises(ValueError, match="'data' is binary"):
+        write_table(table, tmp_path / "t.csv")
+    assert not (tmp_path / "t.csv").exists()
+
+
+@pytest.mark.parametrize("name", ["t.parquet", "t.csv"])
+def test_an_empty_table_can_be_written(tmp_path: Path, name: str) -> None:
+    empty = pd.DataFrame({"record_time": np.empty(0)}, index=pd.Index(np.empty(0), name="time"))
+    write_table(empty, tmp_path / name)
+    assert (tmp_path / name).stat().st_size > 0
