@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+NODES = sorted(path for path in ROOT.glob("src/*/nodes/*") if path.is_file())
 
 
 def run(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -25,8 +26,14 @@ def test_mypy_finds_nothing_in_the_cores() -> None:
     assert result.returncode == 0, result.stdout + result.stderr
 
 
-@pytest.mark.parametrize("node", sorted(ROOT.glob("src/*/nodes/*")), ids=lambda node: node.name)
+@pytest.mark.parametrize("node", NODES, ids=lambda node: node.name)
 def test_node_runs_with_the_interpreter_that_has_ros(node: Path) -> None:
     """Installed, a node keeps its first line; with `env python3` another Python first on PATH would run it."""
     assert node.read_text().startswith("#!/usr/bin/python3\n")
     assert os.access(node, os.X_OK)
+
+
+def test_catkin_lint_finds_no_error_in_the_packages() -> None:
+    command = ["catkin_lint", "--offline", "-W0", str(ROOT / "src")]
+    result = subprocess.run(command, capture_output=True, text=True)
+    assert result.returncode == 0, result.stdout + result.stderr

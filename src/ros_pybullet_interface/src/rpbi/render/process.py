@@ -25,7 +25,7 @@ DEMAND_PERIOD_S = 0.05
 """How often to look who looks at the images [s]."""
 
 STUCK_AFTER_S = 300.0
-"""After so long in one go something hangs, in a driver perhaps, and the process ends itself to be started again [s].
+"""After so long in one go something hangs, in a driver perhaps, and the process ends itself [s].
 At idle priority on a busy machine a lot may take long."""
 
 

@@ -8,7 +8,9 @@ from ..bodies.robot import Robot
 from ..inputs import PoseInput
 from ..sensors import JointStateSensor, LinkPoseSensor
 from ..world import World
+from .camera_topics import CAMERA_TOPICS, camera_prefix
 from .inputs import TOPIC_INPUTS
+from .services import NODE_SERVICES
 
 
 class Endpoint(NamedTuple):
@@ -27,15 +29,14 @@ class Endpoint(NamedTuple):
     note: str = ""
 
 
-def endpoints(world: World, simulated_time: bool = True) -> list[Endpoint]:
-    """Lists what the node would open for a world."""
+def endpoints(world: World) -> list[Endpoint]:
+    """Lists what the node opens for a world."""
     config = world.config
     listed = [
         Endpoint("publishes", "rpbi/status", "std_msgs/Int64", f"{config.status_hz:g} Hz; 1 running, 0 stopped"),
         Endpoint("publishes", "/diagnostics", "diagnostic_msgs/DiagnosticArray", "1 Hz"),
     ]
-    if simulated_time:
-        listed.append(Endpoint("publishes", "/clock", "rosgraph_msgs/Clock", "if use_sim_time"))
+    listed.append(Endpoint("publishes", "/clock", "rosgraph_msgs/Clock", "if use_sim_time"))
     for name, body in world.bodies.items():
         for sensor in body.sensors():
             if isinstance(sensor, JointStateSensor):
@@ -43,8 +44,10 @@ def endpoints(world: World, simulated_time: bool = True) -> list[Endpoint]:
                 listed.append(Endpoint("publishes", topic, "sensor_msgs/JointState", f"{sensor.hz:g} Hz"))
             elif isinstance(sensor, LinkPoseSensor):
                 listed.append(Endpoint("publishes", "/tf", "tf2_msgs/TFMessage", f"{sensor.hz:g} Hz; {name}"))
-    for camera in world.cameras.values():
-        listed += [Endpoint("publishes", *topic, f"{camera.hz:g} Hz") for topic in CAMERA_TOPICS]
+    for index, (name, camera) in enumerate(world.cameras.items()):
+        for topic in CAMERA_TOPICS:
+            full_name = f"{camera_prefix(name, index)}/{topic.suffix}"
+            listed.append(Endpoint("publishes", full_name, topic.message_type._type, f"{camera.hz:g} Hz"))
     for slot, taken in world.inputs.items():
         name, key = slot.split("/")
         if isinstance(taken, PoseInput):
@@ -53,7 +56,8 @@ def endpoints(world: World, simulated_time: bool = True) -> list[Endpoint]:
             topic_input = TOPIC_INPUTS[key]
             type_name = topic_input.message_type._type
             listed.append(Endpoint("subscribes", topic_input.topic.format(name=name), type_name))
-    listed += [Endpoint("serves", *service) for service in NODE_SERVICES]
+    for name, service_type in NODE_SERVICES.items():
+        listed.append(Endpoint("serves", name, service_type._type))
     for name, body in world.bodies.items():
         if isinstance(body, Robot):
             listed.append(Endpoint("serves", f"rpbi/{name}/robot_info", "ros_pybullet_interface/RobotInfo"))

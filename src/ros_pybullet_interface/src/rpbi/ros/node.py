@@ -15,9 +15,10 @@ from ..asset_files import ROBOT_DESCRIPTION
 from ..bodies import BODY_TYPES
 from ..bodies.robot import Robot
 from ..config import load_world_dict
-from ..samples import JointStateSample, LinkPoseSample
+from ..samples import JointStateSample, LinkPoseSample, SceneSample
 from ..urdf import write_description
 from ..world import World
+from .camera_outlet import CameraOutlet
 from .inputs import Inputs
 from .outlets import JointStateOutlet, Outlet, TransformOutlet
 from .requests import Requests
@@ -55,12 +56,20 @@ class SimulatorNode:
         self._world = World(loaded, simulated)
         self._joint_states, self._transforms = JointStateOutlet(), TransformOutlet()
         outlets: dict[type, Outlet] = {JointStateSample: self._joint_states, LinkPoseSample: self._transforms}
+        self._cameras = CameraOutlet(self._world) if self._world.cameras else None
+        if self._cameras is not None:
+            outlets[SceneSample] = self._cameras
         clock = ClockOutlet(self._world.clock, _clock_hz(config)) if simulated else None
-        self._simulation = Simulation(self._world, outlets, config.real_time_factor, config.status_hz, clock)
+        cameras = {} if self._cameras is None else {"helpers": (self._cameras.poll,), "facts": self._cameras.facts}
+        self._simulation = Simulation(
+            self._world, outlets, config.real_time_factor, config.status_hz, clock, **cameras
+        )
         self._inputs = Inputs(self._world)
         self._ask = Requests(self._simulation)
         self._robot_infos: dict[str, RobotInfoService] = {}
         self._objects_lock = threading.Lock()  # one object comes or goes at a time
+        for name, camera in self._world.cameras.items():
+            self._inputs.open(name, camera.inputs())
         for name in self._world.bodies:
             self._open(name)
         context = {"search_paths": config.search_paths(), ROBOT_DESCRIPTION: description}
@@ -73,6 +82,8 @@ class SimulatorNode:
         try:
             self._simulation.run(rospy.is_shutdown)
         finally:
+            if self._cameras is not None:
+                self._cameras.close()
             self._world.close()
 
     def _add(self, kind: str, config: Any) -> None:

@@ -38,6 +38,17 @@ OBJECT_TYPES = {
 """Key of BODY_TYPES for each number in PybulletObject."""
 
 
+NODE_SERVICES: dict[str, type] = {
+    "rpbi/start": Trigger,
+    "rpbi/stop": Trigger,
+    "rpbi/step": Trigger,
+    "rpbi/add_pybullet_object": AddPybulletObject,
+    "rpbi/remove_pybullet_object": SetString,
+    "rpbi/list_objects": ListObjects,
+}
+"""What the node serves, in the order of its handlers."""
+
+
 class NodeServices:
     """Start, stop, step; add, remove and list objects.
 
@@ -59,12 +70,9 @@ class NodeServices:
     ) -> None:
         self._simulation, self._ask, self._add, self._remove = simulation, ask, add, remove
         self._context = context
-        rospy.Service("rpbi/start", Trigger, self._start)
-        rospy.Service("rpbi/stop", Trigger, self._stop)
-        rospy.Service("rpbi/step", Trigger, self._step)
-        rospy.Service("rpbi/add_pybullet_object", AddPybulletObject, self._add_object)
-        rospy.Service("rpbi/remove_pybullet_object", SetString, self._remove_object)
-        rospy.Service("rpbi/list_objects", ListObjects, self._list_objects)
+        handlers = (self._start, self._stop, self._step, self._add_object, self._remove_object, self._list_objects)
+        for (name, service_type), handler in zip(NODE_SERVICES.items(), handlers, strict=True):
+            rospy.Service(name, service_type, handler)
 
     def _start(self, _: TriggerRequest) -> TriggerResponse:
         return self._switch(self._simulation.start, "started", "already running")

@@ -30,6 +30,7 @@ class Simulation:
         status_hz: Rate of the status [Hz].
         clock: Publishes /clock if stamps are simulated time.
         helpers: Called at every pass; they must return at once.
+        facts: Tells what else the diagnostics should have.
     """
 
     def __init__(
@@ -40,6 +41,7 @@ class Simulation:
         status_hz: float,
         clock: Optional[ClockOutlet] = None,
         helpers: Sequence[Callable[[], None]] = (),
+        facts: Callable[[], Mapping[str, str]] = dict,
     ) -> None:
         self.world = world
         self.running = False
@@ -53,7 +55,7 @@ class Simulation:
         self._idle_pacer = Pacer(max(world.clock.dt_s, IDLE_PERIOD_S))
         self._idle_ticks_a_pass = max(1, round(IDLE_PERIOD_S / world.clock.dt_s))
         self._idle_tick = 0
-        self._status = StatusOutlet(world.clock, self._pacer, status_hz, real_time_factor)
+        self._status = StatusOutlet(world.clock, self._pacer, status_hz, real_time_factor, facts)
 
     def start(self) -> bool:
         """Lets the world run.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import Callable, Mapping
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -64,10 +65,19 @@ class StatusOutlet:
         pacer: What keeps it in step with the wall clock.
         hz: Rate of `rpbi/status` [Hz] of wall time.
         real_time_factor: The factor asked for; 0 is as fast as it goes.
+        facts: Tells what else the diagnostics should have.
     """
 
-    def __init__(self, clock: Clock, pacer: Pacer, hz: float, real_time_factor: float) -> None:
+    def __init__(
+        self,
+        clock: Clock,
+        pacer: Pacer,
+        hz: float,
+        real_time_factor: float,
+        facts: Callable[[], Mapping[str, str]] = dict,
+    ) -> None:
         self._clock, self._pacer, self._wanted_factor = clock, pacer, real_time_factor
+        self._facts = facts
         self._period_s = 1.0 / hz
         self._status = rospy.Publisher("rpbi/status", Int64, queue_size=10)
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
@@ -105,6 +115,7 @@ class StatusOutlet:
             "lost_s_total": f"{self._pacer.lost_s:.3f}",
             "tick": str(self._clock.tick),
             "time_s": f"{self._clock.time_s:.6f}",
+            **self._facts(),
         }
         status.values = [KeyValue(key, value) for key, value in values.items()]
         message = DiagnosticArray(status=[status])

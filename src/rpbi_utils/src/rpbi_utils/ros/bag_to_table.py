@@ -38,7 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return 130
     if not arguments.quiet:
-        print(written.to_string(index=False) if len(written) else "no topic to write")
+        print(_text(written) if len(written) else "no topic to write")
     return 0
 
 
@@ -78,6 +78,13 @@ def _convert(arguments: argparse.Namespace) -> pd.DataFrame:
             raise BagError(bag, f"{topic}: {error}") from error
         rows.append((topic, *tables[topic].shape, _size(path), path))
     return pd.DataFrame(rows, columns=["topic", "rows", "columns", "size", "file"])
+
+
+def _text(written: pd.DataFrame) -> str:
+    """Returns what was written as a table, texts to the left."""
+    widths = {name: written[name].astype(str).str.len().max() for name in ("topic", "file")}
+    left = {name: f"{{!s:<{width}}}".format for name, width in widths.items()}
+    return str(written.to_string(index=False, justify="left", formatters=left))
 
 
 def _size(path: Path) -> str:

@@ -1,0 +1,6 @@
+#!/usr/bin/env python3
+"""Checks a world without a ROS master."""
+
+from rpbi.ros.check import main
+
+main()

@@ -1,0 +1,46 @@
+"""Checks a world without a ROS master, and tells what it would offer."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+
+import pybullet
+from custom_ros_tools.errors import InterfaceError
+
+from ..bodies import BODY_TYPES
+from ..config import load_world
+from ..world import World
+from .interface_table import endpoints
+
+
+def main() -> None:
+    """Runs the command; exits with 1 if the world has problems."""
+    parser = argparse.ArgumentParser(prog="./rpbi check", description="Finds all problems of a world.")
+    parser.add_argument("world", metavar="WORLD.yaml", help="main YAML file; {package}/path is resolved")
+    path = parser.parse_args().world
+    logging.basicConfig(format="warning: %(message)s", level=logging.WARNING)
+    try:
+        world = World(load_world(path, BODY_TYPES), connection_mode=pybullet.DIRECT)
+    except InterfaceError as error:
+        problems = str(error).splitlines()
+        print("\n".join(problems), file=sys.stderr)
+        print(f"{path}: {len(problems)} problem{'s' if len(problems) > 1 else ''}", file=sys.stderr)
+        sys.exit(1)
+    _print(path, world)
+    world.close()
+
+
+def _print(path: str, world: World) -> None:
+    kinds = {body_type: kind for kind, body_type in BODY_TYPES.items()}
+    print(f"{path}: fine; {1.0 / world.clock.dt_s:g} ticks a second")
+    for name, body in world.bodies.items():
+        joints = f", {len(body.joint_indices)} joints" if body.joint_indices else ""
+        print(f"  {kinds[type(body)]:<10} {name}{joints}")
+    for name in world.cameras:
+        print(f"  {'camera':<10} {name}")
+    rows = endpoints(world)
+    kind_width, name_width, type_width = (max(map(len, column)) for column in list(zip(*rows))[:3])
+    for kind, name, type_name, note in rows:
+        print(f"  {kind:<{kind_width}}  {name:<{name_width}}  {type_name:<{type_width}}  {note}".rstrip())

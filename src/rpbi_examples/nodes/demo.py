@@ -1,0 +1,6 @@
+#!/usr/bin/env python3
+"""Runs the demo."""
+
+from rpbi_examples.ros.demo import main
+
+main()

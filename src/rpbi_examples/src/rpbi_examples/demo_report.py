@@ -1,0 +1,121 @@
+"""What the demo writes about its recording: tables, pictures and a summary."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Mapping
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt  # noqa: E402
+import numpy as np  # noqa: E402
+import numpy.typing as npt  # noqa: E402
+import pandas as pd  # noqa: E402
+
+ENOUGH = 0.95
+"""Share of its rate that a topic must reach."""
+
+
+def measured_rates(messages: Mapping[str, int], expected_hz: Mapping[str, float], duration_s: float) -> pd.DataFrame:
+    """Compares how often topics came with how often they should.
+
+    Args:
+        messages: Number of messages by topic.
+        expected_hz: Rate by topic [Hz].
+        duration_s: Length of the recording [s] of ROS time.
+
+    Returns:
+        One row a topic with the columns `messages`, `rate_hz`, `expected_hz` and `enough`.
+    """
+    table = pd.DataFrame({"expected_hz": pd.Series(expected_hz, dtype=float)})
+    table.index.name = "topic"
+    table["messages"] = [messages.get(topic, 0) for topic in table.index]
+    table["rate_hz"] = table["messages"] / duration_s
+    # One message may fall outside either end.
+    table["enough"] = (table["messages"] + 1) / duration_s >= ENOUGH * table["expected_hz"]
+    return table[["messages", "rate_hz", "expected_hz", "enough"]]
+
+
+def tracking_error(states: pd.DataFrame, targets: pd.DataFrame) -> pd.DataFrame:
+    """Compares positions with the targets that held at the time.
+
+    Args:
+        states: Joint states with columns `position/JOINT`, index time [s].
+        targets: Targets alike.
+
+    Returns:
+        One row a joint with the columns `rms` and `max` [rad or m].
+    """
+    columns = [column for column in targets.columns if column.startswith("position/")]
+    latest = targets[columns].ffill()
+    held = latest[~latest.index.duplicated(keep="last")].reindex(states.index, method="ffill")
+    error = (states[columns] - held).dropna()
+    error.columns = [column.removeprefix("position/") for column in columns]
+    return pd.DataFrame({"rms": np.sqrt((error**2).mean()), "max": error.abs().max()})
+
+
+def plot_joints(states: pd.DataFrame, targets: pd.DataFrame, path: Path) -> None:
+    """Draws positions and targets of the joints that have any."""
+    columns = [column for column in targets.columns if column.startswith("position/")]
+    start_s = states.index[0]
+    figure, axes = plt.subplots(len(columns), sharex=True, figsize=(9, 1.3 * len(columns) + 1), squeeze=False)
+    for axis, column in zip(axes[:, 0], columns, strict=True):
+        axis.plot(targets.index - start_s, targets[column], color="#e8731a", lw=2.2, label="target")
+        axis.plot(states.index - start_s, states[column], color="#22333f", lw=1.0, label="position")
+        axis.set_ylabel(column.removeprefix("position/").removesuffix("_joint") + "\n[rad]", fontsize=8)
+        axis.grid(alpha=0.3)
+    axes[0, 0].legend(loc="upper right", ncols=2, fontsize=8)
+    axes[-1, 0].set_xlabel("simulated time [s]")
+    _save(figure, path, "Joint positions and their targets")
+
+
+def plot_efforts(states: pd.DataFrame, joints: list[str], path: Path) -> None:
+    """Draws the motors' efforts."""
+    figure, axis = plt.subplots(figsize=(9, 4))
+    for joint in joints:
+        axis.plot(states.index - states.index[0], states[f"effort/{joint}"], lw=1.0, label=joint)
+    axis.set_xlabel("simulated time [s]")
+    axis.set_ylabel("effort [N m]")
+    axis.grid(alpha=0.3)
+    axis.legend(fontsize=8, ncols=2, loc="upper right")
+    _save(figure, path, "Motor efforts")
+
+
+def save_colour(pixels: npt.NDArray[np.uint8], path: Path) -> None:
+    """Writes a colour image of shape (height, width, 3)."""
+    plt.imsave(path, pixels)
+
+
+def save_depth(depth_m: npt.NDArray[np.float32], far_m: float, path: Path) -> None:
+    """Draws a depth image of shape (height, width) [m]; what sees nothing stays white."""
+    figure, axis = plt.subplots(figsize=(7.2, 4.9))
+    image = axis.imshow(np.where(depth_m < 0.999 * far_m, depth_m, np.nan), cmap="viridis_r")
+    figure.colorbar(image, ax=axis, label="depth along the optical axis [m]")
+    axis.set_xlabel("column [px]")
+    axis.set_ylabel("row [px]")
+    _save(figure, path, "Depth image")
+
+
+def write_summary(summary: Mapping[str, Any], path: Path) -> None:
+    """Writes the summary as JSON."""
+    path.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+
+
+def as_text(summary: Mapping[str, Any]) -> str:
+    """Returns the summary as a table for the terminal."""
+    lines = [f"{'topic':<36}{'messages':>9}{'rate [Hz]':>11}{'expected':>10}"]
+    for topic, row in summary["topics"].items():
+        mark = "" if row["enough"] else "  TOO FEW"
+        lines.append(f"{topic:<36}{row['messages']:>9}{row['rate_hz']:>11.2f}{row['expected_hz']:>10.1f}{mark}")
+    lines += [""] + [f"{key:<36}{value}" for key, value in summary["figures"].items()]
+    return "\n".join(lines)
+
+
+def _save(figure: Any, path: Path, title: str) -> None:
+    figure.suptitle(title, fontsize=11)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+    plt.close(figure)

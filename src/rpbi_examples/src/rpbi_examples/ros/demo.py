@@ -1,0 +1,204 @@
+"""The main job end to end: simulate, record, tabulate, draw."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any, Optional
+
+import numpy as np
+import pandas as pd
+import rosbag
+import rosgraph
+from custom_ros_tools.errors import InterfaceError
+from rpbi.bodies import BODY_TYPES
+from rpbi.config import load_world
+from rpbi_utils import Recorder, bag_to_dataframes, topic_report
+
+from .. import demo_report
+from .basic_robot_example import HZ as TARGET_HZ
+
+EXAMPLE = "basic_example_kuka_lwr"
+WORLD = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"
+STATES = "/rpbi/kuka_lwr/joint_states"
+TARGETS = "/rpbi/kuka_lwr/joint_states/target"
+COLOUR, DEPTH = "/rpbi/camera/colour/image", "/rpbi/camera/depth/image"
+START_TIMEOUT_S = 60.0
+
+
+def main() -> None:
+    """Runs the demo; exits with 1 if it failed or a topic came too seldom."""
+    arguments = _arguments()
+    logging.basicConfig(format="%(message)s", level=logging.WARNING)
+    try:
+        sys.exit(_demo(arguments))
+    except InterfaceError as error:
+        sys.exit(f"demo: {error}")
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="./rpbi demo", description="Simulates, records, tabulates and draws.")
+    parser.add_argument("--seconds", type=float, default=10.0, help="length of the recording, default 10")
+    parser.add_argument("--headless", action="store_true", help="no window, even if there is a screen")
+    parser.add_argument("--out", type=Path, default=Path("out/demo"), help="where to write, default out/demo")
+    arguments = parser.parse_args()
+    if not 1.0 <= arguments.seconds <= 3600.0:
+        parser.error(f"--seconds: expected 1 to 3600, got {arguments.seconds:g}")
+    arguments.headless = arguments.headless or not os.environ.get("DISPLAY")
+    return arguments
+
+
+def _demo(arguments: argparse.Namespace) -> int:
+    out: Path = arguments.out.resolve()
+    out.mkdir(parents=True, exist_ok=True)
+    bag = out / "recording.bag"
+    expected_hz = _expected_rates()
+    with _Example(arguments.headless, out / "launch.log"):
+        with Recorder(bag, [*expected_hz, "/diagnostics", "/tf_static"]):
+            _say(f"recording {arguments.seconds:g} s of {len(expected_hz)} topics into {bag}")
+            time.sleep(arguments.seconds)
+    _say("reading the bag")
+    summary = _report(bag, expected_hz, out)
+    print(demo_report.as_text(summary))
+    _say(f"\nwritten to {out}: {', '.join(sorted(path.name for path in out.iterdir()))}")
+    too_few = [topic for topic, row in summary["topics"].items() if not row["enough"]]
+    for topic in too_few:
+        _say(f"FAILED: {topic} came at less than {demo_report.ENOUGH:.0%} of its rate")
+    return 1 if too_few else 0
+
+
+class _Example:
+    """The example, launched on a ROS master of its own, so that it meets nobody else's nodes."""
+
+    def __init__(self, headless: bool, log: Path) -> None:
+        self._log = log
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self._port = probe.getsockname()[1]
+        os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{self._port}"
+        os.environ["ROS_IP"] = "127.0.0.1"
+        os.environ.pop("ROS_HOSTNAME", None)
+        self._command = [
+            "roslaunch", "-p", str(self._port), "rpbi_examples", f"{EXAMPLE}.launch", f"headless:={headless}",
+        ]  # fmt: skip
+        self._process: Optional[subprocess.Popen] = None
+
+    def __enter__(self) -> _Example:
+        _say(f"launching {EXAMPLE} (ROS_MASTER_URI={os.environ['ROS_MASTER_URI']}, log: {self._log})")
+        with open(self._log, "w", encoding="utf-8") as log:
+            self._process = subprocess.Popen(
+                self._command, stdout=log, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True
+            )
+        try:
+            self._wait_until_moving()
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        assert self._process is not None
+        if self._process.poll() is None:
+            self._process.send_signal(signal.SIGINT)
+            try:
+                self._process.wait(30.0)
+            except subprocess.TimeoutExpired:
+                os.killpg(self._process.pid, signal.SIGKILL)
+
+    def _wait_until_moving(self) -> None:
+        """Waits until the arm gets targets, by when everything else is up."""
+        end_s = time.monotonic() + START_TIMEOUT_S
+        while time.monotonic() < end_s:
+            assert self._process is not None
+            if self._process.poll() is not None:
+                break
+            if _is_published(TARGETS) and _is_published(COLOUR):
+                return
+            time.sleep(0.1)
+        tail = "\n".join(self._log.read_text(errors="replace").splitlines()[-20:])
+        raise InterfaceError(f"the example did not come up; the end of {self._log}:\n{tail}")
+
+
+def _is_published(topic: str) -> bool:
+    try:
+        publishers, _, _ = rosgraph.Master("/demo").getSystemState()
+    except (OSError, rosgraph.MasterException):
+        return False
+    return any(name == topic for name, _ in publishers)
+
+
+def _expected_rates() -> dict[str, float]:
+    """Returns the rate of each topic [Hz], from the files that the example is made of."""
+    world = load_world(WORLD, BODY_TYPES)
+    robot: Any = next(item.config for item in world.objects if item.type == "robot")
+    camera = world.config.rgbd_sensor
+    assert camera is not None
+    rates = {
+        STATES: robot.joint_state_publisher_hz,
+        TARGETS: TARGET_HZ,
+        "/tf": robot.broadcast_link_states_hz,
+        "/clock": min(1.0 / world.config.timeStep, 1000.0),
+    }
+    for topic in (COLOUR, DEPTH, "/rpbi/camera/colour/camera_info", "/rpbi/camera/depth/camera_info"):
+        rates[topic] = camera.hz
+    return rates
+
+
+def _report(bag: Path, expected_hz: dict[str, float], out: Path) -> dict[str, Any]:
+    """Writes tables, pictures and the summary, and returns the summary."""
+    tables = bag_to_dataframes(bag, [STATES, TARGETS, "/clock", "/diagnostics"])
+    states, targets, clock = tables[STATES], tables[TARGETS], tables["/clock"]["clock"]
+    duration_s = float(clock.iloc[-1] - clock.iloc[0])
+    rates = demo_report.measured_rates(topic_report(bag)["messages"].to_dict(), expected_hz, duration_s)
+    states.to_parquet(out / "joint_states.parquet", engine="fastparquet")
+    demo_report.plot_joints(states, targets, out / "joints.png")
+    error = demo_report.tracking_error(states, targets)
+    demo_report.plot_efforts(states, list(error.index), out / "efforts.png")
+    world = load_world(WORLD, BODY_TYPES)
+    assert world.config.rgbd_sensor is not None
+    demo_report.save_colour(_middle_image(bag, COLOUR, np.uint8, 3), out / "colour.png")
+    depth = _middle_image(bag, DEPTH, np.float32, 1)[:, :, 0]
+    demo_report.save_depth(depth, world.config.rgbd_sensor.intrinsics.range[1], out / "depth.png")
+    summary = {
+        "topics": rates.to_dict(orient="index"),
+        "figures": {**_diagnostics(tables["/diagnostics"]), "recorded_s": round(duration_s, 3),
+                    "tracking_error_rms_rad": round(float(error["rms"].max()), 5),
+                    "tracking_error_max_rad": round(float(error["max"].max()), 5),
+                    "bag_mb": round(bag.stat().st_size / 1e6, 1)},
+    }  # fmt: skip
+    demo_report.write_summary(summary, out / "summary.json")
+    return summary
+
+
+def _diagnostics(table: pd.DataFrame) -> dict[str, Any]:
+    """Returns what the simulator told of itself."""
+    own = table[table["name"].str.endswith(": simulation")]
+    overruns = own["values/overruns_total"].astype(int)
+    return {
+        "real_time_factor": round(float(own["values/real_time_factor"].astype(float).mean()), 4),
+        "overruns": int(overruns.iloc[-1] - overruns.iloc[0]),
+        "renderer": own["values/camera_renderer"].iloc[-1],
+    }
+
+
+def _middle_image(bag: Path, topic: str, dtype: type, channels: int) -> np.ndarray:
+    """Returns the image in the middle of the recording, shape (height, width, channels)."""
+    with rosbag.Bag(str(bag)) as recording:
+        count = recording.get_message_count(topic)
+        for number, (_, message, _) in enumerate(recording.read_messages(topics=[topic])):
+            if number == count // 2:
+                return np.frombuffer(message.data, dtype).reshape(message.height, message.width, channels)
+    raise InterfaceError(f"{bag}: no image on {topic}")
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

@@ -1,0 +1,72 @@
+"""What docs/data.md tells people to type works."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import genpy
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import TransformStamped
+from sensor_msgs.msg import Image, JointState
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
+
+ROOT = Path(__file__).resolve().parents[3]
+PAGE = (ROOT / "docs/data.md").read_text()
+
+
+@pytest.fixture
+def recording(write_bag: Callable[..., Path]) -> Path:
+    """A bag like the demo's, with the robot at 0.1 * t and targets 0.01 ahead."""
+    messages: list[tuple[str, Any]] = []
+    for index in range(100):
+        header = Header(stamp=genpy.Time.from_sec(1 + index / 100), frame_id="rpbi/world")
+        angle = index / 1000
+        target = JointState(header, ["lwr_arm_0_joint"], [angle + 0.01], [], [])
+        state = JointState(
+            header, ["lwr_arm_0_joint", "lwr_arm_1_joint"], [angle, 0.0], [0.1, 0.0], [1.0, 2.0]
+        )
+        box = TransformStamped(header=header, child_frame_id="rpbi/box")
+        loop = DiagnosticStatus(name="loop", values=[KeyValue("overruns", str(index))])
+        pixels = np.full((2, 3), 1.5, np.float32)
+        image = Image(header=header, height=2, width=3, encoding="32FC1", step=12, data=pixels.tobytes())
+        messages += [
+            ("/rpbi/kuka_lwr/joint_states/target", target),
+            ("/rpbi/kuka_lwr/joint_states", state),
+            ("/tf", TFMessage([box])),
+            ("/diagnostics", DiagnosticArray(header, [loop])),
+            ("/rpbi/camera/depth/image", image),
+        ]
+    return write_bag(messages, name="recording.bag", compression="lz4")
+
+
+def test_the_examples_run_one_after_the_other(
+    ros: Any, recording: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(recording.parent)
+    blocks = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    assert len(blocks) == 7
+    names: dict[str, Any] = {}
+    for block in blocks:
+        exec(compile(block, "docs/data.md", "exec"), names)
+    assert names["error"].abs().max() == pytest.approx(0.01)
+    assert names["speed"]["position/lwr_arm_0_joint"].mean() == pytest.approx(0.1)
+    assert (recording.parent / "positions.png").stat().st_size > 1000
+    assert len(names["path"]) == 100
+    assert names["values"]["values/overruns"].max() == 99
+    assert (names["metres"] == 1.5).all() and names["metres"].shape == (2, 3)
+    assert "largest error: 0.0100 rad" in capsys.readouterr().out
+
+
+def test_the_command_has_the_options_of_the_page(recording: Path) -> None:
+    command = [sys.executable, str(ROOT / "src/rpbi_utils/nodes/bag_to_table")]
+    text = subprocess.run([*command, "--help"], capture_output=True, text=True).stdout
+    documented = set(re.findall(r"^\| `(--\w+)", PAGE, flags=re.MULTILINE))
+    assert documented == set(re.findall(r"(--\w+)", text)) - {"--help"}
