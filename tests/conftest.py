@@ -7,8 +7,8 @@ import socket
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Iterator
 
 import pytest
 
@@ -39,9 +39,8 @@ def ros_master() -> Iterator[str]:
     roscore = subprocess.Popen(
         ["roscore", "-p", uri.rsplit(":", 1)[1]], stdout=log, stderr=subprocess.STDOUT, start_new_session=True
     )
-    from ros_system import stop_group, wait_until
-
     import rosgraph
+    from ros_system import stop_group, wait_until
 
     wait_until(rosgraph.is_master_online, "the ROS master answers", 30.0)
     wait_until(lambda: rosgraph.Master("/tests").lookupNode("/rosout"), "rosout is up", 30.0)
@@ -51,7 +50,7 @@ def ros_master() -> Iterator[str]:
 
 
 @pytest.fixture
-def ros(ros_master: str, tmp_path: Path) -> Iterator["RosSystem"]:  # noqa: F821
+def ros(ros_master: str, tmp_path: Path) -> Iterator[RosSystem]:  # noqa: F821
     """Starts nodes, talks to them and stops them after the test."""
     from ros_system import RosSystem
 

@@ -7,8 +7,9 @@ import signal
 import subprocess
 import threading
 import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Callable, Optional, Sequence
+from typing import Any
 
 import rosgraph
 import rospy
@@ -90,7 +91,7 @@ class RosSystem:
             rospy.init_node("tests", anonymous=True, disable_rostime=True, disable_signals=True)
         rospy.set_param("/use_sim_time", False)
 
-    def start(self, command: Sequence[str], log: Optional[str] = None, **environment: str) -> subprocess.Popen:
+    def start(self, command: Sequence[str], log: str | None = None, **environment: str) -> subprocess.Popen:
         """Starts a program in a process group of its own; its output goes to `output(process)`."""
         path = self.folder / (log or f"{len(self.processes)}.log")
         with open(path, "w") as file:
@@ -111,7 +112,12 @@ class RosSystem:
         return process.log_path.read_text(errors="replace")  # type: ignore[attr-defined]
 
     def simulator(
-        self, world: dict[str, Any], use_sim_time: bool = False, wait: bool = True, namespace: str = "/", **environment: str
+        self,
+        world: dict[str, Any],
+        use_sim_time: bool = False,
+        wait: bool = True,
+        namespace: str = "/",
+        **environment: str,
     ) -> subprocess.Popen:
         """Starts the simulator node with a main configuration and waits until it is up."""
         rospy.set_param("/use_sim_time", use_sim_time)
@@ -122,7 +128,9 @@ class RosSystem:
         )
         if wait:
             wait_until(
-                lambda: process.poll() is not None or _has_service(f"{namespace}rpbi/list_objects"), "the node is up", 40.0
+                lambda: process.poll() is not None or _has_service(f"{namespace}rpbi/list_objects"),
+                "the node is up",
+                40.0,
             )
             assert process.poll() is None, self.output(process)
         return process

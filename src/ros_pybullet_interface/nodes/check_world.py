@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Checks a world without a ROS master."""
 
 from rpbi.ros.check import main

@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Moves the joints of a robot one after the other."""
 
 from rpbi_examples.ros.basic_robot_example import main

@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Runs the demo."""
 
 from rpbi_examples.ros.demo import main

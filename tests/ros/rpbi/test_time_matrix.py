@@ -11,11 +11,12 @@ import rosbag
 import yaml
 from ros_system import wait_until
 from rosgraph_msgs.msg import Clock
-from rpbi_utils import Recorder
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from worlds import ball, iiwa, write_world
+
+from rpbi_utils import Recorder
 
 STATES = {
     "running": {},

@@ -7,16 +7,17 @@ import math
 import struct
 import sys
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Iterable
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from worlds import FLOOR, ball, box, iiwa, write_world  # noqa: E402
 
 from rpbi.bodies import BODY_TYPES  # noqa: E402
 from rpbi.config import load_object  # noqa: E402
 from rpbi.joint_model import JointTarget  # noqa: E402
 from rpbi.world import World  # noqa: E402
-from worlds import FLOOR, ball, box, iiwa, write_world  # noqa: E402
 
 TICKS = 3000
 
@@ -28,7 +29,9 @@ def build() -> World:
             Path(folder),
             collision=(FLOOR,),
             dynamic=tuple(
-                (box if turn % 2 else ball)(f"body{turn}", basePosition=[0.45, 0.02 * turn, 0.1 + 0.21 * turn], broadcast_hz=100)
+                (box if turn % 2 else ball)(
+                    f"body{turn}", basePosition=[0.45, 0.02 * turn, 0.1 + 0.21 * turn], broadcast_hz=100
+                )
                 for turn in range(5)
             ),
             robots=(
@@ -57,7 +60,9 @@ def run(world: World, ticks: int = TICKS, visitors: bool = False) -> str:
     for tick in range(ticks):
         if tick % 20 == 0:
             phase = 2.0 * math.pi * tick * 0.001
-            target = JointTarget(["lbr_iiwa_joint_1", "lbr_iiwa_joint_2"], [0.6 * math.sin(phase), 0.7 + 0.4 * math.sin(2 * phase)])
+            target = JointTarget(
+                ["lbr_iiwa_joint_1", "lbr_iiwa_joint_2"], [0.6 * math.sin(phase), 0.7 + 0.4 * math.sin(2 * phase)]
+            )
             world.put("iiwa/target", target)
         if visitors and tick % 500 == 100:
             config = load_object("dynamic", ball("visitor", basePosition=[0.4, 0.1, 1.0]), "visitor.yaml", BODY_TYPES)

@@ -5,6 +5,7 @@ import sys
 
 import deterministic_session as session
 import pytest
+
 from rpbi.load_log import replay
 
 

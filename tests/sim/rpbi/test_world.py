@@ -3,6 +3,8 @@
 import math
 
 import pytest
+from worlds import FLOOR, ball, box, iiwa, write_world
+
 from custom_ros_tools.errors import ConfigError, PhysicsError, UnknownNameError
 from rpbi.bodies import BODY_TYPES
 from rpbi.config import load_object
@@ -10,7 +12,6 @@ from rpbi.joint_model import JointTarget
 from rpbi.pose import Pose
 from rpbi.samples import JointStateSample, LinkPoseSample
 from rpbi.world import World
-from worlds import FLOOR, ball, box, iiwa, write_world
 
 
 @pytest.fixture
@@ -93,9 +94,7 @@ def test_a_robot_holds_its_start_pose_against_gravity(build):
 
 def test_start_positions_in_radians_are_taken_as_such(build):
     world = build(
-        robots=(
-            iiwa(initial_joint_position={"lbr_iiwa_joint_2": 0.5}, initial_revolute_joint_positions_are_deg=False),
-        )
+        robots=(iiwa(initial_joint_position={"lbr_iiwa_joint_2": 0.5}, initial_revolute_joint_positions_are_deg=False),)
     )
     assert _positions(world)["lbr_iiwa_joint_2"] == 0.5
 
@@ -143,7 +142,11 @@ def test_link_poses_are_those_of_urdf_frames_not_of_mass_centres(build):
 
 
 def test_an_object_follows_its_frame(build):
-    visual = {"name": "hand", "createVisualShape": {"shapeType": "GEOM_SPHERE", "radius": 0.1}, "object_tf": {"tf_id": "hand"}}
+    visual = {
+        "name": "hand",
+        "createVisualShape": {"shapeType": "GEOM_SPHERE", "radius": 0.1},
+        "object_tf": {"tf_id": "hand"},
+    }
     world = build(visual=(visual,))
     world.put("hand/pose", Pose((1.0, 2.0, 3.0), (0.0, 0.0, 2.0, 0.0)))
     world.step()

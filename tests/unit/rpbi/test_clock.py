@@ -3,6 +3,7 @@
 import time
 
 import pytest
+
 from rpbi.clock import Clock, Schedule
 
 

@@ -4,6 +4,7 @@ import math
 
 import pybullet
 import pytest
+
 from custom_ros_tools.errors import UnknownNameError
 from rpbi.joint_model import Joint, JointModel, JointTarget
 

@@ -3,7 +3,8 @@
 import threading
 
 import pytest
-from rpbi.mailbox import Closed, Mailbox
+
+from rpbi.mailbox import ClosedError, Mailbox
 
 
 def test_the_newest_value_of_a_slot_wins_and_is_taken_once():
@@ -66,7 +67,7 @@ def test_closing_fails_those_that_wait_and_those_that_come():
     waiting = mailbox.request(lambda: 1)
     mailbox.close()
     for future in (waiting, mailbox.request(lambda: 2)):
-        with pytest.raises(Closed):
+        with pytest.raises(ClosedError):
             future.result(0)
 
 

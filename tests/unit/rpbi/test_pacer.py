@@ -1,6 +1,7 @@
 """Keeping step with the wall clock, with a clock that the test moves."""
 
 import pytest
+
 from rpbi import pacer
 from rpbi.pacer import MAX_DEBT_S, Pacer
 

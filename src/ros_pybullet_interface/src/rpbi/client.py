@@ -6,6 +6,7 @@ from functools import partial
 from typing import Any
 
 import pybullet
+
 from custom_ros_tools.errors import PhysicsError
 
 

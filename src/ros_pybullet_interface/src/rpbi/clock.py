@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from fractions import Fraction
-from typing import Optional
 
 NS_PER_S = 1_000_000_000
 
@@ -71,7 +70,7 @@ class Schedule:
         self.clamped = wanted > 1
         self._per_tick = min(wanted, Fraction(1))
 
-    def is_due(self, tick: int, since: Optional[int] = None) -> bool:
+    def is_due(self, tick: int, since: int | None = None) -> bool:
         """Tells whether it is due at `tick`, or was at any tick after `since`; at tick 0 it always is."""
         numerator, denominator = self._per_tick.numerator, self._per_tick.denominator
         last = tick - 1 if since is None else since

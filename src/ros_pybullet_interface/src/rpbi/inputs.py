@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Callable, Optional
+from typing import Any
 
 from .pose import Pose
 from .pybullet_models import ObjectTf
@@ -23,7 +24,7 @@ class Input:
 
     check: Callable[[Any], Any]
     apply: Callable[[Any], None]
-    merge: Optional[Callable[[Any, Any], Any]] = None
+    merge: Callable[[Any, Any], Any] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,4 +58,4 @@ def check_pose(pose: Pose) -> Pose:
     if norm < 1e-6:
         raise ValueError(f"quaternion must not be zero, got {quat}")
     x, y, z, w = (component / norm for component in quat)
-    return Pose(tuple(position), (x, y, z, w))
+    return Pose((position[0], position[1], position[2]), (x, y, z, w))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Sequence
+from typing import NamedTuple
 
 import pybullet
+
 from custom_ros_tools.errors import UnknownNameError
 
 _TYPE_NAMES = {

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, Iterable, NamedTuple
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 import pybullet
+
 from custom_ros_tools.errors import PhysicsError, UnknownNameError
 
 from .bodies import BODY_TYPES, Body
 from .client import Client
 from .world_config import WorldConfig
-
 
 _SAME_EVERY_TIME = {
     "deterministicOverlappingPairs": 1,  # else the order of contacts depends on what the broad phase has seen before
@@ -55,7 +56,8 @@ def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:
         kind, config = entry.arguments
         before = _body_ids(pb)
         try:
-            bodies[entry.name] = BODY_TYPES[kind](pb, config)
+            make: Any = BODY_TYPES[kind]  # each with a constructor of its own
+            bodies[entry.name] = make(pb, config)
         except BaseException as error:
             for body_id in _body_ids(pb) - before:
                 pb.removeBody(body_id)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
-from typing import Any, Callable, Mapping, Optional, TypeVar
+from typing import Any, TypeVar
 
 T = TypeVar("T")
 
 
-class Closed(RuntimeError):
+class ClosedError(RuntimeError):
     """The simulation has ended and takes no more requests."""
 
 
@@ -27,7 +28,7 @@ class Mailbox:
         self._requests: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
         self._closed = False
 
-    def put(self, slot: str, value: Any, merge: Optional[Callable[[Any, Any], Any]] = None) -> None:
+    def put(self, slot: str, value: Any, merge: Callable[[Any, Any], Any] | None = None) -> None:
         """Leaves a value in a slot; one that was not taken yet is replaced, or merged with it."""
         with self._lock:
             if merge is not None and slot in self._slots:
@@ -53,7 +54,7 @@ class Mailbox:
             if not self._closed:
                 self._requests.append((call, future))
                 return future
-        future.set_exception(Closed("the simulation has ended"))
+        future.set_exception(ClosedError("the simulation has ended"))
         return future
 
     def run_requests(self) -> None:
@@ -74,4 +75,4 @@ class Mailbox:
             waiting, self._requests = self._requests, deque()
         for _, future in waiting:
             if future.set_running_or_notify_cancel():
-                future.set_exception(Closed("the simulation has ended"))
+                future.set_exception(ClosedError("the simulation has ended"))

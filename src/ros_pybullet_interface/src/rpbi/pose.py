@@ -21,7 +21,7 @@ class Pose(NamedTuple):
     position: Vector = (0.0, 0.0, 0.0)
     quat_xyzw: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
-    def __matmul__(self, other: Pose) -> Pose:  # type: ignore[override]
+    def __matmul__(self, other: Pose) -> Pose:
         """Chains poses: `pose_b_in_a @ pose_c_in_b` is the pose of c in a."""
         return Pose(*pybullet.multiplyTransforms(*self, *other))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Optional
+from typing import NamedTuple
 
 from .pose import Pose
 
@@ -67,5 +67,5 @@ class SceneSample(NamedTuple):
     name: str
     tick: int
     stamp_ns: int
-    camera: Optional[Pose]
+    camera: Pose | None
     bodies: tuple[BodyState, ...]

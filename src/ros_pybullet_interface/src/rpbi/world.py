@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import logging
-from typing import Any, Iterator, Optional
+from collections.abc import Iterator
+from typing import Any
 
 import pybullet
+
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.schema import ConfigModel
 
@@ -56,7 +58,7 @@ class World:
     """
 
     def __init__(
-        self, loaded: LoadedWorld, simulated_time: bool = True, connection_mode: Optional[int] = None
+        self, loaded: LoadedWorld, simulated_time: bool = True, connection_mode: int | None = None
     ) -> None:
         self.config = loaded.config
         self.clock = Clock(self.config.timeStep, simulated_time)

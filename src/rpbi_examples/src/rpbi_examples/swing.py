@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Sequence
+from collections.abc import Sequence
 
 TO_ZERO_S = 3.0
 """Time that all joints take together to reach zero [s]."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Optional
+from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, Name
-from pydantic import Field
 
 from ..client import Client
 from ..pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ObjectTf
@@ -18,8 +17,8 @@ class CollisionObjectConfig(ConfigModel):
     name: Name
     createVisualShape: CreateVisualShape
     createCollisionShape: CreateCollisionShape
-    changeDynamics: Optional[ChangeDynamics] = Field(None, description="Friction, restitution and the like.")
-    object_tf: Optional[ObjectTf] = Field(None, description="TF frame to follow; without it, it stays at the origin.")
+    changeDynamics: ChangeDynamics | None = Field(None, description="Friction, restitution and the like.")
+    object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, it stays at the origin.")
 
 
 class CollisionObject(ShapeObject):

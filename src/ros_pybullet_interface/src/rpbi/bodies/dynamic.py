@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Optional
-
-from custom_ros_tools.schema import ConfigModel, Name, HzOrOff, Positive, Position, Quat
 from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel, HzOrOff, Name, Position, Positive, Quat
 
 from ..client import Client
 from ..pose import Pose
@@ -25,7 +24,7 @@ class DynamicObjectConfig(ConfigModel):
     baseMass: Positive = Field(description="Mass.", json_schema_extra={"unit": "kg"})
     basePosition: Position = Field((0.0, 0.0, 0.0), description="Start position.")
     baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Start orientation, x, y, z, w.")
-    resetBaseVelocity: Optional[ResetBaseVelocity] = Field(None, description="Start velocity.")
+    resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity.")
     broadcast_hz: HzOrOff = Field(0.0, description="Rate of its pose on TF; 0 is off.")
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Mapping, Optional
+from collections.abc import Mapping
+from typing import Any
 
 import pybullet
+from pydantic import Field
+
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import ConfigModel, Hz, Name
-from pydantic import Field
 
 from ..client import Client
 from ..inputs import Input
@@ -37,8 +39,8 @@ class RobotConfig(ConfigModel):
     joint_state_publisher_hz: Hz = Field(50.0, description="Rate of the joint states.")
     broadcast_link_states: bool = Field(False, description="Whether the poses of all links are on TF.")
     broadcast_link_states_hz: Hz = Field(50.0, description="Rate of the links' poses on TF.")
-    resetBaseVelocity: Optional[ResetBaseVelocity] = Field(None, description="Start velocity of a floating base.")
-    color_alpha: Optional[float] = Field(None, ge=0.0, le=1.0, description="Opacity of the whole robot, 0 to 1.")
+    resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity of a floating base.")
+    color_alpha: float | None = Field(None, ge=0.0, le=1.0, description="Opacity of the whole robot, 0 to 1.")
 
 
 class Robot(Body):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Mapping, Optional
+from collections.abc import Mapping
+from typing import Any
 
 from ..client import Client
 from ..inputs import Input, PoseInput
@@ -29,10 +30,10 @@ class ShapeObject(Body):
         pb: Client,
         name: str,
         visual: CreateVisualShape,
-        collision: Optional[CreateCollisionShape] = None,
+        collision: CreateCollisionShape | None = None,
         mass_kg: float = 0.0,
         pose: Pose = Pose(),
-        object_tf: Optional[ObjectTf] = None,
+        object_tf: ObjectTf | None = None,
     ) -> None:
         shapes: dict[str, Any] = {"baseVisualShapeIndex": pb.createVisualShape(**visual.kwargs())}
         if collision is not None:

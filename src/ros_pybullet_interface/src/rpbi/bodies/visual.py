@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Optional
+from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, Name
-from pydantic import Field
 
 from ..client import Client
 from ..pybullet_models import CreateCollisionShape, CreateVisualShape, ObjectTf
@@ -17,10 +16,10 @@ class VisualObjectConfig(ConfigModel):
 
     name: Name
     createVisualShape: CreateVisualShape
-    createCollisionShape: Optional[CreateCollisionShape] = Field(
+    createCollisionShape: CreateCollisionShape | None = Field(
         None, description="Accepted and ignored, so that a collision object can be turned into a visual one."
     )
-    object_tf: Optional[ObjectTf] = Field(None, description="TF frame to follow; without it, it stays at the origin.")
+    object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, it stays at the origin.")
 
 
 class VisualObject(ShapeObject):

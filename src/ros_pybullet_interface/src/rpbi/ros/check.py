@@ -7,6 +7,7 @@ import logging
 import sys
 
 import pybullet
+
 from custom_ros_tools.errors import InterfaceError
 
 from ..bodies import BODY_TYPES

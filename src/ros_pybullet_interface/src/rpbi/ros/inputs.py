@@ -5,13 +5,15 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from typing import Any, Callable, NamedTuple, Optional
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import rospy
 import tf2_ros
+from sensor_msgs.msg import JointState
+
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.throttle import ThrottledWarning
-from sensor_msgs.msg import JointState
 
 from ..inputs import Input, PoseInput
 from ..joint_model import JointTarget
@@ -96,7 +98,7 @@ class _TfFollower:
     def __init__(self, put: Callable[[str, Any], None]) -> None:
         self._put = put
         self._followed: dict[str, PoseInput] = {}
-        self._thread: Optional[threading.Thread] = None
+        self._thread: threading.Thread | None = None
         self._warn = ThrottledWarning(period_s=30.0)
 
     def follow(self, slot: str, pose_input: PoseInput) -> None:
@@ -141,7 +143,7 @@ class _TfFollower:
             self._warn(slot, f"TF refused: {error}")
 
 
-def _look_up(buffer: tf2_ros.Buffer, frame: str) -> Optional[Pose]:
+def _look_up(buffer: tf2_ros.Buffer, frame: str) -> Pose | None:
     """Returns the newest pose of a frame in the world, None if there is none."""
     try:
         transform = buffer.lookup_transform(WORLD_FRAME, frame, rospy.Time(0)).transform

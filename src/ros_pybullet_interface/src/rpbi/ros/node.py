@@ -5,9 +5,10 @@ from __future__ import annotations
 import logging
 import sys
 import threading
-from typing import Any, Optional
+from typing import Any
 
 import rospy
+
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
 from custom_ros_tools.ros.logging_bridge import attach_logging
 
@@ -142,7 +143,7 @@ def _config_parameter() -> dict[str, Any]:
     return config
 
 
-def _robot_description() -> Optional[str]:
+def _robot_description() -> str | None:
     """Returns a file with the robot description of the parameter server, None if there is none."""
     text = _parameter_above("robot_description", None)
     return None if text is None else write_description(text)

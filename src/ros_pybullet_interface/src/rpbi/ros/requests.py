@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from concurrent.futures import wait
-from typing import Callable, TypeVar
+from typing import TypeVar
 
 import rospy
+
 from custom_ros_tools.errors import InterfaceError
 
 from .simulation import Simulation

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import rospy
 from geometry_msgs.msg import Point, Quaternion
+
 from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import RobotInfo, RobotInfoRequest, RobotInfoResponse
 

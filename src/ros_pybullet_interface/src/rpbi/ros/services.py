@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import logging
-from typing import Any, Callable, Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import rospy
+from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
+
 from custom_ros_tools.config import load_config, load_configs, replace_package
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.srv import SetString, SetStringRequest, SetStringResponse
@@ -18,12 +21,11 @@ from ros_pybullet_interface.srv import (
     ListObjectsRequest,
     ListObjectsResponse,
 )
-from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from ..bodies import BODY_TYPES
 from ..clock import NS_PER_S
 from ..config import load_object
-from ..mailbox import Closed
+from ..mailbox import ClosedError
 from .requests import Requests
 from .simulation import Simulation
 
@@ -83,7 +85,7 @@ class NodeServices:
     def _switch(self, switch: Callable[[], bool], done: str, refused: str) -> TriggerResponse:
         try:
             changed = self._ask(switch)
-        except (InterfaceError, Closed) as error:
+        except (InterfaceError, ClosedError) as error:
             return TriggerResponse(success=False, message=str(error))
         return TriggerResponse(success=changed, message=done if changed else refused)
 
@@ -95,7 +97,7 @@ class NodeServices:
 
         try:
             tick, stamp_ns = self._ask(step)
-        except (InterfaceError, Closed) as error:
+        except (InterfaceError, ClosedError) as error:
             return TriggerResponse(success=False, message=str(error))
         seconds, nanoseconds = divmod(stamp_ns, NS_PER_S)
         return TriggerResponse(success=True, message=f"tick {tick}, stamp {seconds}.{nanoseconds:09d}")
@@ -116,14 +118,14 @@ class NodeServices:
                 raise InterfaceError("expected a filename or a config; got neither")
             config = load_object(kind, data, file, BODY_TYPES, self._context)
             self._add(kind, config)
-        except (InterfaceError, Closed) as error:
+        except (InterfaceError, ClosedError) as error:
             return AddPybulletObjectResponse(success=False, message=str(error))
         return AddPybulletObjectResponse(success=True, message=f"added '{config.name}'")
 
     def _remove_object(self, request: SetStringRequest) -> SetStringResponse:
         try:
             self._remove(request.data)
-        except (InterfaceError, Closed) as error:
+        except (InterfaceError, ClosedError) as error:
             return SetStringResponse(success=False, message=str(error))
         return SetStringResponse(success=True, message=f"removed '{request.data}'")
 

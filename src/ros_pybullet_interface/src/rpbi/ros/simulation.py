@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from typing import Any, Callable, Mapping, Optional, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from custom_ros_tools.errors import PhysicsError
 
@@ -39,7 +40,7 @@ class Simulation:
         outlets: Mapping[type, Outlet],
         real_time_factor: float,
         status_hz: float,
-        clock: Optional[ClockOutlet] = None,
+        clock: ClockOutlet | None = None,
         helpers: Sequence[Callable[[], None]] = (),
         facts: Callable[[], Mapping[str, str]] = dict,
     ) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Mapping, Optional
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from ..clock import Clock
 from ..inputs import Input, PoseInput
@@ -32,13 +33,13 @@ class RgbdSensor(Sensor):
         self.wanted = False
         self._bodies = bodies
         self._clock = clock
-        self._pose: Optional[Pose] = None
+        self._pose: Pose | None = None
 
     def inputs(self) -> Mapping[str, Input]:
         """Takes `pose`, the pose of the optical frame in the world."""
         return {"pose": PoseInput.following(self.config.object_tf, self._set_pose)}
 
-    def read(self, tick: int) -> Optional[SceneSample]:
+    def read(self, tick: int) -> SceneSample | None:
         """Returns where everything is, None as long as the camera's own pose is unknown."""
         if self._pose is None:
             return None

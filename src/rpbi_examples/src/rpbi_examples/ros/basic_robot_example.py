@@ -5,10 +5,11 @@ from __future__ import annotations
 import sys
 
 import rospy
-from ros_pybullet_interface.msg import JointInfo
-from ros_pybullet_interface.srv import RobotInfo, RobotInfoResponse
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Int64
+
+from ros_pybullet_interface.msg import JointInfo
+from ros_pybullet_interface.srv import RobotInfo, RobotInfoResponse
 
 from ..swing import Swing
 

@@ -11,12 +11,13 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import rosbag
 import rosgraph
+
 from custom_ros_tools.errors import InterfaceError
 from rpbi.bodies import BODY_TYPES
 from rpbi.config import load_world
@@ -90,7 +91,7 @@ class _Example:
         self._command = [
             "roslaunch", "-p", str(self._port), "rpbi_examples", f"{EXAMPLE}.launch", f"headless:={headless}",
         ]  # fmt: skip
-        self._process: Optional[subprocess.Popen] = None
+        self._process: subprocess.Popen | None = None
 
     def __enter__(self) -> _Example:
         _say(f"launching {EXAMPLE} (ROS_MASTER_URI={os.environ['ROS_MASTER_URI']}, log: {self._log})")
