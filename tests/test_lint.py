@@ -28,7 +28,7 @@ def test_mypy_finds_nothing_in_the_cores() -> None:
 
 @pytest.mark.parametrize("node", NODES, ids=lambda node: node.name)
 def test_node_runs_with_the_interpreter_that_has_ros(node: Path) -> None:
-    """Installed, a node keeps its first line; with `env python3` another Python first on PATH would run it."""
+    """Installed, a node keeps its first line: with `env python3`, the first Python on PATH would run it."""
     assert node.read_text().startswith("#!/usr/bin/python3\n")
     assert os.access(node, os.X_OK)
 
