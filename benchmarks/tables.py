@@ -6,10 +6,10 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import genpy
 import rosbag
+from result import Result, Target
 from sensor_msgs.msg import JointState
 
 from rpbi_utils import bag_to_dataframes
@@ -21,36 +21,23 @@ TARGET_S = 2.5
 TOPIC = "/rpbi/kuka_lwr/joint_states"
 
 
-def run(quick: bool = False) -> list[dict[str, Any]]:
-    """Measures joint states of 7 joints, bag to DataFrame, without compression and with lz4.
+def run(quick: bool) -> list[Result]:
+    """Measures joint states of 7 joints, bag to DataFrame, without compression and with lz4; the best of three.
 
     Args:
         quick: Whether a tenth of the messages will do; the target is for all of them and scales with it.
-
-    Returns:
-        One result a kind of bag: `name`, `value` and `floor` [`unit`], their `ratio`, and `target`, the
-        greatest value [`unit`] that is good enough. Each is the best of three.
     """
     messages = QUICK_MESSAGES if quick else MESSAGES
+    target = Target(TARGET_S * messages / MESSAGES)
     results = []
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(prefix="rpbi-bench-") as folder:
         for compression in ("none", "lz4"):
             path = Path(folder) / f"{compression}.bag"
             _write(path, messages, compression)
-            value, floor = (
-                _best(lambda path=path: bag_to_dataframes(path)),
-                _best(lambda path=path: _read(path)),
-            )
-            results.append(
-                {
-                    "name": f"tables: {messages} joint states, compression {compression}",
-                    "value": value,
-                    "unit": "s",
-                    "floor": floor,
-                    "ratio": value / floor,
-                    "target": TARGET_S * messages / MESSAGES,
-                }
-            )
+            value = _best(lambda path=path: bag_to_dataframes(path))
+            floor = _best(lambda path=path: _read(path))
+            figure = f"{messages} joint states, compression {compression}"
+            results.append(Result("tables", figure, value, "s", floor, target))
     return results
 
 
@@ -76,12 +63,7 @@ def _best(job: Callable[[], object], repeats: int = 3) -> float:
     """Returns the shortest wall time of a job [s]."""
     durations = []
     for _ in range(repeats):
-        start = time.perf_counter()
+        start_s = time.perf_counter()
         job()
-        durations.append(time.perf_counter() - start)
+        durations.append(time.perf_counter() - start_s)
     return min(durations)
-
-
-if __name__ == "__main__":
-    for each in run():
-        print(f"{each['name']}: {each['value']:.2f} s (floor {each['floor']:.2f}, at most {each['target']})")

@@ -3,7 +3,7 @@
 
 import signal
 
-signal.signal(signal.SIGINT, signal.SIG_DFL)  # until rospy takes over, Ctrl-C ends it without a traceback
+signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # before any thread is; main() takes Ctrl-C
 
 from rpbi.ros.node import main  # noqa: E402
 

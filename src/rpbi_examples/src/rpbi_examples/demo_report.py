@@ -18,6 +18,8 @@ import pandas as pd  # noqa: E402
 
 ENOUGH = 0.95
 """Share of its rate that a topic must reach."""
+LEAST_SPAN_RAD = 0.2
+"""Smallest range of a joint's plot, so that a joint at rest looks like one [rad or m]."""
 
 
 def measured_rates(messages: Mapping[str, int], expected_hz: Mapping[str, float], duration_s: float) -> pd.DataFrame:
@@ -67,6 +69,9 @@ def plot_joints(states: pd.DataFrame, targets: pd.DataFrame, path: Path) -> None
         axis.plot(targets.index - start_s, targets[column], color="#e8731a", lw=2.2, label="target")
         axis.plot(states.index - start_s, states[column], color="#22333f", lw=1.0, label="position")
         axis.set_ylabel(column.removeprefix("position/").removesuffix("_joint") + "\n[rad]", fontsize=8)
+        low, high = axis.get_ylim()
+        half = max((high - low) / 2.0, LEAST_SPAN_RAD / 2.0)
+        axis.set_ylim((low + high) / 2.0 - half, (low + high) / 2.0 + half)
         axis.grid(alpha=0.3)
     axes[0, 0].legend(loc="upper right", ncols=2, fontsize=8)
     axes[-1, 0].set_xlabel("simulated time [s]")

@@ -14,9 +14,9 @@ from .shape_object import ShapeObject
 class CollisionObjectConfig(ConfigModel):
     """YAML of a collision object."""
 
-    name: Name
-    createVisualShape: CreateVisualShape
-    createCollisionShape: CreateCollisionShape
+    name: Name = Field(description="Unique name; topics and TF frames are named after it.")
+    createVisualShape: CreateVisualShape = Field(description="What it looks like.")
+    createCollisionShape: CreateCollisionShape = Field(description="What it feels like.")
     changeDynamics: ChangeDynamics | None = Field(None, description="Friction, restitution and the like.")
     object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, it stays at the origin.")
 

@@ -17,9 +17,9 @@ from .shape_object import ShapeObject
 class DynamicObjectConfig(ConfigModel):
     """YAML of a dynamic object."""
 
-    name: Name
-    createVisualShape: CreateVisualShape
-    createCollisionShape: CreateCollisionShape
+    name: Name = Field(description="Unique name; topics and TF frames are named after it.")
+    createVisualShape: CreateVisualShape = Field(description="What it looks like.")
+    createCollisionShape: CreateCollisionShape = Field(description="What it feels like.")
     changeDynamics: ChangeDynamics = Field(description="Friction, restitution and the like.")
     baseMass: Positive = Field(description="Mass.", json_schema_extra={"unit": "kg"})
     basePosition: Position = Field((0.0, 0.0, 0.0), description="Start position.")

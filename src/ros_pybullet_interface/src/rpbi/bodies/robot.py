@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import pybullet
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from custom_ros_tools.errors import ConfigError, Problem
-from custom_ros_tools.schema import ConfigModel, Hz, Name
+from custom_ros_tools.schema import ConfigModel, Hz, KeyedError, Name
 
 from ..client import Client
 from ..inputs import Input
@@ -26,9 +26,9 @@ from .body import Body
 class RobotConfig(ConfigModel):
     """YAML of a robot."""
 
-    name: Name
-    loadURDF: LoadURDF
-    setJointMotorControlArray: SetJointMotorControlArray
+    name: Name = Field(description="Unique name; topics and TF frames are named after it.")
+    loadURDF: LoadURDF = Field(description="Its description and where its base is.")
+    setJointMotorControlArray: SetJointMotorControlArray = Field(description="How its motors follow targets.")
     initial_joint_position: dict[str, float] = Field(
         {}, description="Start position by joint; those not named start at 0.", json_schema_extra={"unit": "deg or m"}
     )
@@ -41,6 +41,12 @@ class RobotConfig(ConfigModel):
     broadcast_link_states_hz: Hz = Field(50.0, description="Rate of the links' poses on TF.")
     resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity of a floating base.")
     color_alpha: float | None = Field(None, ge=0.0, le=1.0, description="Opacity of the whole robot, 0 to 1.")
+
+    @model_validator(mode="after")
+    def _is_position_controlled(self) -> RobotConfig:
+        if self.setJointMotorControlArray.controlMode != pybullet.POSITION_CONTROL:
+            raise KeyedError("setJointMotorControlArray.controlMode", "only POSITION_CONTROL is there yet")
+        return self
 
 
 class Robot(Body):

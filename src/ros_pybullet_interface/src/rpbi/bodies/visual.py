@@ -14,8 +14,8 @@ from .shape_object import ShapeObject
 class VisualObjectConfig(ConfigModel):
     """YAML of a visual object."""
 
-    name: Name
-    createVisualShape: CreateVisualShape
+    name: Name = Field(description="Unique name; topics and TF frames are named after it.")
+    createVisualShape: CreateVisualShape = Field(description="What it looks like.")
     createCollisionShape: CreateCollisionShape | None = Field(
         None, description="Accepted and ignored, so that a collision object can be turned into a visual one."
     )

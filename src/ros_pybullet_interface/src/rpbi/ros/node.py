@@ -21,6 +21,7 @@ from ..urdf import write_description
 from ..world import World
 from .camera_outlet import CameraOutlet
 from .inputs import Inputs
+from .interrupts import leaving_ros_on_interrupt
 from .outlets import JointStateOutlet, Outlet, TransformOutlet
 from .requests import Requests
 from .robot_info import RobotInfoService
@@ -121,18 +122,31 @@ class SimulatorNode:
 
 
 def main() -> None:
-    """Runs the node; exits with 1 if it cannot start."""
+    """Runs the node; exits with 1 if it cannot start, with 0 when it is interrupted."""
+    with leaving_ros_on_interrupt():
+        try:
+            node = _start()
+        except InterfaceError as error:
+            _report(error)
+            sys.exit(1)
+        except (rospy.ROSException, OSError):
+            if rospy.is_shutdown():
+                return  # what Ctrl-C cut short is no error
+            raise
+        node.run()
+
+
+def _start() -> SimulatorNode:
     # Without ROS time: the simulator is the source of /clock and must never wait for it.
-    rospy.init_node("ros_pybullet_interface", disable_rostime=True)
+    rospy.init_node("ros_pybullet_interface", disable_rostime=True, disable_signals=True)
     attach_logging("rpbi", "custom_ros_tools")
-    try:
-        node = SimulatorNode()
-    except InterfaceError as error:
-        for line in str(error).splitlines():
-            rospy.logfatal(line.replace("%", "%%"))
-        rospy.signal_shutdown("the configuration is wrong")
-        sys.exit(1)
-    node.run()
+    return SimulatorNode()
+
+
+def _report(error: InterfaceError) -> None:
+    """Tells why the node cannot start, a problem a line."""
+    for line in str(error).splitlines():
+        rospy.logfatal(line)
 
 
 def _config_parameter() -> dict[str, Any]:

@@ -1,0 +1,53 @@
+"""What the arrivals of stamped messages tell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+
+class Arrivals(NamedTuple):
+    """Messages of one topic as another process received them.
+
+    Attributes:
+        arrival_s: Wall times [s] at which its callback began, shape (n,).
+        stamp_ns: Stamps of the messages [ns], shape (n,).
+    """
+
+    arrival_s: npt.NDArray[np.float64]
+    stamp_ns: npt.NDArray[np.int64]
+
+    @property
+    def rate_hz(self) -> float:
+        """Messages a second of wall time, 0 if there were fewer than two."""
+        return float((len(self.arrival_s) - 1) / self._wall_s) if len(self.arrival_s) > 1 else 0.0
+
+    @property
+    def real_time_factor(self) -> float:
+        """Stamped seconds a second of wall time."""
+        return float((self.stamp_ns[-1] - self.stamp_ns[0]) * 1e-9 / self._wall_s)
+
+    @property
+    def _wall_s(self) -> float:
+        return float(self.arrival_s[-1] - self.arrival_s[0])
+
+    def lateness_ms(self, percentile: float) -> float:
+        """Returns how much later than by the grid of the stamps messages came [ms].
+
+        The grid is where the promptest message of all puts it, so this is lateness beyond the best that happened.
+
+        Args:
+            percentile: Which percentile of it.
+        """
+        late_s = self.arrival_s - (self.stamp_ns - self.stamp_ns[0]) * 1e-9
+        return float(np.percentile(late_s - late_s.min(), percentile)) * 1e3
+
+
+def load(path: Path) -> dict[str, Arrivals]:
+    """Reads what `programs/watch.py` wrote, by topic."""
+    with np.load(path) as data:
+        topics = {name.split(" ")[0] for name in data.files}
+        return {topic: Arrivals(data[f"{topic} arrival_s"], data[f"{topic} stamp_ns"]) for topic in topics}

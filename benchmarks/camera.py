@@ -1,0 +1,38 @@
+"""Joint states at 1 kHz beside a camera of 640x480 pixels at 30 Hz; the floor draws and does nothing else."""
+
+from __future__ import annotations
+
+from loop import publisher_alone
+from result import Result, Target
+from session import COLOUR, DEPTH, JOINT_STATES, Session
+from worlds import CAMERA, arm_world, write_main
+
+HZ = 1000
+
+
+def run(quick: bool) -> list[Result]:
+    """Measures both rates, as other processes receive them, and the loop's lateness."""
+    seconds = 6.0 if quick else 30.0
+    floor = publisher_alone(HZ, seconds / 2)
+    with Session() as ros:
+        world = arm_world(ros.folder, HZ, rgbd_sensor=CAMERA)
+        alone = ros.program("render_alone", write_main(ros.folder, world), seconds / 2)
+        images_alone = float(ros.result_of(alone).split()[-1])
+        ros.place_camera()
+        ros.simulator(world)
+        images = ros.watch(COLOUR, DEPTH, seconds=seconds)
+        found = ros.watch(JOINT_STATES, seconds=seconds).arrivals()[JOINT_STATES]
+        seen = images.arrivals()
+    rate, factor, image_rate = (Target(limit, at_least=True) for limit in (980, 0.98, 25))
+    return [
+        Result("camera", "joint states received", found.rate_hz, "1/s", floor.rate_hz, rate),
+        Result("camera", "real-time factor", found.real_time_factor, "", floor.real_time_factor, factor),
+        *(
+            Result("camera", f"lateness p{p}", found.lateness_ms(p), "ms", floor.lateness_ms(p))
+            for p in (50, 99)
+        ),
+        *(
+            Result("camera", f"{name} images received", seen[topic].rate_hz, "1/s", images_alone, image_rate)
+            for name, topic in (("colour", COLOUR), ("depth", DEPTH))
+        ),
+    ]

@@ -1,0 +1,40 @@
+"""Time a step takes through the node, as fast as it goes, beside the same PyBullet calls in a bare loop."""
+
+from __future__ import annotations
+
+import statistics
+from typing import Any
+
+from result import Result, Target
+from session import JOINT_STATES, Session
+from worlds import arm_world, write_main
+
+HZ = 1000
+JOINT_STATES_HZ = 50
+
+
+def run(quick: bool) -> list[Result]:
+    """Measures both by turns, with a subscriber of the joint states and with nobody but who reads /diagnostics."""
+    rounds, seconds = (2, 3.0) if quick else (5, 6.0)
+    alone, subscribed, unseen = [], [], []
+    with Session() as ros:
+        world = arm_world(ros.folder, HZ, JOINT_STATES_HZ, real_time_factor=0)
+        path = write_main(ros.folder, world)
+        for _ in range(rounds):
+            program = ros.program("step_alone", path, seconds, JOINT_STATES_HZ)
+            alone.append(float(ros.result_of(program).split()[-1]))
+            subscribed.append(_step_s(ros, world, JOINT_STATES, seconds))
+            unseen.append(_step_s(ros, world, "/diagnostics", seconds))
+    value_us, unseen_us, floor_us = (statistics.median(times) * 1e6 for times in (subscribed, unseen, alone))
+    return [
+        Result("free_run", "a step, joint states subscribed", value_us, "us", floor_us, Target(1.3, of_floor=True)),
+        Result("free_run", "a step, joint states not subscribed", unseen_us, "us", floor_us),
+    ]
+
+
+def _step_s(ros: Session, world: dict[str, Any], topic: str, seconds: float) -> float:
+    """Returns the mean time of a step [s], by the stamps of the only topic that is subscribed to."""
+    simulator = ros.simulator(world)
+    found = ros.watch(topic, seconds=seconds, stock=False).arrivals()[topic]
+    ros.stop(simulator)
+    return 1.0 / (HZ * found.real_time_factor)

@@ -1,0 +1,172 @@
+"""A private ROS master, and the nodes and programs of one benchmark around it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import arrivals
+import rosgraph
+
+PROGRAMS = Path(__file__).parent / "programs"
+JOINT_STATES = "/rpbi/kuka_lwr/joint_states"
+COLOUR, DEPTH = "/rpbi/camera/colour/image", "/rpbi/camera/depth/image"
+TYPES = {"joint_states": "sensor_msgs/JointState", "image": "sensor_msgs/Image", "clock": "rosgraph_msgs/Clock"}
+TYPES["diagnostics"] = "diagnostic_msgs/DiagnosticArray"
+START_TIMEOUT_S = 60.0
+CAMERA_POSE = "0.05 -2.3 1.55 0 0 -2.09".split()  # x y z [m], yaw pitch roll [rad]: the example's view
+
+
+class Session:
+    """Starts everything of a benchmark on a master of its own and leaves nothing of it behind.
+
+    Args:
+        use_sim_time: Whether ROS time is the simulator's.
+    """
+
+    def __init__(self, use_sim_time: bool = True) -> None:
+        self._use_sim_time = use_sim_time
+        self._processes: list[subprocess.Popen[bytes]] = []
+        self._folder = tempfile.TemporaryDirectory(prefix="rpbi-bench-")
+        self.folder = Path(self._folder.name)
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            port = probe.getsockname()[1]
+        uri = f"http://127.0.0.1:{port}"
+        self._environment = {
+            **{key: value for key, value in os.environ.items() if key not in ("ROS_HOSTNAME", "ROS_NAMESPACE")},
+            "ROS_MASTER_URI": uri,
+            "ROS_IP": "127.0.0.1",
+            "ROS_HOME": str(self.folder / "ros"),
+        }
+        self._master = rosgraph.Master("/benchmarks", master_uri=uri)
+        self._port = port
+
+    def __enter__(self) -> Session:
+        try:
+            self.start(["roscore", "-p", str(self._port)])
+            self._until(lambda: self._master.lookupNode("/rosout"), "the ROS master is up")
+            self._master.setParam("/use_sim_time", self._use_sim_time)
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def start(self, command: list[str]) -> subprocess.Popen[bytes]:
+        """Starts a command in a process group of its own; what it prints goes to a file (see `output`)."""
+        with open(self.folder / f"{len(self._processes)}.log", "wb") as file:
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=file,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+                env=self._environment,
+            )
+        self._processes.append(process)
+        return process
+
+    def program(self, name: str, *arguments: Any) -> subprocess.Popen[bytes]:
+        """Starts one of `programs/`."""
+        return self.start([sys.executable, "-u", str(PROGRAMS / f"{name}.py"), *map(str, arguments)])
+
+    def simulator(self, world: dict[str, Any]) -> subprocess.Popen[bytes]:
+        """Starts the simulator with a main configuration and waits until it is up."""
+        self._master.setParam("/ros_pybullet_interface/config", world)
+        process = self.start(["rosrun", "ros_pybullet_interface", "ros_pybullet_interface_node.py"])
+        self._until(lambda: self._master.lookupService("/rpbi/list_objects"), "the simulator is up", process)
+        return process
+
+    def place_camera(self) -> None:
+        """Puts the camera where it sees arm and floor."""
+        self.start(["rosrun", "tf2_ros", "static_transform_publisher", *CAMERA_POSE, "rpbi/world", "rpbi/camera"])
+
+    def watch(self, *topics: str, seconds: float = 3600.0, stock: bool = True) -> Watcher:
+        """Starts a subscriber in a process of its own and waits until it has received from every topic.
+
+        Args:
+            topics: What it subscribes to.
+            seconds: For how long it then goes on [s].
+            stock: Whether it is an ordinary node, which takes /clock too where that is the time.
+        """
+        path = self.folder / f"{len(self._processes)}.npz"
+        typed = [f"{topic}:{TYPES[topic.rsplit('/', 1)[-1]]}" for topic in topics]
+        process = self.program("watch", path, seconds, *([] if stock else ["--wall"]), *typed)
+        self._until(lambda: "ready" in self.output(process), f"messages come on {', '.join(topics)}", process)
+        return Watcher(self, process, path)
+
+    def output(self, process: subprocess.Popen[bytes]) -> str:
+        """Returns what a process has printed so far."""
+        path = self.folder / f"{self._processes.index(process)}.log"
+        return path.read_text(errors="replace")
+
+    def result_of(self, process: subprocess.Popen[bytes], timeout_s: float = 600.0) -> str:
+        """Waits for a process to end and returns what it printed.
+
+        Raises:
+            RuntimeError: If it fails.
+        """
+        if process.wait(timeout_s):
+            raise RuntimeError(f"{process.args} failed:\n{self.output(process)}")
+        return self.output(process)
+
+    def stop(self, process: subprocess.Popen[bytes]) -> None:
+        """Ends a process and its children as Ctrl-C would, and by force if that does not do."""
+        for number, timeout_s in ((signal.SIGINT, 15.0), (signal.SIGKILL, 5.0)):
+            if process.poll() is not None:
+                return
+            os.killpg(process.pid, number)
+            os.killpg(process.pid, signal.SIGCONT)
+            try:
+                process.wait(timeout_s)
+            except subprocess.TimeoutExpired:
+                continue
+
+    def close(self) -> None:
+        """Ends all that was started, the master last."""
+        for process in reversed(self._processes):
+            self.stop(process)
+        self._folder.cleanup()
+
+    def _until(
+        self, condition: Callable[[], Any], what: str, process: subprocess.Popen[bytes] | None = None
+    ) -> None:
+        end_s = time.monotonic() + START_TIMEOUT_S
+        while time.monotonic() < end_s and (process is None or process.poll() is None):
+            try:
+                if condition():
+                    return
+            except (OSError, rosgraph.MasterException):
+                pass
+            time.sleep(0.05)
+        printed = "" if process is None else f":\n{self.output(process)}"
+        raise RuntimeError(f"it did not come about that {what}{printed}")
+
+
+class Watcher:
+    """A subscriber in another process.
+
+    Attributes:
+        process: The process.
+    """
+
+    def __init__(self, session: Session, process: subprocess.Popen[bytes], path: Path) -> None:
+        self.process = process
+        self._session, self._path = session, path
+
+    def arrivals(self) -> dict[str, arrivals.Arrivals]:
+        """Waits until its time is over and returns what it received, by topic."""
+        self._session.result_of(self.process)
+        return arrivals.load(self._path)

@@ -1,0 +1,69 @@
+"""The main job end to end, as a user runs it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from PIL import Image
+
+ROOT = Path(__file__).resolve().parents[3]
+JOINTS = [f"lwr_arm_{number}_joint" for number in range(7)]
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    out = tmp_path_factory.mktemp("demo")
+    command = ["rosrun", "rpbi_examples", "demo.py", "--headless", "--seconds", "3", "--out", str(out)]
+    return out, subprocess.run(command, capture_output=True, text=True, timeout=180)
+
+
+def test_it_writes_all_that_it_promises(demo):
+    out, run = demo
+    names = {
+        "recording.bag",
+        "joint_states.parquet",
+        "joints.png",
+        "efforts.png",
+        "colour.png",
+        "depth.png",
+        "summary.json",
+    }
+    assert names <= {path.name for path in out.iterdir()}, run.stderr
+
+
+def test_its_exit_code_is_that_of_its_summary(demo):
+    """How many images a busy machine draws is not for a test to say; that too few are named is."""
+    out, run = demo
+    topics = json.loads((out / "summary.json").read_text())["topics"]
+    too_few = [topic for topic, row in topics.items() if not row["enough"]]
+    assert run.returncode == (1 if too_few else 0)
+    for topic in too_few:
+        assert f"FAILED: {topic}" in run.stderr
+    assert len(topics) == 8
+    assert all(row["messages"] > 0 for row in topics.values())
+
+
+def test_the_table_has_all_joints_by_name_and_they_move(demo):
+    out, _ = demo
+    table = pd.read_parquet(out / "joint_states.parquet", engine="fastparquet")
+    for joint in JOINTS:
+        assert {f"position/{joint}", f"velocity/{joint}", f"effort/{joint}"} <= set(table.columns)
+    assert table["position/lwr_arm_0_joint"].abs().max() > 0.01 or table["position/lwr_arm_1_joint"].std() > 0.01
+    assert table.index.is_monotonic_increasing
+
+
+def test_the_camera_sees_something(demo):
+    out, _ = demo
+    colours = Image.open(out / "colour.png").convert("RGB").getcolors(maxcolors=640 * 480)
+    assert Image.open(out / "colour.png").size == (640, 480)
+    assert len(colours) > 200
+
+
+def test_bad_arguments_are_named():
+    run = subprocess.run(["rosrun", "rpbi_examples", "demo.py", "--seconds", "0"], capture_output=True, text=True)
+    assert run.returncode == 2
+    assert "--seconds: expected 1 to 3600, got 0" in run.stderr
