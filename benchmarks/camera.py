@@ -17,7 +17,7 @@ def run(quick: bool) -> list[Result]:
     with Session() as ros:
         world = arm_world(ros.folder, HZ, rgbd_sensor=CAMERA)
         alone = ros.program("render_alone", write_main(ros.folder, world), seconds / 2)
-        images_alone = float(ros.result_of(alone).split()[-1])
+        images_alone = ros.result_of(alone)
         ros.place_camera()
         ros.simulator(world)
         images = ros.watch(COLOUR, DEPTH, seconds=seconds)
@@ -27,10 +27,7 @@ def run(quick: bool) -> list[Result]:
     return [
         Result("camera", "joint states received", found.rate_hz, "1/s", floor.rate_hz, rate),
         Result("camera", "real-time factor", found.real_time_factor, "", floor.real_time_factor, factor),
-        *(
-            Result("camera", f"lateness p{p}", found.lateness_ms(p), "ms", floor.lateness_ms(p))
-            for p in (50, 99)
-        ),
+        *(Result("camera", f"lateness p{p}", found.lateness_ms(p), "ms", floor.lateness_ms(p)) for p in (50, 99)),
         *(
             Result("camera", f"{name} images received", seen[topic].rate_hz, "1/s", images_alone, image_rate)
             for name, topic in (("colour", COLOUR), ("depth", DEPTH))

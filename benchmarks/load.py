@@ -25,7 +25,7 @@ def run(quick: bool) -> list[Result]:
     with Session() as ros:
         world = crowded_world(ros.folder, HZ, rgbd_sensor=CAMERA)
         alone = ros.program("step_alone", write_main(ros.folder, world), seconds / 4, HZ)
-        alone_s = float(ros.result_of(alone).split()[-1])
+        alone_s = ros.result_of(alone)
         ros.place_camera()
         ros.simulator(world)
         bag = ros.folder / "load.bag"
@@ -44,10 +44,7 @@ def run(quick: bool) -> list[Result]:
         Result("load", "physics alone", alone_s * 1e6, "us/step"),
         Result("load", "joint states received", found.rate_hz, "1/s", floor.rate_hz),
         Result("load", "real-time factor", found.real_time_factor, "", floor.real_time_factor),
-        *(
-            Result("load", f"lateness p{p}", found.lateness_ms(p), "ms", floor.lateness_ms(p))
-            for p in (50, 99)
-        ),
+        *(Result("load", f"lateness p{p}", found.lateness_ms(p), "ms", floor.lateness_ms(p)) for p in (50, 99)),
         Result("load", "TF recorded, share of its rate", recorded["/tf"] / TF_HZ, ""),
         Result("load", "joint states recorded, share of their rate", recorded[JOINT_STATES] / HZ, ""),
         Result("load", "colour images received", seen[COLOUR].rate_hz, "1/s"),

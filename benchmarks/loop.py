@@ -29,11 +29,6 @@ def _at(hz: int, seconds: float, rate: Target | None = None, factor: Target | No
     at = f"at {hz} Hz"
     return [
         Result("loop", f"joint states received {at}", found.rate_hz, "1/s", floor.rate_hz, rate),
-        Result(
-            "loop", f"real-time factor {at}", found.real_time_factor, "", floor.real_time_factor, factor
-        ),
-        *(
-            Result("loop", f"lateness p{p} {at}", found.lateness_ms(p), "ms", floor.lateness_ms(p))
-            for p in (50, 99)
-        ),
+        Result("loop", f"real-time factor {at}", found.real_time_factor, "", floor.real_time_factor, factor),
+        *(Result("loop", f"lateness p{p} {at}", found.lateness_ms(p), "ms", floor.lateness_ms(p)) for p in (50, 99)),
     ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
 import signal
 import socket
@@ -112,27 +114,27 @@ class Session:
         path = self.folder / f"{self._processes.index(process)}.log"
         return path.read_text(errors="replace")
 
-    def result_of(self, process: subprocess.Popen[bytes], timeout_s: float = 600.0) -> str:
-        """Waits for a process to end and returns what it printed.
+    def result_of(self, process: subprocess.Popen[bytes], timeout_s: float = 600.0) -> Any:
+        """Waits for one of `programs/` to end and returns what it prints after `result: `, as JSON.
 
         Raises:
             RuntimeError: If it fails.
         """
         if process.wait(timeout_s):
             raise RuntimeError(f"{process.args} failed:\n{self.output(process)}")
-        return self.output(process)
+        # PyBullet prints a lot around it
+        found = [line for line in self.output(process).splitlines() if line.startswith("result: ")]
+        return json.loads(found[-1].partition(": ")[2]) if found else None
 
     def stop(self, process: subprocess.Popen[bytes]) -> None:
         """Ends a process and its children as Ctrl-C would, and by force if that does not do."""
         for number, timeout_s in ((signal.SIGINT, 15.0), (signal.SIGKILL, 5.0)):
             if process.poll() is not None:
                 return
-            os.killpg(process.pid, number)
-            os.killpg(process.pid, signal.SIGCONT)
-            try:
+            with contextlib.suppress(ProcessLookupError, subprocess.TimeoutExpired):
+                os.killpg(process.pid, number)
+                os.killpg(process.pid, signal.SIGCONT)
                 process.wait(timeout_s)
-            except subprocess.TimeoutExpired:
-                continue
 
     def close(self) -> None:
         """Ends all that was started, the master last."""
@@ -140,9 +142,7 @@ class Session:
             self.stop(process)
         self._folder.cleanup()
 
-    def _until(
-        self, condition: Callable[[], Any], what: str, process: subprocess.Popen[bytes] | None = None
-    ) -> None:
+    def _until(self, condition: Callable[[], Any], what: str, process: subprocess.Popen[bytes] | None = None) -> None:
         end_s = time.monotonic() + START_TIMEOUT_S
         while time.monotonic() < end_s and (process is None or process.poll() is None):
             try:

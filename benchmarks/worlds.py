@@ -16,17 +16,20 @@ CAMERA = {
 }
 
 
-def arm_world(folder: Path, hz: float, joint_states_hz: float | None = None, **main: Any) -> dict[str, Any]:
+def arm_world(
+    folder: Path, hz: float, joint_states_hz: float | None = None, tf: bool = True, **main: Any
+) -> dict[str, Any]:
     """Returns the main configuration of the arm on the floor, at rest.
 
     Args:
         folder: Where its files are written to.
         hz: Steps a second.
         joint_states_hz: Rate of the joint states; without it, that of the steps.
+        tf: Whether the links are on TF, 50 times a second.
         main: Further keys of the main configuration.
     """
     arm = yaml.safe_load((CONFIGS / "basic_example_kuka_lwr" / "kuka_lwr.yaml").read_text())
-    arm["joint_state_publisher_hz"] = joint_states_hz or hz
+    arm |= {"joint_state_publisher_hz": joint_states_hz or hz, "broadcast_link_states": tf}
     return {
         "connect": {"connection_mode": "DIRECT"},
         "setGravity": {"gravZ": -9.81},
@@ -52,16 +55,20 @@ def crowded_world(folder: Path, hz: float, count: int = 30, **main: Any) -> dict
     floor["changeDynamics"] = {"restitution": 1.0}
     world["collision_objects"] = [_write(folder, floor)]
     for index, (x, y) in enumerate([(0.8, 0.0), (-0.8, 0.0), (0.0, 0.8), (0.0, -0.8)]):
-        half_extents = [0.05 if x else 0.8, 0.05 if y else 0.8, 1.0]
+        wide, long = 0.05 if x else 0.8, 0.05 if y else 0.8
         wall = {
             "name": f"wall_{index}",
-            "createCollisionShape": {"shapeType": "GEOM_BOX", "halfExtents": half_extents},
+            "createCollisionShape": {
+                "shapeType": "GEOM_BOX",
+                "halfExtents": [wide, long, 2.0],
+                "collisionFramePosition": [x, y, 2.0],
+            },
             "createVisualShape": {
                 "shapeType": "GEOM_BOX",
-                "halfExtents": [half_extents[0], half_extents[1], 0.05],
+                "halfExtents": [wide, long, 0.05],
+                "visualFramePosition": [x, y, 0.05],
             },
             "changeDynamics": {"restitution": 1.0},
-            "basePosition": [x, y, 0.0],
         }
         world["collision_objects"].append(_write(folder, wall))
     world["dynamic_objects"] = []

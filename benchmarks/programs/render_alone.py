@@ -37,7 +37,7 @@ def main() -> None:
         drawing = renderer.draw(intrinsics, CAMERA_POSE, segmentation=False)
         depth_in_metres(drawing.depth_buffer, intrinsics)
         images += 1
-    print(images / (time.monotonic() - start_s))
+    print("result:", images / (time.monotonic() - start_s))
 
 
 if __name__ == "__main__":

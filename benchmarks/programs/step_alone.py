@@ -30,7 +30,7 @@ def main() -> None:
         for body_id, joint_indices in robots:
             pybullet.getJointStates(body_id, joint_indices, physicsClientId=client)
         steps += steps_a_read
-    print((time.monotonic() - start_s) / steps)
+    print("result:", (time.monotonic() - start_s) / steps)
 
 
 if __name__ == "__main__":

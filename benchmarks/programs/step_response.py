@@ -90,7 +90,7 @@ def main() -> None:
         latency_s = client.respond_s(0.0 if trial % 2 == 0 else STEP)
         if trial >= 0:
             latencies.append(latency_s)
-    print(json.dumps(latencies))
+    print("result:", json.dumps(latencies))
 
 
 if __name__ == "__main__":

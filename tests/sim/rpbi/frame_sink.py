@@ -19,9 +19,7 @@ class FolderSink:
     """Writes `CAMERA-TICK.npz` into the folder that `--folder=` names."""
 
     def __init__(self, cameras: Sequence[Camera]) -> None:
-        self._folder = Path(
-            next(item for item in sys.argv if item.startswith("--folder="))[len("--folder=") :]
-        )
+        self._folder = Path(next(item for item in sys.argv if item.startswith("--folder="))[len("--folder=") :])
 
     def demands(self) -> Mapping[str, Demand]:
         try:

@@ -117,9 +117,7 @@ def test_depth_back_projected_with_K_lies_on_the_surface_of_the_box(rendering, e
 
 
 @pytest.mark.parametrize("distance_m", [0.2, 1.0, 2.0, 3.0])
-def test_depth_of_a_wall_is_right_to_a_millimetre_though_the_near_plane_is_at_a_centimetre(
-    rendering, distance_m
-):
+def test_depth_of_a_wall_is_right_to_a_millimetre_though_the_near_plane_is_at_a_centimetre(rendering, distance_m):
     clear_view(rendering.world)
     rendering.world.bodies["wall"].set_base_pose(in_front(distance_m + 0.1))
     depth = rendering.look(EYE)["depth"]

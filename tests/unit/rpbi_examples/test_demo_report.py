@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+
 from rpbi_examples.demo_report import as_text, measured_rates, tracking_error
 
 

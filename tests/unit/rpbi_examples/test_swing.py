@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+
 from rpbi_examples.swing import PERIOD_S, TO_ZERO_S, Swing
 
 START = (0.3, -1.2, 0.0)

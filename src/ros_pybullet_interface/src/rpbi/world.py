@@ -8,7 +8,7 @@ from typing import Any
 
 import pybullet
 
-from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
+from custom_ros_tools.errors import ConfigError, PhysicsError, Problem, UnknownNameError
 from custom_ros_tools.schema import ConfigModel
 
 from .bodies import BODY_TYPES, Body
@@ -72,8 +72,11 @@ class World:
         self._next_due = 0
         connect = self.config.connect.kwargs()
         configured_mode = connect.pop("connection_mode")
-        self.pb = Client(configured_mode if connection_mode is None else connection_mode, **connect)
+        mode = configured_mode if connection_mode is None else connection_mode
+        self.pb = Client(mode, **connect)
         try:
+            if mode == pybullet.GUI:
+                self._set_up_window()
             self._build(loaded)
         except BaseException:
             self.close()
@@ -92,12 +95,13 @@ class World:
         """
         return cls(load_world(path, BODY_TYPES), **options)
 
-    def add(self, kind: str, config: ConfigModel) -> Body:
+    def add(self, kind: str, config: ConfigModel, file: str | None = None) -> Body:
         """Adds a body; when it raises, the world is as it was.
 
         Args:
             kind: A key of BODY_TYPES.
             config: Configuration of that type.
+            file: Where it came from, for messages; without it, they have the body's name.
 
         Raises:
             ConfigError: If the name is taken or the configuration does not fit.
@@ -105,8 +109,12 @@ class World:
         """
         name: str = config.name  # type: ignore[attr-defined]
         if name in self._scheduled:
-            raise ConfigError([Problem(name, "name", f"'{name}' is taken already; names are unique in a world")])
-        self._append(LogEntry(name, "add", (kind, config)))
+            message = f"'{name}' is taken already; names are unique in a world"
+            raise ConfigError([Problem(file or name, "name", message)])
+        try:
+            self._append(LogEntry(name, "add", (kind, config)))
+        except ConfigError as error:
+            raise ConfigError([Problem(file or name, each.key, each.message) for each in error.problems]) from None
         body = self.bodies[name]
         self._register(name, body.sensors(), body.inputs())
         if type(body).before_step is not Body.before_step:
@@ -125,6 +133,7 @@ class World:
             self._stepping.remove(body)
         del self._scheduled[name]
         self._inputs = {slot: taken for slot, taken in self._inputs.items() if slot.split("/")[0] != name}
+        self._take_inputs()  # what still waits for it must not meet a later body of the same name
 
     def put(self, slot: str, value: Any) -> None:
         """Hands a value to a body or sensor before the next tick; any thread may call it.
@@ -156,9 +165,7 @@ class World:
         Raises:
             PhysicsError: If something in the world is not finite any more.
         """
-        for slot, value in self.mailbox.take().items():
-            if slot in self._inputs:  # its body may have gone since
-                self._inputs[slot].apply(value)
+        self._take_inputs()
         for body in self._stepping:
             body.before_step(self.clock.tick)
         self.pb.stepSimulation()
@@ -185,20 +192,33 @@ class World:
         except pybullet.error:
             log.debug("PyBullet had disconnected before")
 
+    def _set_up_window(self) -> None:
+        for arguments in self.config.configureDebugVisualizer.calls():
+            self.pb.configureDebugVisualizer(**arguments)
+        self.pb.resetDebugVisualizerCamera(**self.config.resetDebugVisualizerCamera.kwargs())
+
     def _build(self, loaded: LoadedWorld) -> None:
         self._append(LogEntry("", "world", self.config))
         problems: list[Problem] = []
         for item in loaded.objects:
             try:
-                self.add(item.type, item.config)
-            except (ConfigError, UnknownNameError) as error:
-                problems.extend(_in_file(error, item.file))
+                self.add(item.type, item.config, item.file)
+            except ConfigError as error:
+                problems += error.problems
+            except PhysicsError as error:
+                problems.append(Problem(item.file, "", str(error)))
         if problems:
             raise ConfigError(problems)
         if self.config.rgbd_sensor is not None:
             camera = RgbdSensor(self.config.rgbd_sensor, self.bodies, self.clock)
             self.cameras[camera.name] = camera
             self._register(camera.name, (camera,), camera.inputs())
+
+    def _take_inputs(self) -> None:
+        """Acts on what came since the last time, unless it was meant for a body that has gone."""
+        for slot, value in self.mailbox.take().items():
+            if slot in self._inputs:
+                self._inputs[slot].apply(value)
 
     def _append(self, entry: LogEntry) -> None:
         """The one way into the world: does what the entry says and logs it."""
@@ -229,10 +249,3 @@ class World:
 def _present(samples: Any) -> list[Any]:
     """Leaves out sensors that had nothing to tell."""
     return [sample for sample in samples if sample is not None]
-
-
-def _in_file(error: ConfigError | UnknownNameError, file: str) -> list[Problem]:
-    """Names the file in which the user can mend what only showed when the body was made."""
-    if isinstance(error, UnknownNameError):
-        return [Problem(file, "", str(error))]
-    return [Problem(file, problem.key, problem.message) for problem in error.problems]

@@ -9,7 +9,7 @@ from typing import Any
 import pybullet
 from pydantic import Field, model_validator
 
-from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.schema import ConfigModel, Hz, KeyedError, Name
 
 from ..client import Client
@@ -21,6 +21,7 @@ from ..sensors.link_pose import LinkPoseSensor
 from ..sensors.sensor import Sensor
 from ..urdf import resolve_meshes
 from .body import Body
+from .urdf_faults import urdf_faults
 
 
 class RobotConfig(ConfigModel):
@@ -63,13 +64,12 @@ class Robot(Body):
     section = "robots"
 
     def __init__(self, pb: Client, config: RobotConfig) -> None:
-        load = config.loadURDF.kwargs()
-        load["fileName"] = resolve_meshes(load["fileName"])
-        super().__init__(pb, config.name, pb.loadURDF(**load))
+        super().__init__(pb, config.name, _load(pb, config))
         self.config = config
         self.model = JointModel([Joint.from_info(pb.getJointInfo(self.body_id, i)) for i in self.joint_indices])
         self.joints = self.model.joints
         self.root_link: str = pb.getBodyInfo(self.body_id)[0].decode()
+        self._check_fit()
         start = self._start_positions()
         self._motor_arguments = {joint.index: self._motor(joint) for joint in self.model.driven}
         for index, position in start.items():
@@ -107,16 +107,31 @@ class Robot(Body):
             arguments["maxVelocity"] = joint.max_velocity
         motors = self.config.setJointMotorControlArray
         for argument, gains in (("positionGain", motors.positionGains), ("velocityGain", motors.velocityGains)):
-            if gains is None:
-                continue
-            if len(gains) not in (1, len(self.model.driven)):
-                names = ", ".join(driven.name for driven in self.model.driven)
-                raise self._problem(
-                    f"setJointMotorControlArray.{argument}s",
-                    f"expected 1 number or {len(self.model.driven)}, one for each of {names}; got {len(gains)}",
-                )
-            arguments[argument] = gains[self.model.driven.index(joint) % len(gains)]
+            if gains is not None:
+                arguments[argument] = gains[self.model.driven.index(joint) % len(gains)]
         return arguments
+
+    def _check_fit(self) -> None:
+        """Finds what in the configuration does not fit the robot.
+
+        Raises:
+            ConfigError: If something does not; it tells all of it.
+        """
+        problems = []
+        for name in self.config.initial_joint_position:
+            try:
+                self.model[name]
+            except UnknownNameError as error:
+                problems.append(Problem(self.name, f"initial_joint_position.{name}", str(error)))
+        motors = self.config.setJointMotorControlArray
+        expected = f"expected 1 number or {len(self.model.driven)}"
+        for key, gains in (("positionGains", motors.positionGains), ("velocityGains", motors.velocityGains)):
+            if gains is not None and len(gains) not in (1, len(self.model.driven)):
+                names = ", ".join(driven.name for driven in self.model.driven)
+                message = f"{expected}, one for each of {names}; got {len(gains)}"
+                problems.append(Problem(self.name, f"setJointMotorControlArray.{key}", message))
+        if problems:
+            raise ConfigError(problems)
 
     def _start_positions(self) -> dict[int, float]:
         """Returns the start position [rad or m] of each driven joint by index."""
@@ -131,5 +146,15 @@ class Robot(Body):
         for shape in self.pb.getVisualShapeData(self.body_id):
             self.pb.changeVisualShape(self.body_id, shape[1], rgbaColor=(*shape[7][:3], alpha))
 
-    def _problem(self, key: str, message: str) -> ConfigError:
-        return ConfigError([Problem(self.name, key, message)])
+
+def _load(pb: Client, config: RobotConfig) -> int:
+    """Loads a robot and returns PyBullet's id of it; what is wrong with its file is told by what PyBullet needs."""
+    arguments = config.loadURDF.kwargs()
+    try:
+        arguments["fileName"] = resolve_meshes(arguments["fileName"])
+        return int(pb.loadURDF(**arguments))
+    except ConfigError as error:
+        messages = [f"{problem.key}: {problem.message}" for problem in error.problems]
+    except (pybullet.error, OSError, UnicodeDecodeError) as error:
+        messages = urdf_faults(arguments["fileName"]) or [f"PyBullet could not load it: {error}"]
+    raise ConfigError([Problem(config.name, "loadURDF.fileName", message) for message in messages])

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from custom_ros_tools.errors import ConfigError, Problem
+
 from ..client import Client
 from ..inputs import Input, PoseInput
 from ..pose import Pose
 from ..pybullet_models import CreateCollisionShape, CreateVisualShape, ObjectTf
 from .body import Body
+from .mesh_faults import mesh_faults
 
 
 class ShapeObject(Body):
@@ -23,6 +26,10 @@ class ShapeObject(Body):
         mass_kg: Mass [kg]; 0 keeps it in place whatever pushes it.
         pose: Pose in the world.
         object_tf: TF frame that it follows, if any.
+
+    Raises:
+        ConfigError: If a mesh is broken.
+        PhysicsError: If PyBullet refuses.
     """
 
     def __init__(
@@ -35,6 +42,7 @@ class ShapeObject(Body):
         pose: Pose = Pose(),
         object_tf: ObjectTf | None = None,
     ) -> None:
+        _check_meshes(name, createVisualShape=visual, createCollisionShape=collision)
         shapes: dict[str, Any] = {"baseVisualShapeIndex": pb.createVisualShape(**visual.kwargs())}
         if collision is not None:
             shapes["baseCollisionShapeIndex"] = pb.createCollisionShape(**collision.kwargs())
@@ -49,3 +57,14 @@ class ShapeObject(Body):
         return {} if self._object_tf is None else {
             "pose": PoseInput.following(self._object_tf, self.set_base_pose)
         }
+
+
+def _check_meshes(name: str, **shapes: CreateVisualShape | CreateCollisionShape | None) -> None:
+    problems = [
+        Problem(name, f"{function}.{key}", message)
+        for function, shape in shapes.items()
+        if shape is not None
+        for key, message in mesh_faults(shape)
+    ]
+    if problems:
+        raise ConfigError(problems)

@@ -25,6 +25,8 @@ log = logging.getLogger(__name__)
 
 TF_MISSING_AFTER_S = 5.0
 """How long a TF frame may be missing before that is worth a warning [s] of wall time."""
+LONGEST_NAP_S = 0.1
+"""How soon a new frame to follow is noticed [s] of wall time."""
 
 
 class TopicInput(NamedTuple):
@@ -41,10 +43,20 @@ class TopicInput(NamedTuple):
     value: Callable[[Any], Any]
 
 
+def _joint_target(message: JointState) -> JointTarget:
+    """Returns the positions in a message; velocities and efforts beside them are left alone.
+
+    Raises:
+        ValueError: If it has none for the joints that it names.
+    """
+    if message.name and not message.position:
+        given = " and ".join(field for field in ("velocity", "effort") if getattr(message, field)) or "no values"
+        raise ValueError(f"expected positions, since the robot is under position control; got {given}")
+    return JointTarget(message.name, message.position)
+
+
 TOPIC_INPUTS: dict[str, TopicInput] = {
-    "target": TopicInput(
-        "rpbi/{name}/joint_states/target", JointState, lambda message: JointTarget(message.name, message.position)
-    ),
+    "target": TopicInput("rpbi/{name}/joint_states/target", JointState, _joint_target),
 }
 """The topic of each kind of input that comes by topic."""
 
@@ -67,7 +79,7 @@ class Inputs:
         subscribers = self._subscribers.setdefault(name, [])
         for key, taken in inputs.items():
             if isinstance(taken, PoseInput):
-                self._tf.follow(f"{name}/{key}", taken)
+                self._tf.follow(name, f"{name}/{key}", taken)
             else:
                 subscribers.append(self._subscribe(name, key, TOPIC_INPUTS[key]))
 
@@ -89,6 +101,23 @@ class Inputs:
         return rospy.Subscriber(topic, topic_input.message_type, take, queue_size=100, tcp_nodelay=True)
 
 
+class _Followed:
+    """A pose input and what is known of its frame.
+
+    Args:
+        name: The body or sensor.
+        slot: Where its pose goes.
+        pose_input: What it follows.
+    """
+
+    def __init__(self, name: str, slot: str, pose_input: PoseInput) -> None:
+        self.name, self.slot = name, slot
+        self.tf_id = pose_input.tf_id
+        self.period_s = 1.0 / pose_input.hz
+        self.due_s = self.since_s = time.monotonic()
+        self.last_pose: Pose | None = None
+
+
 class _TfFollower:
     """Looks up the TF frames that poses follow, in one thread, by wall time.
 
@@ -97,50 +126,48 @@ class _TfFollower:
 
     def __init__(self, put: Callable[[str, Any], None]) -> None:
         self._put = put
-        self._followed: dict[str, PoseInput] = {}
+        self._followed: tuple[_Followed, ...] = ()
         self._thread: threading.Thread | None = None
         self._warn = ThrottledWarning(period_s=30.0)
 
-    def follow(self, slot: str, pose_input: PoseInput) -> None:
-        """Begins to follow a frame."""
-        self._followed = {**self._followed, slot: pose_input}
+    def follow(self, name: str, slot: str, pose_input: PoseInput) -> None:
+        """Begins to follow a frame for a body or sensor."""
+        self._followed = (*self._followed, _Followed(name, slot, pose_input))
         if self._thread is None:
             self._thread = threading.Thread(target=self._run, name="tf follower", daemon=True)
             self._thread.start()
 
     def leave(self, name: str) -> None:
         """Follows nothing for a body or sensor any more."""
-        self._followed = {
-            slot: pose_input for slot, pose_input in self._followed.items() if slot.split("/")[0] != name
-        }
+        self._followed = tuple(followed for followed in self._followed if followed.name != name)
 
     def _run(self) -> None:
         buffer = tf2_ros.Buffer()
         tf2_ros.TransformListener(buffer)
-        due_s: dict[str, float] = {}
-        seen_s: dict[str, float] = {}
-        last_pose: dict[str, Any] = {}
         while not rospy.is_shutdown():
+            followed = self._followed
             now_s = time.monotonic()
-            for slot, pose_input in self._followed.items():
-                if now_s < due_s.get(slot, 0.0):
-                    continue
-                due_s[slot] = now_s + 1.0 / pose_input.hz
-                found = _look_up(buffer, pose_input.tf_id)
-                if found is None:
-                    if now_s - seen_s.setdefault(slot, now_s) > TF_MISSING_AFTER_S:
-                        self._warn(slot, f"no TF from '{WORLD_FRAME}' to '{pose_input.tf_id}' so far; it stays put")
-                elif found != last_pose.get(slot):
-                    last_pose[slot] = found
-                    self._hand_over(slot, found)
-            next_s = min((due_s.get(slot, 0.0) for slot in self._followed), default=now_s + 0.1)
-            time.sleep(min(max(next_s - time.monotonic(), 0.001), 0.1))
+            for each in followed:
+                if now_s >= each.due_s:
+                    each.due_s = now_s + each.period_s
+                    self._look(buffer, each, now_s)
+            next_s = min((each.due_s for each in followed), default=now_s + LONGEST_NAP_S)
+            time.sleep(min(max(next_s - time.monotonic(), 0.001), LONGEST_NAP_S))
 
-    def _hand_over(self, slot: str, pose: Pose) -> None:
-        try:
-            self._put(slot, pose)
-        except (InterfaceError, ValueError) as error:
-            self._warn(slot, f"TF refused: {error}")
+    def _look(self, buffer: tf2_ros.Buffer, followed: _Followed, now_s: float) -> None:
+        pose = _look_up(buffer, followed.tf_id)
+        if pose is None:
+            if followed.last_pose is None and now_s - followed.since_s > TF_MISSING_AFTER_S:
+                self._warn(
+                    followed.slot, f"no TF from '{WORLD_FRAME}' to '{followed.tf_id}' so far; it stays where it is"
+                )
+        elif pose != followed.last_pose:
+            followed.last_pose = pose
+            try:
+                self._put(followed.slot, pose)
+            except (InterfaceError, ValueError) as error:
+                if followed in self._followed:  # else it has gone meanwhile
+                    self._warn(followed.slot, f"TF refused: {error}")
 
 
 def _look_up(buffer: tf2_ros.Buffer, frame: str) -> Pose | None:

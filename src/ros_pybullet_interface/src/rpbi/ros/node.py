@@ -9,7 +9,7 @@ from typing import Any
 
 import rospy
 
-from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
+from custom_ros_tools.errors import ConfigError, InterfaceError, Problem, UnknownNameError
 from custom_ros_tools.ros.logging_bridge import attach_logging
 
 from ..asset_files import ROBOT_DESCRIPTION
@@ -22,16 +22,20 @@ from ..world import World
 from .camera_outlet import CameraOutlet
 from .inputs import Inputs
 from .interrupts import leaving_ros_on_interrupt
+from .last_words import log_last_words
 from .outlets import JointStateOutlet, Outlet, TransformOutlet
 from .requests import Requests
 from .robot_info import RobotInfoService
 from .services import NodeServices
 from .simulation import Simulation
 from .status import FREE_RUNNING_CLOCK_HZ, ClockOutlet
+from .topics import StateTopic
 
 log = logging.getLogger(__name__)
 
 MAX_CLOCK_HZ = 1000.0
+LONGEST_END_S = 10.0
+"""How long ROS waits for the loop and the renderer before it shuts down without them [s]."""
 
 # A thread that waits for Python's lock gets it after this long at most [s]; Python's own 5 ms are five ticks at 1 kHz.
 sys.setswitchinterval(0.0005)
@@ -80,28 +84,33 @@ class SimulatorNode:
             self._simulation.start()
 
     def run(self) -> None:
-        """Simulates until ROS shuts down."""
+        """Simulates until ROS shuts down, which waits until everything here has ended in good order."""
+        ended = threading.Event()
+        ended.set()
+        rospy.on_shutdown(lambda: ended.wait(LONGEST_END_S))  # called at once if ROS has shut down already
+        ended.clear()
         try:
-            self._simulation.run(rospy.is_shutdown)
+            self._simulation.run(rospy.core.is_shutdown_requested)
         finally:
             if self._cameras is not None:
                 self._cameras.close()
             self._world.close()
+            ended.set()
 
-    def _add(self, kind: str, config: Any) -> None:
+    def _add(self, kind: str, config: Any, file: str) -> None:
         with self._objects_lock:
-            self._ask(lambda: self._world.add(kind, config))
+            self._ask(lambda: self._world.add(kind, config, file))
             try:
                 self._open(config.name)
-            except Exception:
-                self._close(config.name)
-                self._ask(lambda: self._world.remove(config.name))
-                raise
+            except Exception as error:
+                self._withdraw(config.name)
+                raise InterfaceError(f"{config.name}: its topics could not be opened: {error}") from error
 
     def _remove(self, name: str) -> None:
         with self._objects_lock:
-            self._ask(lambda: self._world.remove(name))
-            self._close(name)
+            if name not in self._world.bodies:
+                raise UnknownNameError("object", name, list(self._world.bodies))
+            self._withdraw(name)
 
     def _open(self, name: str) -> None:
         """Opens the topics and services of a body."""
@@ -111,14 +120,21 @@ class SimulatorNode:
             self._joint_states.open(name)
             self._robot_infos[name] = RobotInfoService(body, self._world, self._ask)
 
-    def _close(self, name: str) -> None:
-        """Ends the topics and services of a body."""
+    def _withdraw(self, name: str) -> None:
+        """Takes a body out of the world, and all that belongs to it from ROS; its inputs first."""
         self._inputs.close(name)
-        self._joint_states.forget(name)
-        self._transforms.forget(name)
+        topic = self._ask(lambda: self._take_out(name))
+        if topic is not None:
+            topic.close()
         info = self._robot_infos.pop(name, None)
         if info is not None:
             info.close()
+
+    def _take_out(self, name: str) -> StateTopic | None:
+        """Does the simulation thread's part of it; returns the topic that is left to close."""
+        self._world.remove(name)
+        self._transforms.forget(name)
+        return self._joint_states.forget(name)
 
 
 def main() -> None:
@@ -127,10 +143,10 @@ def main() -> None:
         try:
             node = _start()
         except InterfaceError as error:
-            _report(error)
+            log_last_words(str(error).splitlines())
             sys.exit(1)
         except (rospy.ROSException, OSError):
-            if rospy.is_shutdown():
+            if rospy.core.is_shutdown_requested():
                 return  # what Ctrl-C cut short is no error
             raise
         node.run()
@@ -141,12 +157,6 @@ def _start() -> SimulatorNode:
     rospy.init_node("ros_pybullet_interface", disable_rostime=True, disable_signals=True)
     attach_logging("rpbi", "custom_ros_tools")
     return SimulatorNode()
-
-
-def _report(error: InterfaceError) -> None:
-    """Tells why the node cannot start, a problem a line."""
-    for line in str(error).splitlines():
-        rospy.logfatal(line)
 
 
 def _config_parameter() -> dict[str, Any]:

@@ -28,7 +28,7 @@ class Outlet(Protocol):
         """Gives the last state to subscribers that have come since."""
 
     def forget(self, name: str) -> None:
-        """Ends what belongs to a body or sensor that has gone."""
+        """Drops what it keeps of a body or sensor that has gone."""
 
 
 class JointStateOutlet:
@@ -39,16 +39,14 @@ class JointStateOutlet:
         self._last: dict[str, tuple[JointStateSample, int]] = {}
 
     def open(self, name: str) -> None:
-        """Advertises the topic of a robot."""
+        """Advertises the topic of a robot; any thread may call it."""
         self._topics = {**self._topics, name: StateTopic(f"rpbi/{name}/joint_states", JointState)}
 
     def publish(self, sample: JointStateSample, stamp_ns: int) -> None:
         """Sends the joint states of a robot."""
-        topic = self._topics.get(sample.name)
-        if topic is None:
-            return
         self._last[sample.name] = sample, stamp_ns
-        if topic.has_subscribers:
+        topic = self._topics.get(sample.name)  # there is none as long as the robot is new
+        if topic is not None and topic.has_subscribers:
             topic.publish(joint_state_message(sample, stamp_ns))
 
     def flush(self) -> None:
@@ -60,14 +58,14 @@ class JointStateOutlet:
             if name in self._last:
                 topic.serve_late(lambda last=self._last[name]: joint_state_message(*last))
 
-    def forget(self, name: str) -> None:
-        """Ends the topic of a robot."""
+    def forget(self, name: str) -> StateTopic | None:
+        """Drops what it keeps of a robot.
+
+        Returns:
+            The robot's topic. Closing it is left to another thread, since the ROS master may be slow to answer.
+        """
         self._last.pop(name, None)
-        remaining = dict(self._topics)
-        topic = remaining.pop(name, None)
-        self._topics = remaining
-        if topic is not None:
-            topic.close()
+        return self._topics.pop(name, None)
 
 
 class TransformOutlet:

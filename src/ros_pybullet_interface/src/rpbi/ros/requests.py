@@ -11,6 +11,7 @@ import rospy
 
 from custom_ros_tools.errors import InterfaceError
 
+from ..mailbox import ClosedError
 from .simulation import Simulation
 
 T = TypeVar("T")
@@ -33,7 +34,7 @@ class Requests:
         """Returns what the call returns, or raises what it raises.
 
         Raises:
-            InterfaceError: If the node shuts down or the loop makes no progress.
+            InterfaceError: If the simulation has ended, the node shuts down or the loop makes no progress.
         """
         future = self._simulation.world.mailbox.request(call)
         passes, progress_s = self._simulation.passes, time.monotonic()
@@ -44,4 +45,18 @@ class Requests:
                 raise InterfaceError("the node is shutting down")
             if time.monotonic() - progress_s > GIVE_UP_AFTER_S and future.cancel():
                 raise InterfaceError(f"the simulation made no progress for {GIVE_UP_AFTER_S:g} s")
-        return future.result()
+        try:
+            return future.result()
+        except ClosedError as error:
+            raise InterfaceError(str(error)) from None
+
+    def or_service_error(self, call: Callable[[], T]) -> T:
+        """Does the same for services whose answer cannot say that something failed.
+
+        Raises:
+            rospy.ServiceException: If it failed; rospy tells the caller why.
+        """
+        try:
+            return self(call)
+        except InterfaceError as error:
+            raise rospy.ServiceException(str(error)) from error

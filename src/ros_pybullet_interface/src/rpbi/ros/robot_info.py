@@ -35,7 +35,7 @@ class RobotInfoService:
         self._service.shutdown()
 
     def _answer(self, _: RobotInfoRequest) -> RobotInfoResponse:
-        return self._ask(self._read)
+        return self._ask.or_service_error(self._read)
 
     def _read(self) -> RobotInfoResponse:
         robot, clock = self._robot, self._world.clock

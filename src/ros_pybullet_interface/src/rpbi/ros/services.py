@@ -9,7 +9,7 @@ from typing import Any
 import rospy
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
-from custom_ros_tools.config import load_config, load_configs, replace_package
+from custom_ros_tools.config import load_config, load_configs
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.srv import SetString, SetStringRequest, SetStringResponse
 from ros_pybullet_interface.msg import PybulletObject
@@ -22,15 +22,17 @@ from ros_pybullet_interface.srv import (
     ListObjectsResponse,
 )
 
+from ..asset_files import find_file
 from ..bodies import BODY_TYPES
 from ..clock import NS_PER_S
 from ..config import load_object
-from ..mailbox import ClosedError
 from .requests import Requests
 from .simulation import Simulation
 
 log = logging.getLogger(__name__)
 
+NO_FOLDER = "~config"
+"""Stands for the path of a YAML that came without one."""
 OBJECT_TYPES = {
     PybulletObject.VISUAL: "visual",
     PybulletObject.COLLISION: "collision",
@@ -57,7 +59,7 @@ class NodeServices:
     Args:
         simulation: What to control.
         ask: Reaches the simulation thread.
-        add: Adds an object, by type and configuration, and all that belongs to it.
+        add: Adds an object, by type, configuration and name of its file, and all that belongs to it.
         remove: Removes an object, by name, and all that belongs to it.
         context: What reading an object's file needs to know of the world, see `load_object`.
     """
@@ -66,7 +68,7 @@ class NodeServices:
         self,
         simulation: Simulation,
         ask: Requests,
-        add: Callable[[str, Any], None],
+        add: Callable[[str, Any, str], None],
         remove: Callable[[str], None],
         context: Mapping[str, Any],
     ) -> None:
@@ -85,7 +87,7 @@ class NodeServices:
     def _switch(self, switch: Callable[[], bool], done: str, refused: str) -> TriggerResponse:
         try:
             changed = self._ask(switch)
-        except (InterfaceError, ClosedError) as error:
+        except InterfaceError as error:
             return TriggerResponse(success=False, message=str(error))
         return TriggerResponse(success=changed, message=done if changed else refused)
 
@@ -97,7 +99,7 @@ class NodeServices:
 
         try:
             tick, stamp_ns = self._ask(step)
-        except (InterfaceError, ClosedError) as error:
+        except InterfaceError as error:
             return TriggerResponse(success=False, message=str(error))
         seconds, nanoseconds = divmod(stamp_ns, NS_PER_S)
         return TriggerResponse(success=True, message=f"tick {tick}, stamp {seconds}.{nanoseconds:09d}")
@@ -109,27 +111,40 @@ class NodeServices:
             if kind is None:
                 known = ", ".join(f"{number} ({name})" for number, name in OBJECT_TYPES.items())
                 raise InterfaceError(f"object_type: expected one of {known}; got {asked.object_type}")
-            if asked.filename:
-                file = replace_package(asked.filename)
-                data = load_config(file)
-            elif asked.config:
-                file, data = "config", load_configs(asked.config)
-            else:
-                raise InterfaceError("expected a filename or a config; got neither")
-            config = load_object(kind, data, file, BODY_TYPES, self._context)
-            self._add(kind, config)
-        except (InterfaceError, ClosedError) as error:
+            data, file, path = self._read(asked)
+            config = load_object(kind, data, file, BODY_TYPES, {**self._context, "file": path})
+            self._add(kind, config, file)
+        except InterfaceError as error:
             return AddPybulletObjectResponse(success=False, message=str(error))
+        except Exception as error:  # nothing that an object brings along may leave the caller without an answer
+            log.exception("adding an object failed in a way that is not foreseen")
+            return AddPybulletObjectResponse(success=False, message=f"{type(error).__name__}: {error}")
         return AddPybulletObjectResponse(success=True, message=f"added '{config.name}'")
+
+    def _read(self, asked: PybulletObject) -> tuple[dict[str, Any], str, str]:
+        """Returns an object's YAML, what to call its file in messages, and beside what its own files are looked for.
+
+        The caller's working directory is unknown here: what has no folder, such as a text, is looked for in the
+        world's search paths and PyBullet's data only.
+        """
+        if asked.filename:
+            try:
+                path = find_file(asked.filename, NO_FOLDER, self._context["search_paths"])
+            except ValueError as error:
+                raise InterfaceError(f"filename: {error}") from None
+            return load_config(path), asked.filename, path
+        if asked.config:
+            return load_configs(asked.config, "config"), "config", NO_FOLDER
+        raise InterfaceError("expected a filename or a config; got neither")
 
     def _remove_object(self, request: SetStringRequest) -> SetStringResponse:
         try:
             self._remove(request.data)
-        except (InterfaceError, ClosedError) as error:
+        except InterfaceError as error:
             return SetStringResponse(success=False, message=str(error))
         return SetStringResponse(success=True, message=f"removed '{request.data}'")
 
     def _list_objects(self, _: ListObjectsRequest) -> ListObjectsResponse:
         kinds = {body_type: kind for kind, body_type in BODY_TYPES.items()}
-        bodies = self._ask(lambda: [(name, kinds[type(body)]) for name, body in self._simulation.world.bodies.items()])
-        return ListObjectsResponse(names=[name for name, _ in bodies], types=[kind for _, kind in bodies])
+        bodies = self._ask.or_service_error(lambda: dict(self._simulation.world.bodies))
+        return ListObjectsResponse(names=list(bodies), types=[kinds[type(body)] for body in bodies.values()])

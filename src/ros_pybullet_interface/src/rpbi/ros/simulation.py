@@ -46,6 +46,7 @@ class Simulation:
     ) -> None:
         self.world = world
         self.running = False
+        self._broken = False
         self.passes = 0
         """Grows as long as the loop is alive."""
         self._outlets = outlets
@@ -66,7 +67,7 @@ class Simulation:
         """
         if self.running:
             return False
-        self.running = True
+        self.running, self._broken = True, False
         self._pacer.restart()
         self._status.publish(True)
         return True
@@ -87,7 +88,11 @@ class Simulation:
 
         Returns:
             The new tick and its stamp [ns].
+
+        Raises:
+            PhysicsError: If something in the world is not finite any more.
         """
+        self._broken = False
         self._status.publish(True)
         samples = self.world.step()
         if self._clock is not None:
@@ -101,10 +106,13 @@ class Simulation:
         while not is_over():
             self.passes += 1
             self.world.mailbox.run_requests()
-            if self.running:
-                self._advance()
-            else:
-                self._idle()
+            try:
+                if self.running:
+                    self._advance()
+                else:
+                    self._idle()
+            except PhysicsError as error:
+                self._break_off(error)
             for help_out in self._helpers:
                 help_out()
             self._status.spin(self.running)
@@ -113,17 +121,20 @@ class Simulation:
     def _advance(self) -> None:
         if not self._pacer.is_due():
             return
-        try:
-            samples = self.world.step()
-        except PhysicsError as error:
-            log.error("simulation stopped: %s", error)
-            self.running = False
-            self._status.publish(False)
-            return
+        samples = self.world.step()
         if self._clock is not None:
             self._clock.publish_tick()
         if samples:
             self._publish(samples)
+
+    def _break_off(self, error: PhysicsError) -> None:
+        """Stands still, and tells no more of a world that is broken; until somebody starts or steps it again."""
+        log.error("simulation stopped: %s", error)
+        self.running, self._broken = False, True
+        self._idle_tick = self.world.clock.tick
+        if self._clock is not None:
+            self._clock.publish_now()
+        self._status.publish(False)
 
     def _halt(self) -> None:
         self.running = False
@@ -139,6 +150,9 @@ class Simulation:
             return
         if self._clock is not None:
             self._clock.repeat()
+        if self._broken:
+            return
+        if self._clock is not None:
             self._publish(self.world.read_rest())
             for outlet in self._distinct_outlets:
                 outlet.serve_late()

@@ -1,0 +1,270 @@
+"""RViz, as the example opens it, shows the robot and the coloured depth where they are."""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rosnode
+import yaml
+from PIL import Image, ImageDraw
+from robot_shape import link_triangles, moved, pose_matrix
+from ros_system import RosSystem, stop_group, wait_until
+from sensor_msgs.msg import CameraInfo
+from sensor_msgs.msg import Image as ImageMessage
+from tf2_msgs.msg import TFMessage
+
+from rpbi.camera import back_project
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "src/rpbi_examples"
+CONFIG_FILE = EXAMPLES / "rviz/basic_example_kuka_lwr.rviz"
+CONFIG = yaml.safe_load(CONFIG_FILE.read_text())["Visualization Manager"]
+ARM = link_triangles(EXAMPLES / "robots/kuka_lwr.urdf", EXAMPLES)
+CAMERA = "/rpbi/camera"
+
+FIELD_OF_VIEW = math.radians(45.0)
+"""Vertical opening of RViz's view."""
+DARK_GREEN = (0, 60, 0)
+"""A background that nothing in the scene looks like."""
+DIFFERENT = 12
+"""From so much on, of 255, a pixel has another colour."""
+WARNING_YELLOW, ERROR_RED = (222, 213, 17), (178, 23, 46)
+"""What RViz writes in where a display has something to complain of."""
+HARMLESS = re.compile(r"arrived closer .* than the lower bound you provided")
+"""RViz's coloured depth believes that images come twice a second at most."""
+SLOW_S = 120.0
+
+
+class View:
+    """RViz's orbit view of its config.
+
+    Args:
+        width: Columns of the picture [px].
+        height: Rows [px].
+    """
+
+    def __init__(self, width, height):
+        view = CONFIG["Views"]["Current"]
+        focus = np.array([view["Focal Point"][axis] for axis in "XYZ"])
+        yaw, pitch = view["Yaw"], view["Pitch"]
+        away = np.array([math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), math.sin(pitch)])
+        self._eye = focus + view["Distance"] * away
+        right = np.cross(-away, [0.0, 0.0, 1.0])
+        right /= np.linalg.norm(right)
+        self._axes = np.array([right, np.cross(-away, right), -away])
+        self._focal_px = height / 2 / math.tan(FIELD_OF_VIEW / 2)
+        self.width, self.height = width, height
+
+    def project(self, points):
+        """Returns columns, rows and depths [px, px, m] of points of the world; shape (..., 3)."""
+        in_view = (points - self._eye) @ self._axes.T
+        depth = in_view[..., 2:]
+        pixels = in_view[..., :2] / depth * self._focal_px + np.array([self.width, self.height]) / 2 - 0.5
+        return np.concatenate([pixels, depth], axis=-1)
+
+    def silhouette(self, triangles):
+        """Returns the pixels that triangles of the world cover by half at least."""
+        fine = 4
+        picture = Image.new("L", (fine * self.width, fine * self.height))
+        pen = ImageDraw.Draw(picture)
+        for corners in fine * (self.project(triangles)[..., :2] + 0.5) - 0.5:
+            pen.polygon([tuple(corner) for corner in corners], fill=1)
+        return np.asarray(picture).reshape(self.height, fine, self.width, fine).mean(axis=(1, 3)) >= 0.5
+
+    def paint(self, points, colours, size_px):
+        """Returns what coloured points of the world look like, and the pixels that they cover."""
+        u, v, depth = self.project(points).T
+        farthest_first = np.argsort(-depth)
+        u, v = np.rint(u).astype(int)[farthest_first], np.rint(v).astype(int)[farthest_first]
+        picture = np.zeros((self.height, self.width, 3), np.uint8)
+        covered = np.zeros((self.height, self.width), bool)
+        nearest = np.full((self.height, self.width), np.inf)
+        reach = range(-(size_px // 2), size_px // 2 + 1)
+        for row, column in ((v + dv, u + du) for dv in reach for du in reach):
+            inside = (row >= 0) & (row < self.height) & (column >= 0) & (column < self.width)
+            inside &= depth[farthest_first] > 0
+            place = row[inside], column[inside]
+            near = depth[farthest_first][inside]
+            own = np.full((self.height, self.width), np.inf)
+            own[place] = near  # of points on the same pixel the last one stays, the nearest
+            layer = np.zeros_like(picture)
+            layer[place] = colours[farthest_first][inside]
+            ahead = own < nearest
+            picture[ahead], nearest[ahead] = layer[ahead], own[ahead]
+            covered |= ahead
+        return picture, covered
+
+
+@pytest.fixture(scope="module")
+def example(ros_master, screen, tmp_path_factory):
+    """The example as a user with a screen launches it, with the arm standing still."""
+    system = RosSystem(tmp_path_factory.mktemp("rviz"))
+    home = {"HOME": str(system.folder), "XDG_RUNTIME_DIR": str(system.folder)}  # for what RViz writes there
+    screen.environment.update(home)
+    arguments = ["headless:=false", "move:=false"]
+    try:
+        system.start(["roslaunch", "rpbi_examples", "basic_example_kuka_lwr.launch", *arguments], **screen.environment)
+        yield system
+    finally:
+        system.close()
+
+
+@pytest.fixture(scope="module")
+def frames(example):
+    """Poses in the world of all frames, as 4x4 matrices."""
+    moving, still = example.listen("/tf", TFMessage), example.listen("/tf_static", TFMessage)
+
+    def known():
+        messages = still.messages + moving.messages[-5:]
+        poses = {one.child_frame_id: pose_matrix(one.transform) for each in messages for one in each.transforms}
+        return poses if "rpbi/camera" in poses and "rpbi/kuka_lwr/base" in poses else None
+
+    wait_until(lambda: len(moving.messages) > 100, "the arm has come to rest", SLOW_S)
+    poses = wait_until(known, "all frames are known", SLOW_S)
+    assert {pose.header.frame_id for message in moving.messages for pose in message.transforms} == {"rpbi/world"}
+    moving.close()
+    return poses
+
+
+@pytest.fixture(scope="module")
+def links(frames):
+    """Triangles of the links in the world, by link."""
+    return {link: moved(triangles, frames[f"rpbi/kuka_lwr/{link}"]) for link, triangles in ARM.items()}
+
+
+@pytest.fixture(scope="module")
+def cloud(example, frames):
+    """What the camera sees: points in the world and their colours."""
+    topics = {"colour/image": ImageMessage, "depth/image": ImageMessage, "depth/camera_info": CameraInfo}
+    listeners = [example.listen(f"{CAMERA}/{topic}", kind) for topic, kind in topics.items()]
+    colour, depth, info = (listener.wait_for(10, SLOW_S)[-1] for listener in listeners)
+    for listener in listeners:
+        listener.close()
+    depth_m = np.frombuffer(depth.data, np.float32).reshape(depth.height, depth.width)
+    points = back_project(depth_m, np.reshape(info.K, (3, 3))).reshape(-1, 3)
+    return moved(points, frames["rpbi/camera"]), np.frombuffer(colour.data, np.uint8).reshape(-1, 3)
+
+
+@pytest.fixture(scope="module")
+def shipped(example, screen, cloud):
+    """RViz as the example opened it: its panels, and what it and the others printed. It is closed then."""
+    background = [int(part) for part in CONFIG["Global Options"]["Background Color"].split(";")]
+
+    def is_shown(picture, view):
+        return differs(picture, background)[view.paint(*cloud, point_size())[1]].mean() > 0.95
+
+    _, window = settled(screen, is_shown, "the cloud is shown")
+    panels, printed = screen.grab()[:, : window.x], example.output(example.processes[0])
+    rosnode.kill_nodes(["/rviz"])
+    wait_until(lambda: not screen.windows(), "RViz has closed", SLOW_S)
+    return panels, printed
+
+
+@pytest.fixture(scope="module")
+def show(example, screen, shipped):
+    """Shows some of the displays of the example's config in an RViz of their own, before another background."""
+
+    def show(classes, is_shown, what):
+        config = yaml.safe_load(CONFIG_FILE.read_text())
+        manager = config["Visualization Manager"]
+        manager["Displays"] = [display for display in manager["Displays"] if display["Class"] in classes]
+        manager["Global Options"]["Background Color"] = "; ".join(map(str, DARK_GREEN))
+        path = example.write_yaml("_".join(sorted(classes)).replace("/", "-") + ".rviz", config)
+        rviz = example.start(["rviz", "-d", path], **screen.environment)
+        picture, window = settled(
+            screen,
+            lambda picture, view: not differs(picture[0], DARK_GREEN).any() and is_shown(picture, view),
+            what,
+        )
+        stop_group(rviz)
+        wait_until(lambda: not screen.windows(), "RViz has closed", SLOW_S)
+        return picture, View(window.width, window.height)
+
+    return show
+
+
+@pytest.fixture(scope="module")
+def bare(show):
+    """The picture without robot and depth."""
+    return show({"rviz/Grid"}, lambda picture, _: differs(picture, DARK_GREEN).any(), "the grid is shown")[0]
+
+
+def find_view(screen):
+    """Returns where RViz's view is, the largest of its windows that have no title; None if it is not there yet."""
+    windows = screen.windows()
+    views = [window for window in windows if not window.title and min(window.width, window.height) > 300]
+    is_open = any("- RViz" in window.title for window in windows)
+    return max(views, key=lambda window: window.width * window.height) if is_open and views else None
+
+
+def settled(screen, is_shown, what):
+    """Waits until RViz's view shows what it should and has not changed for some time; returns picture and window."""
+    seen = []
+
+    def is_settled():
+        time.sleep(0.2)
+        window = find_view(screen)
+        picture = None if window is None else screen.grab(window)
+        if seen and (window != seen[-1][1] or differs(picture, seen[-1][0]).mean() > 0.002):
+            seen.clear()
+        if window is not None:
+            seen.append((picture, window))
+        return len(seen) >= 4 and is_shown(picture, View(window.width, window.height))
+
+    wait_until(is_settled, what, SLOW_S)
+    return seen[-1]
+
+
+def point_size():
+    return next(each for each in CONFIG["Displays"] if each["Class"] == "rviz/DepthCloud")["Size (Pixels)"]
+
+
+def differs(one, other):
+    """Returns where two pictures, or a picture and a colour, differ."""
+    return np.abs(np.asarray(one, int) - np.asarray(other, int)).max(axis=-1) > DIFFERENT
+
+
+def grown(mask, by_px):
+    """Returns a mask with its surroundings."""
+    for axis in (0, 1):
+        mask = np.any([np.roll(mask, shift, axis) for shift in range(-by_px, by_px + 1)], axis=0)
+    return mask
+
+
+def test_rviz_of_the_example_shows_the_cloud_and_has_nothing_to_complain_of(shipped):
+    panels, printed = shipped
+    for colour in (WARNING_YELLOW, ERROR_RED):
+        assert not (panels == colour).all(axis=-1).any()
+    complaints = [line for line in printed.splitlines() if re.search(r"\[ *(WARN|ERROR|FATAL)\]", line)]
+    assert [line for line in complaints if not HARMLESS.search(line)] == []
+
+
+def test_robot_display_paints_the_arm_where_tf_says_and_nothing_else(show, bare, links):
+    def is_shown(picture, view):
+        arm = view.silhouette(np.concatenate(list(links.values())))
+        return picture.shape == bare.shape and differs(picture, bare)[arm].mean() > 0.9
+
+    picture, view = show({"rviz/Grid", "rviz/RobotModel"}, is_shown, "the robot is shown")
+    painted = differs(picture, bare)
+    arm = view.silhouette(np.concatenate(list(links.values())))
+    assert arm.sum() > 10_000
+    assert (painted & arm).sum() > 0.95 * (painted | arm).sum()
+    assert not painted[~grown(arm, 3)].any()
+    for link, triangles in links.items():
+        assert painted[view.silhouette(triangles)].mean() > 0.95, link
+
+
+def test_depth_display_paints_what_the_camera_sees_in_its_colours(show, bare, cloud):
+    def is_shown(picture, view):
+        covered = view.paint(*cloud, point_size())[1]
+        return picture.shape == bare.shape and differs(picture, bare)[covered].mean() > 0.95
+
+    picture, view = show({"rviz/Grid", "rviz/DepthCloud"}, is_shown, "the cloud is shown")
+    expected, covered = view.paint(*cloud, point_size())
+    assert 0.2 < covered.mean() < 0.8
+    assert (~differs(picture, expected))[covered].mean() > 0.95
+    assert (~differs(picture, bare))[~grown(covered, 2)].mean() > 0.99

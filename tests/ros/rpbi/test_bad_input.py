@@ -1,0 +1,180 @@
+"""What comes in while the world runs is hostile: refused whole, named now and then, and without any effect."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import TransformStamped
+from node_world import Rosout, add, diagnosed, main_config, objects, publishing, remove
+from ros_system import wait_until
+from rosgraph_msgs.msg import Log
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Int64
+from tf2_msgs.msg import TFMessage
+from worlds import FLOOR, ball, iiwa
+
+from ros_pybullet_interface.msg import PybulletObject
+
+TOPIC = "/rpbi/iiwa/joint_states/target"
+JOINT = "lbr_iiwa_joint_4"
+GOAL = 0.6
+
+
+@pytest.fixture(scope="module")
+def node(module_ros):
+    config = main_config(
+        module_ros.folder,
+        collision=(
+            {**FLOOR, "name": "lost", "object_tf": {"tf_id": "never/there", "hz": 100}},
+            {**FLOOR, "name": "follower", "object_tf": {"tf_id": "marker", "hz": 100}},
+        ),
+        dynamic=(ball(broadcast_hz=50, basePosition=[1.5, 0.0, 5.0]),),
+        robots=(iiwa(broadcast_link_states=True),),
+        setGravity={},
+        timeStep=0.002,
+    )
+    return module_ros.simulator(config)
+
+
+def _is_finite(message):
+    values = [*message.position, *message.velocity, *message.effort]
+    return all(map(math.isfinite, values))
+
+
+def test_bad_targets_among_good_ones_are_refused_whole_and_named_now_and_then(ros, node):
+    rosout = Rosout(ros)
+    joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
+    tf = ros.listen("/tf", TFMessage)
+    ros.start([sys.executable, str(Path(__file__).with_name("flood_targets.py")), TOPIC, JOINT, str(GOAL)])
+    wait_until(
+        lambda: joint_states.messages and abs(joint_states.messages[-1].position[3] - GOAL) < 0.01, "good ones are obeyed"
+    )
+    settled = len(joint_states.messages)
+    rosout.wait_for([TOPIC])
+    time.sleep(6.0)  # once more is due after 5 s
+    warnings = [log for log in rosout.logs(TOPIC) if log.level == Log.WARN]
+    assert 1 <= len(warnings) <= 4, [log.msg for log in warnings]
+    assert "message refused: " in warnings[0].msg
+    assert "more like it" in warnings[-1].msg, "how many were kept back is told"
+    assert all(map(_is_finite, joint_states.messages))
+    for message in joint_states.messages[settled:]:
+        assert message.position[3] == pytest.approx(GOAL, abs=0.02), "a bad target moved the arm"
+        assert message.position[0] == pytest.approx(0.0, abs=0.02), "half of a bad target was obeyed"
+    translations = [transform.transform.translation for message in tf.messages for transform in message.transforms]
+    assert all(math.isfinite(value) for each in translations for value in (each.x, each.y, each.z))
+    assert node.poll() is None
+
+
+REFUSALS = {
+    "NaN": (JointState(name=[JOINT], position=[math.nan]), "values must be finite, got nan for joint 'lbr_iiwa_joint_4'"),
+    "infinity": (JointState(name=[JOINT], position=[-math.inf]), "values must be finite, got -inf"),
+    "unknown joint": (JointState(name=["elbow"], position=[0.0]), "unknown joint 'elbow': known are lbr_iiwa_joint_1"),
+    "too few": (JointState(name=[JOINT, "lbr_iiwa_joint_1"], position=[0.0]), "expected one value for each of the 2"),
+    "velocity only": (JointState(name=[JOINT], velocity=[1.0]), "expected positions"),
+    "effort only": (JointState(name=[JOINT], effort=[1.0]), "expected positions"),
+    "named twice": (JointState(name=[JOINT, JOINT], position=[0.0, 1.0]), "must be named once each"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSALS)
+def test_a_refusal_names_topic_and_reason(ros, node, case):
+    message, reason = REFUSALS[case]
+    # A robot of its own, so that nothing was said about its topic in the last seconds.
+    name = "refuses_" + case.replace(" ", "_")
+    load = {"fileName": "kuka_iiwa/model.urdf", "useFixedBase": True, "basePosition": [0.0, 3.0, 0.0]}
+    assert add(ros, PybulletObject.ROBOT, iiwa(name, loadURDF=load)).success
+    rosout = Rosout(ros)
+    with publishing(f"/rpbi/{name}/joint_states/target", JointState) as target:
+        target.publish(message)
+        rosout.wait_for([f"/{name}/joint_states/target: message refused: {reason}"])
+    assert remove(ros, name).success
+
+
+def test_names_without_values_and_values_beside_the_positions_do_no_harm(ros, node):
+    joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
+    with publishing(TOPIC, JointState) as target:
+        target.publish(JointState())
+        target.publish(JointState(name=[JOINT], position=[0.2], velocity=[math.nan, 1.0], effort=[math.inf]))
+        wait_until(
+            lambda: joint_states.messages and abs(joint_states.messages[-1].position[3] - 0.2) < 0.01, "it is obeyed"
+        )
+
+
+def test_targets_however_large_leave_the_world_finite(ros, node):
+    joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
+    status = ros.listen("/rpbi/status", Int64)
+    with publishing(TOPIC, JointState) as target:
+        for value in (1e30, -1e300, 1.7e308):
+            target.publish(JointState(name=[JOINT], position=[value]))
+            joint_states.wait_for(len(joint_states.messages) + 10)
+        target.publish(JointState(name=[JOINT], position=[0.0]))
+    wait_until(lambda: abs(joint_states.messages[-1].position[3]) < 0.01, "it comes back")
+    assert all(map(_is_finite, joint_states.messages))
+    assert {message.data for message in status.messages} == {1}
+
+
+def test_tf_that_never_comes_is_named(ros, node):
+    rosout = Rosout(ros)
+    missing = {**FLOOR, "name": "also_lost", "object_tf": {"tf_id": "never/there/either", "hz": 10}}
+    assert add(ros, PybulletObject.COLLISION, missing).success
+    rosout.wait_for(["no TF from 'rpbi/world' to 'never/there/either'"], 15.0)
+    said = rosout.logs("never/there/either")
+    assert len(said) == 1 and said[0].level == Log.WARN
+    assert "also_lost" in said[0].msg
+    assert remove(ros, "also_lost").success
+
+
+def _transform(child, x=0.0, quat=(0.0, 0.0, 0.0, 1.0)):
+    transform = TransformStamped(child_frame_id=child)
+    transform.header.frame_id = "rpbi/world"
+    transform.header.stamp = rospy.Time.from_sec(time.time())
+    transform.transform.translation.x = x
+    rotation = transform.transform.rotation
+    rotation.x, rotation.y, rotation.z, rotation.w = quat
+    return TFMessage([transform])
+
+
+@pytest.mark.parametrize(
+    ("x", "quat"),
+    [
+        (math.nan, (0.0, 0.0, 0.0, 1.0)),
+        (math.inf, (0.0, 0.0, 0.0, 1.0)),
+        (0.0, (math.nan, 0.0, 0.0, 1.0)),
+        (0.0, (0.0, 0.0, 0.0, 0.0)),
+        (1e308, (0.0, 0.0, 0.0, 1.0)),
+    ],
+    ids=["NaN position", "infinite position", "NaN rotation", "no rotation", "far away"],
+)
+def test_tf_that_is_no_pose_changes_nothing_and_does_not_flood(ros, node, x, quat):
+    rosout = Rosout(ros)
+    tf = ros.listen("/tf", TFMessage)
+    printed = len(ros.output(node))
+    with publishing("/tf", TFMessage) as publisher:
+        for _ in range(100):
+            publisher.publish(_transform("marker", x, quat))
+            time.sleep(0.01)
+        publisher.publish(_transform("marker", 1.0))
+        time.sleep(0.2)
+    own = [t.transform for message in tf.messages for t in message.transforms if t.child_frame_id.startswith("rpbi/")]
+    assert own and all(math.isfinite(t.translation.x + t.rotation.w) for t in own)
+    assert len([log for log in rosout.logs() if log.name == "/ros_pybullet_interface"]) <= 3
+    assert len(ros.output(node)) - printed < 3000, ros.output(node)[printed:][:1500]
+    assert node.poll() is None
+    assert set(objects(ros)) == {"lost", "follower", "ball", "iiwa"}
+
+
+def test_a_flood_of_messages_does_not_hold_the_loop_up(ros, node):
+    diagnostics = ros.listen("/diagnostics", DiagnosticArray)
+    with publishing(TOPIC, JointState) as target:
+        end_s = time.monotonic() + 3.0
+        while time.monotonic() < end_s:
+            target.publish(JointState(name=["elbow"] * 50, position=[math.nan] * 50))
+            time.sleep(0.001)
+    factors = [float(diagnosed(message)["real_time_factor"]) for message in diagnostics.messages[1:]]
+    assert factors and max(factors) > 0.9
