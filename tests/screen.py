@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import subprocess
+import time
 from typing import NamedTuple
 
 import numpy as np
@@ -58,7 +59,12 @@ class Screen:
     def windows(self) -> list[Window]:
         """Returns all windows, those inside of others too."""
         line = re.compile(r'0x\w+ (?:"(.*)"|\(has no name\)): \(.*\) +(\d+)x(\d+)\S+ +\+(-?\d+)\+(-?\d+)')
-        found = line.findall(self.run("xwininfo", "-root", "-tree"))
+        while True:
+            try:
+                found = line.findall(self.run("xwininfo", "-root", "-tree"))
+                break
+            except subprocess.CalledProcessError:  # a window went while it made the list
+                time.sleep(0.05)
         return [Window(title, int(x), int(y), int(w), int(h)) for title, w, h, x, y in found]
 
     def run(self, *command: str) -> str:

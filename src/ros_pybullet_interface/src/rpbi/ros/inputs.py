@@ -9,7 +9,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import rospy
-import tf2_ros
 from sensor_msgs.msg import JointState
 
 from custom_ros_tools.errors import InterfaceError
@@ -20,6 +19,7 @@ from ..joint_model import JointTarget
 from ..pose import Pose
 from ..world import World
 from .outlets import WORLD_FRAME
+from .tf_listener import TfListener
 
 log = logging.getLogger(__name__)
 
@@ -90,7 +90,7 @@ class Inputs:
         self._tf.leave(name)
 
     def _subscribe(self, name: str, key: str, topic_input: TopicInput) -> rospy.Subscriber:
-        topic = topic_input.topic.format(name=name)
+        topic = rospy.resolve_name(topic_input.topic.format(name=name))
 
         def take(message: Any) -> None:
             try:
@@ -142,20 +142,19 @@ class _TfFollower:
         self._followed = tuple(followed for followed in self._followed if followed.name != name)
 
     def _run(self) -> None:
-        buffer = tf2_ros.Buffer()
-        tf2_ros.TransformListener(buffer)
+        listener = TfListener()
         while not rospy.is_shutdown():
             followed = self._followed
             now_s = time.monotonic()
             for each in followed:
                 if now_s >= each.due_s:
                     each.due_s = now_s + each.period_s
-                    self._look(buffer, each, now_s)
+                    self._look(listener, each, now_s)
             next_s = min((each.due_s for each in followed), default=now_s + LONGEST_NAP_S)
             time.sleep(min(max(next_s - time.monotonic(), 0.001), LONGEST_NAP_S))
 
-    def _look(self, buffer: tf2_ros.Buffer, followed: _Followed, now_s: float) -> None:
-        pose = _look_up(buffer, followed.tf_id)
+    def _look(self, listener: TfListener, followed: _Followed, now_s: float) -> None:
+        pose = listener.pose(WORLD_FRAME, followed.tf_id)
         if pose is None:
             if followed.last_pose is None and now_s - followed.since_s > TF_MISSING_AFTER_S:
                 self._warn(
@@ -168,13 +167,3 @@ class _TfFollower:
             except (InterfaceError, ValueError) as error:
                 if followed in self._followed:  # else it has gone meanwhile
                     self._warn(followed.slot, f"TF refused: {error}")
-
-
-def _look_up(buffer: tf2_ros.Buffer, frame: str) -> Pose | None:
-    """Returns the newest pose of a frame in the world, None if there is none."""
-    try:
-        transform = buffer.lookup_transform(WORLD_FRAME, frame, rospy.Time(0)).transform
-    except tf2_ros.TransformException:
-        return None
-    position, quat = transform.translation, transform.rotation
-    return Pose((position.x, position.y, position.z), (quat.x, quat.y, quat.z, quat.w))

@@ -152,6 +152,7 @@ class Simulation:
             self._clock.repeat()
         if self._broken:
             return
+        self.world.take_inputs()
         if self._clock is not None:
             self._publish(self.world.read_rest())
             for outlet in self._distinct_outlets:

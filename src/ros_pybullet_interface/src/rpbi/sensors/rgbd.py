@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,11 @@ from .sensor import Sensor
 
 if TYPE_CHECKING:
     from ..bodies.body import Body
+
+log = logging.getLogger(__name__)
+
+PLANNED = ("pointcloud", "synchronous")
+"""Keys that are accepted and do nothing yet."""
 
 
 class RgbdSensor(Sensor):
@@ -29,6 +35,9 @@ class RgbdSensor(Sensor):
 
     def __init__(self, config: RgbdSensorConfig, bodies: Mapping[str, Body], clock: Clock) -> None:
         super().__init__(config.name, config.hz)
+        for key in PLANNED:
+            if getattr(config, key):
+                log.warning("rgbd_sensor: %s: has no effect yet", key)
         self.config = config
         self.wanted = False
         self._bodies = bodies
