@@ -86,6 +86,7 @@ class RosSystem:
         self.folder = folder
         self.processes: list[subprocess.Popen] = []
         self._listeners: list[Listener] = []
+        self._parameters: set[str] = set()
         self._lock = threading.Lock()
         if not rospy.core.is_initialized():
             rospy.init_node("tests", anonymous=True, disable_rostime=True, disable_signals=True)
@@ -122,6 +123,7 @@ class RosSystem:
         """Starts the simulator node with a main configuration and waits until it is up."""
         rospy.set_param("/use_sim_time", use_sim_time)
         name = f"{namespace}ros_pybullet_interface"
+        self._parameters.add(name)
         rospy.set_param(f"{name}/config", world)
         process = self.start(
             ["rosrun", "ros_pybullet_interface", "ros_pybullet_interface_node.py", f"__ns:={namespace}"], **environment
@@ -163,6 +165,9 @@ class RosSystem:
             except TimeoutError as error:
                 late.append(f"{error}:\n{self.output(process)}")
         rospy.set_param("/use_sim_time", False)
+        for name in self._parameters:
+            if rospy.has_param(name):
+                rospy.delete_param(name)
         if late:
             raise AssertionError("\n".join(late))
 

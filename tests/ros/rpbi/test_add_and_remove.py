@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 
 import pytest
 import rospy
@@ -318,6 +319,51 @@ def test_of_many_who_add_the_same_name_at_once_one_succeeds(ros, world):
         thread.join(20.0)
     assert sorted(answers) == [False] * 5 + [True]
     assert remove(ros, "same").success
+
+
+def test_asking_about_a_robot_that_comes_and_goes_gets_answers_or_plain_errors(ros, world):
+    over = threading.Event()
+    outcomes = []
+
+    def ask():
+        while not over.is_set():
+            try:
+                outcomes.append(rospy.ServiceProxy("/rpbi/new/robot_info", RobotInfo)().numJoints)
+            except (rospy.ServiceException, OSError) as error:
+                outcomes.append(str(error))
+                time.sleep(0.002)
+
+    threads = [threading.Thread(target=ask) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for _ in range(20):
+        assert add(ros, ROBOT, iiwa("new")).success
+        assert remove(ros, "new").success
+    over.set()
+    for thread in threads:
+        thread.join(20.0)
+    assert 7 in outcomes
+    assert {outcome for outcome in outcomes if isinstance(outcome, int)} == {7}
+    assert "Traceback" not in ros.output(world)
+
+
+ONE_LINK = "<robot name='r'><link name='a'/></robot>"
+ODD_JOINTS = """<robot name='r'><link name='a'/>
+<link name='b'><inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial></link>
+<link name='c'><inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial></link>
+<joint name='ball' type='spherical'><parent link='a'/><child link='b'/></joint>
+<joint name='wheel' type='continuous'><parent link='b'/><child link='c'/><axis xyz='0 0 1'/></joint></robot>"""
+
+
+@pytest.mark.parametrize(("urdf", "joints"), [(ONE_LINK, []), (ODD_JOINTS, ["ball", "wheel"])], ids=["none", "odd"])
+def test_robots_with_no_joints_or_odd_ones_are_fine(ros, world, urdf, joints):
+    load = {**_urdf(ros, urdf)["loadURDF"], "useFixedBase": True, "basePosition": [0.0, 0.0, 5.0]}
+    assert add(ros, ROBOT, iiwa("new", loadURDF=load, broadcast_link_states=True)).success
+    message = ros.listen("/rpbi/new/joint_states", JointState).wait_for(5)[-1]
+    assert message.name == joints
+    assert len(message.position) == len(message.velocity) == len(message.effort) == len(joints)
+    assert _info(ros, "new").numJoints == len(joints)
+    assert remove(ros, "new").success
 
 
 def test_the_text_of_an_object_is_yaml_of_any_style(ros, world):

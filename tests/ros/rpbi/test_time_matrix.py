@@ -27,7 +27,9 @@ STATES = {
     "real time": {"real_time_factor": 1},
 }
 STEPS = 60
-PERIOD_NS = 20_000_000  # of joint states and TF
+HZ = {"as fast as it goes": 5}
+"""Rate of joint states and TF [Hz], 50 where nothing is said. `rosbag record` keeps 100 messages a topic, which at
+hundreds of simulated seconds a second is little on a busy machine; what it drops is not for this test to say."""
 
 
 @pytest.fixture(params=STATES)
@@ -43,7 +45,9 @@ def simulated(request):
 @pytest.fixture
 def scene(ros, tmp_path, state, simulated):
     """The simulator, listeners from the start, and then those that come late: a tf2 listener and a recorder."""
-    path = write_world(tmp_path, dynamic=(ball(broadcast_hz=50),), robots=(iiwa(),), **STATES[state])
+    hz = HZ.get(state, 50)
+    objects = {"dynamic": (ball(broadcast_hz=hz),), "robots": (iiwa(joint_state_publisher_hz=hz),)}
+    path = write_world(tmp_path, **objects, **STATES[state])
     world = yaml.safe_load(Path(path).read_text())
     for section in ("dynamic_objects", "robots"):
         world[section] = [str(tmp_path / name) for name in world[section]]
@@ -102,7 +106,7 @@ def test_time_behaves(ros, scene, state, simulated):
     if simulated and state in ("running", "real time", "slow", "as fast as it goes"):
         for topic, stamps in recorded.items():
             gaps = {after - before for before, after in zip(stamps, stamps[1:])}
-            assert gaps <= {PERIOD_NS}, f"{topic}: messages are missing in the bag: {gaps}"
+            assert gaps <= {10**9 // HZ.get(state, 50)}, f"{topic}: messages are missing in the bag: {gaps}"
     if state == "stepped" and simulated:
         told = [int(answer.split("stamp ")[1].replace(".", "")) for answer in answers]
         for stamps in (scene["joint_states"].stamps_ns, _ball_stamps(scene["tf"].messages)):

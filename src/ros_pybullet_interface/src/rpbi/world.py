@@ -158,6 +158,11 @@ class World:
         """What the world takes while it runs, by slot."""
         return self._inputs
 
+    @property
+    def is_connected(self) -> bool:
+        """Whether PyBullet is still there: its window may have been closed, or its server have ended."""
+        return bool(self.pb.isConnected())
+
     def take_inputs(self) -> None:
         """Acts on what came since the last time, unless it was meant for a body that has gone.
 

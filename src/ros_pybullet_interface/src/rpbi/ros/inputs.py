@@ -127,22 +127,21 @@ class _TfFollower:
     def __init__(self, put: Callable[[str, Any], None]) -> None:
         self._put = put
         self._followed: tuple[_Followed, ...] = ()
-        self._thread: threading.Thread | None = None
+        self._listener: TfListener | None = None
         self._warn = ThrottledWarning(period_s=30.0)
 
     def follow(self, name: str, slot: str, pose_input: PoseInput) -> None:
         """Begins to follow a frame for a body or sensor."""
         self._followed = (*self._followed, _Followed(name, slot, pose_input))
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._run, name="tf follower", daemon=True)
-            self._thread.start()
+        if self._listener is None:
+            self._listener = TfListener()
+            threading.Thread(target=self._run, args=(self._listener,), name="tf follower", daemon=True).start()
 
     def leave(self, name: str) -> None:
         """Follows nothing for a body or sensor any more."""
         self._followed = tuple(followed for followed in self._followed if followed.name != name)
 
-    def _run(self) -> None:
-        listener = TfListener()
+    def _run(self, listener: TfListener) -> None:
         while not rospy.is_shutdown():
             followed = self._followed
             now_s = time.monotonic()

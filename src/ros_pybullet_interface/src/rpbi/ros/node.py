@@ -7,9 +7,10 @@ import sys
 import threading
 from typing import Any
 
+import pybullet
 import rospy
 
-from custom_ros_tools.errors import ConfigError, InterfaceError, Problem, UnknownNameError
+from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, Problem, UnknownNameError
 from custom_ros_tools.ros.logging_bridge import attach_logging
 
 from ..asset_files import ROBOT_DESCRIPTION
@@ -21,7 +22,7 @@ from ..urdf import write_description
 from ..world import World
 from .camera_outlet import CameraOutlet
 from .inputs import Inputs
-from .interrupts import leaving_ros_on_interrupt
+from .interrupts import leaving_ros_on_interrupt, wait_for_master
 from .last_words import log_last_words
 from .outlets import JointStateOutlet, Outlet, TransformOutlet
 from .requests import Requests
@@ -29,7 +30,7 @@ from .robot_info import RobotInfoService
 from .services import NodeServices
 from .simulation import Simulation
 from .status import FREE_RUNNING_CLOCK_HZ, ClockOutlet
-from .topics import StateTopic
+from .topics import FastTopic
 
 log = logging.getLogger(__name__)
 
@@ -84,18 +85,30 @@ class SimulatorNode:
             self._simulation.start()
 
     def run(self) -> None:
-        """Simulates until ROS shuts down, which waits until everything here has ended in good order."""
+        """Simulates until ROS shuts down, which waits until everything here has ended in good order.
+
+        Raises:
+            PhysicsError: If PyBullet has gone before, for instance because its window was closed.
+        """
         ended = threading.Event()
         ended.set()
         rospy.on_shutdown(lambda: ended.wait(LONGEST_END_S))  # called at once if ROS has shut down already
         ended.clear()
         try:
-            self._simulation.run(rospy.core.is_shutdown_requested)
+            self._simulation.run(lambda: rospy.core.is_shutdown_requested() or not self._world.is_connected)
+        except pybullet.error:
+            if self._world.is_connected:
+                raise
         finally:
+            has_gone = not self._world.is_connected
             if self._cameras is not None:
                 self._cameras.close()
-            self._world.close()
+            self._world.close()  # from here on, no object comes or goes
+            # Topics that are just being opened or closed would lock rospy up. Who waits for them ends with the process.
+            self._objects_lock.acquire(timeout=LONGEST_END_S)
             ended.set()
+        if has_gone:
+            raise PhysicsError("PyBullet has gone: its window was closed, or its server has ended")
 
     def _add(self, kind: str, config: Any, file: str) -> None:
         with self._objects_lock:
@@ -130,7 +143,7 @@ class SimulatorNode:
         if info is not None:
             info.close()
 
-    def _take_out(self, name: str) -> StateTopic | None:
+    def _take_out(self, name: str) -> FastTopic | None:
         """Does the simulation thread's part of it; returns the topic that is left to close."""
         self._world.remove(name)
         self._transforms.forget(name)
@@ -139,24 +152,22 @@ class SimulatorNode:
 
 def main() -> None:
     """Runs the node; exits with 1 if it cannot start, with 0 when it is interrupted."""
-    with leaving_ros_on_interrupt():
-        try:
-            node = _start()
-        except InterfaceError as error:
-            log_last_words(str(error).splitlines())
-            sys.exit(1)
-        except (rospy.ROSException, OSError):
-            if rospy.core.is_shutdown_requested():
-                return  # what Ctrl-C cut short is no error
-            raise
-        node.run()
-
-
-def _start() -> SimulatorNode:
+    if not wait_for_master():
+        return
     # Without ROS time: the simulator is the source of /clock and must never wait for it.
     rospy.init_node("ros_pybullet_interface", disable_rostime=True, disable_signals=True)
     attach_logging("rpbi", "custom_ros_tools")
-    return SimulatorNode()
+    try:
+        node = SimulatorNode()
+    except InterfaceError as error:
+        log_last_words(str(error).splitlines())
+        sys.exit(1)
+    with leaving_ros_on_interrupt():
+        try:
+            node.run()
+        except PhysicsError as error:
+            log_last_words([str(error)])
+            sys.exit(1)
 
 
 def _config_parameter() -> dict[str, Any]:

@@ -10,7 +10,7 @@ from tf2_msgs.msg import TFMessage
 
 from ..samples import JointStateSample, LinkPoseSample
 from .stamps import to_ros_time
-from .topics import StateTopic
+from .topics import FastTopic
 
 WORLD_FRAME = "rpbi/world"
 
@@ -35,12 +35,12 @@ class JointStateOutlet:
     """Joint states on `rpbi/NAME/joint_states`."""
 
     def __init__(self) -> None:
-        self._topics: dict[str, StateTopic] = {}
+        self._topics: dict[str, FastTopic] = {}
         self._last: dict[str, tuple[JointStateSample, int]] = {}
 
     def open(self, name: str) -> None:
         """Advertises the topic of a robot; any thread may call it."""
-        self._topics = {**self._topics, name: StateTopic(f"rpbi/{name}/joint_states", JointState)}
+        self._topics = {**self._topics, name: FastTopic(f"rpbi/{name}/joint_states", JointState)}
 
     def publish(self, sample: JointStateSample, stamp_ns: int) -> None:
         """Sends the joint states of a robot."""
@@ -58,7 +58,7 @@ class JointStateOutlet:
             if name in self._last:
                 topic.serve_late(lambda last=self._last[name]: joint_state_message(*last))
 
-    def forget(self, name: str) -> StateTopic | None:
+    def forget(self, name: str) -> FastTopic | None:
         """Drops what it keeps of a robot.
 
         Returns:
@@ -72,7 +72,7 @@ class TransformOutlet:
     """Link poses on TF, all that a tick has in one message."""
 
     def __init__(self) -> None:
-        self._topic = StateTopic("/tf", TFMessage)
+        self._topic = FastTopic("/tf", TFMessage)
         self._last: dict[str, list[TransformStamped]] = {}
         self._collected: list[TransformStamped] = []
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import rospy
 from geometry_msgs.msg import Point, Quaternion
 
+from custom_ros_tools.errors import UnknownNameError
 from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import RobotInfo, RobotInfoRequest, RobotInfoResponse
 
@@ -39,6 +40,8 @@ class RobotInfoService:
 
     def _read(self) -> RobotInfoResponse:
         robot, clock = self._robot, self._world.clock
+        if self._world.bodies.get(robot.name) is not robot:  # it went while the request was on its way
+            raise UnknownNameError("object", robot.name, list(self._world.bodies))
         infos = [_joint_info(robot.pb.getJointInfo(robot.body_id, joint.index), joint) for joint in robot.joints]
         return RobotInfoResponse(
             robot_name=robot.name,

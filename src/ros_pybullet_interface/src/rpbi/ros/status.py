@@ -13,6 +13,7 @@ from std_msgs.msg import Int64
 from ..clock import Clock
 from ..pacer import Pacer
 from .stamps import to_ros_time
+from .topics import FastTopic
 
 DIAGNOSTICS_PERIOD_S = 1.0
 STOPPED_CLOCK_PERIOD_S = 0.05
@@ -32,7 +33,7 @@ class ClockOutlet:
     def __init__(self, clock: Clock, hz: float) -> None:
         self._clock = clock
         self._period_s = 1.0 / hz
-        self._publisher = rospy.Publisher("/clock", ClockMessage, queue_size=1000)
+        self._publisher = FastTopic("/clock", ClockMessage)
         self._due_s = 0.0
 
     def publish_tick(self) -> None:

@@ -43,14 +43,14 @@ class TfListener:
     def _take(self, message: TFMessage, store: Callable[[TransformStamped, str], None]) -> None:
         sender = message._connection_header.get("callerid", "")
         for transform in message.transforms:
-            fault = _fault(transform)
+            fault = fault_in(transform)
             if fault is None:
                 store(transform, sender)
             else:
-                self._warn(f"TF of '{transform.child_frame_id}' from {sender}", f"refused: {fault}")
+                self._warn(f"TF from {sender}", f"'{transform.child_frame_id}' refused: {fault}")
 
 
-def _fault(transform: TransformStamped) -> str | None:
+def fault_in(transform: TransformStamped) -> str | None:
     """Returns what is wrong with a transform, None if nothing is."""
     parent, child = transform.header.frame_id.strip("/"), transform.child_frame_id.strip("/")
     position, quat = transform.transform.translation, transform.transform.rotation

@@ -1,0 +1,153 @@
+"""PyBullet's own window: what it shows, and how a node with a window lives and ends."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+
+import numpy as np
+import pybullet
+import pytest
+import rosgraph
+from ros_system import wait_until
+from sensor_msgs.msg import Image, JointState
+from worlds import FLOOR, iiwa
+
+WIDTH, HEIGHT = 480, 360
+FIELD_OF_VIEW = math.radians(90.0)
+"""Vertical opening of the window's camera."""
+BACKGROUND = [0.1, 0.3, 0.1]
+CAMERA = {
+    "cameraDistance": 2.0,
+    "cameraYaw": 40.0,
+    "cameraPitch": -25.0,
+    "cameraTargetPosition": [3.0, -1.0, 2.0],
+}
+SLOW_S = 60.0
+
+
+def marker(ros, name, rgba, position, radius_m=0.15):
+    """Writes the configuration of a ball that floats; returns its file."""
+    shape = {
+        "shapeType": "GEOM_SPHERE",
+        "radius": radius_m,
+        "rgbaColor": rgba,
+        "specularColor": [0.0, 0.0, 0.0],
+        "visualFramePosition": position,
+    }
+    return ros.write_yaml(f"{name}.yaml", {"name": name, "createVisualShape": shape})
+
+
+@pytest.fixture
+def start(ros, screen):
+    """Starts a simulator with a window and waits until that is there; returns its process."""
+
+    def start(**main):
+        config = {
+            "connect": {"connection_mode": "GUI", "options": f"--width={WIDTH} --height={HEIGHT}"},
+            "timeStep": 0.01,
+            **main,
+        }
+        node = ros.simulator(config, use_sim_time=True, **screen.environment)
+        wait_until(lambda: window(screen), "there is a window", SLOW_S)
+        return node
+
+    return start
+
+
+def window(screen):
+    """Returns PyBullet's window, None if there is none."""
+    return next((each for each in screen.windows() if each.title.startswith("Bullet Physics")), None)
+
+
+def mostly(picture, channel):
+    """Returns the pixels of a picture that are red (0), green (1) or blue (2) above all."""
+    others = np.delete(picture.astype(int), channel, axis=-1)
+    return picture[..., channel] > 2 * others.max(axis=-1) + 20
+
+
+def middle(mask):
+    """Returns column and row of the middle of a mask [px]."""
+    rows, columns = np.nonzero(mask)
+    return columns.mean(), rows.mean()
+
+
+def test_window_looks_where_the_config_says_and_shows_what_it_says(ros, screen, start):
+    target = np.array(CAMERA["cameraTargetPosition"])
+    aside = target + [0.5, 0.2, 0.3]
+    start(
+        resetDebugVisualizerCamera=CAMERA,
+        configureDebugVisualizer={"flag": "COV_ENABLE_GUI|COV_ENABLE_SHADOWS", "rgbBackground": BACKGROUND},
+        visual_objects=[
+            marker(ros, "red", [1.0, 0.0, 0.0, 1.0], target.tolist()),
+            marker(ros, "blue", [0.0, 0.0, 1.0, 1.0], aside.tolist()),
+        ],
+    )
+
+    pictures = []
+
+    def is_shown():
+        pictures.append(screen.grab(window(screen)))
+        return len(pictures) > 1 and not (pictures[-1] != pictures[-2]).any() and mostly(pictures[-1], 2).any()
+
+    wait_until(is_shown, "the balls are shown, and it settles", SLOW_S)
+    picture = pictures[-1]
+    distance_m, yaw, pitch = (CAMERA[f"camera{key}"] for key in ("Distance", "Yaw", "Pitch"))
+    view = pybullet.computeViewMatrixFromYawPitchRoll(target.tolist(), distance_m, yaw, pitch, 0.0, 2)
+    focal_px = HEIGHT / 2 / math.tan(FIELD_OF_VIEW / 2)
+    x, y, z, _ = np.array([*aside, 1.0]) @ np.reshape(view, (4, 4))
+    assert middle(mostly(picture, 0)) == pytest.approx((WIDTH / 2, HEIGHT / 2), abs=3.0)
+    assert middle(mostly(picture, 2)) == pytest.approx(
+        (WIDTH / 2 - focal_px * x / z, HEIGHT / 2 + focal_px * y / z), abs=3.0
+    )
+    radius_px = focal_px * 0.15 / math.sqrt(distance_m**2 - 0.15**2)
+    assert mostly(picture, 0).sum() == pytest.approx(math.pi * radius_px**2, rel=0.1)
+    edges = np.concatenate([picture[0], picture[-1], picture[:, 0], picture[:, -1]])
+    assert np.abs(edges - 255 * np.array(BACKGROUND)).max() < 3  # no panels there
+
+
+def test_node_with_a_window_publishes_joint_states_and_images_and_ends_on_interrupt(ros, screen, start):
+    joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
+    images = ros.listen("/rpbi/camera/colour/image", Image)
+    place = ["0", "0", "3", "0", "0", "3.1416", "rpbi/world", "rpbi/eye"]
+    ros.start(["rosrun", "tf2_ros", "static_transform_publisher", *place])
+    node = start(
+        setAdditionalSearchPath="pybullet_data_path",
+        collision_objects=[ros.write_yaml("floor.yaml", FLOOR)],
+        robots=[ros.write_yaml("iiwa.yaml", iiwa())],
+        rgbd_sensor={
+            "name": "eye",
+            "hz": 10,
+            "intrinsics": {"width": 160, "height": 120},
+            "object_tf": {"tf_id": "rpbi/eye"},
+        },
+    )
+    joint_states.wait_for(100, SLOW_S)
+    images.wait_for(5, SLOW_S)
+    assert set(np.diff(joint_states.stamps_ns)) == {20_000_000}
+    os.killpg(node.pid, signal.SIGINT)
+    assert node.wait(SLOW_S) == 0
+    assert "Traceback" not in ros.output(node)
+    wait_until(lambda: window(screen) is None, "the window has gone", SLOW_S)
+
+
+@pytest.mark.parametrize("running", [True, False], ids=["running", "stopped"])
+def test_closed_window_ends_the_node_with_one_line_and_exit_code_1(ros, screen, start, running):
+    node = start(
+        setAdditionalSearchPath="pybullet_data_path",
+        robots=[ros.write_yaml("iiwa.yaml", iiwa())],
+        start_pybullet_after_initialization=running,
+    )
+    place = window(screen)
+    screen.run("xdotool", "mousemove", str(place.x + WIDTH // 2), str(place.y + HEIGHT // 2), "key", "Escape")
+    assert node.wait(SLOW_S) == 1
+    output = ros.output(node)
+    assert output.count("window was closed") == 1
+    assert "Traceback" not in output
+    wait_until(lambda: not registered("/ros_pybullet_interface"), "the node has left the master")
+
+
+def registered(node):
+    """Returns whether the ROS master knows anything of a node."""
+    return any(node in nodes for kind in rosgraph.Master("/tests").getSystemState() for _, nodes in kind)

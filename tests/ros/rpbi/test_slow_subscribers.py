@@ -1,0 +1,52 @@
+"""A subscriber that stops taking its messages stops nobody else: ticks go on at their rate."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from node_world import diagnosed, main_config
+from ros_system import wait_until
+from sensor_msgs.msg import JointState
+from worlds import ball, iiwa
+
+FROZEN_S = 5.0
+PERIOD_NS = 2_000_000
+AT_ITS_RATE = 0.9
+
+
+@pytest.fixture
+def frozen(ros, tmp_path):
+    """A simulator whose topics somebody subscribes to who is then stopped; what it says of itself meanwhile."""
+    config = main_config(
+        tmp_path,
+        dynamic=(ball(broadcast_hz=250, basePosition=[1.5, 0.0, 0.5]),),
+        robots=(iiwa(joint_state_publisher_hz=500, broadcast_link_states=True, broadcast_link_states_hz=250),),
+        timeStep=0.002,
+    )
+    ros.simulator(config, use_sim_time=True)
+    topics = ["/clock", "/tf", "/rpbi/iiwa/joint_states"]
+    holder = ros.start([sys.executable, str(Path(__file__).with_name("hold_topics.py")), *topics])
+    wait_until(lambda: "listening" in ros.output(holder), "it listens")
+    os.kill(holder.pid, signal.SIGSTOP)
+    yield holder
+    os.kill(holder.pid, signal.SIGCONT)
+
+
+def test_ticks_go_on_while_a_subscriber_is_frozen(ros, frozen):
+    diagnostics = ros.listen("/diagnostics", DiagnosticArray)
+    joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
+    time.sleep(FROZEN_S)
+    stamps = joint_states.stamps_ns
+    gaps = {after - before for before, after in zip(stamps, stamps[1:], strict=False)}
+    assert gaps == {PERIOD_NS}, "others miss some"
+    factors = [float(diagnosed(message)["real_time_factor"]) for message in diagnostics.messages[1:]]
+    assert len(factors) >= 2
+    # The best of them: another program on the same machine may take some of its time, a frozen one must not take all.
+    assert max(factors) >= AT_ITS_RATE, factors
+    assert min(factors) > 0.0
