@@ -86,11 +86,11 @@ class RosSystem:
         self.folder = folder
         self.processes: list[subprocess.Popen] = []
         self._listeners: list[Listener] = []
-        self._parameters: set[str] = set()
         self._lock = threading.Lock()
         if not rospy.core.is_initialized():
             rospy.init_node("tests", anonymous=True, disable_rostime=True, disable_signals=True)
         rospy.set_param("/use_sim_time", False)
+        self._parameters = set(rospy.get_param_names())
 
     def start(self, command: Sequence[str], log: str | None = None, **environment: str) -> subprocess.Popen:
         """Starts a program in a process group of its own; its output goes to `output(process)`."""
@@ -123,7 +123,6 @@ class RosSystem:
         """Starts the simulator node with a main configuration and waits until it is up."""
         rospy.set_param("/use_sim_time", use_sim_time)
         name = f"{namespace}ros_pybullet_interface"
-        self._parameters.add(name)
         rospy.set_param(f"{name}/config", world)
         process = self.start(
             ["rosrun", "ros_pybullet_interface", "ros_pybullet_interface_node.py", f"__ns:={namespace}"], **environment
@@ -165,9 +164,8 @@ class RosSystem:
             except TimeoutError as error:
                 late.append(f"{error}:\n{self.output(process)}")
         rospy.set_param("/use_sim_time", False)
-        for name in self._parameters:
-            if rospy.has_param(name):
-                rospy.delete_param(name)
+        for name in set(rospy.get_param_names()) - self._parameters:  # launch files leave theirs behind
+            rospy.delete_param(name)
         if late:
             raise AssertionError("\n".join(late))
 
