@@ -10,6 +10,7 @@ from rpbi.ros.patient_socket import PatientSocket
 @pytest.fixture
 def pair():
     ours, theirs = socket.socketpair()
+    ours.settimeout(60.0)  # as rospy's are
     ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 8192)
     yield ours, theirs
     ours.close()

@@ -19,7 +19,7 @@ class _RosHandler(logging.Handler):
             (logging.INFO, rospy.loginfo),
             (logging.DEBUG, rospy.logdebug),
         )
-        text = self.format(record).replace("%", "%%")
+        text = self.format(record)
         next(send for level, send in levels if record.levelno >= level)(text)
 
 

@@ -16,6 +16,7 @@ class PatientSocket:
     """
 
     def __init__(self, connection: socket.socket, limit: int) -> None:
+        connection.setblocking(False)  # rospy's sockets have a timeout, for which Python would wait whatever the flags
         self._socket = connection
         self._begun = b""  # rest of a message of which a part was sent
         self._kept: deque[bytes] = deque(maxlen=limit)
@@ -48,6 +49,6 @@ class PatientSocket:
     def _send(self, data: bytes) -> bytes:
         """Sends what can be sent at once and returns the rest."""
         try:
-            return data[self._socket.send(data, socket.MSG_DONTWAIT) :] if data else data
+            return data[self._socket.send(data) :] if data else data
         except BlockingIOError:
             return data
