@@ -30,7 +30,13 @@ class StateTopic(rospy.SubscribeListener):
     def __init__(self, topic: str, message_type: type, queue_size: int = QUEUE_SIZE) -> None:
         super().__init__()
         self._late: deque[Callable[[Any], None]] = deque()
-        self._publisher = rospy.Publisher(topic, message_type, subscriber_listener=self, queue_size=queue_size)
+        self._publisher = rospy.Publisher(
+            topic,
+            message_type,
+            subscriber_listener=self,
+            tcp_nodelay=True,  # else a message may wait 40 ms for the last one to be acknowledged
+            queue_size=queue_size,
+        )
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Callable[[Any], None]) -> None:
         """Notes a new subscriber; rospy calls it from a thread of its own."""
