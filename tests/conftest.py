@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import socket
 import subprocess
@@ -29,6 +30,11 @@ os.environ["ROS_IP"] = "127.0.0.1"
 os.environ["ROS_HOME"] = _HOME.name
 os.environ.pop("ROS_HOSTNAME", None)
 os.environ.pop("ROS_NAMESPACE", None)
+
+
+def pytest_terminal_summary() -> None:
+    """Empties the buffer of what PyBullet printed, so that pytest's closing line comes last."""
+    ctypes.CDLL(None).fflush(None)
 
 
 @pytest.fixture(scope="session")
