@@ -156,7 +156,7 @@ def _urdf(ros, body):
 
 REFUSED = {
     "neither file nor text": (DYNAMIC, "", "", ["expected a filename or a config; got neither"]),
-    "unknown type": (77, box(), "", ["object_type: expected one of 0 (visual)", "got 77"]),
+    "unknown type": (77, box(), "", ["object_type: expected one of 0 (visual_objects)", "got 77"]),
     "type that is not there yet": (PybulletObject.SOFT, box(), "", ["object_type: expected one of", "got 4"]),
     "no such file": (DYNAMIC, "", "/none/box.yaml", ["no such file: /none/box.yaml"]),
     "file without a folder": (DYNAMIC, "", "none.yaml", ["no such file: none.yaml (looked in "]),

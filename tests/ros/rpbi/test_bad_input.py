@@ -92,8 +92,8 @@ REFUSALS = {
     "infinity": (JointState(name=[JOINT], position=[-math.inf]), "values must be finite, got -inf"),
     "unknown joint": (JointState(name=["elbow"], position=[0.0]), "unknown joint 'elbow': known are lbr_iiwa_joint_1"),
     "too few": (JointState(name=[JOINT, "lbr_iiwa_joint_1"], position=[0.0]), "expected one value for each of the 2"),
-    "velocity only": (JointState(name=[JOINT], velocity=[1.0]), "expected positions"),
-    "effort only": (JointState(name=[JOINT], effort=[1.0]), "expected positions"),
+    "velocity only": (JointState(name=[JOINT], velocity=[1.0]), "expected position, since the robot is under"),
+    "effort only": (JointState(name=[JOINT], effort=[1.0]), "expected position, since the robot is under"),
     "named twice": (JointState(name=[JOINT, JOINT], position=[0.0, 1.0]), "joints must be named once each"),
 }
 

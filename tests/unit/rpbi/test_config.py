@@ -43,12 +43,18 @@ class Ball:
     Config: type[ConfigModel] = BallConfig
     section = "visual_objects"
 
+    def claims(self, data: Any) -> bool:
+        return True
+
 
 class Arm:
     """Body class with what the loader asks of it."""
 
     Config: type[ConfigModel] = ArmConfig
     section = "robots"
+
+    def claims(self, data: Any) -> bool:
+        return True
 
 
 BODY_TYPES = {"visual": Ball(), "robot": Arm()}
@@ -160,7 +166,7 @@ def test_all_faults_of_all_files_are_told_at_once(folder: Path) -> None:
     ) == [
         "world.yaml: connect.connection_mode: unknown connection mode 'GIU'; did you mean 'GUI'?",
         "world.yaml: timeStep: expected a number [s], got text '1e-3': YAML reads 1e-3 as text: write 1.0e-3",
-        "world.yaml: visual_objects[4]: expected text, got 3",
+        "world.yaml: visual_objects[4]: expected a file name, or a mapping with 'file' and the keys that differ; got 3",
         "world.yaml: rgbd_sensor.hz: must be > 0 [Hz], got -1",
         "world.yaml: rgbd_sensor.object_tf.tf_id: missing, expected a TF frame",
         "world.yaml: setGravty: unknown key 'setGravty'; did you mean 'setGravity'?",
@@ -183,8 +189,8 @@ def test_all_faults_of_all_files_are_told_at_once(folder: Path) -> None:
         ({"timeStep": 0}, "timeStep: must be > 0 [s], got 0"),
         ({"timeStep": 1e-12}, "timeStep: must be at least 1.0e-9 [s], got 1e-12"),
         ({"real_time_factor": -1}, "real_time_factor: must be >= 0, got -1"),
-        ({"robots": "arm.yaml"}, "robots: expected a list of text, got text 'arm.yaml'"),
-        ({"robots": None}, "robots: expected a list of text, got nothing"),
+        ({"robots": "arm.yaml"}, "robots: expected a list of files, got text 'arm.yaml'"),
+        ({"robots": None}, "robots: expected a list of files, got nothing"),
         ({"config": {"timeStep": 0.01}}, "config: unknown key 'config'; known are "),
         ({"setAdditionalSearchPath": "none"}, "setAdditionalSearchPath: no such folder: none"),
         (

@@ -6,7 +6,7 @@ import pybullet
 import pytest
 
 from custom_ros_tools.errors import UnknownNameError
-from rpbi.joint_model import Joint, JointModel, JointTarget
+from rpbi.joint_model import Joint, JointModel
 
 
 def _joint(index, name, kind=pybullet.JOINT_REVOLUTE, lower=-1.0, upper=1.0, effort=10.0, velocity=2.0):
@@ -18,20 +18,20 @@ MODEL = JointModel([_joint(0, "base", pybullet.JOINT_FIXED), _joint(1, "a"), _jo
 
 
 def test_a_target_is_resolved_by_name_whatever_the_order():
-    assert MODEL.resolve(JointTarget(["b", "a"], [0.2, 0.1])) == {1: 0.1, 2: 0.2}
+    assert MODEL.resolve(["b", "a"], [0.2, 0.1]) == {1: 0.1, 2: 0.2}
 
 
 def test_a_partial_target_names_only_its_joints():
-    assert MODEL.resolve(JointTarget(["b"], [0.2])) == {2: 0.2}
+    assert MODEL.resolve(["b"], [0.2]) == {2: 0.2}
 
 
 def test_fixed_joints_are_known_but_not_driven():
-    assert MODEL.resolve(JointTarget(["base", "a"], [0.0, 0.1])) == {1: 0.1}
+    assert MODEL.resolve(["base", "a"], [0.0, 0.1]) == {1: 0.1}
 
 
 def test_an_unknown_joint_is_named_with_the_known_ones():
     with pytest.raises(UnknownNameError, match="unknown joint 'aa'.*base, a, b"):
-        MODEL.resolve(JointTarget(["aa"], [0.0]))
+        MODEL.resolve(["aa"], [0.0])
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_an_unknown_joint_is_named_with_the_known_ones():
 )
 def test_bad_targets_are_refused_whole(names, values, message):
     with pytest.raises(ValueError, match=message):
-        MODEL.resolve(JointTarget(names, values))
+        MODEL.resolve(names, values)
 
 
 def test_no_limits_in_the_description_mean_no_limits():

@@ -47,7 +47,7 @@ def test_old_spelling_works_with_a_warning_that_says_what_to_write(
 
 def test_every_old_spelling_means_a_key_that_exists() -> None:
     for section, table in LEGACY_KEYS.items():
-        (model,) = (body.Config for body in BODY_TYPES.values() if body.section == section)
+        (model,) = {body.Config for body in BODY_TYPES.values() if body.section == section}
         assert set(table.values()) <= set(model.model_fields)
 
 

@@ -10,14 +10,14 @@ from typing import Any
 
 from custom_ros_tools.config import load_config, replace_package
 from custom_ros_tools.errors import ConfigError, Problem
-from custom_ros_tools.schema import ConfigModel
 
 from .asset_files import ROBOT_DESCRIPTION, find_file, find_folder
+from .instance import Instance, parse_instance
 from .legacy import MAIN
-from .object_config import BodyType, ObjectConfig, load_object, name_in, parse_section
+from .object_config import BodyType, ObjectConfig, load_object, name_in, parse_section, type_of
 from .world_config import WorldConfig
 
-__all__ = ["LoadedWorld", "ObjectConfig", "WorldConfig", "load_object", "load_world", "load_world_dict"]
+__all__ = ["LoadedWorld", "ObjectConfig", "WorldConfig", "load_object", "load_world", "load_world_dict", "type_of"]
 
 log = logging.getLogger(__name__)
 
@@ -115,30 +115,35 @@ class _Reader:
 
     def _objects(self) -> Iterator[ObjectConfig]:
         search_paths = self._search_paths()
-        for kind, body_type in self._body_types.items():
-            for index, entry in _texts(self._data.get(body_type.section)):
+        for section in dict.fromkeys(body_type.section for body_type in self._body_types.values()):
+            for index, instance in _instances(self._data.get(section)):
+                key = f"{section}[{index}]"
                 try:
-                    path = find_file(entry, self._path, search_paths)
+                    path = find_file(instance.file, self._path, search_paths)
                 except ValueError as error:
-                    self._problems.append(Problem(self._file, f"{body_type.section}[{index}]", str(error)))
+                    self._problems.append(Problem(self._file, key, str(error)))
                     continue
                 context = {
                     "file": path,
                     "search_paths": search_paths,
                     ROBOT_DESCRIPTION: self._robot_description,
                 }
+                file = f"{instance.file} (changed by {key})" if instance.changes else instance.file
                 try:
-                    yield ObjectConfig(kind, self._object(kind, entry, context), entry)
+                    yield self._object(section, instance, file, context)
                 except ConfigError as error:
                     self._problems += [
-                        Problem(entry, problem.key, problem.message) for problem in error.problems
+                        Problem(file, problem.key, problem.message) for problem in error.problems
                     ]
         self._claim_name(self._data.get("rgbd_sensor"), self._file, "rgbd_sensor.name")
 
-    def _object(self, kind: str, file: str, context: Mapping[str, Any]) -> ConfigModel:
-        data = load_config(context["file"])
+    def _object(
+        self, section: str, instance: Instance, file: str, context: Mapping[str, Any]
+    ) -> ObjectConfig:
+        data = instance.apply_changes(load_config(context["file"]))
         self._claim_name(data, file, "name")
-        return load_object(kind, data, file, self._body_types, context)
+        kind = type_of(section, data, self._body_types)
+        return ObjectConfig(kind, load_object(kind, data, file, self._body_types, context), file)
 
     def _claim_name(self, data: Any, file: str, key: str) -> None:
         """Note the name of an object, so that no other has it."""
@@ -157,6 +162,13 @@ class _Reader:
             with contextlib.suppress(ValueError):  # it is reported with the main file
                 found.append(find_folder(name, self._path))
         return tuple(found)
+
+
+def _instances(given: Any) -> Iterator[tuple[int, Instance]]:
+    """Yield the entries of a list of objects with their indices; others are reported by the model."""
+    for index, entry in enumerate(given if isinstance(given, (list, tuple)) else ()):
+        with contextlib.suppress(ValueError):
+            yield index, parse_instance(entry)
 
 
 def _texts(given: Any) -> list[tuple[int, str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,6 +18,9 @@ _TYPE_NAMES = {
     pybullet.JOINT_PLANAR: "JOINT_PLANAR",
     pybullet.JOINT_FIXED: "JOINT_FIXED",
 }
+
+LIMIT_ROUNDING = 1e-6
+"""A position may be this far beyond a limit [rad or m] and still counts as within."""
 
 
 @dataclass(frozen=True)
@@ -75,9 +78,27 @@ class Joint:
         return self.type == pybullet.JOINT_FIXED
 
     @property
+    def unit(self) -> str:
+        """Unit of its position."""
+        return "m" if self.type == pybullet.JOINT_PRISMATIC else "rad"
+
+    def allows(self, position: float) -> bool:
+        """Tells whether a position [rad or m] is within the limits, rounding errors of limits in degrees aside."""
+        return self.lower - LIMIT_ROUNDING <= position <= self.upper + LIMIT_ROUNDING
+
+    def limit_violation(self, position: float) -> str:
+        """Returns a message that tells how a position [rad or m] lies to the limits."""
+        limits = f"{self.lower:.6g} to {self.upper:.6g} {self.unit}"
+        return f"joint '{self.name}' must be within {limits}, got {position:.6g}"
+
+    @property
     def is_driven(self) -> bool:
         """Whether it has one axis that a motor can move."""
         return self.type in (pybullet.JOINT_REVOLUTE, pybullet.JOINT_PRISMATIC)
+
+
+class WrongQuantityError(ValueError):
+    """A target gives other quantities than those that are asked for."""
 
 
 class JointTarget(NamedTuple):
@@ -85,11 +106,31 @@ class JointTarget(NamedTuple):
 
     Attributes:
         names: n joint names.
-        values: n numbers [rad or m for positions].
+        position: n positions [rad or m], or none.
+        velocity: n velocities [rad/s or m/s], or none.
+        effort: n torques or forces [N m or N], or none.
     """
 
     names: Sequence[str]
-    values: Sequence[float]
+    position: Sequence[float] = ()
+    velocity: Sequence[float] = ()
+    effort: Sequence[float] = ()
+
+    def values_of(self, quantity: str, reason: str) -> Sequence[float]:
+        """Returns the values of one quantity.
+
+        Args:
+            quantity: `position`, `velocity` or `effort`.
+            reason: Why it must be this one, for the message.
+
+        Raises:
+            WrongQuantityError: If joints are named and it has none for them.
+        """
+        values: Sequence[float] = getattr(self, quantity)
+        if not values and self.names:
+            given = " and ".join(each for each in self._fields[1:] if getattr(self, each)) or "no values"
+            raise WrongQuantityError(f"expected {quantity}, since {reason}; got {given}")
+        return values
 
 
 class JointModel:
@@ -97,12 +138,14 @@ class JointModel:
 
     Args:
         joints: All joints in PyBullet's index order.
+        base_joints: How many of them, the first ones, move its base and are none of the robot's own.
     """
 
-    def __init__(self, joints: Sequence[Joint]) -> None:
+    def __init__(self, joints: Sequence[Joint], base_joints: int = 0) -> None:
         self.joints = tuple(joints)
-        self.driven = tuple(joint for joint in self.joints if joint.is_driven)
-        self._by_name = {joint.name: joint for joint in self.joints}
+        self.own = self.joints[base_joints:]
+        self.driven = tuple(joint for joint in self.own if joint.is_driven)
+        self._by_name = {joint.name: joint for joint in self.own}
 
     def __getitem__(self, name: str) -> Joint:
         """Returns a joint by name.
@@ -115,14 +158,13 @@ class JointModel:
         except KeyError:
             raise UnknownNameError("joint", name, list(self._by_name)) from None
 
-    def resolve(self, target: JointTarget) -> dict[int, float]:
-        """Checks a target and returns its values by joint index; fixed joints are known but not driven.
+    def resolve(self, names: Sequence[str], values: Sequence[float]) -> dict[int, float]:
+        """Checks values of joints and returns them by joint index; fixed joints are known but not driven.
 
         Raises:
             UnknownNameError: If the robot lacks one of the joints.
             ValueError: If lengths differ, a joint is named twice or a value is not finite.
         """
-        names, values = target
         if len(names) != len(values):
             raise ValueError(f"expected one value for each of the {len(names)} joints named, got {len(values)}")
         if len(set(names)) != len(names):
@@ -135,3 +177,17 @@ class JointModel:
             if joint.is_driven:
                 resolved[joint.index] = float(value)
         return resolved
+
+    def check_limits(self, positions: Mapping[int, float]) -> None:
+        """Checks positions [rad or m] by joint index.
+
+        Raises:
+            ValueError: If one is outside its joint's limits; it names all that are.
+        """
+        beyond = [
+            self.joints[index].limit_violation(position)
+            for index, position in positions.items()
+            if not self.joints[index].allows(position)
+        ]
+        if beyond:
+            raise ValueError("; ".join(beyond))

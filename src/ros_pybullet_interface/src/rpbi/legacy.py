@@ -54,15 +54,6 @@ PLANNED_KEYS: dict[str, dict[str, Any]] = {
         "visualizer_image_width": ANY,
         "visualizer_image_height": ANY,
     },
-    "robots": {
-        "is_visual_robot": False,
-        "object_tf": {},
-        "enabled_joint_force_torque_sensors": [],
-        "move_to_initial_joint_state_on_startup": False,
-        "start_ik_callback": False,
-        "do_log_joint_limit_violations": ANY,
-        "log_joint_limit_violations_hz": ANY,
-    },
 }
 """By section: a key that does nothing yet, and the value that asks for nothing (ANY if every value does)."""
 

@@ -29,6 +29,9 @@ class BodyType(Protocol):
     def section(self) -> str:
         """List of the main file that names its files."""
 
+    def claims(self, data: Mapping[str, Any], /) -> bool:
+        """Tells whether a YAML of that list is one of this type."""
+
 
 @dataclass(frozen=True)
 class ObjectConfig:
@@ -43,6 +46,20 @@ class ObjectConfig:
     type: str
     config: ConfigModel
     file: str
+
+
+def type_of(section: str, data: Any, body_types: Mapping[str, BodyType]) -> str:
+    """Return the type of an object in a list of the main file.
+
+    Args:
+        section: The list, such as `robots`.
+        data: What the object's file says; if it is no mapping, any type of the list will do to say so.
+        body_types: The classes of bodies by type.
+    """
+    of_section = [kind for kind, body_type in body_types.items() if body_type.section == section]
+    if isinstance(data, Mapping):
+        return next((kind for kind in of_section if body_types[kind].claims(data)), of_section[0])
+    return of_section[0]
 
 
 def load_object(

@@ -44,6 +44,9 @@ from .pybullet_args import (
 HalfExtents = Annotated[tuple[PositiveMetres, PositiveMetres, PositiveMetres], Field(strict=False)]
 
 
+Gains = ListOf[NonNegative] | dict[str, NonNegative]
+
+
 class PybulletModel(ConfigModel):
     """Keyword arguments of one PyBullet function."""
 
@@ -195,8 +198,8 @@ class SetJointMotorControlArray(PybulletModel):
     """How the motors of a robot follow their targets."""
 
     controlMode: Annotated[int, CONTROL_MODES] = Field(description="What the targets are.")
-    positionGains: ListOf[NonNegative] | None = Field(None, description="Position gain of each driven joint.")
-    velocityGains: ListOf[NonNegative] | None = Field(None, description="Velocity gain of each driven joint.")
+    positionGains: Gains | None = Field(None, description="Position gain: one, one of each driven joint, or by joint.")
+    velocityGains: Gains | None = Field(None, description="Velocity gain: one, one of each driven joint, or by joint.")
 
 
 class ObjectTf(ConfigModel):

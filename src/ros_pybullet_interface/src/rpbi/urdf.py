@@ -6,6 +6,7 @@ import atexit
 import hashlib
 import re
 import tempfile
+import xml.etree.ElementTree as ElementTree
 from functools import lru_cache
 from pathlib import Path
 
@@ -67,6 +68,39 @@ def write_description(text: str) -> str:
         The file, which lasts as long as the process.
     """
     return _write("robot_description", text)
+
+
+def description_for_ros(path: str) -> str:
+    """Returns a URDF file as ROS wants it, which does not know where the file is.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Its text, with relative mesh paths as `file://` addresses; `package://` paths stay.
+    """
+    source = Path(path)
+
+    def address(match: re.Match[str]) -> str:
+        mesh = match["path"]
+        if "://" in mesh:
+            return match[0]
+        return f"{match['before']}{match['quote']}file://{(source.parent / mesh).resolve()}{match['quote']}"
+
+    return _FILENAME.sub(address, source.read_text(encoding="utf-8"))
+
+
+def joint_types(path: str) -> dict[str, str]:
+    """Returns the type of each joint in a URDF file by name, such as `revolute` or `fixed`.
+
+    Raises:
+        ConfigError: If the file is not XML.
+    """
+    try:
+        joints = ElementTree.parse(path).getroot().iterfind("joint")
+    except ElementTree.ParseError as error:
+        raise ConfigError([Problem(path, "", f"is not XML: {error}")]) from None
+    return {joint.get("name", ""): joint.get("type", "") for joint in joints}
 
 
 def _write(stem: str, text: str) -> str:

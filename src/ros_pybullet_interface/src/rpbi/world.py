@@ -71,6 +71,7 @@ class World:
         self._inputs: dict[str, Input] = {}
         self._scheduled: dict[str, list[_Scheduled]] = {}
         self._stepping: list[Body] = []
+        self._watching: list[Sensor] = []
         self._next_due = 0
         connect = self.config.connect.kwargs()
         configured_mode = connect.pop("connection_mode")
@@ -133,7 +134,8 @@ class World:
         self._append(LogEntry(name, "remove"))
         if body in self._stepping:
             self._stepping.remove(body)
-        del self._scheduled[name]
+        gone = [each.sensor for each in self._scheduled.pop(name)]
+        self._watching = [sensor for sensor in self._watching if sensor not in gone]
         self._inputs = {slot: taken for slot, taken in self._inputs.items() if slot.split("/")[0] != name}
         self.take_inputs()  # what still waits for it must not meet a later body of the same name
 
@@ -157,6 +159,10 @@ class World:
     def inputs(self) -> dict[str, Input]:
         """What the world takes while it runs, by slot."""
         return self._inputs
+
+    def sensors_of(self, name: str) -> list[Sensor]:
+        """Returns the sensors of a body, or the camera of that name."""
+        return [each.sensor for each in self._scheduled[name]]
 
     @property
     def is_connected(self) -> bool:
@@ -184,8 +190,12 @@ class World:
         self.take_inputs()
         for body in self._stepping:
             body.before_step(self.clock.tick)
+        for sensor in self._watching:
+            sensor.before_step(self.clock.tick)
         self.pb.stepSimulation()
         self.clock.advance()
+        for sensor in self._watching:
+            sensor.after_step(self.clock.tick)
         return self._read_due() if self.clock.tick >= self._next_due else []
 
     def read_rest(self) -> list[Any]:
@@ -200,10 +210,16 @@ class World:
             each.read(now) for each in self._all() if each.sensor.wanted and each.schedule.is_due(tick, since)
         )
 
+    def halt(self, reason: str) -> None:
+        """Breaks off what bodies were about to do over the coming ticks, such as timed motions."""
+        for body in self.bodies.values():
+            body.halt(reason)
+
     def close(self) -> None:
         """Disconnects from PyBullet and fails the requests that wait."""
         self.mailbox.close()
         try:
+            self.halt("the simulation ended")
             self.pb.disconnect()
         except pybullet.error:
             log.debug("PyBullet had disconnected before")
@@ -237,6 +253,7 @@ class World:
 
     def _register(self, name: str, sensors: tuple[Sensor, ...], inputs: Any) -> None:
         self._scheduled[name] = [_Scheduled(sensor, self.clock.dt_ns, self.clock.tick) for sensor in sensors]
+        self._watching += [sensor for sensor in sensors if type(sensor).before_step is not Sensor.before_step]
         self._inputs = {**self._inputs, **{f"{name}/{key}": value for key, value in inputs.items()}}
         self._next_due = 0
 

@@ -6,9 +6,10 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
-from custom_ros_tools.schema import ConfigModel, Hz, ListOf, Name, NonNegative, Seconds, Switch, Text
+from custom_ros_tools.schema import ConfigModel, FrameId, Hz, ListOf, Name, NonNegative, Seconds, Switch, Text
 
 from .asset_files import find_folder
+from .instance import ObjectEntry
 from .pybullet_world_models import (
     ConfigureDebugVisualizer,
     Connect,
@@ -66,8 +67,8 @@ class WorldConfig(ConfigModel):
         1.0, description="Simulated seconds in a second of wall time; 0 is as fast as it goes."
     )
     clock_hz: Hz | None = Field(None, description="Most /clock messages in a second of wall time.")
-    target_timeout_s: Seconds = Field(
-        0.5, description="Age at which velocity and torque targets expire; position targets never do."
+    tf_prefix: FrameId | None = Field(
+        None, description="What to put before all TF frames, so that two worlds can share one TF tree."
     )
     step_pybullet_manually: Switch = Field(
         False, description="Accepted without effect: the interface does every step itself."
@@ -82,10 +83,10 @@ class WorldConfig(ConfigModel):
     resetDebugVisualizerCamera: ResetDebugVisualizerCamera = Field(
         ResetDebugVisualizerCamera(), description="Where PyBullet's window looks from."
     )
-    visual_objects: ListOf[Text] = Field((), description="Files of objects that are seen and never felt.")
-    collision_objects: ListOf[Text] = Field((), description="Files of objects that nothing moves.")
-    dynamic_objects: ListOf[Text] = Field((), description="Files of objects that physics moves.")
-    robots: ListOf[Text] = Field((), description="Files of robots.")
+    visual_objects: ListOf[ObjectEntry] = Field((), description="Files of objects that are seen and never felt.")
+    collision_objects: ListOf[ObjectEntry] = Field((), description="Files of objects that nothing moves.")
+    dynamic_objects: ListOf[ObjectEntry] = Field((), description="Files of objects that physics moves.")
+    robots: ListOf[ObjectEntry] = Field((), description="Files of robots.")
     rgbd_sensor: RgbdSensorConfig | None = Field(
         None, description="Camera of colour, depth and segmentation."
     )

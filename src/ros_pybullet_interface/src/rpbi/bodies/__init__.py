@@ -5,15 +5,28 @@ from __future__ import annotations
 from .body import Body
 from .collision import CollisionObject
 from .dynamic import DynamicObject
+from .mobile_robot import MobileRobot
 from .robot import Robot
 from .visual import VisualObject
+from .visual_robot import VisualRobot
 
 BODY_TYPES: dict[str, type[Body]] = {
     "visual": VisualObject,
     "collision": CollisionObject,
     "dynamic": DynamicObject,
     "robot": Robot,
+    "mobile_robot": MobileRobot,
+    "visual_robot": VisualRobot,
 }
 """In the order in which a world loads them."""
 
-__all__ = ["BODY_TYPES", "Body", "CollisionObject", "DynamicObject", "Robot", "VisualObject"]
+__all__ = [
+    "BODY_TYPES",
+    "Body",
+    "CollisionObject",
+    "DynamicObject",
+    "MobileRobot",
+    "Robot",
+    "VisualObject",
+    "VisualRobot",
+]

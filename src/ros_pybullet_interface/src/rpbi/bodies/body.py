@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from custom_ros_tools.errors import PhysicsError
 from custom_ros_tools.schema import ConfigModel
@@ -13,6 +13,8 @@ from ..inputs import Input
 from ..pose import Pose
 from ..samples import BodyState
 from ..sensors.sensor import Sensor
+from ..twist import Twist
+from ..vectors import cross, minus, plus
 
 
 class Body:
@@ -38,12 +40,29 @@ class Body:
         self.name = name
         self.body_id = body_id
         self.joint_indices = tuple(range(pb.getNumJoints(body_id)))
+        self.link_indices = self.joint_indices
+        """PyBullet's indices of all links but the root."""
+        self.root_link: str = pb.getBodyInfo(body_id)[0].decode()
         inertial = pb.getDynamicsInfo(body_id, -1)
         self.inertial_pose_in_base = Pose(inertial[3], inertial[4])
         self._base_pose_in_inertial = self.inertial_pose_in_base.inverse()
+        self.dynamics_changes = 0
+        """How often its dynamics were changed, for those who keep what they know of them."""
 
     def before_step(self, tick: int) -> None:
         """Acts just before the physics of each tick; bodies that need nothing leave it."""
+
+    def halt(self, reason: str) -> None:
+        """Breaks off what it was about to do over the coming ticks, since they may not come; most bodies do nothing.
+
+        Args:
+            reason: Why, for whoever waits for it.
+        """
+
+    @classmethod
+    def claims(cls, data: Mapping[str, Any]) -> bool:
+        """Tells whether a YAML of its section is one of this type, where several types share a section."""
+        return True
 
     def sensors(self) -> tuple[Sensor, ...]:
         """Returns the sensors that the body carries."""
@@ -60,6 +79,17 @@ class Body:
     def set_base_pose(self, pose: Pose) -> None:
         """Puts the base link's URDF frame at a pose in the world and leaves the velocity as it is."""
         self.pb.resetBasePositionAndOrientation(self.body_id, *(pose @ self.inertial_pose_in_base))
+
+    def base_twist(self) -> Twist:
+        """Returns the twist of the base link's URDF frame in the world; of a base that TF puts somewhere it is 0."""
+        linear, angular = self.pb.getBaseVelocity(self.body_id)  # of the centre of mass
+        centre = self.pb.getBasePositionAndOrientation(self.body_id)[0]
+        return Twist(plus(linear, cross(angular, minus(self.base_pose().position, centre))), angular)
+
+    def teleport(self, pose: Pose) -> None:
+        """Puts the base link's URDF frame at a pose in the world, at rest."""
+        self.set_base_pose(pose)
+        self.pb.resetBaseVelocity(self.body_id, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
     def state(self) -> BodyState:
         """Returns where the body is."""

@@ -1,160 +1,218 @@
-"""Robots: jointed bodies that hold and follow joint targets."""
+"""Robots: jointed bodies whose motors hold and follow targets."""
 
 from __future__ import annotations
 
-import math
+import logging
+import re
 from collections.abc import Mapping
 from typing import Any
 
 import pybullet
-from pydantic import Field, model_validator
 
-from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
-from custom_ros_tools.schema import ConfigModel, Hz, KeyedError, Name
+from custom_ros_tools.errors import Problem, UnknownNameError
 
 from ..client import Client
+from ..control.follower import TrajectoryFollower
+from ..control.gravity import GravityModel
+from ..control.motion import JointMotion, Motion
+from ..control.motors import Command, Motors
+from ..control.trajectory_config import trajectory_misfits
 from ..inputs import Input
-from ..joint_model import Joint, JointModel
-from ..pybullet_models import LoadURDF, ResetBaseVelocity, SetJointMotorControlArray
+from ..joint_model import JointTarget
+from ..sensors.force_torque import ForceTorqueSensor
 from ..sensors.joint_state import JointStateSensor
-from ..sensors.link_pose import LinkPoseSensor
 from ..sensors.sensor import Sensor
-from ..urdf import resolve_meshes
-from .body import Body
-from .urdf_faults import urdf_faults
+from ..sensors.trajectory_state import TrajectoryStateSensor
+from .jointed import JointedBody
+from .robot_config import RobotConfig
+
+log = logging.getLogger(__name__)
 
 
-class RobotConfig(ConfigModel):
-    """YAML of a robot."""
+class Robot(JointedBody):
+    """A robot with motors, within the effort and velocity limits of its URDF.
 
-    name: Name = Field(description="Unique name; topics and TF frames are named after it.")
-    loadURDF: LoadURDF = Field(description="Its description and where its base is.")
-    setJointMotorControlArray: SetJointMotorControlArray = Field(description="How its motors follow targets.")
-    initial_joint_position: dict[str, float] = Field(
-        {}, description="Start position by joint; those not named start at 0.", json_schema_extra={"unit": "deg or m"}
-    )
-    initial_revolute_joint_positions_are_deg: bool = Field(
-        True, description="Whether start positions of revolute joints are in degrees, else in radians."
-    )
-    enforce_effort_limits: bool = Field(True, description="Whether motors are held to the efforts of the URDF.")
-    joint_state_publisher_hz: Hz = Field(50.0, description="Rate of the joint states.")
-    broadcast_link_states: bool = Field(False, description="Whether the poses of all links are on TF.")
-    broadcast_link_states_hz: Hz = Field(50.0, description="Rate of the links' poses on TF.")
-    resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity of a floating base.")
-    color_alpha: float | None = Field(None, ge=0.0, le=1.0, description="Opacity of the whole robot, 0 to 1.")
-
-    @model_validator(mode="after")
-    def _is_position_controlled(self) -> RobotConfig:
-        if self.setJointMotorControlArray.controlMode != pybullet.POSITION_CONTROL:
-            raise KeyedError("setJointMotorControlArray.controlMode", "only POSITION_CONTROL is there yet")
-        return self
-
-
-class Robot(Body):
-    """A robot under position control, within the effort and velocity limits of its URDF.
-
-    It holds its start position until the first target, and every target until the next.
+    It holds its start position until the first target. Targets of joints that a motion drives are refused until it
+    ends.
 
     Raises:
         ConfigError: If the configuration does not fit the robot.
         PhysicsError: If PyBullet cannot load it.
     """
 
-    Config = RobotConfig
-    section = "robots"
-
     def __init__(self, pb: Client, config: RobotConfig) -> None:
-        super().__init__(pb, config.name, _load(pb, config))
-        self.config = config
-        self.model = JointModel([Joint.from_info(pb.getJointInfo(self.body_id, i)) for i in self.joint_indices])
-        self.joints = self.model.joints
-        self.root_link: str = pb.getBodyInfo(self.body_id)[0].decode()
-        self._check_fit()
-        start = self._start_positions()
-        self._motor_arguments = {joint.index: self._motor(joint) for joint in self.model.driven}
-        for index, position in start.items():
-            pb.resetJointState(self.body_id, index, position)
-        self._follow(start)
-        if config.resetBaseVelocity is not None:
+        super().__init__(pb, config)
+        assert config.setJointMotorControlArray is not None  # the model demands it
+        mode = config.setJointMotorControlArray.controlMode
+        self.dt_s: float = pb.getPhysicsEngineParameters()["fixedTimeStep"]
+        self.motors = Motors(
+            pb,
+            self.body_id,
+            self.model,
+            mode,
+            self._gains(),
+            config.enforce_effort_limits,
+            max(1, round(config.target_timeout_s / self.dt_s)),
+        )
+        self.force_torque_sensors = tuple(
+            ForceTorqueSensor(self, self.model[each.joint], each, config.joint_state_publisher_hz)
+            for each in config.enabled_joint_force_torque_sensors
+        )
+        self.motion: Motion | None = None
+        follower = config.joint_trajectory_controller
+        self.follower = None if follower is None else TrajectoryFollower(self, follower)
+        self._has_begun = False
+        self._gravity = GravityModel(self) if config.gravity_compensation else None
+        if config.resetBaseVelocity is not None and self.has_fixed_base:
+            log.warning("%s: resetBaseVelocity: has no effect: the base is fixed (useFixedBase is set)", self.name)
+        elif config.resetBaseVelocity is not None:
             pb.resetBaseVelocity(self.body_id, **config.resetBaseVelocity.kwargs())
-        if config.color_alpha is not None:
-            self._set_alpha(config.color_alpha)
+        if config.object_tf is not None and not self.has_fixed_base:
+            log.warning("%s: object_tf: has no effect: physics moves a base that is not fixed", self.name)
+
+    @classmethod
+    def claims(cls, data: Mapping[str, Any]) -> bool:
+        """Tells whether a YAML of the section `robots` is that of a robot with motors whose base does not drive."""
+        return data.get("is_visual_robot") not in (True, 1) and data.get("planar_base") is None
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """Joint states, and link poses if they are to be broadcast."""
+        """Joint states, force-torque sensors and the state of the follower of trajectories, beside link poses."""
         joint_states = JointStateSensor(self, self.config.joint_state_publisher_hz)
-        if not self.config.broadcast_link_states:
-            return (joint_states,)
-        return joint_states, LinkPoseSensor(self, self.config.broadcast_link_states_hz)
+        trajectory = () if self.follower is None else (TrajectoryStateSensor(self, self.follower),)
+        return (joint_states, *self.force_torque_sensors, *trajectory, *super().sensors())
 
     def inputs(self) -> Mapping[str, Input]:
-        """Takes `target`, a JointTarget of positions [rad or m]."""
-        return {"target": Input(self.model.resolve, self._follow, merge=dict.__or__)}
+        """Takes `target`, a JointTarget of what the control mode asks for, beside the pose of its base."""
+        target = Input(self._check_target, self.motors.follow, merge=Command.merged)
+        return {**super().inputs(), "target": target}
 
-    def _follow(self, positions: Mapping[int, float]) -> None:
-        """Sets the motors' set points [rad or m] by joint index; PyBullet keeps them until they are set again."""
-        for index, position in positions.items():
-            self.pb.setJointMotorControl2(
-                self.body_id, index, targetPosition=position, **self._motor_arguments[index]
-            )
+    def before_step(self, tick: int) -> None:
+        """Follows the motion, lets targets expire and applies efforts."""
+        if self.motion is not None:
+            self._advance(self.motion, tick)
+        if self._gravity is not None and self.motors.mode == pybullet.TORQUE_CONTROL:
+            self.motors.set_feed_forward(self._gravity.efforts())
+        self.motors.before_step(tick)
 
-    def _motor(self, joint: Joint) -> dict[str, Any]:
-        """Returns what PyBullet's motor of a joint is told beside its set point."""
-        arguments: dict[str, Any] = {"controlMode": pybullet.POSITION_CONTROL}
-        if self.config.enforce_effort_limits and math.isfinite(joint.max_effort):
-            arguments["force"] = joint.max_effort
-        if math.isfinite(joint.max_velocity):
-            arguments["maxVelocity"] = joint.max_velocity
-        motors = self.config.setJointMotorControlArray
-        for argument, gains in (("positionGain", motors.positionGains), ("velocityGain", motors.velocityGains)):
-            if gains is not None:
-                arguments[argument] = gains[self.model.driven.index(joint) % len(gains)]
-        return arguments
-
-    def _check_fit(self) -> None:
-        """Finds what in the configuration does not fit the robot.
+    def run(self, motion: Motion) -> None:
+        """Starts a motion; one that runs is ended with a reason.
 
         Raises:
-            ConfigError: If something does not; it tells all of it.
+            ValueError: If the robot is under torque control.
         """
-        problems = []
-        for name in self.config.initial_joint_position:
-            try:
-                self.model[name]
-            except UnknownNameError as error:
-                problems.append(Problem(self.name, f"initial_joint_position.{name}", str(error)))
+        if self.motors.mode == pybullet.TORQUE_CONTROL:
+            raise ValueError("the robot is under TORQUE_CONTROL, where nothing holds it to a position")
+        self.halt("a newer motion replaced it")
+        self.motion, self._has_begun = motion, False
+
+    def halt(self, reason: str) -> None:
+        """Ends the motion that runs, if any; its joints hold where they are."""
+        if self.motion is not None:
+            measured = self.joint_motion()
+            self.motion.halt(reason, measured)
+            for index in self.motion.joints:
+                self.motors.track(index, measured[index][0], 0.0)
+            self._end_motion(self.motion)
+
+    def switch_mode(self, mode: int) -> None:
+        """Changes PyBullet's control mode; a motion that runs is ended."""
+        self.halt("the control mode was changed")
+        self.motors.switch(mode)
+
+    def set_joint_state(self, target: JointTarget) -> None:
+        """Puts joints somewhere at once, where the motors then hold them; a motion that runs is ended."""
+        super().set_joint_state(target)
+        self.halt("its joints were put elsewhere")
+        self.motors.switch(self.motors.mode)
+
+    def efforts(self, reported: tuple[float, ...]) -> tuple[float, ...]:
+        """Returns the motors' efforts [N m or N] of all joints; PyBullet does not report those of torque control."""
+        if self.motors.mode != pybullet.TORQUE_CONTROL:
+            return reported
+        return tuple(self.motors.applied_efforts.get(joint.index, 0.0) for joint in self.joints)
+
+    def joint_motion(self) -> JointMotion:
+        """Returns measured position [rad or m] and velocity [rad/s or m/s] of each driven joint by index."""
+        indices = [joint.index for joint in self.model.driven]
+        states = self.pb.getJointStates(self.body_id, indices) if indices else ()
+        return {index: (state[0], state[1]) for index, state in zip(indices, states)}
+
+    def remove(self) -> None:
+        """Takes the robot out of the world; a motion that runs is ended."""
+        self.halt("the robot was removed")
+        if self._gravity is not None:
+            self._gravity.close()
+        super().remove()
+
+    def _advance(self, motion: Motion, tick: int) -> None:
+        measured = self.joint_motion()
+        if not self._has_begun:
+            motion.begin(tick * self.dt_s, measured)
+            self._has_begun = True
+        for index, (position, velocity) in motion.advance((tick + 1) * self.dt_s, measured).items():
+            self.motors.track(index, position, velocity)
+        if motion.is_over:
+            self._end_motion(motion)
+
+    def _end_motion(self, motion: Motion) -> None:
+        self.motion = None
+        self.motors.release(motion.joints)
+
+    def _check_target(self, target: JointTarget) -> Command:
+        command = self.motors.check(target)
+        motion = self.motion
+        driven = [] if motion is None else [self.joints[i].name for i in command.values if i in motion.joints]
+        if driven:
+            raise ValueError(f"a motion drives {', '.join(driven)} until it ends")
+        return command
+
+    def _gains(self) -> dict[int, dict[str, float]]:
+        """Returns PyBullet's gains by joint index; what does not fit was found before."""
+        gains: dict[int, dict[str, float]] = {}
+        for key, given in self._configured_gains().items():
+            argument = key.removesuffix("s")
+            if isinstance(given, Mapping):
+                by_index = {self.model[name].index: gain for name, gain in given.items()}
+            else:
+                by_index = {joint.index: given[i % len(given)] for i, joint in enumerate(self.model.driven)}
+            for index, gain in by_index.items():
+                gains.setdefault(index, {})[argument] = gain
+        return gains
+
+    def _configured_gains(self) -> dict[str, tuple[float, ...] | dict[str, float]]:
         motors = self.config.setJointMotorControlArray
-        expected = f"expected 1 number or {len(self.model.driven)}"
-        for key, gains in (("positionGains", motors.positionGains), ("velocityGains", motors.velocityGains)):
-            if gains is not None and len(gains) not in (1, len(self.model.driven)):
-                names = ", ".join(driven.name for driven in self.model.driven)
-                message = f"{expected}, one for each of {names}; got {len(gains)}"
-                problems.append(Problem(self.name, f"setJointMotorControlArray.{key}", message))
-        if problems:
-            raise ConfigError(problems)
+        given = {key: getattr(motors, key) for key in ("positionGains", "velocityGains")}
+        return {key: gains for key, gains in given.items() if gains is not None}
 
-    def _start_positions(self) -> dict[int, float]:
-        """Returns the start position [rad or m] of each driven joint by index."""
-        configured: dict[str, float] = {}
-        for name, value in self.config.initial_joint_position.items():
-            in_degrees = self.config.initial_revolute_joint_positions_are_deg and self.model[name].is_revolute
-            configured[name] = math.radians(value) if in_degrees else value
-        return {joint.index: configured.get(joint.name, 0.0) for joint in self.model.driven}
+    def _misfits(self) -> list[Problem]:
+        problems = [*super()._misfits(), *self._trajectory_misfits()]
+        driven = self.model.driven
+        for key, gains in self._configured_gains().items():
+            path = f"setJointMotorControlArray.{key}"
+            if isinstance(gains, Mapping):
+                problems += self._unknown_joints(path, gains)
+            elif len(gains) not in (1, len(driven)):
+                names = ", ".join(joint.name for joint in driven)
+                message = f"expected 1 number or {len(driven)}, one for each of {names}; got {len(gains)}"
+                problems.append(Problem(self.name, path, message))
+        return problems + self._force_torque_misfits()
 
-    def _set_alpha(self, alpha: float) -> None:
-        """Makes every visual shape as opaque as asked."""
-        for shape in self.pb.getVisualShapeData(self.body_id):
-            self.pb.changeVisualShape(self.body_id, shape[1], rgbaColor=(*shape[7][:3], alpha))
+    def _trajectory_misfits(self) -> list[Problem]:
+        names = [joint.name for joint in self.model.driven]
+        return trajectory_misfits(self.name, self.config.joint_trajectory_controller, names)
 
-
-def _load(pb: Client, config: RobotConfig) -> int:
-    """Loads a robot and returns PyBullet's id of it; what is wrong with its file is told by what PyBullet needs."""
-    arguments = config.loadURDF.kwargs()
-    try:
-        arguments["fileName"] = resolve_meshes(arguments["fileName"])
-        return int(pb.loadURDF(**arguments))
-    except ConfigError as error:
-        messages = [f"{problem.key}: {problem.message}" for problem in error.problems]
-    except (pybullet.error, OSError, UnicodeDecodeError) as error:
-        messages = urdf_faults(arguments["fileName"]) or [f"PyBullet could not load it: {error}"]
-    raise ConfigError([Problem(config.name, "loadURDF.fileName", message) for message in messages])
+    def _force_torque_misfits(self) -> list[Problem]:
+        problems = []
+        joints = [each.joint for each in self.config.enabled_joint_force_torque_sensors]
+        for index, joint in enumerate(joints):
+            key = f"enabled_joint_force_torque_sensors[{index}]"
+            if joint in joints[:index]:
+                problems.append(Problem(self.name, key, f"joint '{joint}' has a sensor already; one joint has one"))
+            if not re.fullmatch(r"\w+", joint, re.ASCII):
+                message = f"topics are named after joint '{joint}', which only letters, digits and '_' allow"
+                problems.append(Problem(self.name, key, message))
+            try:
+                self.model[joint]
+            except UnknownNameError as error:
+                problems.append(Problem(self.name, key, str(error)))
+        return problems

@@ -37,7 +37,7 @@ def _print(path: str, world: World) -> None:
     kinds = {body_type: kind for kind, body_type in BODY_TYPES.items()}
     print(f"{path}: fine; {1.0 / world.clock.dt_s:g} ticks a second")
     for name, body in world.bodies.items():
-        joints = f", {len(body.joint_indices)} joints" if body.joint_indices else ""
+        joints = f", {len(body.link_indices)} joints" if body.link_indices else ""
         print(f"  {kinds[type(body)]:<10} {name}{joints}")
     for name in world.cameras:
         print(f"  {'camera':<10} {name}")

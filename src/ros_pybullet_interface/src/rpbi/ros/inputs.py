@@ -15,10 +15,10 @@ from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.throttle import ThrottledWarning
 
 from ..inputs import Input, PoseInput
-from ..joint_model import JointTarget
+from ..joint_model import JointTarget, WrongQuantityError
 from ..pose import Pose
 from ..world import World
-from .outlets import WORLD_FRAME
+from .frames import world_frame
 from .tf_listener import TfListener
 
 log = logging.getLogger(__name__)
@@ -44,15 +44,8 @@ class TopicInput(NamedTuple):
 
 
 def _joint_target(message: JointState) -> JointTarget:
-    """Returns the positions in a message; velocities and efforts beside them are left alone.
-
-    Raises:
-        ValueError: If it has none for the joints that it names.
-    """
-    if message.name and not message.position:
-        given = " and ".join(field for field in ("velocity", "effort") if getattr(message, field)) or "no values"
-        raise ValueError(f"expected positions, since the robot is under position control; got {given}")
-    return JointTarget(message.name, message.position)
+    """Returns all that a message has; which of it counts is up to the robot's control mode."""
+    return JointTarget(message.name, message.position, message.velocity, message.effort)
 
 
 TOPIC_INPUTS: dict[str, TopicInput] = {
@@ -71,6 +64,7 @@ class Inputs:
     def __init__(self, world: World) -> None:
         self._world = world
         self._warn = ThrottledWarning()
+        self._warn_seldom = ThrottledWarning(period_s=60.0)  # a controller made for another mode sends on and on
         self._subscribers: dict[str, list[rospy.Subscriber]] = {}
         self._tf = _TfFollower(world.put)
 
@@ -95,6 +89,8 @@ class Inputs:
         def take(message: Any) -> None:
             try:
                 self._world.put(f"{name}/{key}", topic_input.value(message))
+            except WrongQuantityError as error:
+                self._warn_seldom(topic, f"message refused: {error}")
             except (InterfaceError, ValueError) as error:
                 self._warn(topic, f"message refused: {error}")
 
@@ -153,11 +149,11 @@ class _TfFollower:
             time.sleep(min(max(next_s - time.monotonic(), 0.001), LONGEST_NAP_S))
 
     def _look(self, listener: TfListener, followed: _Followed, now_s: float) -> None:
-        pose = listener.pose(WORLD_FRAME, followed.tf_id)
+        pose = listener.pose(world_frame(), followed.tf_id)
         if pose is None:
             if followed.last_pose is None and now_s - followed.since_s > TF_MISSING_AFTER_S:
                 self._warn(
-                    followed.slot, f"no TF from '{WORLD_FRAME}' to '{followed.tf_id}' so far; it stays where it is"
+                    followed.slot, f"no TF from '{world_frame()}' to '{followed.tf_id}' so far; it stays where it is"
                 )
         elif pose != followed.last_pose:
             followed.last_pose = pose

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..bodies.robot import Robot
 from ..inputs import PoseInput
-from ..sensors import JointStateSensor, LinkPoseSensor
+from ..sensors import LinkPoseSensor
 from ..world import World
+from .body_services import BODY_SERVICES
+from .body_topics import BODY_TOPICS
 from .camera_topics import CAMERA_TOPICS, camera_prefix
 from .inputs import TOPIC_INPUTS
+from .outlets import TOPICS
 from .services import NODE_SERVICES
 
 
@@ -37,11 +39,12 @@ def endpoints(world: World) -> list[Endpoint]:
         Endpoint("publishes", "/diagnostics", "diagnostic_msgs/DiagnosticArray", "1 Hz"),
     ]
     listed.append(Endpoint("publishes", "/clock", "rosgraph_msgs/Clock", "if use_sim_time"))
-    for name, body in world.bodies.items():
-        for sensor in body.sensors():
-            if isinstance(sensor, JointStateSensor):
-                topic = f"rpbi/{name}/joint_states"
-                listed.append(Endpoint("publishes", topic, "sensor_msgs/JointState", f"{sensor.hz:g} Hz"))
+    for name in world.bodies:
+        for sensor in world.sensors_of(name):
+            sample_topic = TOPICS.get(sensor.sample_type)
+            if sample_topic is not None:
+                topic_name = sample_topic.topic.format(name=sensor.name)
+                listed.append(Endpoint("publishes", topic_name, sample_topic.message_type._type, f"{sensor.hz:g} Hz"))
             elif isinstance(sensor, LinkPoseSensor):
                 listed.append(Endpoint("publishes", "/tf", "tf2_msgs/TFMessage", f"{sensor.hz:g} Hz; {name}"))
     for index, (name, camera) in enumerate(world.cameras.items()):
@@ -59,6 +62,10 @@ def endpoints(world: World) -> list[Endpoint]:
     for name, service_type in NODE_SERVICES.items():
         listed.append(Endpoint("serves", name, service_type._type))
     for name, body in world.bodies.items():
-        if isinstance(body, Robot):
-            listed.append(Endpoint("serves", f"rpbi/{name}/robot_info", "ros_pybullet_interface/RobotInfo"))
+        for topic in BODY_TOPICS:
+            for suffix in topic.suffixes(body):
+                listed.append(Endpoint("subscribes", f"rpbi/{name}/{suffix}", topic.message_type._type))
+        for service in BODY_SERVICES:
+            for suffix in service.suffixes(body):
+                listed.append(Endpoint("serves", f"rpbi/{name}/{suffix}", service.service_type._type))
     return listed

@@ -15,18 +15,19 @@ from custom_ros_tools.ros.logging_bridge import attach_logging
 
 from ..asset_files import ROBOT_DESCRIPTION
 from ..bodies import BODY_TYPES
-from ..bodies.robot import Robot
 from ..config import load_world_dict
-from ..samples import JointStateSample, LinkPoseSample, SceneSample
+from ..samples import LinkPoseSample, SceneSample
 from ..urdf import write_description
 from ..world import World
+from .body_endpoints import BodyEndpoints
 from .camera_outlet import CameraOutlet
+from .frames import use_prefix
+from .initial_state import start_where_robots_are, with_initial_state
 from .inputs import Inputs
 from .interrupts import leaving_ros_on_interrupt, wait_for_master
 from .last_words import log_last_words
-from .outlets import JointStateOutlet, Outlet, TransformOutlet
+from .outlets import TOPICS, Outlet, SampleOutlet, TransformOutlet
 from .requests import Requests
-from .robot_info import RobotInfoService
 from .services import NodeServices
 from .simulation import Simulation
 from .status import FREE_RUNNING_CLOCK_HZ, ClockOutlet
@@ -53,7 +54,9 @@ class SimulatorNode:
     def __init__(self) -> None:
         description = _robot_description()
         loaded = load_world_dict(_config_parameter(), "~config", BODY_TYPES, description)
+        loaded = start_where_robots_are(loaded)
         config = loaded.config
+        use_prefix(config.tf_prefix)
         simulated = bool(_parameter_above("use_sim_time", False))
         if config.real_time_factor != 1 and not simulated:
             log.warning(
@@ -61,8 +64,9 @@ class SimulatorNode:
                 config.real_time_factor,
             )
         self._world = World(loaded, simulated)
-        self._joint_states, self._transforms = JointStateOutlet(), TransformOutlet()
-        outlets: dict[type, Outlet] = {JointStateSample: self._joint_states, LinkPoseSample: self._transforms}
+        self._topics = {sample_type: SampleOutlet(topic) for sample_type, topic in TOPICS.items()}
+        self._transforms = TransformOutlet()
+        outlets: dict[type, Outlet] = {**self._topics, LinkPoseSample: self._transforms}
         self._cameras = CameraOutlet(self._world) if self._world.cameras else None
         if self._cameras is not None:
             outlets[SceneSample] = self._cameras
@@ -73,7 +77,7 @@ class SimulatorNode:
         )
         self._inputs = Inputs(self._world)
         self._ask = Requests(self._simulation)
-        self._robot_infos: dict[str, RobotInfoService] = {}
+        self._endpoints = BodyEndpoints(self._world, self._simulation, self._ask)
         self._objects_lock = threading.Lock()  # one object comes or goes at a time
         for name, camera in self._world.cameras.items():
             self._inputs.open(name, camera.inputs())
@@ -112,6 +116,7 @@ class SimulatorNode:
 
     def _add(self, kind: str, config: Any, file: str) -> None:
         with self._objects_lock:
+            config = with_initial_state(config, file)
             self._ask(lambda: self._world.add(kind, config, file))
             try:
                 self._open(config.name)
@@ -129,25 +134,26 @@ class SimulatorNode:
         """Opens the topics and services of a body."""
         body = self._world.bodies[name]
         self._inputs.open(name, body.inputs())
-        if isinstance(body, Robot):
-            self._joint_states.open(name)
-            self._robot_infos[name] = RobotInfoService(body, self._world, self._ask)
+        for sensor in self._world.sensors_of(name):
+            if sensor.sample_type in self._topics:
+                self._topics[sensor.sample_type].open(sensor.name)
+        self._endpoints.open(body)
 
     def _withdraw(self, name: str) -> None:
         """Takes a body out of the world, and all that belongs to it from ROS; its inputs first."""
         self._inputs.close(name)
-        topic = self._ask(lambda: self._take_out(name))
-        if topic is not None:
+        for topic in self._ask(lambda: self._take_out(name)):
             topic.close()
-        info = self._robot_infos.pop(name, None)
-        if info is not None:
-            info.close()
+        self._endpoints.close(name)
 
-    def _take_out(self, name: str) -> FastTopic | None:
-        """Does the simulation thread's part of it; returns the topic that is left to close."""
+    def _take_out(self, name: str) -> list[FastTopic]:
+        """Does the simulation thread's part of it; returns the topics that are left to close."""
+        sensors = self._world.sensors_of(name) if name in self._world.bodies else []
         self._world.remove(name)
         self._transforms.forget(name)
-        return self._joint_states.forget(name)
+        outlets = [(self._topics.get(each.sample_type), each.name) for each in sensors]
+        topics = [outlet.forget(sensor) for outlet, sensor in outlets if outlet is not None]
+        return [topic for topic in topics if topic is not None]
 
 
 def main() -> None:

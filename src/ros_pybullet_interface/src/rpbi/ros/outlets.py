@@ -1,18 +1,34 @@
-"""Where samples go: one outlet for each sensor, chosen by the type of its samples."""
+"""Where samples go: one outlet for each type of samples."""
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
 
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import TransformStamped, Vector3, Wrench, WrenchStamped
 from sensor_msgs.msg import JointState
 from tf2_msgs.msg import TFMessage
 
-from ..samples import JointStateSample, LinkPoseSample
+from ..control.controller_state import ControllerState
+from ..samples import JointStateSample, LinkPoseSample, WrenchSample
+from .frames import prefixed, world_frame
 from .stamps import to_ros_time
 from .topics import FastTopic
+from .trajectory_messages import CONTROLLER, JointTrajectoryControllerState, state_message
 
-WORLD_FRAME = "rpbi/world"
+
+class SampleTopic(NamedTuple):
+    """The topic of one type of samples.
+
+    Attributes:
+        topic: Its name, with `{name}` for the sensor.
+        message_type: ROS type.
+        to_message: Makes the message of a sample and its stamp [ns].
+    """
+
+    topic: str
+    message_type: type
+    to_message: Callable[[Any, int], Any]
 
 
 class Outlet(Protocol):
@@ -27,45 +43,54 @@ class Outlet(Protocol):
     def serve_late(self) -> None:
         """Gives the last state to subscribers that have come since."""
 
-    def forget(self, name: str) -> None:
-        """Drops what it keeps of a body or sensor that has gone."""
+    def forget(self, name: str) -> FastTopic | None:
+        """Drops what it keeps of a body or sensor that has gone; returns its topic, if it has one to close."""
 
 
-class JointStateOutlet:
-    """Joint states on `rpbi/NAME/joint_states`."""
+class SampleOutlet:
+    """Samples of one type, each sensor on a topic of its own.
 
-    def __init__(self) -> None:
+    Args:
+        sample_topic: The topics and what is sent on them.
+    """
+
+    def __init__(self, sample_topic: SampleTopic) -> None:
+        self._pattern, self._message_type, self._to_message = sample_topic
         self._topics: dict[str, FastTopic] = {}
-        self._last: dict[str, tuple[JointStateSample, int]] = {}
+        self._last: dict[str, tuple[Any, int]] = {}
 
     def open(self, name: str) -> None:
-        """Advertises the topic of a robot; any thread may call it."""
-        self._topics = {**self._topics, name: FastTopic(f"rpbi/{name}/joint_states", JointState)}
+        """Advertises the topic of a sensor; any thread may call it."""
+        topic = FastTopic(self._pattern.format(name=name), self._message_type)
+        self._topics = {**self._topics, name: topic}
 
-    def publish(self, sample: JointStateSample, stamp_ns: int) -> None:
-        """Sends the joint states of a robot."""
+    def publish(self, sample: Any, stamp_ns: int) -> None:
+        """Sends a sample."""
         self._last[sample.name] = sample, stamp_ns
-        topic = self._topics.get(sample.name)  # there is none as long as the robot is new
+        topic = self._topics.get(sample.name)  # there is none as long as the body is new
         if topic is not None and topic.has_subscribers:
-            topic.publish(joint_state_message(sample, stamp_ns))
+            topic.publish(self._to_message(sample, stamp_ns))
 
     def flush(self) -> None:
-        """Has nothing to send: each robot has a topic of its own."""
+        """Has nothing to send: each sensor has a topic of its own."""
 
     def serve_late(self) -> None:
-        """Gives the last joint states to who has come since."""
+        """Gives the last samples to who has come since."""
         for name, topic in self._topics.items():
             if name in self._last:
-                topic.serve_late(lambda last=self._last[name]: joint_state_message(*last))
+                topic.serve_late(lambda last=self._last[name]: self._to_message(*last))
 
     def forget(self, name: str) -> FastTopic | None:
-        """Drops what it keeps of a robot.
+        """Drops what it keeps of a sensor.
 
         Returns:
-            The robot's topic. Closing it is left to another thread, since the ROS master may be slow to answer.
+            Its topic. Closing it is left to another thread, since the ROS master may be slow to answer.
         """
         self._last.pop(name, None)
-        return self._topics.pop(name, None)
+        topics = dict(self._topics)
+        topic = topics.pop(name, None)
+        self._topics = topics
+        return topic
 
 
 class TransformOutlet:
@@ -75,9 +100,6 @@ class TransformOutlet:
         self._topic = FastTopic("/tf", TFMessage)
         self._last: dict[str, list[TransformStamped]] = {}
         self._collected: list[TransformStamped] = []
-
-    def open(self, name: str) -> None:
-        """Needs nothing: all bodies share the topic."""
 
     def publish(self, sample: LinkPoseSample, stamp_ns: int) -> None:
         """Collects the transforms of a body."""
@@ -116,7 +138,23 @@ def joint_state_message(sample: JointStateSample, stamp_ns: int) -> JointState:
     return message
 
 
-def _transform(frame: str) -> TransformStamped:
-    message = TransformStamped(child_frame_id=frame)
-    message.header.frame_id = WORLD_FRAME
+def wrench_message(sample: WrenchSample, stamp_ns: int) -> WrenchStamped:
+    message = WrenchStamped(wrench=Wrench(Vector3(*sample.force), Vector3(*sample.torque)))
+    is_ours = sample.frame_id.startswith("rpbi/")
+    message.header.frame_id = prefixed(sample.frame_id) if is_ours else sample.frame_id
+    message.header.stamp = to_ros_time(stamp_ns)
     return message
+
+
+def _transform(frame: str) -> TransformStamped:
+    message = TransformStamped(child_frame_id=prefixed(frame))
+    message.header.frame_id = world_frame()
+    return message
+
+
+TOPICS: dict[type, SampleTopic] = {
+    WrenchSample: SampleTopic("rpbi/{name}/ft_sensor", WrenchStamped, wrench_message),
+    JointStateSample: SampleTopic("rpbi/{name}/joint_states", JointState, joint_state_message),
+    ControllerState: SampleTopic(f"rpbi/{{name}}/{CONTROLLER}/state", JointTrajectoryControllerState, state_message),
+}
+"""The topic of each type of samples that has topics of its own."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from concurrent.futures import wait
+from concurrent.futures import Future, wait
 from typing import TypeVar
 
 import rospy
@@ -36,7 +36,14 @@ class Requests:
         Raises:
             InterfaceError: If the simulation has ended, the node shuts down or the loop makes no progress.
         """
-        future = self._simulation.world.mailbox.request(call)
+        return self.wait_for(self._simulation.world.mailbox.request(call))
+
+    def wait_for(self, future: Future[T]) -> T:
+        """Waits for something that the simulation thread does sooner or later; returns or raises its outcome.
+
+        Raises:
+            InterfaceError: If the simulation has ended, the node shuts down or the loop makes no progress.
+        """
         passes, progress_s = self._simulation.passes, time.monotonic()
         while not wait([future], timeout=0.2).done:
             if self._simulation.passes != passes:

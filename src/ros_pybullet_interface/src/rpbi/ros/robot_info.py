@@ -2,46 +2,25 @@
 
 from __future__ import annotations
 
-import rospy
 from geometry_msgs.msg import Point, Quaternion
 
-from custom_ros_tools.errors import UnknownNameError
 from ros_pybullet_interface.msg import JointInfo
-from ros_pybullet_interface.srv import RobotInfo, RobotInfoRequest, RobotInfoResponse
+from ros_pybullet_interface.srv import RobotInfoRequest, RobotInfoResponse
 
-from ..bodies.robot import Robot
+from ..bodies.jointed import JointedBody
 from ..joint_model import Joint
 from ..sensors.joint_state import JointStateSensor
-from ..world import World
+from .body_context import BodyContext
 from .outlets import joint_state_message
-from .requests import Requests
 
 
-class RobotInfoService:
-    """Serves `rpbi/NAME/robot_info`.
+def robot_info(context: BodyContext, _: RobotInfoRequest) -> RobotInfoResponse:
+    """Tells a robot's joints and where they are."""
+    robot: JointedBody = context.body
 
-    Args:
-        robot: The robot.
-        world: The world it is in.
-        ask: Reaches the simulation thread.
-    """
-
-    def __init__(self, robot: Robot, world: World, ask: Requests) -> None:
-        self._robot, self._world, self._ask = robot, world, ask
-        self._sensor = JointStateSensor(robot, hz=1.0)
-        self._service = rospy.Service(f"rpbi/{robot.name}/robot_info", RobotInfo, self._answer)
-
-    def close(self) -> None:
-        """Ends the service."""
-        self._service.shutdown()
-
-    def _answer(self, _: RobotInfoRequest) -> RobotInfoResponse:
-        return self._ask.or_service_error(self._read)
-
-    def _read(self) -> RobotInfoResponse:
-        robot, clock = self._robot, self._world.clock
-        if self._world.bodies.get(robot.name) is not robot:  # it went while the request was on its way
-            raise UnknownNameError("object", robot.name, list(self._world.bodies))
+    def read() -> RobotInfoResponse:
+        clock = context.world.clock
+        state = JointStateSensor(robot, hz=1.0).read(clock.tick)
         infos = [_joint_info(robot.pb.getJointInfo(robot.body_id, joint.index), joint) for joint in robot.joints]
         return RobotInfoResponse(
             robot_name=robot.name,
@@ -50,8 +29,11 @@ class RobotInfoService:
             numJoints=len(robot.joints),
             numDof=sum(not joint.is_fixed for joint in robot.joints),
             joint_info=infos,
-            current_joint_state=joint_state_message(self._sensor.read(clock.tick), clock.stamp_ns),
+            enabled_ft_sensors=[sensor.joint.name for sensor in robot.force_torque_sensors],
+            current_joint_state=joint_state_message(state, clock.stamp_ns),
         )
+
+    return context.ask_body(read)
 
 
 def _joint_info(info: tuple, joint: Joint) -> JointInfo:

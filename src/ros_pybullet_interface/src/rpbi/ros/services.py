@@ -23,9 +23,9 @@ from ros_pybullet_interface.srv import (
 )
 
 from ..asset_files import find_file
-from ..bodies import BODY_TYPES
+from ..bodies import BODY_TYPES, CollisionObject, DynamicObject, Robot, VisualObject
 from ..clock import NS_PER_S
-from ..config import load_object
+from ..config import load_object, type_of
 from .requests import Requests
 from .simulation import Simulation
 
@@ -34,12 +34,12 @@ log = logging.getLogger(__name__)
 NO_FOLDER = "~config"
 """Stands for the path of a YAML that came without one."""
 OBJECT_TYPES = {
-    PybulletObject.VISUAL: "visual",
-    PybulletObject.COLLISION: "collision",
-    PybulletObject.DYNAMIC: "dynamic",
-    PybulletObject.ROBOT: "robot",
+    PybulletObject.VISUAL: VisualObject.section,
+    PybulletObject.COLLISION: CollisionObject.section,
+    PybulletObject.DYNAMIC: DynamicObject.section,
+    PybulletObject.ROBOT: Robot.section,
 }
-"""Key of BODY_TYPES for each number in PybulletObject."""
+"""List of the main file for each number in PybulletObject."""
 
 
 NODE_SERVICES: dict[str, type] = {
@@ -107,11 +107,12 @@ class NodeServices:
     def _add_object(self, request: AddPybulletObjectRequest) -> AddPybulletObjectResponse:
         asked = request.pybullet_object
         try:
-            kind = OBJECT_TYPES.get(asked.object_type)
-            if kind is None:
+            section = OBJECT_TYPES.get(asked.object_type)
+            if section is None:
                 known = ", ".join(f"{number} ({name})" for number, name in OBJECT_TYPES.items())
                 raise InterfaceError(f"object_type: expected one of {known}; got {asked.object_type}")
             data, file, path = self._read(asked)
+            kind = type_of(section, data, BODY_TYPES)
             config = load_object(kind, data, file, BODY_TYPES, {**self._context, "file": path})
             self._add(kind, config, file)
         except InterfaceError as error:

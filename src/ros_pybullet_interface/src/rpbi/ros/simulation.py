@@ -131,6 +131,7 @@ class Simulation:
         """Stands still, and tells no more of a world that is broken; until somebody starts or steps it again."""
         log.error("simulation stopped: %s", error)
         self.running, self._broken = False, True
+        self.world.halt("the simulation broke off")
         self._idle_tick = self.world.clock.tick
         if self._clock is not None:
             self._clock.publish_now()
@@ -138,6 +139,7 @@ class Simulation:
 
     def _halt(self) -> None:
         self.running = False
+        self.world.halt("the simulation was stopped")
         self._idle_tick = self.world.clock.tick
         if self._clock is not None:
             self._clock.publish_now()

@@ -11,7 +11,7 @@ from ..samples import JointStateSample
 from .sensor import Sensor
 
 if TYPE_CHECKING:
-    from ..bodies.robot import Robot
+    from ..bodies.jointed import JointedBody
 
 
 class JointStateSensor(Sensor):
@@ -22,15 +22,17 @@ class JointStateSensor(Sensor):
         hz: Rate [Hz].
     """
 
-    def __init__(self, robot: Robot, hz: float) -> None:
+    sample_type = JointStateSample
+
+    def __init__(self, robot: JointedBody, hz: float) -> None:
         super().__init__(robot.name, hz)
         self._robot = robot
         self._names = tuple(joint.name for joint in robot.joints)
 
     def read(self, tick: int) -> JointStateSample:
         """Reads all joints, fixed ones included, in index order."""
-        states = self._robot.pb.getJointStates(self._robot.body_id, self._robot.joint_indices)
+        states = self._robot.pb.getJointStates(self._robot.body_id, self._robot.link_indices)
         position, velocity, _, effort = zip(*states) if states else ((), (), (), ())
         if not math.isfinite(sum(position) + sum(velocity)):
             raise PhysicsError(f"{self.name}: joint state is not finite any more at tick {tick}: {position}")
-        return JointStateSample(self.name, self._names, position, velocity, effort)
+        return JointStateSample(self.name, self._names, position, velocity, self._robot.efforts(effort))

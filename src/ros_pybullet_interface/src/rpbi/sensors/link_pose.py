@@ -21,20 +21,19 @@ class LinkPoseSensor(Sensor):
     Args:
         body: The body.
         hz: Rate [Hz].
-        links: Whether to tell every link as `rpbi/NAME/LINK`; otherwise only the body as `rpbi/NAME`.
+        links: Whether to tell every link as `rpbi/NAME/LINK`; otherwise the root link alone.
+        root_frame: TF frame of the root link; without it, it is as any link's.
     """
 
-    def __init__(self, body: Body, hz: float, links: bool = True) -> None:
+    sample_type = LinkPoseSample
+
+    def __init__(self, body: Body, hz: float, links: bool = True, root_frame: str | None = None) -> None:
         super().__init__(body.name, hz)
         self._body = body
         frame = f"rpbi/{body.name}"
-        self._indices = body.joint_indices if links else ()
-        if links:
-            root: bytes = body.pb.getBodyInfo(body.body_id)[0]
-            names = [root, *(body.pb.getJointInfo(body.body_id, index)[12] for index in self._indices)]
-            self._frames = tuple(f"{frame}/{name.decode()}" for name in names)
-        else:
-            self._frames = (frame,)
+        self._indices = body.link_indices if links else ()
+        names = [body.pb.getJointInfo(body.body_id, index)[12].decode() for index in self._indices]
+        self._frames = (root_frame or f"{frame}/{body.root_link}", *(f"{frame}/{name}" for name in names))
 
     def read(self, tick: int) -> LinkPoseSample:
         """Reads the base and all links."""

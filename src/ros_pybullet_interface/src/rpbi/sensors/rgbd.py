@@ -32,6 +32,7 @@ class RgbdSensor(Sensor):
     """
 
     Config = RgbdSensorConfig
+    sample_type = SceneSample
 
     def __init__(self, config: RgbdSensorConfig, bodies: Mapping[str, Body], clock: Clock) -> None:
         super().__init__(config.name, config.hz)

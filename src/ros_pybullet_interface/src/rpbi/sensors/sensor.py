@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from ..inputs import Input
 
@@ -19,6 +19,8 @@ class Sensor(ABC):
     """
 
     wanted: bool = True
+    sample_type: ClassVar[type]
+    """The type of its samples, by which their topic is found."""
 
     def __init__(self, name: str, hz: float) -> None:
         self.name = name
@@ -31,6 +33,12 @@ class Sensor(ABC):
         Raises:
             PhysicsError: If the world holds something that is not finite.
         """
+
+    def before_step(self, tick: int) -> None:
+        """Acts just before the physics of each tick, due or not; sensors that need nothing leave it."""
+
+    def after_step(self, tick: int) -> None:
+        """Acts just after the physics of each tick, before sensors are read; called where `before_step` is."""
 
     def inputs(self) -> Mapping[str, Input]:
         """Returns what the sensor takes while the world runs, by name."""

@@ -1,0 +1,78 @@
+"""Motions: what drives some joints of a robot from tick to tick until it ends."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from concurrent.futures import Future
+from typing import NamedTuple
+
+JointMotion = Mapping[int, tuple[float, float]]
+"""Position [rad or m] and velocity [rad/s or m/s] by joint index."""
+
+
+class MotionResult(NamedTuple):
+    """How a motion ended.
+
+    Attributes:
+        success: Whether it reached what it was to reach.
+        message: What was reached, and why it ended.
+    """
+
+    success: bool
+    message: str
+
+
+class Motion(ABC):
+    """Drives some joints of one robot; `Robot.run` starts it, on the simulation thread, where all of it happens.
+
+    Args:
+        joints: Indices of the joints that it drives.
+
+    Attributes:
+        result: What others wait for. It is set when the motion ends, whatever the reason.
+    """
+
+    def __init__(self, joints: frozenset[int]) -> None:
+        self.joints = joints
+        self.result: Future[MotionResult] = Future()
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it has ended."""
+        return self.result.done()
+
+    @abstractmethod
+    def begin(self, time_s: float, measured: JointMotion) -> None:
+        """Starts.
+
+        Args:
+            time_s: The world's time now [s].
+            measured: State of all driven joints of the robot.
+        """
+
+    @abstractmethod
+    def advance(self, time_s: float, measured: JointMotion) -> JointMotion:
+        """Returns the set points for one tick; a motion that has reached its end calls `end` in it.
+
+        Args:
+            time_s: The world's time at the end of that tick [s].
+            measured: State of all driven joints at its beginning.
+
+        Returns:
+            Set points of `joints`, or of fewer: the others keep theirs.
+        """
+
+    def halt(self, reason: str, measured: JointMotion) -> None:
+        """Ends before the goal, because of something from outside; the result tells the reason.
+
+        Args:
+            reason: Why, such as `the simulation was stopped`.
+            measured: State of all driven joints.
+        """
+        self.end(False, reason)
+
+    def end(self, success: bool, message: str) -> None:
+        """Ends, unless it has ended already."""
+        if not self.is_over:
+            self.result.set_result(MotionResult(success, message))

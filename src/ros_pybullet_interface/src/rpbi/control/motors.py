@@ -1,0 +1,203 @@
+"""The motors of a robot: control modes, set points, and how long they last."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+import pybullet
+
+from ..client import Client
+from ..joint_model import Joint, JointModel, JointTarget
+
+QUANTITIES = {
+    pybullet.POSITION_CONTROL: "position",
+    pybullet.VELOCITY_CONTROL: "velocity",
+    pybullet.TORQUE_CONTROL: "effort",
+}
+"""What a target is in each control mode."""
+MODE_NAMES = {
+    getattr(pybullet, name): name for name in ("POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL")
+}
+
+
+class Command(NamedTuple):
+    """A target that was checked, with the control mode that it was checked for.
+
+    Attributes:
+        mode: The control mode.
+        values: Positions, velocities or efforts by joint index.
+    """
+
+    mode: int
+    values: dict[int, float]
+
+    def merged(self, newer: Command) -> Command:
+        """Returns both as one: the newer one wins joint by joint, or as a whole if the mode changed between them."""
+        return Command(self.mode, self.values | newer.values) if self.mode == newer.mode else newer
+
+
+class Motors:
+    """Drives the joints of one robot within the efforts and velocities of its URDF.
+
+    Positions hold until the next target. Velocities and efforts that are not renewed go back to 0 after a while of
+    simulated time, so that whoever stops sending stops the robot.
+
+    Args:
+        pb: The client.
+        body_id: PyBullet's id of the robot.
+        model: Its joints.
+        mode: Control mode at the start.
+        gains: PyBullet's `positionGain` and `velocityGain` by joint index, where they are not PyBullet's own.
+        enforce_effort_limits: Whether motors are held to the efforts of the URDF.
+        timeout_ticks: Ticks after which velocity and effort targets expire.
+    """
+
+    def __init__(
+        self,
+        pb: Client,
+        body_id: int,
+        model: JointModel,
+        mode: int,
+        gains: Mapping[int, Mapping[str, float]],
+        enforce_effort_limits: bool,
+        timeout_ticks: int,
+    ) -> None:
+        self._pb, self._body_id, self._model = pb, body_id, model
+        self._enforce_effort_limits = enforce_effort_limits
+        self._position_arguments = {joint.index: self._arguments(joint, gains) for joint in model.driven}
+        self._velocity_arguments = {
+            index: {key: value for key, value in arguments.items() if key in ("velocityGain", "force")}
+            for index, arguments in self._position_arguments.items()
+        }
+        self._timeout_ticks = timeout_ticks
+        self._indices = [joint.index for joint in model.driven]
+        self._targets: dict[int, float] = {}
+        self._expiry: dict[int, int] = {}
+        """Tick at which the target of a joint expires, by joint index."""
+        self._renewed: set[int] = set()
+        self._feed_forward: list[float] = [0.0] * len(self._indices)
+        self.applied_efforts: dict[int, float] = {}
+        """Efforts [N m or N] applied in the last tick under torque control, by joint index; PyBullet tells them not."""
+        self.switch(mode)
+
+    def switch(self, mode: int) -> None:
+        """Changes the control mode: the robot holds still, or under torque control is left to itself."""
+        self.mode = mode
+        self._expiry.clear()
+        self._renewed.clear()
+        self.applied_efforts = {}
+        states = self._pb.getJointStates(self._body_id, self._indices) if self._indices else ()
+        if mode == pybullet.POSITION_CONTROL:
+            self._targets = {index: state[0] for index, state in zip(self._indices, states)}
+        else:
+            self._targets = dict.fromkeys(self._indices, 0.0)
+        for index in self._indices:
+            self._drive(index, self._targets[index])
+
+    def check(self, target: JointTarget) -> Command:
+        """Checks a target against the present control mode; any thread may call it.
+
+        Raises:
+            UnknownNameError: If the robot lacks one of the joints.
+            ValueError: If the target has nothing for this mode, lengths differ or a number is not finite.
+        """
+        mode = self.mode
+        values = target.values_of(QUANTITIES[mode], f"the robot is under {MODE_NAMES[mode]}")
+        return Command(mode, self._model.resolve(target.names, values))
+
+    def follow(self, command: Command) -> None:
+        """Follows a target from now on, unless the control mode has changed since it was checked."""
+        if command.mode != self.mode:
+            return
+        for index, value in command.values.items():
+            self._targets[index] = value = self._limited(index, value)
+            if self.mode != pybullet.POSITION_CONTROL:
+                self._renewed.add(index)
+            if self.mode != pybullet.TORQUE_CONTROL:
+                self._drive(index, value)
+
+    def track(self, index: int, position: float, velocity: float) -> None:
+        """Sets a joint's position [rad or m] and velocity [rad/s or m/s] for the coming tick, in any control mode."""
+        self._pb.setJointMotorControl2(
+            self._body_id,
+            index,
+            pybullet.POSITION_CONTROL,
+            targetPosition=position,
+            targetVelocity=velocity,
+            **self._position_arguments[index],
+        )
+        if self.mode == pybullet.POSITION_CONTROL:
+            self._targets[index] = position
+
+    def release(self, indices: Iterable[int]) -> None:
+        """Gives joints that were tracked back: they hold their last position, or stand still under velocity control."""
+        for index in indices:
+            if self.mode == pybullet.VELOCITY_CONTROL:
+                self._targets[index] = 0.0
+            self._drive(index, self._targets[index])
+
+    @property
+    def targets(self) -> Mapping[int, float]:
+        """What the motors are set to by joint index: positions, velocities or efforts, as the control mode says."""
+        return self._targets
+
+    def set_feed_forward(self, efforts: Mapping[int, float]) -> None:
+        """Sets efforts [N m or N] by joint index that are added to those of the targets under torque control."""
+        self._feed_forward = [efforts.get(index, 0.0) for index in self._indices]
+
+    def before_step(self, tick: int) -> None:
+        """Lets targets expire, and applies efforts, which PyBullet keeps for one tick only."""
+        if self._renewed:
+            self._expiry.update(dict.fromkeys(self._renewed, tick + self._timeout_ticks))
+            self._renewed.clear()
+        if self._expiry:
+            self._expire(tick)
+        if self.mode == pybullet.TORQUE_CONTROL and self._indices:
+            efforts = [
+                self._limited(index, self._targets[index] + extra)
+                for index, extra in zip(self._indices, self._feed_forward)
+            ]
+            self._pb.setJointMotorControlArray(
+                self._body_id, self._indices, pybullet.TORQUE_CONTROL, forces=efforts
+            )
+            self.applied_efforts = dict(zip(self._indices, efforts))
+
+    def _expire(self, tick: int) -> None:
+        for index in [index for index, expiry in self._expiry.items() if tick >= expiry]:
+            del self._expiry[index]
+            self._targets[index] = 0.0
+            if self.mode == pybullet.VELOCITY_CONTROL:
+                self._drive(index, 0.0)
+
+    def _limited(self, index: int, value: float) -> float:
+        """Returns a velocity or an effort within what the joint can do; a position as it is."""
+        joint = self._model.joints[index]
+        if self.mode == pybullet.VELOCITY_CONTROL:
+            limit = joint.max_velocity
+        elif self.mode == pybullet.TORQUE_CONTROL and self._enforce_effort_limits:
+            limit = joint.max_effort
+        else:
+            return value
+        return min(max(value, -limit), limit)
+
+    def _drive(self, index: int, value: float) -> None:
+        """Sets the set point of one motor; PyBullet keeps it. Under torque control the motor is released."""
+        if self.mode == pybullet.POSITION_CONTROL:
+            arguments = {"targetPosition": value, **self._position_arguments[index]}
+        elif self.mode == pybullet.VELOCITY_CONTROL:
+            arguments = {"targetVelocity": value, **self._velocity_arguments[index]}
+        else:
+            arguments = {"force": 0.0}
+        mode = pybullet.VELOCITY_CONTROL if self.mode == pybullet.TORQUE_CONTROL else self.mode
+        self._pb.setJointMotorControl2(self._body_id, index, mode, **arguments)
+
+    def _arguments(self, joint: Joint, gains: Mapping[int, Mapping[str, float]]) -> dict[str, Any]:
+        """Returns what PyBullet's position motor of a joint is told beside its set point."""
+        arguments: dict[str, Any] = dict(gains.get(joint.index, {}))
+        if self._enforce_effort_limits and math.isfinite(joint.max_effort):
+            arguments["force"] = joint.max_effort
+        if math.isfinite(joint.max_velocity):
+            arguments["maxVelocity"] = joint.max_velocity
+        return arguments

@@ -1,0 +1,94 @@
+"""The polynomial that joins two knots of one joint, and how far and how fast it goes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+Polynomial = tuple[float, float, float, float, float, float]
+"""Coefficients of 1, t .. t^5, with t from the segment's origin [s] and the value in rad or m."""
+
+DEGREE = 5
+_TO_BERNSTEIN = np.array(
+    [[math.comb(i, k) / math.comb(DEGREE, k) if k <= i else 0.0 for k in range(DEGREE + 1)] for i in range(DEGREE + 1)]
+)
+"""From coefficients of 1 .. t^5 on [0, 1] to those of the Bernstein polynomials."""
+_ROOT_TOLERANCE = 1e-9
+"""Imaginary part, in parts of the interval, below which a root counts as real."""
+
+
+def constant(position: float) -> Polynomial:
+    """Returns the polynomial of a joint that stands still [rad or m]."""
+    return (position, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def line(duration_s: float, p0: float, p1: float) -> Polynomial:
+    """Returns the line between two positions [rad or m]."""
+    return (p0, (p1 - p0) / duration_s, 0.0, 0.0, 0.0, 0.0)
+
+
+def cubic(duration_s: float, p0: float, p1: float, v0: float, v1: float) -> Polynomial:
+    """Returns the cubic between two positions [rad or m] and velocities [rad/s or m/s] (Hermite)."""
+    mean = (p1 - p0) / duration_s
+    return (p0, v0, (3.0 * mean - 2.0 * v0 - v1) / duration_s, (v0 + v1 - 2.0 * mean) / duration_s**2, 0.0, 0.0)
+
+
+def quintic(duration_s: float, p0: float, p1: float, v0: float, v1: float, a0: float, a1: float) -> Polynomial:
+    """Returns the quintic between two positions, velocities and accelerations [rad or m, s] (Hermite)."""
+    t = duration_s
+    mean = (p1 - p0) / t
+    return (
+        p0,
+        v0,
+        0.5 * a0,
+        (10.0 * mean - 6.0 * v0 - 4.0 * v1 - t * (1.5 * a0 - 0.5 * a1)) / t**2,
+        (-15.0 * mean + 8.0 * v0 + 7.0 * v1 + t * (1.5 * a0 - a1)) / t**3,
+        (6.0 * mean - 3.0 * v0 - 3.0 * v1 - t * (0.5 * a0 - 0.5 * a1)) / t**4,
+    )
+
+
+def derivative(polynomial: Polynomial) -> Polynomial:
+    """Returns the derivative."""
+    _, c1, c2, c3, c4, c5 = polynomial
+    return (c1, 2.0 * c2, 3.0 * c3, 4.0 * c4, 5.0 * c5, 0.0)
+
+
+def value_range(polynomial: Polynomial, duration_s: float) -> tuple[float, float]:
+    """Returns the least and the greatest value between 0 and a time [s]: at an end or where the derivative vanishes."""
+    values = [_value(polynomial, 0.0), _value(polynomial, duration_s)]
+    if any(polynomial[2:]):  # else it is a line
+        # In parts of the interval, so that roots do not depend on whether it lasts a millisecond or an hour.
+        scaled = [c * duration_s**k for k, c in enumerate(derivative(polynomial))]
+        roots = np.roots(scaled[::-1])
+        real = roots.real[np.abs(roots.imag) < _ROOT_TOLERANCE]
+        values += [_value(polynomial, float(root) * duration_s) for root in real if 0.0 < root < 1.0]
+    return min(values), max(values)
+
+
+def value_bounds(
+    polynomials: Sequence[Polynomial], durations_s: Sequence[float]
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Returns bounds of the values of many polynomials, each between 0 and a time: quick, and not always tight.
+
+    A polynomial stays within the hull of its coefficients in the Bernstein basis.
+
+    Args:
+        polynomials: n of them.
+        durations_s: n times [s].
+
+    Returns:
+        n lower and n upper bounds.
+    """
+    powers = np.asarray(durations_s)[:, np.newaxis] ** np.arange(DEGREE + 1)
+    bernstein = (np.asarray(polynomials) * powers) @ _TO_BERNSTEIN.T
+    return bernstein.min(axis=1), bernstein.max(axis=1)
+
+
+def _value(polynomial: Polynomial, t: float) -> float:
+    value = 0.0
+    for coefficient in reversed(polynomial):
+        value = value * t + coefficient
+    return value

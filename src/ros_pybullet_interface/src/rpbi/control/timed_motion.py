@@ -1,0 +1,101 @@
+"""Motions to a goal in a given time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from ..joint_model import JointModel
+from .motion import JointMotion, Motion
+from .trajectory import Trajectory, minimum_jerk
+
+TOLERANCES = {"rad": 0.01, "m": 0.001}
+"""How far a joint may be from its goal at the end of a motion that succeeded, by unit."""
+REST = {"rad": 0.05, "m": 0.005}
+"""Speed below which a joint counts as having come to rest there, by unit and second."""
+SETTLING_S = 1.0
+"""How long after the last set point the joints may take to come to rest at the goal [s] of the world's time."""
+SHORTEST_S = 0.04
+"""A motion takes at least this long [s], as in the first release."""
+PEAK = 15.0 / 8.0
+"""Largest velocity of a minimum-jerk motion over its mean one: 30 s^2 (1 - s)^2 at s = 1/2 (Flash and Hogan, 1985)."""
+
+
+class TimedMotion(Motion):
+    """Moves joints to a goal with minimum jerk; it takes longer than asked if the joints' velocities demand it.
+
+    It succeeds if the measured joints come to rest within `TOLERANCES` of the goal. Joints that are not named are left alone.
+
+    Args:
+        model: The robot's joints.
+        goal: Positions [rad or m] by joint index.
+        duration_s: How long it shall take [s].
+
+    Raises:
+        ValueError: If the goal is empty or outside the joints' limits, or the duration is negative or not finite.
+    """
+
+    def __init__(self, model: JointModel, goal: Mapping[int, float], duration_s: float) -> None:
+        if not goal:
+            raise ValueError("expected a position for one joint or more, got none")
+        if not (math.isfinite(duration_s) and duration_s >= 0.0):
+            raise ValueError(f"duration must be 0 or more [s], got {duration_s:g}")
+        model.check_limits(goal)
+        super().__init__(frozenset(goal))
+        self._model = model
+        self._goal = dict(goal)
+        self._asked_s = max(duration_s, SHORTEST_S)
+        self._trajectory: Trajectory
+
+    def begin(self, time_s: float, measured: JointMotion) -> None:
+        """Plans the motion from the measured state."""
+        start = [measured[index][0] for index in self._goal]
+        shortest = max(
+            PEAK * abs(goal - from_) / self._model.joints[index].max_velocity
+            for from_, (index, goal) in zip(start, self._goal.items())
+        )
+        self._duration_s = max(self._asked_s, shortest)
+        self._trajectory = minimum_jerk(start, list(self._goal.values()), time_s, self._duration_s)
+
+    def advance(self, time_s: float, measured: JointMotion) -> JointMotion:
+        """Follows the plan, then waits at the goal until the joints have come, or have had their time."""
+        if time_s > self._trajectory.end_s + 1e-9:
+            missed = self._missed(measured)
+            if not missed and self._rests(measured):
+                self.end(True, f"reached: {self._residuals(measured)}{self._stretched()}")
+            elif time_s > self._trajectory.end_s + SETTLING_S:
+                why = "missed the goal" if missed else "still swings about the goal"
+                self.end(False, f"{why}: {self._residuals(measured, missed or None)}; {self._reached(measured)}")
+        state = self._trajectory.sample(time_s)
+        return dict(zip(self._goal, zip(state.position, state.velocity)))
+
+    def halt(self, reason: str, measured: JointMotion) -> None:
+        """Ends before the goal; the message tells the state reached."""
+        self.end(False, f"{reason} before the goal: {self._residuals(measured)}; {self._reached(measured)}")
+
+    def _missed(self, measured: JointMotion) -> list[int]:
+        joints = self._model.joints
+        return [i for i, goal in self._goal.items() if abs(measured[i][0] - goal) > TOLERANCES[joints[i].unit]]
+
+    def _rests(self, measured: JointMotion) -> bool:
+        return all(abs(measured[index][1]) <= REST[self._model.joints[index].unit] for index in self._goal)
+
+    def _residuals(self, measured: JointMotion, indices: list[int] | None = None) -> str:
+        """Tells how far joints are from their goals: of each kind the farthest, or all of those given."""
+        errors = {index: abs(measured[index][0] - goal) for index, goal in self._goal.items()}
+        joints = self._model.joints
+        if indices is None:
+            kinds = {joints[index].unit for index in errors}
+            indices = [max((i for i in errors if joints[i].unit == unit), key=errors.__getitem__) for unit in kinds]
+        return ", ".join(
+            f"joint '{joints[i].name}' is {errors[i]:.3g} {joints[i].unit} from its goal" for i in sorted(indices)
+        )
+
+    def _reached(self, measured: JointMotion) -> str:
+        state = ", ".join(f"{self._model.joints[i].name}={measured[i][0]:.6g}" for i in self._goal)
+        return f"state reached: {state}"
+
+    def _stretched(self) -> str:
+        if self._duration_s <= self._asked_s:
+            return ""
+        return f"; it took {self._duration_s:.3g} s rather than {self._asked_s:.3g} s to keep to the joints' velocities"

@@ -1,0 +1,231 @@
+"""Trajectories of joints: piecewise polynomials through knots, in plain Python, since they are sampled at every tick."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from .polynomial import Polynomial, constant, cubic, line, quintic
+
+
+class Knot(NamedTuple):
+    """What a trajectory of n joints passes through.
+
+    Attributes:
+        time_s: When [s].
+        position: n positions [rad or m].
+        velocity: n velocities [rad/s or m/s], None if they are left open.
+        acceleration: n accelerations [rad/s^2 or m/s^2], None if they are left open; they need velocities.
+    """
+
+    time_s: float
+    position: tuple[float, ...]
+    velocity: tuple[float, ...] | None = None
+    acceleration: tuple[float, ...] | None = None
+
+
+class State(NamedTuple):
+    """Where n joints are to be at one time.
+
+    Attributes:
+        position: n positions [rad or m].
+        velocity: n velocities [rad/s or m/s].
+        acceleration: n accelerations [rad/s^2 or m/s^2].
+    """
+
+    position: tuple[float, ...]
+    velocity: tuple[float, ...]
+    acceleration: tuple[float, ...]
+
+
+class Segment(NamedTuple):
+    """The stretch between two knots.
+
+    Attributes:
+        start_s: Where it begins [s].
+        origin_s: Time at which the argument of its polynomials is 0 [s], at or before `start_s`.
+        polynomials: One for each of n joints.
+    """
+
+    start_s: float
+    origin_s: float
+    polynomials: tuple[Polynomial, ...]
+
+
+class Trajectory:
+    """The motion of n joints through knots; immutable.
+
+    Two neighbouring knots are joined by a line if one of them has positions alone, by a cubic if both have velocities,
+    by a quintic if both have accelerations as well. Before the first knot and after the last the joints stand still.
+
+    Args:
+        knots: At least one, with strictly increasing times, all for the same number of joints, all finite.
+
+    Raises:
+        ValueError: If they are not.
+    """
+
+    __slots__ = ("_before", "_end", "_starts", "end_s", "segments", "start_s")
+
+    segments: tuple[Segment, ...]
+    """In the order of time; one that stands still if there is only one knot."""
+    start_s: float
+    """Time of the first knot [s]."""
+    end_s: float
+    """Time of the last knot [s]."""
+
+    def __init__(self, knots: Sequence[Knot]) -> None:
+        _check(knots)
+        segments = tuple(_segment(before, after) for before, after in zip(knots, knots[1:]))
+        last = knots[-1]
+        self._set(segments or (_standing(last.time_s, last.position),), last.time_s, last.position)
+
+    def _set(self, segments: tuple[Segment, ...], end_s: float, goal: tuple[float, ...]) -> None:
+        self.segments = segments
+        self._starts = tuple(segment.start_s for segment in segments)
+        self.start_s = self._starts[0]
+        self.end_s = end_s
+        still = (0.0,) * len(goal)
+        self._before = State(_evaluated(segments[0], self.start_s).position, still, still)
+        self._end = State(goal, still, still)
+
+    @classmethod
+    def _of(cls, segments: Sequence[Segment], end_s: float, goal: tuple[float, ...]) -> Trajectory:
+        trajectory = cls.__new__(cls)
+        trajectory._set(tuple(segments), end_s, goal)
+        return trajectory
+
+    @property
+    def goal(self) -> tuple[float, ...]:
+        """The last knot's positions [rad or m]."""
+        return self._end.position
+
+    def sample(self, time_s: float) -> State:
+        """Returns where the joints are to be at a time [s].
+
+        Before the start that is the first knot's position, from the end on exactly the last one's, both at rest.
+        """
+        if time_s >= self.end_s:
+            return self._end
+        if time_s < self.start_s:
+            return self._before
+        return _evaluated(self.segments[bisect_right(self._starts, time_s) - 1], time_s)
+
+    def spliced(self, new: Trajectory, at_s: float) -> Trajectory:
+        """Returns this one until a time, and another from then on.
+
+        Args:
+            new: The trajectory of the same joints that takes over: from `at_s` on it is sampled as by itself.
+            at_s: When it takes over [s].
+        """
+        if at_s <= self.start_s:
+            return new
+        kept = [segment for segment in self.segments if segment.start_s < at_s]
+        if self.end_s < at_s:
+            kept.append(_standing(self.end_s, self.goal))
+        if at_s < new.start_s:
+            taken = [_standing(at_s, new.sample(at_s).position), *new.segments]
+        else:
+            first, *rest = new.since(at_s).segments
+            taken = [first._replace(start_s=at_s), *rest]
+        return Trajectory._of(kept + taken, max(at_s, new.end_s), new.goal)
+
+    def shifted(self, by_s: float, by_position: Sequence[float]) -> Trajectory:
+        """Returns the same motion at another time [s], from other positions [rad or m], n of them."""
+        segments = [
+            Segment(
+                segment.start_s + by_s,
+                segment.origin_s + by_s,
+                tuple((c[0] + offset, *c[1:]) for c, offset in zip(segment.polynomials, by_position)),
+            )
+            for segment in self.segments
+        ]
+        goal = tuple(position + offset for position, offset in zip(self.goal, by_position))
+        return Trajectory._of(segments, self.end_s + by_s, goal)
+
+    def since(self, time_s: float) -> Trajectory:
+        """Returns the same trajectory without the segments that are over at a time [s]."""
+        first = max(bisect_right(self._starts, time_s) - 1, 0)
+        return self if first == 0 else Trajectory._of(self.segments[first:], self.end_s, self.goal)
+
+    def spans(self) -> list[tuple[Segment, float]]:
+        """Returns the segments, each with the time [s] at which it ends."""
+        return list(zip(self.segments, (*self._starts[1:], self.end_s)))
+
+
+def minimum_jerk(
+    start: Sequence[float], goal: Sequence[float], start_s: float, duration_s: float
+) -> Trajectory:
+    """Returns the motion from rest to rest with the least jerk.
+
+    It is the quintic whose velocity and acceleration vanish at both ends (Flash and Hogan 1985). Its highest speed is
+    15/8 of the mean one.
+
+    Args:
+        start: n positions [rad or m].
+        goal: n positions [rad or m].
+        start_s: When it begins [s].
+        duration_s: How long it takes [s], more than 0.
+
+    Raises:
+        ValueError: If the numbers of positions differ, or something is not finite or not positive.
+    """
+    still = (0.0,) * len(start)
+    return Trajectory(
+        [Knot(start_s, tuple(start), still, still), Knot(start_s + duration_s, tuple(goal), still, still)]
+    )
+
+
+def _evaluated(segment: Segment, time_s: float) -> State:
+    t = time_s - segment.origin_s
+    position, velocity, acceleration = [], [], []
+    for c0, c1, c2, c3, c4, c5 in segment.polynomials:
+        position.append(c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5)))))
+        velocity.append(c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5))))
+        acceleration.append(2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5)))
+    return State(tuple(position), tuple(velocity), tuple(acceleration))
+
+
+def _standing(start_s: float, position: Sequence[float]) -> Segment:
+    return Segment(start_s, start_s, tuple(map(constant, position)))
+
+
+def _segment(before: Knot, after: Knot) -> Segment:
+    duration_s = after.time_s - before.time_s
+    positions = zip(before.position, after.position)
+    if before.velocity is None or after.velocity is None:
+        polynomials = tuple(line(duration_s, *p) for p in positions)
+    elif before.acceleration is None or after.acceleration is None:
+        polynomials = tuple(
+            cubic(duration_s, *p, *v) for p, v in zip(positions, zip(before.velocity, after.velocity))
+        )
+    else:
+        velocities = zip(before.velocity, after.velocity)
+        accelerations = zip(before.acceleration, after.acceleration)
+        polynomials = tuple(
+            quintic(duration_s, *p, *v, *a) for p, v, a in zip(positions, velocities, accelerations)
+        )
+    return Segment(before.time_s, before.time_s, polynomials)
+
+
+def _check(knots: Sequence[Knot]) -> None:
+    """Raises a ValueError that names the first knot that is not as it should be."""
+    if not knots:
+        raise ValueError("a trajectory needs at least one knot")
+    width = len(knots[0].position)
+    previous_s = -math.inf
+    for number, knot in enumerate(knots):
+        if not previous_s < knot.time_s < math.inf:
+            raise ValueError(
+                f"knot {number}: expected a time after {previous_s:g} s, got {knot.time_s:g} s"
+            )
+        previous_s = knot.time_s
+        if knot.acceleration is not None and knot.velocity is None:
+            raise ValueError(f"knot {number}: has accelerations but no velocities")
+        for kind, values in zip(knot._fields[1:], knot[1:]):
+            if values is not None and len(values) != width:
+                raise ValueError(f"knot {number}: expected {width} values of {kind}, got {len(values)}")
+            if values is not None and not all(map(math.isfinite, values)):
+                raise ValueError(f"knot {number}: {kind} is not finite: {', '.join(f'{v:g}' for v in values)}")

@@ -1,0 +1,51 @@
+"""Topics that a body listens to beside the inputs of the world."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import rospy
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.throttle import ThrottledWarning
+from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
+
+from ..bodies import Body
+from .body_context import BodyContext
+from .robot_ik import ik_topic_suffixes, move_by_ik
+
+
+class BodyTopic(NamedTuple):
+    """A topic that bodies of some types listen to.
+
+    Attributes:
+        message_type: Its ROS type.
+        take: Acts on a message; it raises InterfaceError or ValueError for one that must be refused.
+        suffixes: What follows `rpbi/NAME/` in its names, for a body; nothing if the body does not have it.
+    """
+
+    message_type: type
+    take: Callable[[BodyContext, Any], None]
+    suffixes: Callable[[Body], Sequence[str]]
+
+
+BODY_TOPICS: tuple[BodyTopic, ...] = (
+    BodyTopic(CalculateInverseKinematicsProblem, move_by_ik, ik_topic_suffixes),
+    BodyTopic(JointTrajectory, follow_command, of_followers("command")),
+)
+
+_warn = ThrottledWarning()
+
+
+def open_topic(body_topic: BodyTopic, context: BodyContext) -> rospy.Subscriber:
+    """Subscribes to one topic of a body; what is refused is named now and then."""
+    topic = rospy.resolve_name(f"rpbi/{context.body.name}/{context.suffix}")
+
+    def take(message: Any) -> None:
+        try:
+            body_topic.take(context, message)
+        except (InterfaceError, ValueError) as error:
+            _warn(topic, f"message refused: {error}")
+
+    return rospy.Subscriber(topic, body_topic.message_type, take, queue_size=1, tcp_nodelay=True)

@@ -1,0 +1,69 @@
+"""Robots that start where another robot, for instance the real one, is at that time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import rospy
+from sensor_msgs.msg import JointState
+
+from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.schema import ConfigModel
+
+from ..bodies.robot_config import RobotConfig
+from ..config import LoadedWorld
+from ..urdf import joint_types
+
+TIMEOUT_S = 5.0
+"""How long to wait for joint states [s] of wall time."""
+
+
+def start_where_robots_are(loaded: LoadedWorld) -> LoadedWorld:
+    """Returns a world whose robots start where the joint states that they ask for say.
+
+    Raises:
+        ConfigError: If such joint states do not come or do not fit; it names all topics.
+    """
+    problems: list[Problem] = []
+    objects = []
+    for item in loaded.objects:
+        try:
+            objects.append(replace(item, config=with_initial_state(item.config, item.file)))
+        except ConfigError as error:
+            problems += error.problems
+    if problems:
+        raise ConfigError(problems)
+    return replace(loaded, objects=tuple(objects))
+
+
+def with_initial_state(config: ConfigModel, file: str) -> ConfigModel:
+    """Returns the configuration of a body; that of a robot that asks for it with the joint positions of a topic.
+
+    Joints that the topic does not name start where the configuration says; joints that the robot lacks are left out.
+
+    Raises:
+        ConfigError: If no joint states come in time, or they have nothing for the robot.
+    """
+    if not isinstance(config, RobotConfig) or config.initial_joint_state_topic is None:
+        return config
+    topic = rospy.resolve_name(config.initial_joint_state_topic)
+    try:
+        message = rospy.wait_for_message(topic, JointState, TIMEOUT_S)
+    except rospy.ROSException:
+        raise _problem(file, f"no joint states came on {topic} within {TIMEOUT_S:g} s") from None
+    types = joint_types(config.loadURDF.fileName)
+    measured = {name: value for name, value in zip(message.name, message.position) if name in types}
+    if not measured:
+        raise _problem(file, f"expected joints {', '.join(types)} on {topic}, got {', '.join(message.name) or 'none'}")
+    if not all(map(math.isfinite, measured.values())):
+        raise _problem(file, f"expected finite positions on {topic}, got {measured}")
+    if config.initial_revolute_joint_positions_are_deg:
+        turning = ("revolute", "continuous")
+        measured = {name: math.degrees(q) if types[name] in turning else q for name, q in measured.items()}
+    start = {**config.initial_joint_position, **measured}
+    return config.model_copy(update={"initial_joint_position": start})
+
+
+def _problem(file: str, message: str) -> ConfigError:
+    return ConfigError([Problem(file, "initial_joint_state_topic", message)])

@@ -1,0 +1,65 @@
+"""Services that move a robot in a given time and answer when it has arrived."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from custom_ros_tools.errors import InterfaceError
+from ros_pybullet_interface.srv import (
+    ResetEffStateRequest,
+    ResetEffStateResponse,
+    ResetJointStateRequest,
+    ResetJointStateResponse,
+)
+
+from ..bodies import Robot
+from ..control.motion import MotionResult
+from ..control.timed_motion import TimedMotion
+from ..joint_model import JointTarget
+from .body_context import BodyContext
+
+
+def move_to_joint_state(context: BodyContext, request: ResetJointStateRequest) -> ResetJointStateResponse:
+    """Moves the joints that are named; the others stay."""
+    state = request.joint_state
+    target = JointTarget(state.name, state.position, state.velocity, state.effort)
+    positions = target.values_of("position", "the goal of a motion is a position")
+    result = _move(context, context.body.model.resolve(target.names, positions), request.duration)
+    return ResetJointStateResponse(success=result.success, message=result.message)
+
+
+def move_to_initial_joint_state(context: BodyContext, request: ResetJointStateRequest) -> ResetJointStateResponse:
+    """Moves all joints to where the robot started; the state in the request is not looked at."""
+    result = _move(context, context.body.start_positions(), request.duration)
+    return ResetJointStateResponse(success=result.success, message=result.message)
+
+
+def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> ResetEffStateResponse:
+    """Moves a link to a pose by way of inverse kinematics; nothing moves if that fails."""
+    from .robot_ik import solve_for_robot  # noqa: PLC0415
+
+    solution = solve_for_robot(context, request.problem)
+    if not solution.success:
+        return ResetEffStateResponse(success=False, message=f"nothing moved: {solution.message}")
+    goal = context.body.model.resolve(solution.joint_names, solution.positions)
+    result = _move(context, goal, request.duration)
+    return ResetEffStateResponse(success=result.success, message=result.message)
+
+
+def _move(context: BodyContext, goal: Mapping[int, float], duration_s: float) -> MotionResult:
+    """Moves and waits for the end.
+
+    Raises:
+        InterfaceError: If the simulation is stopped, has ended or makes no progress.
+        ValueError: If the goal or the duration is refused; nothing moves then.
+    """
+    robot: Robot = context.body
+    motion = TimedMotion(robot.model, goal, duration_s)
+
+    def start() -> None:
+        if not context.simulation.running:
+            raise InterfaceError("the simulation is stopped: start it, else nothing moves")
+        robot.run(motion)
+
+    context.ask_body(start)
+    return context.ask.wait_for(motion.result)

@@ -1,0 +1,38 @@
+"""Services that change at once how a robot is controlled and where its joints are."""
+
+from __future__ import annotations
+
+from custom_ros_tools.srv import SetStringRequest, SetStringResponse
+from ros_pybullet_interface.srv import SetJointStateRequest, SetJointStateResponse
+
+from ..control.motors import MODE_NAMES
+from ..joint_model import JointTarget
+from ..pybullet_args import CONTROL_MODES
+from .body_context import BodyContext
+
+
+def set_control_mode(context: BodyContext, request: SetStringRequest) -> SetStringResponse:
+    """Switches between POSITION_CONTROL, VELOCITY_CONTROL and TORQUE_CONTROL.
+
+    Raises:
+        ValueError: If the text is none of these.
+    """
+    mode = CONTROL_MODES.parse(request.data)
+    before = MODE_NAMES[context.body.motors.mode]
+    context.ask_body(lambda: context.body.switch_mode(mode))
+    return SetStringResponse(success=True, message=f"{MODE_NAMES[mode]}, was {before}")
+
+
+def set_joint_state(context: BodyContext, request: SetJointStateRequest) -> SetJointStateResponse:
+    """Puts joints somewhere at once.
+
+    Raises:
+        UnknownNameError: If the robot lacks one of the joints.
+        ValueError: If a number is missing, not finite or outside the joint's limits.
+    """
+    state = request.joint_state
+    if not state.name:
+        raise ValueError("expected one joint or more, got none")
+    target = JointTarget(state.name, state.position, state.velocity)
+    context.ask_body(lambda: context.body.set_joint_state(target))
+    return SetJointStateResponse(success=True, message=f"{', '.join(state.name)} put there")

@@ -1,0 +1,142 @@
+"""The action of a follower of trajectories, for planners such as MoveIt."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from queue import SimpleQueue
+from typing import Any
+
+from actionlib.server_goal_handle import ServerGoalHandle
+from actionlib_msgs.msg import GoalStatus
+
+from custom_ros_tools.errors import InterfaceError
+
+from ..bodies import Robot
+from ..control.controller_state import ControllerState
+from ..control.trajectory_motion import TrajectoryMotion
+from ..control.trajectory_request import ErrorCode, TrajectoryRefusedError
+from .body_context import BodyContext
+from .stamped_action_server import StampedActionServer
+from .trajectory_messages import (
+    CONTROLLER,
+    FollowJointTrajectoryAction,
+    fill_state,
+    goal_tolerances,
+    trajectory_request,
+)
+
+log = logging.getLogger(__name__)
+
+LONGEST_END_S = 5.0
+"""How long closing waits for the last answers [s]."""
+
+
+def open_trajectory_action(context: BodyContext) -> Callable[[], None] | None:
+    """Serves the action of a robot that follows trajectories; returns what closes it."""
+    if not isinstance(context.body, Robot) or context.body.follower is None:
+        return None
+    if FollowJointTrajectoryAction is None:
+        log.warning(
+            "%s: rpbi/%s/%s has its topics only: the action follow_joint_trajectory and the service query_state need "
+            "control_msgs, which is not installed (docs/trajectories.md tells how)",
+            context.body.name,
+            context.body.name,
+            CONTROLLER,
+        )
+        return None
+    return TrajectoryAction(context).close
+
+
+class TrajectoryAction:
+    """Serves `follow_joint_trajectory` of one robot.
+
+    actionlib holds its lock while it calls back, and takes it to answer. So neither the simulation thread answers a
+    goal nor a callback waits for the simulation thread: both leave what is to be done to a thread of the action's own.
+
+    Args:
+        context: The robot and the way to it.
+    """
+
+    def __init__(self, context: BodyContext) -> None:
+        self._context = context
+        self._follower = context.body.follower
+        self._motions: dict[ServerGoalHandle, TrajectoryMotion] = {}
+        self._tasks: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
+        self._thread = threading.Thread(target=self._work, name=f"{context.body.name} trajectories", daemon=True)
+        self._server = StampedActionServer(
+            f"rpbi/{context.body.name}/{CONTROLLER}/follow_joint_trajectory",
+            FollowJointTrajectoryAction,
+            context.world.clock,
+            take_goal=lambda goal: self._tasks.put(lambda: self._begin(goal)),
+            take_cancel=lambda goal: self._tasks.put(lambda: self._cancel(goal)),
+        )
+        self._thread.start()
+        self._server.start()
+
+    def close(self) -> None:
+        """Ends the action when all goals have their answers; the robot has gone before."""
+        self._tasks.put(None)
+        self._thread.join(LONGEST_END_S)
+        self._server.stop()
+
+    def _work(self) -> None:
+        while (task := self._tasks.get()) is not None:
+            try:
+                task()
+            except Exception:  # the next goals shall have their answers all the same
+                log.exception("%s: a goal could not be served", self._context.body.name)
+
+    def _begin(self, goal: ServerGoalHandle) -> None:
+        if goal.get_goal_status().status == GoalStatus.RECALLING:
+            goal.set_canceled(self._result(ErrorCode.SUCCESSFUL, "cancelled before it began"))
+            return
+
+        def feed(state: ControllerState) -> None:
+            stamp_ns = self._context.world.clock.stamp_ns
+            self._tasks.put(lambda: goal.publish_feedback(self._feedback(state, stamp_ns)))
+
+        clock, message = self._context.world.clock, goal.get_goal()
+        try:
+            request = self._follower.check(trajectory_request(message.trajectory), goal_tolerances(message))
+            motion = self._context.ask_body(lambda: self._follower.follow(request, clock, feed))
+        except InterfaceError as error:
+            code = error.code if isinstance(error, TrajectoryRefusedError) else ErrorCode.INVALID_GOAL
+            log.warning("%s: goal refused: %s", self._context.body.name, error)
+            goal.set_rejected(self._result(code, str(error)), str(error))
+            return
+        goal.set_accepted()
+        self._motions[goal] = motion
+        motion.result.add_done_callback(lambda _: self._tasks.put(lambda: self._finish(goal)))
+
+    def _cancel(self, goal: ServerGoalHandle) -> None:
+        motion = self._motions.get(goal)
+        if motion is None:
+            return  # it has ended meanwhile
+        try:
+            self._context.ask_body(
+                lambda: self._follower.cancel("cancelled; the joints hold", self._context.world.clock, motion)
+            )
+        except InterfaceError as error:
+            log.warning("%s: could not cancel a goal: %s", self._context.body.name, error)
+
+    def _finish(self, goal: ServerGoalHandle) -> None:
+        motion = self._motions.pop(goal)
+        success, message = motion.result.result()
+        result = self._result(motion.code, message)
+        if success:
+            goal.set_succeeded(result, message)
+        elif motion.preempted:
+            goal.set_canceled(result, message)
+        else:
+            log.warning("%s: goal aborted: %s", self._context.body.name, message)
+            goal.set_aborted(result, message)
+
+    def _feedback(self, state: ControllerState, stamp_ns: int) -> Any:
+        return fill_state(self._server.ActionFeedback().feedback, state, stamp_ns)
+
+    def _result(self, code: ErrorCode, message: str) -> Any:
+        result = self._server.ActionResultType()
+        result.error_code, result.error_string = int(code), message
+        return result
