@@ -23,9 +23,9 @@ PROGRAMS = Path(__file__).parent / "programs"
 JOINT_STATES = "/rpbi/kuka_lwr/joint_states"
 COLOUR, DEPTH = "/rpbi/camera/colour/image", "/rpbi/camera/depth/image"
 TYPES = {"joint_states": "sensor_msgs/JointState", "image": "sensor_msgs/Image", "clock": "rosgraph_msgs/Clock"}
-TYPES["diagnostics"] = "diagnostic_msgs/DiagnosticArray"
+TYPES |= {"diagnostics": "diagnostic_msgs/DiagnosticArray", "tf": "tf2_msgs/TFMessage"}
 START_TIMEOUT_S = 60.0
-CAMERA_POSE = "0.05 -2.3 1.55 0 0 -2.09".split()  # x y z [m], yaw pitch roll [rad]: the example's view
+CAMERA_POSE = "-0.32 -2.05 2.2 -0.346 0 -2.22".split()  # x y z [m], yaw pitch roll [rad]: the example's view
 
 
 class Session:
@@ -128,7 +128,7 @@ class Session:
 
     def stop(self, process: subprocess.Popen[bytes]) -> None:
         """Ends a process and its children as Ctrl-C would, and by force if that does not do."""
-        for number, timeout_s in ((signal.SIGINT, 15.0), (signal.SIGKILL, 5.0)):
+        for number, timeout_s in ((signal.SIGINT, 60.0), (signal.SIGKILL, 5.0)):
             if process.poll() is not None:
                 return
             with contextlib.suppress(ProcessLookupError, subprocess.TimeoutExpired):

@@ -45,6 +45,8 @@ def main() -> None:
 def _note(notes: list[tuple[float, Any]], type_name: str) -> Any:
     if type_name == "rosgraph_msgs/Clock":
         return lambda message: notes.append((time.monotonic(), message.clock))
+    if type_name == "tf2_msgs/TFMessage":
+        return lambda message: notes.append((time.monotonic(), message.transforms[0].header.stamp))
     return lambda message: notes.append((time.monotonic(), message.header.stamp))
 
 

@@ -14,6 +14,7 @@ from custom_ros_tools.config import replace_package
 from custom_ros_tools.errors import ConfigError, Problem
 
 _FILENAME = re.compile(r"""(?P<before>filename\s*=\s*)(?P<quote>["'])(?P<path>.*?)(?P=quote)""")
+_PACKAGE = "package://"
 
 
 @lru_cache(maxsize=1)
@@ -44,15 +45,11 @@ def resolve_meshes(path: str) -> str:
     problems: list[Problem] = []
 
     def absolute(match: re.Match[str]) -> str:
-        mesh = match["path"]
         try:
-            resolved = Path(replace_package(mesh))
+            resolved = _mesh_file(match["path"], source)
         except ConfigError as error:
-            problems.extend(Problem(str(source), mesh, problem.message) for problem in error.problems)
+            problems.extend(error.problems)
             return match[0]
-        resolved = source.parent / resolved
-        if not resolved.is_file():
-            problems.append(Problem(str(source), mesh, f"no such file: {resolved}"))
         return f"{match['before']}{match['quote']}{resolved}{match['quote']}"
 
     resolved_text = _FILENAME.sub(absolute, text)
@@ -77,15 +74,19 @@ def description_for_ros(path: str) -> str:
         path: The file.
 
     Returns:
-        Its text, with relative mesh paths as `file://` addresses; `package://` paths stay.
+        Its text, with relative mesh paths as `file://` addresses; paths of ROS packages stay.
+
+    Raises:
+        ConfigError: If a mesh belongs to an unknown package.
     """
     source = Path(path)
 
     def address(match: re.Match[str]) -> str:
         mesh = match["path"]
-        if "://" in mesh:
+        if "://" in mesh and not _is_of_unknown_package(mesh):
             return match[0]
-        return f"{match['before']}{match['quote']}file://{(source.parent / mesh).resolve()}{match['quote']}"
+        file = _mesh_file(mesh, source) if _is_of_unknown_package(mesh) else source.parent / mesh
+        return f"{match['before']}{match['quote']}file://{file.resolve()}{match['quote']}"
 
     return _FILENAME.sub(address, source.read_text(encoding="utf-8"))
 
@@ -101,6 +102,39 @@ def joint_types(path: str) -> dict[str, str]:
     except ElementTree.ParseError as error:
         raise ConfigError([Problem(path, "", f"is not XML: {error}")]) from None
     return {joint.get("name", ""): joint.get("type", "") for joint in joints}
+
+
+def _mesh_file(mesh: str, source: Path) -> Path:
+    """Returns the file of a mesh.
+
+    Args:
+        mesh: What the URDF says.
+        source: The URDF file.
+
+    Raises:
+        ConfigError: If it belongs to an unknown package or does not exist.
+    """
+    if _is_of_unknown_package(mesh):
+        # PyBullet takes package://FOLDER/FILE for a folder beside the URDF or above it, and its own robots use that.
+        files = (folder / mesh.removeprefix(_PACKAGE) for folder in source.resolve().parents)
+        found = next((file for file in files if file.is_file()), None)
+        if found is not None:
+            return found
+    try:
+        file = source.parent / replace_package(mesh)
+    except ConfigError as error:
+        raise ConfigError([Problem(str(source), mesh, problem.message) for problem in error.problems]) from None
+    if not file.is_file():
+        raise ConfigError([Problem(str(source), mesh, f"no such file: {file}")])
+    return file
+
+
+def _is_of_unknown_package(mesh: str) -> bool:
+    try:
+        replace_package(mesh)
+    except ConfigError:
+        return mesh.startswith(_PACKAGE)
+    return False
 
 
 def _write(stem: str, text: str) -> str:

@@ -1,12 +1,18 @@
-"""The parameter that tells ROS what a robot looks like."""
+"""The parameter that tells ROS what a robot looks like, and the command that makes it for launch files."""
 
 from __future__ import annotations
 
+import argparse
 import contextlib
+import sys
 from collections.abc import Callable
 
+import pybullet_data
 import rospy
 
+from custom_ros_tools.errors import ConfigError
+
+from ..asset_files import find_file
 from ..bodies.jointed import JointedBody
 from ..urdf import description_for_ros
 from .body_context import BodyContext
@@ -25,3 +31,15 @@ def publish_description(context: BodyContext) -> Callable[[], None] | None:
             rospy.delete_param(name)
 
     return withdraw
+
+
+def main() -> None:
+    """Prints a robot description; launch files need it before the simulator is up: robot_state_publisher does."""
+    parser = argparse.ArgumentParser(description="Prints a URDF with mesh paths that RViz finds.")
+    parser.add_argument("urdf", help="file; {package}/path is resolved, and PyBullet's data is looked in")
+    name = parser.parse_args().urdf
+    try:
+        print(description_for_ros(find_file(name, ".", (pybullet_data.getDataPath(),))))
+    except (ConfigError, OSError, ValueError) as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        sys.exit(1)

@@ -1,0 +1,222 @@
+"""Motions, modes and teleports of a robot over ROS."""
+
+from __future__ import annotations
+
+import math
+import re
+import threading
+import time
+
+import pytest
+import rospy
+from node_world import add, main_config, publishing, remove
+from ros_system import wait_until
+from rosgraph_msgs.msg import Log
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from worlds import box, iiwa
+
+from custom_ros_tools.srv import SetString, SetTransform
+from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem, PybulletObject
+from ros_pybullet_interface.srv import CalculateInverseKinematics, ResetEffState, ResetJointState, SetJointState
+
+FIRST, FOURTH = "lbr_iiwa_joint_1", "lbr_iiwa_joint_4"
+JOINTS = [f"lbr_iiwa_joint_{i}" for i in range(1, 8)]
+BENT = dict(zip(JOINTS, [0.0, 30.0, 0.0, -60.0, 0.0, 40.0, 0.0]))
+
+
+@pytest.fixture(scope="module")
+def node(module_ros, tmp_path_factory):
+    module_ros.simulator(
+        main_config(
+            tmp_path_factory.mktemp("world"),
+            robots=(iiwa("iiwa", initial_joint_position=BENT, joint_state_publisher_hz=100.0),),
+            dynamic=(box("box", basePosition=[2.0, 0.0, 0.1]),),
+            timeStep=0.005,
+        )
+    )
+    return module_ros
+
+
+@pytest.fixture
+def states(node, ros):
+    """Joint states of a robot in position control at its start, running."""
+    listener = ros.listen("/rpbi/iiwa/joint_states", JointState)
+    listener.wait_for(1)
+    yield listener
+    ros.call("/rpbi/start", Trigger)
+    ros.call("/rpbi/iiwa/set_control_mode", SetString, "POSITION_CONTROL")
+    start = JointState(name=list(BENT), position=[math.radians(q) for q in BENT.values()])
+    assert ros.call("/rpbi/iiwa/set_joint_state", SetJointState, start).success
+
+
+def move(ros, duration_s, **goal):
+    state = JointState(name=[f"lbr_iiwa_joint_{key[1]}" for key in goal], position=list(goal.values()))
+    return ros.call("/rpbi/iiwa/move_to_joint_state", ResetJointState, state, duration_s)
+
+
+def in_background(call):
+    """Makes a call in a thread; returns a function that waits for its answer."""
+    answers = []
+    thread = threading.Thread(target=lambda: answers.append(call()))
+    thread.start()
+
+    def wait():
+        thread.join(30.0)
+        return answers[0]
+
+    return wait
+
+
+def now(states) -> dict[str, float]:
+    seen = len(states.messages)
+    message = states.wait_for(seen + 2)[-1]
+    return dict(zip(message.name, message.position))
+
+
+def test_a_robot_moves_to_a_joint_state_and_answers_when_it_is_there(ros, states):
+    answer = move(ros, 0.5, j1=0.4, j4=-1.2)
+    assert answer.success, answer.message
+    assert (now(states)[FIRST], now(states)[FOURTH]) == pytest.approx((0.4, -1.2), abs=0.01)
+    assert now(states)[JOINTS[1]] == pytest.approx(math.radians(30.0), abs=0.005), "joints not named stay"
+
+
+def test_it_moves_back_to_where_it_started_whatever_the_request_says(ros, states):
+    move(ros, 0.3, j1=0.4)
+    answer = ros.call(
+        "/rpbi/iiwa/move_to_initial_joint_state", ResetJointState, JointState(name=["no joint"]), 0.3
+    )
+    assert answer.success, answer.message
+    assert [now(states)[name] for name in JOINTS] == pytest.approx(
+        [math.radians(BENT[name]) for name in JOINTS], abs=0.01
+    )
+
+
+def test_its_hand_moves_to_a_pose(ros, states):
+    here = ros.call(
+        "/rpbi/iiwa/ik",
+        CalculateInverseKinematics,
+        CalculateInverseKinematicsProblem(link_name="lbr_iiwa_link_7", targetPosition=[0.5, 0.2, 0.6]),
+    )
+    assert here.success, here.message
+    problem = CalculateInverseKinematicsProblem(link_name="lbr_iiwa_link_7", targetPosition=[0.5, 0.2, 0.6])
+    answer = ros.call("/rpbi/iiwa/move_to_eff_state", ResetEffState, problem, 0.5)
+    assert answer.success, answer.message
+    assert [now(states)[name] for name in here.solution.name] == pytest.approx(
+        list(here.solution.position), abs=0.02
+    )
+
+
+def test_a_pose_out_of_reach_moves_nothing(ros, states):
+    before = now(states)
+    problem = CalculateInverseKinematicsProblem(link_name="lbr_iiwa_link_7", targetPosition=[3.0, 0.0, 0.5])
+    answer = ros.call("/rpbi/iiwa/move_to_eff_state", ResetEffState, problem, 0.5)
+    assert not answer.success
+    assert "nothing moved" in answer.message
+    assert now(states) == pytest.approx(before, abs=1e-3)
+
+
+REFUSED = {
+    "outside limits": ({"j1": 0.2, "j4": 3.0}, 1.0, f"joint '{FOURTH}' must be within -2.0944 to 2.0944 rad, got 3"),
+    "not finite": ({"j1": math.nan}, 1.0, f"values must be finite, got nan for joint '{FIRST}'"),
+    "unknown joint": ({"j9": 0.1}, 1.0, "unknown joint 'lbr_iiwa_joint_9': known are"),
+    "duration": ({"j1": 0.2}, -1.0, "duration must be 0 or more [s], got -1"),
+    "no joint": ({}, 1.0, "expected a position for one joint or more, got none"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_goal_that_cannot_be_is_refused_before_anything_moves(ros, states, case):
+    goal, duration_s, message = REFUSED[case]
+    before = now(states)
+    answer = move(ros, duration_s, **goal)
+    assert not answer.success
+    assert message in answer.message
+    assert now(states) == pytest.approx(before, abs=1e-3)
+
+
+def test_of_two_moves_at_once_the_later_wins_and_the_earlier_says_where_it_got(ros, states):
+    first = in_background(lambda: move(ros, 4.0, j1=1.0))
+    wait_until(lambda: now(states)[FIRST] > 0.05, "the first is under way")
+    assert move(ros, 0.5, j1=-0.2).success
+    answer = first()
+    assert not answer.success
+    assert "a newer motion replaced it before the goal" in answer.message
+    assert 0.05 < float(re.search(rf"{FIRST}=(\S+)", answer.message)[1]) < 1.0
+
+
+def test_a_stop_in_the_middle_is_answered_and_while_stopped_moves_are_refused(ros, states):
+    moving = in_background(lambda: move(ros, 4.0, j1=1.0))
+    wait_until(lambda: now(states)[FIRST] > 0.05, "it is under way")
+    assert ros.call("/rpbi/stop", Trigger).success
+    answer = moving()
+    assert not answer.success
+    assert "the simulation was stopped before the goal" in answer.message
+    assert "the simulation is stopped" in move(ros, 1.0, j1=0.5).message
+    reached = now(states)[FIRST]
+    assert ros.call("/rpbi/start", Trigger).success
+    time.sleep(0.3)
+    assert now(states)[FIRST] == pytest.approx(reached, abs=0.02), "it does not go on by itself"
+
+
+def test_removal_in_the_middle_is_answered(ros, node):
+    load = {"fileName": "kuka_iiwa/model.urdf", "useFixedBase": True, "basePosition": [0.0, 3.0, 0.0]}
+    assert add(ros, PybulletObject.ROBOT, iiwa("guest", loadURDF=load)).success
+    goal = JointState(name=[FIRST], position=[1.0])
+    moving = in_background(lambda: ros.call("/rpbi/guest/move_to_joint_state", ResetJointState, goal, 5.0))
+    time.sleep(0.3)
+    assert remove(ros, "guest").success
+    answer = moving()
+    assert not answer.success
+    assert "the robot was removed before the goal" in answer.message
+
+
+def test_modes_are_switched_and_targets_for_another_mode_named_once(ros, states):
+    rosout = ros.listen("/rosout", Log)
+    assert ros.call("/rpbi/iiwa/set_control_mode", SetString, "VELOCITY_CONTROL").success
+    with publishing("/rpbi/iiwa/joint_states/target", JointState) as target:
+        for _ in range(40):
+            target.publish(JointState(name=[FIRST], position=[0.1]))
+            rospy.rostime.wallsleep(0.01)
+        wait_until(lambda: [log for log in rosout.messages if "expected velocity" in log.msg], "it is named")
+        for _ in range(20):
+            target.publish(JointState(name=[FIRST], velocity=[0.3]))
+            rospy.rostime.wallsleep(0.02)
+        assert states.messages[-1].velocity[0] == pytest.approx(0.3, abs=0.05)
+    time.sleep(0.5)
+    assert len([log for log in rosout.messages if "expected velocity" in log.msg]) == 1
+    wait_until(lambda: abs(states.messages[-1].velocity[0]) < 1e-3, "it stops when nobody sends any more")
+
+
+def test_torque_control_lets_an_arm_fall_and_moves_are_refused_in_it(ros, states):
+    assert ros.call("/rpbi/iiwa/set_control_mode", SetString, "TORQUE_CONTROL").success
+    assert "TORQUE_CONTROL" in move(ros, 1.0, j1=0.5).message
+    before = now(states)[JOINTS[1]]
+    time.sleep(0.5)
+    assert abs(now(states)[JOINTS[1]] - before) > 0.05
+
+
+@pytest.mark.parametrize("text", ["", "POSITION", "position_control"])
+def test_an_unknown_mode_is_refused_with_those_there_are(ros, node, text):
+    answer = ros.call("/rpbi/iiwa/set_control_mode", SetString, text)
+    assert not answer.success
+    assert "unknown control mode" in answer.message
+
+
+def test_joints_are_put_somewhere_at_once(ros, states):
+    answer = ros.call("/rpbi/iiwa/set_joint_state", SetJointState, JointState(name=[FIRST], position=[1.2]))
+    assert answer.success, answer.message
+    assert now(states)[FIRST] == pytest.approx(1.2, abs=0.01)
+    refused = ros.call("/rpbi/iiwa/set_joint_state", SetJointState, JointState(name=[FIRST], position=[9.0]))
+    assert not refused.success
+    assert "must be within" in refused.message
+
+
+def test_bodies_are_put_somewhere_at_once_and_nonsense_is_refused(ros, node):
+    transform = SetTransform._request_class().transform
+    transform.translation.x, transform.translation.z, transform.rotation.w = 2.5, 0.5, 1.0
+    assert ros.call("/rpbi/box/set_pose", SetTransform, transform).success
+    transform.translation.x = math.nan
+    answer = ros.call("/rpbi/box/set_pose", SetTransform, transform)
+    assert not answer.success
+    assert "must be finite" in answer.message

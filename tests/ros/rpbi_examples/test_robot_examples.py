@@ -1,0 +1,123 @@
+"""The examples of robots do what they say, headless."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import rosgraph
+import rospy
+import tf2_ros
+from geometry_msgs.msg import WrenchStamped
+from ros_system import wait_until
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from ros_pybullet_interface.srv import ResetJointState
+from rpbi_examples.circles import CENTRE, RADIUS
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def launch(ros, example: str, **arguments: object) -> None:
+    """Starts an example without windows and waits until its world runs."""
+    given = [f"{key}:={value}" for key, value in arguments.items()]
+    process = ros.start(["roslaunch", "rpbi_examples", f"{example}.launch", "headless:=true", *given])
+    wait_until(
+        lambda: process.poll() is not None or _serves("/rpbi/list_objects"), f"{example} is up", 40.0
+    )
+    assert process.poll() is None, ros.output(process)
+
+
+def _serves(name: str) -> bool:
+    try:
+        rosgraph.Master("/tests").lookupService(name)
+        return True
+    except rosgraph.MasterError:
+        return False
+
+
+@pytest.fixture
+def position() -> Callable[[str], tuple[float, float, float] | None]:
+    """Tells where a frame is in the world [m]."""
+    buffer = tf2_ros.Buffer(debug=False)
+    tf2_ros.TransformListener(buffer)
+
+    def look(frame: str) -> tuple[float, float, float] | None:
+        try:
+            found = buffer.lookup_transform("rpbi/world", frame, rospy.Time(0)).transform.translation
+        except tf2_ros.TransformException:
+            return None
+        return found.x, found.y, found.z
+
+    return look
+
+
+def test_two_hands_draw_mirrored_circles(ros, position):
+    launch(ros, "basic_example_dual_iiwa", real_time_factor=4)
+    hands = {1.0: "rpbi/left/lbr_iiwa_link_7", -1.0: "rpbi/right/lbr_iiwa_link_7"}
+    x, y, z = CENTRE
+
+    def off(side: float) -> tuple[float, float] | None:
+        """Returns how far a hand is from its circle, and where on it [m, rad]."""
+        found = position(hands[side])
+        if found is None:
+            return None
+        dy, dz = side * found[1] - y, found[2] - z - RADIUS
+        return math.hypot(math.hypot(dy, dz) - RADIUS, found[0] - x), math.atan2(dy, -dz)
+
+    angles = set()
+    both: list[float] = []
+
+    def drawn() -> bool:
+        left, right = off(1.0), off(-1.0)
+        if left is None or right is None or max(left[0], right[0]) > 0.01:
+            return False
+        both.append(abs(math.remainder(left[1] - right[1], math.tau)))
+        angles.add(int(left[1] // (math.pi / 4)))
+        return len(angles) == 8
+
+    wait_until(drawn, "the hands went round, within 1 cm of their circles", 60.0)
+    assert sorted(both)[len(both) // 2] < 0.1, "both are at the same place of their circle most of the time"
+
+
+def test_panda_works_the_ros_way(ros, position):
+    launch(ros, "basic_example_panda", move="false")
+    wait_until(lambda: position("rpbi/panda/panda_hand"), "robot_state_publisher tells where the hand is")
+    wrench = ros.listen("/rpbi/panda/panda_joint8/ft_sensor", WrenchStamped).wait_for(20)[-1]
+    weight = 9.81 * (0.81 + 2 * 0.1)  # hand and fingers in PyBullet's URDF
+    force = wrench.wrench.force
+    assert math.sqrt(force.x**2 + force.y**2 + force.z**2) == pytest.approx(weight, rel=0.02)
+
+    states = ros.listen("/rpbi/panda/joint_states", JointState)
+    start = dict(zip(states.wait_for(1)[-1].name, states.messages[-1].position))
+    trajectory = JointTrajectory(joint_names=[f"panda_joint{i}" for i in range(1, 8)])
+    goal = [0.4, *[start[name] for name in trajectory.joint_names[1:]]]
+    trajectory.points = [JointTrajectoryPoint(positions=goal, time_from_start=rospy.Duration(1.0))]
+    command = rospy.Publisher("/rpbi/panda/joint_trajectory_controller/command", JointTrajectory, queue_size=1)
+    wait_until(command.get_num_connections, "the controller listens")
+    command.publish(trajectory)
+    wait_until(
+        lambda: abs(dict(zip(states.messages[-1].name, states.messages[-1].position))["panda_joint1"] - 0.4) < 0.01,
+        "it follows a trajectory",
+    )
+
+
+def test_panda_swings(ros):
+    launch(ros, "basic_example_panda")
+    states = ros.listen("/rpbi/panda/joint_states", JointState)
+    first = states.wait_for(1)[0]
+    index = first.name.index("panda_joint4")
+    wait_until(lambda: abs(states.messages[-1].position[index] - first.position[index]) > 0.3, "it moves", 30.0)
+
+
+def test_kuka_holds_still_until_it_is_told_to_move(ros):
+    launch(ros, "run_kuka")
+    states = ros.listen("/rpbi/kuka_lwr/joint_states", JointState)
+    home = states.wait_for(200)[0].position
+    assert states.messages[-1].position == pytest.approx(home, abs=2e-3)
+    goal = JointState(name=["lwr_arm_0_joint"], position=[0.5])
+    answer = ros.call("/rpbi/kuka_lwr/move_to_joint_state", ResetJointState, goal, 0.5)
+    assert answer.success, answer.message
