@@ -1,0 +1,84 @@
+"""The joints between a robot's base and one of its links."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..client import Client
+from ..joint_model import Joint
+from ..pose import Pose, Vector
+from ..urdf import write_description
+from .residual import Residual
+from .target import Target
+
+
+class Chain:
+    """A link and the m joints that move it, as a body of its own: PyBullet takes its time for joints that do not.
+
+    Args:
+        pb: A private client.
+        urdf: What is between the root and the link, see `Skeleton.chain`.
+        scaling: PyBullet's `globalScaling`.
+        link_name: The link.
+        joint_names: The n joints of the robot that a motor can move.
+
+    Attributes:
+        members: Where the m joints are among the n.
+        anchor: Where the first of them is in the base [m].
+        reach_m: No position of the joints brings the link farther from the anchor than this [m].
+    """
+
+    def __init__(self, pb: Client, urdf: str, scaling: float, link_name: str, joint_names: Sequence[str]) -> None:
+        self.pb = pb
+        self.body_id: int = pb.loadURDF(write_description(urdf), useFixedBase=True, globalScaling=scaling)
+        joints = [Joint.from_info(pb.getJointInfo(self.body_id, i)) for i in range(pb.getNumJoints(self.body_id))]
+        self.link_index = next(joint.index for joint in joints if joint.link == link_name)
+        driven = [joint for joint in joints if joint.is_driven]
+        self._joint_indices = [joint.index for joint in driven]
+        self.members = [joint_names.index(joint.name) for joint in driven]
+        self.set(np.zeros(len(driven)))
+        knots = [
+            pb.getLinkState(self.body_id, index, computeForwardKinematics=True)[4]
+            for index in (*self._joint_indices, self.link_index)
+        ]
+        self.anchor: Vector = knots[0]
+        travel = [max(abs(joint.lower), abs(joint.upper)) for joint in driven if not joint.is_revolute]
+        self.reach_m: float = sum(map(math.dist, knots, knots[1:])) + sum(travel)
+
+    def set(self, q: np.ndarray) -> None:
+        """Puts the joints at m positions [rad or m]."""
+        if self._joint_indices:
+            self.pb.resetJointStatesMultiDof(self.body_id, self._joint_indices, [[position] for position in q.tolist()])
+
+    def pose(self) -> Pose:
+        """Returns the pose of the link in the base."""
+        state = self.pb.getLinkState(self.body_id, self.link_index, computeForwardKinematics=True)
+        return Pose(state[4], state[5])
+
+    def error(self, target: Target) -> np.ndarray:
+        """Returns the way to the target: 3 values [m], and 3 of a rotation vector [rad] if it has an orientation."""
+        position, quat = self.pose()
+        way = [goal - here for goal, here in zip(target.position, position)]
+        if target.quat_xyzw is not None:
+            x, y, z, w = self.pb.getDifferenceQuaternion(quat, target.quat_xyzw)
+            sine = math.hypot(x, y, z)
+            angle = 2.0 * math.atan2(sine, abs(w))  # the shorter way round
+            scale = math.copysign(angle / sine if sine > 1e-12 else 2.0, w)
+            way += [x * scale, y * scale, z * scale]
+        return np.array(way)
+
+    def residual(self, target: Target) -> Residual:
+        """Returns how far the link is from the target."""
+        way = self.error(target).tolist()
+        return Residual(math.hypot(*way[:3]), math.hypot(*way[3:]))
+
+    def jacobian(self, q: np.ndarray, rows: int) -> np.ndarray:
+        """Returns how the link's position, and with 6 rows its orientation, changes with the joints, rows x m."""
+        zeros = [0.0] * len(q)
+        linear, angular = self.pb.calculateJacobian(
+            self.body_id, self.link_index, [0.0, 0.0, 0.0], q.tolist(), zeros, zeros
+        )
+        return np.array(linear if rows == 3 else linear + angular)

@@ -1,0 +1,179 @@
+"""Forward and inverse kinematics of one robot."""
+
+from __future__ import annotations
+
+import math
+import threading
+import weakref
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+import pybullet
+
+from custom_ros_tools.errors import PhysicsError, UnknownNameError
+
+from ..client import Client
+from ..joint_model import Joint
+from ..pose import Pose
+from ..urdf import write_description
+from .chain import Chain
+from .ik_problem import IKProblem
+from .ik_solution import IKSolution
+from .joint_limits import JointLimits
+from .residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
+from .search import Search
+from .skeleton import Skeleton
+from .target import Target
+
+
+class Kinematics:
+    """Forward and inverse kinematics of one robot, in a private PyBullet client with its base at the origin.
+
+    Any thread may call it; a lock inside lets one in at a time. PyBullet holds Python's lock for a few tenths of a
+    millisecond at a time, never for a whole solution.
+
+    Args:
+        urdf_path: The robot's description; the meshes it names need not be there.
+        scaling: PyBullet's `globalScaling` of the robot.
+        flags: PyBullet's `flags` of its `loadURDF`.
+
+    Attributes:
+        joint_names: The n joints that a motor can move, in the robot's order.
+        limits: Their limits.
+
+    Raises:
+        ConfigError: If the description cannot be read or is not well-formed.
+        PhysicsError: If PyBullet cannot load it.
+    """
+
+    def __init__(self, urdf_path: str, scaling: float = 1.0, flags: int = 0) -> None:
+        self._skeleton = Skeleton(urdf_path)
+        self._scaling = scaling
+        self._lock = threading.Lock()
+        self._pb = Client(pybullet.DIRECT)
+        self._disconnect = weakref.finalize(self, self._pb.disconnect)
+        try:
+            joints = self._load_joints(flags)
+        except pybullet.error as error:
+            self.close()
+            raise PhysicsError(f"{urdf_path}: PyBullet cannot load its links and joints: {error}") from error
+        self._links = [joint.link for joint in joints]
+        driven = [joint for joint in joints if joint.is_driven]
+        self.joint_names = tuple(joint.name for joint in driven)
+        self.limits = JointLimits(driven)
+        self._chains: dict[str, Chain] = {}
+
+    def close(self) -> None:
+        """Disconnects the client; whoever comes later gets a PhysicsError."""
+        with self._lock:
+            self._disconnect()
+
+    def forward(self, positions: Sequence[float], link_name: str) -> Pose:
+        """Returns the pose of a link's URDF frame in the frame of the base link.
+
+        Args:
+            positions: n positions [rad or m], in the order of `joint_names`.
+            link_name: The link; not the root.
+
+        Raises:
+            UnknownNameError: If there is no such link.
+            ValueError: If there are not n positions, or one is not finite.
+            PhysicsError: If it was closed.
+        """
+        if len(positions) != len(self.joint_names) or not all(map(math.isfinite, positions)):
+            expected = f"{len(self.joint_names)} finite values, one for each of {', '.join(self.joint_names)}"
+            raise ValueError(f"positions: expected {expected}; got {list(positions)}")
+        with self._open():
+            chain = self._chain(link_name)
+            chain.set(np.array(positions, dtype=float)[chain.members])
+            return chain.pose()
+
+    def solve(self, problem: IKProblem) -> IKSolution:
+        """Looks for joint positions that bring a link to a target; the same problem has the same answer.
+
+        It takes the first solution that it finds, from the start that was given or else from random ones, and gives up
+        after a fixed number of iterations. With a rest posture it starts there, and slides from the solution to the
+        one nearest to the posture.
+
+        Raises:
+            UnknownNameError: If there is no such link.
+            ValueError: If a list has not one value for each joint, limits leave a joint no position, or the link
+                hangs on a joint that is neither revolute nor prismatic.
+            PhysicsError: If it was closed.
+        """
+        problem.check_lengths(self.joint_names)
+        limits = self.limits.narrowed(problem)
+        positions = np.zeros(len(self.joint_names))
+        if start := problem.currentPosition or problem.resetPoses:
+            positions[:] = start
+        with self._open():
+            chain = self._chain(problem.link_name)
+            search = Search(chain, _target(problem), limits.of(chain.members), problem, positions[chain.members])
+            positions[chain.members], residual = search.run()
+        return IKSolution(
+            success=residual.size <= 1.0,
+            message=_in_words(problem, residual),
+            joint_names=self.joint_names,
+            positions=tuple(positions.tolist()),
+            chain=tuple(self.joint_names[i] for i in chain.members),
+            position_error_m=residual.position_m,
+            orientation_error_rad=residual.orientation_rad,
+        )
+
+    @contextmanager
+    def _open(self) -> Iterator[None]:
+        """Lets one thread at the client.
+
+        Raises:
+            PhysicsError: If it was closed.
+        """
+        with self._lock:
+            if not self._disconnect.alive:
+                raise PhysicsError("the robot has gone, and its kinematics with it")
+            yield
+
+    def _load_joints(self, flags: int) -> list[Joint]:
+        """Returns all joints in the order in which PyBullet loads them."""
+        pb = self._pb
+        body_id = pb.loadURDF(
+            write_description(self._skeleton.text()), useFixedBase=True, globalScaling=self._scaling, flags=flags
+        )
+        joints = [Joint.from_info(pb.getJointInfo(body_id, i)) for i in range(pb.getNumJoints(body_id))]
+        pb.removeBody(body_id)
+        return joints
+
+    def _chain(self, link_name: str) -> Chain:
+        """Returns what moves a link.
+
+        Raises:
+            UnknownNameError: If there is no such link.
+            ValueError: If it hangs on a joint that is neither revolute nor prismatic.
+        """
+        if link_name not in self._links:
+            raise UnknownNameError("link", link_name, self._links)
+        if link_name not in self._chains:
+            try:
+                urdf = self._skeleton.chain(link_name)
+            except ValueError as error:
+                raise ValueError(f"link_name: {error}") from None
+            self._chains[link_name] = Chain(self._pb, urdf, self._scaling, link_name, self.joint_names)
+        return self._chains[link_name]
+
+
+def _target(problem: IKProblem) -> Target:
+    x, y, z = problem.targetPosition
+    if not problem.targetOrientation:
+        return Target((x, y, z), None)
+    norm = math.hypot(*problem.targetOrientation)
+    qx, qy, qz, qw = (component / norm for component in problem.targetOrientation)
+    return Target((x, y, z), (qx, qy, qz, qw))
+
+
+def _in_words(problem: IKProblem, residual: Residual) -> str:
+    angle = f" and {residual.orientation_rad:.3g} rad" if problem.targetOrientation else ""
+    if residual.size <= 1.0:
+        return f"'{problem.link_name}' is within {residual.position_m * 1e3:.3g} mm{angle} of its target"
+    tolerance = f"{POSITION_TOLERANCE_M * 1e3:g} mm" + (f" and {ORIENTATION_TOLERANCE_RAD:g} rad" if angle else "")
+    missed = f"'{problem.link_name}' misses its target by {residual.position_m * 1e3:.4g} mm{angle}"
+    return f"{missed}; {tolerance} would do"

@@ -1,0 +1,144 @@
+"""The search for a solution: from one start after the other, until one leads to the target."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+import pybullet
+
+from .chain import Chain
+from .damped_least_squares import DampedLeastSquares
+from .ik_problem import IKProblem
+from .joint_limits import TURN, JointLimits
+from .posture import towards_posture
+from .residual import POSITION_TOLERANCE_M, Residual
+from .selectively_damped_least_squares import SelectivelyDampedLeastSquares
+from .step import Step
+from .target import Target
+
+RANDOM_STARTS = 50
+"""How many random starts follow those that the problem names."""
+RANDOM_STARTS_BEYOND_REACH = 5
+"""How many, if the arm stretched out could not be long enough: only the best of what there is can be found."""
+ITERATIONS_A_STAGE = 20
+"""After so many iterations, positions are brought into limits and the way that was gained is looked at."""
+ITERATIONS_A_START = 120
+"""Most iterations from one start, unless the problem says otherwise."""
+JOINT_ITERATIONS = 14_000
+"""Most iterations for one problem, times the number of joints: 2,000 for 7 joints, some 20 ms."""
+THRESHOLD = 0.1
+"""Residual at which the search stops, unless the problem says otherwise, see `Residual.size`."""
+BREAK_S = 5e-5
+"""Pause between stages, in which the simulation gets Python's lock [s]."""
+SEED = 0
+"""Of the random starts."""
+LEAST_WEIGHT = 1e-3
+"""Least damping and least range of a joint, as a part of the largest."""
+
+SOLVERS: dict[int, Callable[..., Step]] = {
+    pybullet.IK_DLS: DampedLeastSquares,
+    pybullet.IK_SDLS: SelectivelyDampedLeastSquares,
+}
+
+
+class Search:
+    """One search.
+
+    Args:
+        chain: The link to move, and the m joints that do.
+        target: Where it shall be.
+        limits: Limits of the m joints.
+        problem: What else is asked for; it fits the robot.
+        current: m positions where the robot is [rad or m].
+    """
+
+    def __init__(
+        self, chain: Chain, target: Target, limits: JointLimits, problem: IKProblem, current: np.ndarray
+    ) -> None:
+        self._chain, self._target, self._limits, self._problem = chain, target, limits, problem
+        self._current, _ = limits.bring_in(current, current)
+        self._rest = self._of_chain(problem.resetPoses)
+        self._threshold = min(problem.residualThreshold / POSITION_TOLERANCE_M, 1.0) or THRESHOLD
+        damping = _damping(self._of_chain(problem.jointDamping), len(current))
+        solver = chain, target, 0.5 * self._threshold * POSITION_TOLERANCE_M, damping
+        self._fast_step = DampedLeastSquares(*solver)
+        self._asked_step = SOLVERS[problem.solver](*solver)
+        self._iterations_left = JOINT_ITERATIONS // max(1, len(current))
+
+    def run(self) -> tuple[np.ndarray, Residual]:
+        """Returns the best m positions [rad or m] that were found, and how far off the target they are."""
+        q, residual = self._solution()
+        if len(self._rest) and residual.size <= 1.0:
+            ranges = self._of_chain(self._problem.jointRanges)
+            ranges = np.where(ranges > 0.0, ranges, TURN)  # PyBullet's -1 of joints without limits
+            weights = np.maximum(ranges / ranges.max(), LEAST_WEIGHT)
+            most = max(residual.size, self._threshold)
+            q = towards_posture(self._chain, self._target, self._limits, self._rest, weights, q, most)
+            residual = self._residual(q)
+        return q, residual
+
+    def _solution(self) -> tuple[np.ndarray, Residual]:
+        """Returns the best positions from the first start that leads to the target, else the best of all."""
+        best, least = self._current, self._residual(self._current)
+        for step, start in self._starts():
+            for q, residual in self._descent(step, start):
+                if residual.size < least.size:
+                    best, least = q, residual
+                if least.size <= self._threshold:
+                    break
+            if least.size <= 1.0:
+                break
+        return best, least
+
+    def _starts(self) -> Iterator[tuple[Step, np.ndarray]]:
+        """Tells where to start: at the rest posture, where the robot is, and then at random, with the faster solver."""
+        if not len(self._current):
+            return
+        if len(self._rest):
+            yield self._asked_step, self._limits.bring_in(self._rest, self._current)[0]
+        yield self._asked_step, self._current
+        generator = np.random.default_rng(SEED)
+        beyond_reach = math.dist(self._target.position, self._chain.anchor) > self._chain.reach_m
+        for _ in range(RANDOM_STARTS_BEYOND_REACH if beyond_reach else RANDOM_STARTS):
+            yield self._fast_step, self._limits.random(generator, self._current)
+
+    def _descent(self, step: Step, q: np.ndarray) -> Iterator[tuple[np.ndarray, Residual]]:
+        """Goes from a start towards the target, and tells each stage on the way.
+
+        A joint that ran into a limit is left there for one stage, so that the others make up for it.
+        """
+        limits, last = self._limits, math.inf
+        frozen = stuck = limits.lower == limits.upper
+        for_this_start = self._problem.maxNumIterations or ITERATIONS_A_START
+        while (iterations := min(ITERATIONS_A_STAGE, for_this_start, self._iterations_left)) > 0:
+            for_this_start -= iterations
+            self._iterations_left -= iterations
+            moved = step(q, frozen, iterations)
+            if not np.isfinite(moved).all():
+                return
+            q, stopped = limits.bring_in(moved, self._current)
+            residual = self._residual(q)
+            yield q, residual
+            time.sleep(BREAK_S)
+            if residual.size > 0.5 * last and not stopped.any():
+                return
+            frozen, last = stuck | stopped, residual.size
+
+    def _residual(self, q: np.ndarray) -> Residual:
+        self._chain.set(q)
+        return self._chain.residual(self._target)
+
+    def _of_chain(self, values: Sequence[float]) -> np.ndarray:
+        """Returns what a field of the problem has for the joints of the chain, if it has anything."""
+        return np.array(values, dtype=float)[self._chain.members] if len(values) else np.empty(0)
+
+
+def _damping(given: np.ndarray, count: int) -> np.ndarray:
+    """Returns how unwilling each joint is to move; the most willing one has 1."""
+    if not given.any():
+        return np.ones(count)
+    given = np.maximum(given, LEAST_WEIGHT * given.max())
+    return given / given.min()
