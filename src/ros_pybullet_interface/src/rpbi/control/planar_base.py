@@ -1,0 +1,113 @@
+"""A base that drives over the ground in any direction, as omnidirectional wheels do."""
+
+from __future__ import annotations
+
+import math
+
+import pybullet
+
+from ..client import Client
+from ..pose import Pose
+from .planar_base_config import PlanarBaseConfig
+from .planar_joints import PLANAR_JOINTS
+from .planar_velocity import PlanarVelocity
+
+GRAVITY = 9.81
+"""What the default force limits count with [m/s^2], whatever the world's gravity is."""
+POSITION_GAIN = 0.1
+"""Share of its lag that the base makes up for in a tick."""
+CATCH_UP_SPEED = (0.5, 0.5, 1.0)
+"""How fast the base may make up for its lag [m/s, m/s, rad/s]; a greater lag is given up: something is in the way."""
+
+
+class PlanarBase:
+    """Drives the planar joints of a robot by velocity, with limited force.
+
+    The motors follow a set point that moves with the limited velocity, so nothing drifts. What needs more force than
+    there is holds the base up or pushes it away; the set point then stays near the base, as wheels slip.
+
+    Args:
+        pb: The client.
+        body_id: PyBullet's id of the robot, which was loaded with planar joints.
+        config: Its limits.
+        dt_s: Length of a tick [s].
+    """
+
+    def __init__(self, pb: Client, body_id: int, config: PlanarBaseConfig, dt_s: float) -> None:
+        self._pb, self._body_id, self._config, self._dt_s = pb, body_id, config, dt_s
+        self._timeout_ticks = max(1, round(config.cmd_vel_timeout_s / dt_s))
+        self._expiry: int | None = None
+        """Tick at which the command expires; None if it was renewed since the last one."""
+        self._command = PlanarVelocity()
+        self._forces = self._force_limits()
+        self._max_lags = tuple(speed * dt_s / POSITION_GAIN for speed in CATCH_UP_SPEED)
+        self.rest()
+
+    def follow(self, velocity: PlanarVelocity) -> None:
+        """Drives at a velocity in the base frame until the next one or the time-out, as fast as the limits allow."""
+        self._command = velocity.limited(self._config.max_linear_velocity, self._config.max_angular_velocity)
+        self._expiry = None
+
+    def rest(self) -> None:
+        """Takes the base as standing where its joints are."""
+        self._velocity = PlanarVelocity()
+        self._set_point = [state[0] for state in self._joint_states()]
+
+    def before_step(self, tick: int) -> None:
+        """Moves the set point on by a tick."""
+        if self._expiry is None:
+            self._expiry = tick + self._timeout_ticks
+        elif tick >= self._expiry:
+            self._command = PlanarVelocity()
+        step = self._config.max_linear_acceleration * self._dt_s, self._config.max_angular_acceleration * self._dt_s
+        self._velocity = self._velocity.towards(self._command, *step)
+        yaw = self._set_point[2] + self._velocity.yaw * self._dt_s / 2.0  # at mid-tick
+        velocity = list(self._velocity.turned(yaw))
+        is_held_up = False
+        for axis, ((position, speed, *_), max_lag) in enumerate(zip(self._joint_states(), self._max_lags)):
+            lag = self._set_point[axis] - position
+            if abs(lag) > max_lag:
+                self._set_point[axis] = position + math.copysign(max_lag, lag)
+                velocity[axis], is_held_up = speed, True
+        if is_held_up:  # go on from the velocity that it has
+            self._velocity = PlanarVelocity(*velocity).turned(-yaw)
+        self._pb.setJointMotorControlArray(
+            self._body_id,
+            PLANAR_JOINTS,
+            pybullet.POSITION_CONTROL,
+            targetPositions=self._set_point,
+            targetVelocities=velocity,
+            positionGains=(POSITION_GAIN,) * 3,
+            velocityGains=(1.0,) * 3,
+            forces=self._forces,
+        )
+        self._set_point = [place + speed * self._dt_s for place, speed in zip(self._set_point, velocity)]
+
+    def pose_in_plane(self) -> Pose:
+        """Returns the pose of the root link's frame in the frame that the plane was put into the world with."""
+        x, y, yaw = (state[0] for state in self._joint_states())
+        return Pose((x, y, 0.0), (0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)))
+
+    def velocity_in_plane(self) -> PlanarVelocity:
+        """Returns the velocity of the root link's frame, expressed in the frame of the plane."""
+        return PlanarVelocity(*(state[1] for state in self._joint_states()))
+
+    def _joint_states(self) -> tuple[tuple[float, ...], ...]:
+        states: tuple[tuple[float, ...], ...] = self._pb.getJointStates(self._body_id, PLANAR_JOINTS)
+        return states
+
+    def _force_limits(self) -> tuple[float, float, float]:
+        """Returns the force along x and y [N] and the torque about z [N m] that the motors have.
+
+        Where the configuration says nothing they have what wheels with a friction coefficient of 1 would have: the
+        robot's weight, and its weight at its radius of gyration.
+        """
+        joints = range(self._pb.getNumJoints(self._body_id))
+        infos = [self._pb.getJointInfo(self._body_id, index) for index in joints]
+        moving = [info[0] for info in infos if info[3] >= 0]
+        positions = [state[0] for state in self._pb.getJointStates(self._body_id, moving)]
+        inertia = self._pb.calculateMassMatrix(self._body_id, positions)
+        mass_kg, yaw_inertia = inertia[0][0], inertia[2][2]
+        force = self._config.max_force or mass_kg * GRAVITY
+        torque = self._config.max_torque or GRAVITY * math.sqrt(mass_kg * yaw_inertia)
+        return force, force, torque

@@ -1,0 +1,38 @@
+"""Where the base of a robot is and how it moves."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from custom_ros_tools.errors import PhysicsError
+
+from ..samples import BaseStateSample
+from .sensor import Sensor
+
+if TYPE_CHECKING:
+    from ..bodies.jointed import JointedBody
+
+
+class BaseStateSensor(Sensor):
+    """Pose and twist of the URDF frame of a robot's root link.
+
+    Args:
+        robot: The robot.
+        hz: Rate [Hz].
+    """
+
+    sample_type = BaseStateSample
+
+    def __init__(self, robot: JointedBody, hz: float) -> None:
+        super().__init__(robot.name, hz)
+        self._robot = robot
+        self._frame = f"rpbi/{robot.name}/{robot.root_link}"
+
+    def read(self, tick: int) -> BaseStateSample:
+        """Reads the base; its velocity is that of the frame's origin, not of the centre of mass."""
+        pose = self._robot.base_pose()
+        twist = self._robot.base_twist()
+        if not math.isfinite(sum(pose.position) + sum(twist.linear) + sum(twist.angular)):
+            raise PhysicsError(f"{self.name}: base is not finite any more at tick {tick}: {pose.position}, {twist}")
+        return BaseStateSample(self.name, self._frame, pose, twist.seen_from(pose.quat_xyzw))
