@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -18,3 +21,22 @@ def module_ros(ros_master: str, tmp_path_factory: pytest.TempPathFactory) -> Ite
         yield system
     finally:
         system.close()
+
+
+@pytest.fixture(scope="session")
+def control_msgs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The package control_msgs for this process; the folder of its Python modules, for others."""
+    from control_msgs_workspace import build_control_msgs
+
+    path = str(build_control_msgs(tmp_path_factory.mktemp("control_msgs")))
+    sys.path.insert(0, path)
+    yield path
+    sys.path.remove(path)
+
+
+@pytest.fixture
+def start(ros: Any, control_msgs: str, tmp_path: Path) -> Callable[..., Any]:
+    """Starts a world with an arm that follows trajectories; see `open_world` for the arguments."""
+    from trajectory_world import open_world
+
+    return partial(open_world, ros, control_msgs, tmp_path)

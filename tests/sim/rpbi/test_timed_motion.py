@@ -79,7 +79,7 @@ def test_the_path_has_minimum_jerk_and_other_joints_stay(build):
         if tick % 250 == 0:
             s = tick / 2000
             expected = 10 * s**3 - 15 * s**4 + 6 * s**5
-            assert positions(world)[JOINTS[0]] == pytest.approx(expected, abs=2e-3)
+            assert positions(world)[JOINTS[0]] == pytest.approx(expected, abs=2e-4)
     assert all(abs(positions(world)[name]) < 2e-3 for name in JOINTS[1:])
 
 

@@ -11,6 +11,7 @@ from custom_ros_tools.errors import PhysicsError, UnknownNameError
 
 from .bodies import BODY_TYPES, Body
 from .client import Client
+from .dynamics import change_dynamics
 from .world_config import WorldConfig
 
 _SAME_EVERY_TIME = {
@@ -24,8 +25,9 @@ class LogEntry(NamedTuple):
 
     Attributes:
         name: The body it was done to, empty for the world itself.
-        what: `world` (set it up), `add` or `remove`.
-        arguments: The WorldConfig of `world`; type and configuration of a body for `add`; None for `remove`.
+        what: `world` (set it up), `add`, `dynamics` (change them) or `remove`.
+        arguments: The WorldConfig of `world`; type and configuration of a body for `add`; link (empty for the root) and
+            ChangeDynamics for `dynamics`; None for `remove`.
     """
 
     name: str
@@ -44,14 +46,17 @@ def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:
     Raises:
         ConfigError: If a configuration does not fit.
         PhysicsError: If PyBullet refuses.
-        UnknownNameError: If there is no body to remove.
+        UnknownNameError: If there is no body or link of that name.
+        ValueError: If a change of dynamics makes no sense.
     """
+    if entry.what in ("remove", "dynamics") and entry.name not in bodies:
+        raise UnknownNameError("object", entry.name, list(bodies))
     if entry.what == "world":
         _set_up(pb, entry.arguments)
     elif entry.what == "remove":
-        if entry.name not in bodies:
-            raise UnknownNameError("object", entry.name, list(bodies))
         bodies.pop(entry.name).remove()
+    elif entry.what == "dynamics":
+        change_dynamics(bodies[entry.name], *entry.arguments)
     else:
         kind, config = entry.arguments
         before = _body_ids(pb)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .pose import Pose
+from .pose import Pose, Vector
+from .twist import Twist
 
 
 class JointStateSample(NamedTuple):
@@ -39,6 +40,22 @@ class LinkPoseSample(NamedTuple):
     poses: tuple[Pose, ...]
 
 
+class BaseStateSample(NamedTuple):
+    """Where the base of a robot is and how it moves.
+
+    Attributes:
+        name: The robot.
+        frame: TF frame id of its root link.
+        pose: Pose of the root link's URDF frame in the world.
+        twist: Velocity of that frame's origin [m/s] and its rotation [rad/s], in the axes of that frame.
+    """
+
+    name: str
+    frame: str
+    pose: Pose
+    twist: Twist
+
+
 class BodyState(NamedTuple):
     """Where a body is, as a mirror of the world needs to know it.
 
@@ -69,3 +86,19 @@ class SceneSample(NamedTuple):
     stamp_ns: int
     camera: Pose | None
     bodies: tuple[BodyState, ...]
+
+
+class WrenchSample(NamedTuple):
+    """What a force-torque sensor feels.
+
+    Attributes:
+        name: `ROBOT/JOINT`.
+        frame_id: Frame of the joint's child link, in whose axes the vectors are.
+        force: Force [N].
+        torque: Moment about the origin of that frame, which is the joint's [N m].
+    """
+
+    name: str
+    frame_id: str
+    force: Vector
+    torque: Vector

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 import logging
 from collections.abc import Iterator
 from typing import Any
@@ -15,9 +16,12 @@ from .bodies import BODY_TYPES, Body
 from .client import Client
 from .clock import Clock, Schedule
 from .config import LoadedWorld, load_world
+from .dynamics import read_dynamics
 from .inputs import Input
+from .link_dynamics import LinkDynamics
 from .load_log import LogEntry, apply
 from .mailbox import Mailbox
+from .pybullet_models import ChangeDynamics
 from .sensors import RgbdSensor
 from .sensors.sensor import Sensor
 
@@ -27,8 +31,9 @@ log = logging.getLogger(__name__)
 class _Scheduled:
     """A sensor and when it is due."""
 
-    def __init__(self, sensor: Sensor, dt_ns: int, tick: int) -> None:
+    def __init__(self, sensor: Sensor, dt_ns: int, tick: int, order: int) -> None:
         self.sensor = sensor
+        self.order = order
         self.schedule = Schedule(sensor.hz, dt_ns)
         if self.schedule.clamped:
             log.warning("%s: %s Hz is more than a sample a tick; it gets one a tick", sensor.name, sensor.hz)
@@ -72,7 +77,9 @@ class World:
         self._scheduled: dict[str, list[_Scheduled]] = {}
         self._stepping: list[Body] = []
         self._watching: list[Sensor] = []
-        self._next_due = 0
+        self._queue: list[tuple[int, int, _Scheduled]] = []
+        """A heap of when each sensor is due, in which order it came, and the sensor."""
+        self._count = 0
         connect = self.config.connect.kwargs()
         configured_mode = connect.pop("connection_mode")
         mode = configured_mode if connection_mode is None else connection_mode
@@ -135,9 +142,39 @@ class World:
         if body in self._stepping:
             self._stepping.remove(body)
         gone = [each.sensor for each in self._scheduled.pop(name)]
+        self._requeue()
         self._watching = [sensor for sensor in self._watching if sensor not in gone]
         self._inputs = {slot: taken for slot, taken in self._inputs.items() if slot.split("/")[0] != name}
         self.take_inputs()  # what still waits for it must not meet a later body of the same name
+
+    def dynamics(self, object_name: str) -> LinkDynamics:
+        """Returns how an object or a link behaves in contact and motion.
+
+        Args:
+            object_name: `NAME`, or `NAME/LINK` for one of its links.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        name, _, link = object_name.partition("/")
+        if name not in self.bodies:
+            raise UnknownNameError("object", name, list(self.bodies))
+        return read_dynamics(self.bodies[name], link)
+
+    def change_dynamics(self, object_name: str, change: ChangeDynamics) -> None:
+        """Changes how an object or a link behaves; when it raises, nothing has changed.
+
+        Args:
+            object_name: `NAME`, or `NAME/LINK` for one of its links.
+            change: What to change.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+            ValueError: If it makes no sense for that link.
+            PhysicsError: If PyBullet refuses.
+        """
+        name, _, link = object_name.partition("/")
+        self._append(LogEntry(name, "dynamics", (link, change)))
 
     def put(self, slot: str, value: Any) -> None:
         """Hands a value to a body or sensor before the next tick; any thread may call it.
@@ -196,7 +233,7 @@ class World:
         self.clock.advance()
         for sensor in self._watching:
             sensor.after_step(self.clock.tick)
-        return self._read_due() if self.clock.tick >= self._next_due else []
+        return self._read_due()
 
     def read_rest(self) -> list[Any]:
         """Returns samples of the sensors that were not read at this tick yet."""
@@ -214,6 +251,11 @@ class World:
         """Breaks off what bodies were about to do over the coming ticks, such as timed motions."""
         for body in self.bodies.values():
             body.halt(reason)
+
+    def pause(self, reason: str) -> None:
+        """Breaks off what cannot wait until the world, which is stopped, runs again."""
+        for body in self.bodies.values():
+            body.pause(reason)
 
     def close(self) -> None:
         """Disconnects from PyBullet and fails the requests that wait."""
@@ -252,10 +294,17 @@ class World:
         self.log.append(entry)
 
     def _register(self, name: str, sensors: tuple[Sensor, ...], inputs: Any) -> None:
-        self._scheduled[name] = [_Scheduled(sensor, self.clock.dt_ns, self.clock.tick) for sensor in sensors]
+        self._scheduled[name] = [
+            _Scheduled(sensor, self.clock.dt_ns, self.clock.tick, order) for order, sensor in enumerate(sensors, self._count)
+        ]
+        self._count += len(sensors)
+        self._requeue()
         self._watching += [sensor for sensor in sensors if type(sensor).before_step is not Sensor.before_step]
         self._inputs = {**self._inputs, **{f"{name}/{key}": value for key, value in inputs.items()}}
-        self._next_due = 0
+
+    def _requeue(self) -> None:
+        self._queue = [(each.next_tick, each.order, each) for each in self._all()]
+        heapq.heapify(self._queue)
 
     def _all(self) -> Iterator[_Scheduled]:
         for scheduled in self._scheduled.values():
@@ -263,13 +312,14 @@ class World:
 
     def _read_due(self) -> list[Any]:
         tick = self.clock.tick
+        queue = self._queue
         samples: list[Any] = []
-        for each in self._all():
-            if each.next_tick <= tick:
-                each.next_tick = each.schedule.next_due(tick)
-                if each.sensor.wanted:
-                    samples.append(each.read(tick))
-        self._next_due = min((each.next_tick for each in self._all()), default=tick + 1)
+        while queue and queue[0][0] <= tick:
+            _, order, each = queue[0]
+            each.next_tick = each.schedule.next_due(tick)
+            heapq.heapreplace(queue, (each.next_tick, order, each))
+            if each.sensor.wanted:
+                samples.append(each.read(tick))
         return _present(samples)
 
 

@@ -59,6 +59,14 @@ class Body:
             reason: Why, for whoever waits for it.
         """
 
+    def pause(self, reason: str) -> None:
+        """Breaks off what cannot wait until a world that is stopped runs again; as a rule that is all.
+
+        Args:
+            reason: Why, for whoever waits for it.
+        """
+        self.halt(reason)
+
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
         """Tells whether a YAML of its section is one of this type, where several types share a section."""

@@ -50,4 +50,6 @@ class DynamicObject(ShapeObject):
 
     def sensors(self) -> tuple[Sensor, ...]:
         """Its pose, if it is to be broadcast."""
-        return (LinkPoseSensor(self, self._broadcast_hz, links=False),) if self._broadcast_hz else ()
+        if not self._broadcast_hz:
+            return ()
+        return (LinkPoseSensor(self, self._broadcast_hz, links=False, root_frame=f"rpbi/{self.name}"),)

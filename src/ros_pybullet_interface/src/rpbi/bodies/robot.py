@@ -52,7 +52,8 @@ class Robot(JointedBody):
             mode,
             self._gains(),
             config.enforce_effort_limits,
-            max(1, round(config.target_timeout_s / self.dt_s)),
+            config.target_timeout_s,
+            self.dt_s,
         )
         self.force_torque_sensors = tuple(
             ForceTorqueSensor(self, self.model[each.joint], each, config.joint_state_publisher_hz)
@@ -113,6 +114,11 @@ class Robot(JointedBody):
             for index in self.motion.joints:
                 self.motors.track(index, measured[index][0], 0.0)
             self._end_motion(self.motion)
+
+    def pause(self, reason: str) -> None:
+        """Ends the motion that runs, unless it can wait until the world runs again."""
+        if self.motion is not None and not self.motion.can_wait:
+            self.halt(reason)
 
     def switch_mode(self, mode: int) -> None:
         """Changes PyBullet's control mode; a motion that runs is ended."""

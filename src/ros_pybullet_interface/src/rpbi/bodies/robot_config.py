@@ -49,7 +49,7 @@ class RobotConfig(ConfigModel):
         0.0, description="Rate of the root link's pose on TF if those of all links are not; 0 is off."
     )
     base_state_hz: HzOrOff | None = Field(
-        None, description="Rate of the state of the base; 0 is off. Without it, 50 where physics moves the base, else 0."
+        None, description="Rate of the state of the base; 0 is off. By default 50 where physics moves it, else off."
     )
     planar_base: PlanarBaseConfig | None = Field(
         None, description="Makes the base drive over the ground by `cmd_vel`, with these limits."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from concurrent.futures import Future
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 JointMotion = Mapping[int, tuple[float, float]]
 """Position [rad or m] and velocity [rad/s or m/s] by joint index."""
@@ -32,6 +32,9 @@ class Motion(ABC):
     Attributes:
         result: What others wait for. It is set when the motion ends, whatever the reason.
     """
+
+    can_wait: ClassVar[bool] = False
+    """Whether it goes on where it was when a world that was stopped runs again; others are broken off."""
 
     def __init__(self, joints: frozenset[int]) -> None:
         self.joints = joints
@@ -60,7 +63,8 @@ class Motion(ABC):
             measured: State of all driven joints at its beginning.
 
         Returns:
-            Set points of `joints`, or of fewer: the others keep theirs.
+            Set points of `joints`, or of fewer: the others keep theirs. They are the positions at the beginning of the
+            tick, and the velocities that lead to where the joints are to be at its end (see `Motors.track`).
         """
 
     def halt(self, reason: str, measured: JointMotion) -> None:

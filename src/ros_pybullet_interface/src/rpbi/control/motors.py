@@ -51,7 +51,8 @@ class Motors:
         mode: Control mode at the start.
         gains: PyBullet's `positionGain` and `velocityGain` by joint index, where they are not PyBullet's own.
         enforce_effort_limits: Whether motors are held to the efforts of the URDF.
-        timeout_ticks: Ticks after which velocity and effort targets expire.
+        timeout_s: Age at which velocity and effort targets expire [s] of the world's time.
+        dt_s: Length of a tick [s].
     """
 
     def __init__(
@@ -62,7 +63,8 @@ class Motors:
         mode: int,
         gains: Mapping[int, Mapping[str, float]],
         enforce_effort_limits: bool,
-        timeout_ticks: int,
+        timeout_s: float,
+        dt_s: float,
     ) -> None:
         self._pb, self._body_id, self._model = pb, body_id, model
         self._enforce_effort_limits = enforce_effort_limits
@@ -71,7 +73,8 @@ class Motors:
             index: {key: value for key, value in arguments.items() if key in ("velocityGain", "force")}
             for index, arguments in self._position_arguments.items()
         }
-        self._timeout_ticks = timeout_ticks
+        self._dt_s = dt_s
+        self._timeout_ticks = max(1, round(timeout_s / dt_s))
         self._indices = [joint.index for joint in model.driven]
         self._targets: dict[int, float] = {}
         self._expiry: dict[int, int] = {}
@@ -119,7 +122,11 @@ class Motors:
                 self._drive(index, value)
 
     def track(self, index: int, position: float, velocity: float) -> None:
-        """Sets a joint's position [rad or m] and velocity [rad/s or m/s] for the coming tick, in any control mode."""
+        """Sets a joint's position [rad or m] and velocity [rad/s or m/s] at the coming tick, in any control mode.
+
+        To the velocity PyBullet adds its gain times how far the joint is from the position before the tick. So this is the
+        position before it, and the velocity the one that leads to where the joint is to be after it.
+        """
         self._pb.setJointMotorControl2(
             self._body_id,
             index,
@@ -129,7 +136,7 @@ class Motors:
             **self._position_arguments[index],
         )
         if self.mode == pybullet.POSITION_CONTROL:
-            self._targets[index] = position
+            self._targets[index] = position + velocity * self._dt_s
 
     def release(self, indices: Iterable[int]) -> None:
         """Gives joints that were tracked back: they hold their last position, or stand still under velocity control."""

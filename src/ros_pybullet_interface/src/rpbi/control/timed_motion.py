@@ -56,6 +56,7 @@ class TimedMotion(Motion):
         )
         self._duration_s = max(self._asked_s, shortest)
         self._trajectory = minimum_jerk(start, list(self._goal.values()), time_s, self._duration_s)
+        self._time_s, self._set_point = time_s, tuple(start)
 
     def advance(self, time_s: float, measured: JointMotion) -> JointMotion:
         """Follows the plan, then waits at the goal until the joints have come, or have had their time."""
@@ -66,8 +67,12 @@ class TimedMotion(Motion):
             elif time_s > self._trajectory.end_s + SETTLING_S:
                 why = "missed the goal" if missed else "still swings about the goal"
                 self.end(False, f"{why}: {self._residuals(measured, missed or None)}; {self._reached(measured)}")
-        state = self._trajectory.sample(time_s)
-        return dict(zip(self._goal, zip(state.position, state.velocity)))
+        before, duration_s = self._set_point, time_s - self._time_s
+        self._set_point, self._time_s = self._trajectory.sample(time_s).position, time_s
+        return {
+            index: (start, (end - start) / duration_s)
+            for index, start, end in zip(self._goal, before, self._set_point)
+        }
 
     def halt(self, reason: str, measured: JointMotion) -> None:
         """Ends before the goal; the message tells the state reached."""

@@ -1,4 +1,7 @@
-"""Trajectories of joints: piecewise polynomials through knots, in plain Python, since they are sampled at every tick."""
+"""Trajectories of joints: piecewise polynomials through knots.
+
+In plain Python: for the few joints of a robot at one time that is faster than NumPy, and it happens at every tick.
+"""
 
 from __future__ import annotations
 
@@ -155,9 +158,7 @@ class Trajectory:
         return list(zip(self.segments, (*self._starts[1:], self.end_s)))
 
 
-def minimum_jerk(
-    start: Sequence[float], goal: Sequence[float], start_s: float, duration_s: float
-) -> Trajectory:
+def minimum_jerk(start: Sequence[float], goal: Sequence[float], start_s: float, duration_s: float) -> Trajectory:
     """Returns the motion from rest to rest with the least jerk.
 
     It is the quintic whose velocity and acceleration vanish at both ends (Flash and Hogan 1985). Its highest speed is
@@ -198,15 +199,11 @@ def _segment(before: Knot, after: Knot) -> Segment:
     if before.velocity is None or after.velocity is None:
         polynomials = tuple(line(duration_s, *p) for p in positions)
     elif before.acceleration is None or after.acceleration is None:
-        polynomials = tuple(
-            cubic(duration_s, *p, *v) for p, v in zip(positions, zip(before.velocity, after.velocity))
-        )
+        polynomials = tuple(cubic(duration_s, *p, *v) for p, v in zip(positions, zip(before.velocity, after.velocity)))
     else:
         velocities = zip(before.velocity, after.velocity)
         accelerations = zip(before.acceleration, after.acceleration)
-        polynomials = tuple(
-            quintic(duration_s, *p, *v, *a) for p, v, a in zip(positions, velocities, accelerations)
-        )
+        polynomials = tuple(quintic(duration_s, *p, *v, *a) for p, v, a in zip(positions, velocities, accelerations))
     return Segment(before.time_s, before.time_s, polynomials)
 
 
@@ -218,9 +215,7 @@ def _check(knots: Sequence[Knot]) -> None:
     previous_s = -math.inf
     for number, knot in enumerate(knots):
         if not previous_s < knot.time_s < math.inf:
-            raise ValueError(
-                f"knot {number}: expected a time after {previous_s:g} s, got {knot.time_s:g} s"
-            )
+            raise ValueError(f"knot {number}: expected a time after {previous_s:g} s, got {knot.time_s:g} s")
         previous_s = knot.time_s
         if knot.acceleration is not None and knot.velocity is None:
             raise ValueError(f"knot {number}: has accelerations but no velocities")

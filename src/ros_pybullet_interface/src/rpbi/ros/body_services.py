@@ -27,6 +27,8 @@ from .robot_info import robot_info
 from .robot_motion import move_to_eff_state, move_to_initial_joint_state, move_to_joint_state
 from .robot_switches import set_control_mode, set_joint_state
 from .set_pose import set_pose
+from .trajectory_commands import query_state, query_suffixes
+from .trajectory_messages import QueryTrajectoryState
 
 
 class BodyService(NamedTuple):
@@ -59,6 +61,7 @@ BODY_SERVICES: tuple[BodyService, ...] = (
     BodyService(ResetJointState, move_to_joint_state, of(Robot, "move_to_joint_state")),
     BodyService(ResetJointState, move_to_initial_joint_state, of(Robot, "move_to_initial_joint_state")),
     BodyService(ResetEffState, move_to_eff_state, of(Robot, "move_to_eff_state")),
+    BodyService(QueryTrajectoryState, query_state, query_suffixes),
 )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import rospy
+from trajectory_msgs.msg import JointTrajectory
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.throttle import ThrottledWarning
@@ -14,6 +15,7 @@ from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
 from ..bodies import Body
 from .body_context import BodyContext
 from .robot_ik import ik_topic_suffixes, move_by_ik
+from .trajectory_commands import follow_command, of_followers
 
 
 class BodyTopic(NamedTuple):

@@ -38,9 +38,9 @@ def _print(path: str, world: World) -> None:
     print(f"{path}: fine; {1.0 / world.clock.dt_s:g} ticks a second")
     for name, body in world.bodies.items():
         joints = f", {len(body.link_indices)} joints" if body.link_indices else ""
-        print(f"  {kinds[type(body)]:<10} {name}{joints}")
+        print(f"  {kinds[type(body)]:<12} {name}{joints}")
     for name in world.cameras:
-        print(f"  {'camera':<10} {name}")
+        print(f"  {'camera':<12} {name}")
     rows = endpoints(world)
     kind_width, name_width, type_width = (max(map(len, column)) for column in list(zip(*rows))[:3])
     for kind, name, type_name, note in rows:

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import geometry_msgs.msg
 import rospy
 from sensor_msgs.msg import JointState
 
@@ -17,6 +18,7 @@ from custom_ros_tools.ros.throttle import ThrottledWarning
 from ..inputs import Input, PoseInput
 from ..joint_model import JointTarget, WrongQuantityError
 from ..pose import Pose
+from ..twist import Twist
 from ..world import World
 from .frames import world_frame
 from .tf_listener import TfListener
@@ -48,8 +50,14 @@ def _joint_target(message: JointState) -> JointTarget:
     return JointTarget(message.name, message.position, message.velocity, message.effort)
 
 
+def _twist(message: geometry_msgs.msg.Twist) -> Twist:
+    linear, angular = message.linear, message.angular
+    return Twist((linear.x, linear.y, linear.z), (angular.x, angular.y, angular.z))
+
+
 TOPIC_INPUTS: dict[str, TopicInput] = {
     "target": TopicInput("rpbi/{name}/joint_states/target", JointState, _joint_target),
+    "cmd_vel": TopicInput("rpbi/{name}/cmd_vel", geometry_msgs.msg.Twist, _twist),
 }
 """The topic of each kind of input that comes by topic."""
 

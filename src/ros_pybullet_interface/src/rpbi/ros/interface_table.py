@@ -10,9 +10,12 @@ from ..world import World
 from .body_services import BODY_SERVICES
 from .body_topics import BODY_TOPICS
 from .camera_topics import CAMERA_TOPICS, camera_prefix
+from .dynamics_services import DYNAMICS_SERVICES
 from .inputs import TOPIC_INPUTS
 from .outlets import TOPICS
 from .services import NODE_SERVICES
+from .trajectory_commands import action_suffixes
+from .trajectory_messages import FollowJointTrajectoryAction
 
 
 class Endpoint(NamedTuple):
@@ -59,12 +62,14 @@ def endpoints(world: World) -> list[Endpoint]:
             topic_input = TOPIC_INPUTS[key]
             type_name = topic_input.message_type._type
             listed.append(Endpoint("subscribes", topic_input.topic.format(name=name), type_name))
-    for name, service_type in NODE_SERVICES.items():
+    for name, service_type in {**NODE_SERVICES, **DYNAMICS_SERVICES}.items():
         listed.append(Endpoint("serves", name, service_type._type))
     for name, body in world.bodies.items():
         for topic in BODY_TOPICS:
             for suffix in topic.suffixes(body):
                 listed.append(Endpoint("subscribes", f"rpbi/{name}/{suffix}", topic.message_type._type))
+        for suffix in action_suffixes(body):
+            listed.append(Endpoint("serves", f"rpbi/{name}/{suffix}", FollowJointTrajectoryAction._type, "action"))
         for service in BODY_SERVICES:
             for suffix in service.suffixes(body):
                 listed.append(Endpoint("serves", f"rpbi/{name}/{suffix}", service.service_type._type))

@@ -11,6 +11,8 @@ import pybullet
 import rospy
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, Problem, UnknownNameError
+from custom_ros_tools.ros.interrupts import leaving_ros_on_interrupt, wait_for_master
+from custom_ros_tools.ros.last_words import log_last_words
 from custom_ros_tools.ros.logging_bridge import attach_logging
 
 from ..asset_files import ROBOT_DESCRIPTION
@@ -21,11 +23,10 @@ from ..urdf import write_description
 from ..world import World
 from .body_endpoints import BodyEndpoints
 from .camera_outlet import CameraOutlet
+from .dynamics_services import DynamicsServices
 from .frames import use_prefix
 from .initial_state import start_where_robots_are, with_initial_state
 from .inputs import Inputs
-from .interrupts import leaving_ros_on_interrupt, wait_for_master
-from .last_words import log_last_words
 from .outlets import TOPICS, Outlet, SampleOutlet, TransformOutlet
 from .requests import Requests
 from .services import NodeServices
@@ -85,6 +86,7 @@ class SimulatorNode:
             self._open(name)
         context = {"search_paths": config.search_paths(), ROBOT_DESCRIPTION: description}
         NodeServices(self._simulation, self._ask, self._add, self._remove, context)
+        DynamicsServices(self._world, self._ask)
         if config.start_pybullet_after_initialization:
             self._simulation.start()
 

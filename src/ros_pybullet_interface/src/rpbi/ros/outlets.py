@@ -6,12 +6,14 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
 from geometry_msgs.msg import TransformStamped, Vector3, Wrench, WrenchStamped
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from tf2_msgs.msg import TFMessage
 
 from ..control.controller_state import ControllerState
-from ..samples import JointStateSample, LinkPoseSample, WrenchSample
+from ..samples import BaseStateSample, JointStateSample, LinkPoseSample, WrenchSample
 from .frames import prefixed, world_frame
+from .odometry import odometry_message
 from .stamps import to_ros_time
 from .topics import FastTopic
 from .trajectory_messages import CONTROLLER, JointTrajectoryControllerState, state_message
@@ -155,6 +157,7 @@ def _transform(frame: str) -> TransformStamped:
 TOPICS: dict[type, SampleTopic] = {
     WrenchSample: SampleTopic("rpbi/{name}/ft_sensor", WrenchStamped, wrench_message),
     JointStateSample: SampleTopic("rpbi/{name}/joint_states", JointState, joint_state_message),
+    BaseStateSample: SampleTopic("rpbi/{name}/base_state", Odometry, odometry_message),
     ControllerState: SampleTopic(f"rpbi/{{name}}/{CONTROLLER}/state", JointTrajectoryControllerState, state_message),
 }
 """The topic of each type of samples that has topics of its own."""

@@ -41,7 +41,7 @@ def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> Re
     solution = solve_for_robot(context, request.problem)
     if not solution.success:
         return ResetEffStateResponse(success=False, message=f"nothing moved: {solution.message}")
-    goal = context.body.model.resolve(solution.joint_names, solution.positions)
+    goal = context.body.model.resolve(solution.chain, solution.chain_positions)
     result = _move(context, goal, request.duration)
     return ResetEffStateResponse(success=result.success, message=result.message)
 

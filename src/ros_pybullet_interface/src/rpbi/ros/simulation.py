@@ -139,7 +139,7 @@ class Simulation:
 
     def _halt(self) -> None:
         self.running = False
-        self.world.halt("the simulation was stopped")
+        self.world.pause("the simulation was stopped")
         self._idle_tick = self.world.clock.tick
         if self._clock is not None:
             self._clock.publish_now()

@@ -45,8 +45,9 @@ class StampedActionServer(ActionServer):
         super().initialize()
         for key in ("status_pub", "result_pub", "feedback_pub"):
             publisher: rospy.Publisher = getattr(self, key)
+            # Both are the same topic to rospy, so it must not end with the first one: who just comes would be lost.
+            setattr(self, key, _StampedTopic(publisher.resolved_name, publisher.data_class, self._clock))
             publisher.unregister()
-            setattr(self, key, _StampedTopic(publisher.name, publisher.data_class, self._clock))
 
     def publish_status(self) -> None:
         """Tells the status of all goals, and sends what slow clients have not taken yet."""

@@ -5,9 +5,12 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
+from concurrent.futures import wait
+from functools import cache
 from queue import SimpleQueue
 from typing import Any
 
+import rospy
 from actionlib.server_goal_handle import ServerGoalHandle
 from actionlib_msgs.msg import GoalStatus
 
@@ -29,6 +32,8 @@ from .trajectory_messages import (
 
 log = logging.getLogger(__name__)
 
+MOST_TASKS = 100
+"""Tasks that may wait before feedback is left out, as it would pile up in a world that runs much too fast."""
 LONGEST_END_S = 5.0
 """How long closing waits for the last answers [s]."""
 
@@ -47,6 +52,15 @@ def open_trajectory_action(context: BodyContext) -> Callable[[], None] | None:
         )
         return None
     return TrajectoryAction(context).close
+
+
+_open_actions: set[TrajectoryAction] = set()
+
+
+@cache
+def _answer_before_shutdown() -> None:
+    """Has ROS wait for the answers to all goals, which end with the world, before it shuts down."""
+    rospy.on_shutdown(lambda: [action.answer_all() for action in list(_open_actions)])
 
 
 class TrajectoryAction:
@@ -74,12 +88,20 @@ class TrajectoryAction:
         )
         self._thread.start()
         self._server.start()
+        _open_actions.add(self)
+        _answer_before_shutdown()
 
     def close(self) -> None:
-        """Ends the action when all goals have their answers; the robot has gone before."""
+        """Ends the action; the robot has gone before."""
+        _open_actions.discard(self)
+        self.answer_all()
+        self._server.stop()
+
+    def answer_all(self) -> None:
+        """Waits until all goals have their answers; for when their motions have ended, or are about to."""
+        wait([motion.result for motion in list(self._motions.values())], LONGEST_END_S)
         self._tasks.put(None)
         self._thread.join(LONGEST_END_S)
-        self._server.stop()
 
     def _work(self) -> None:
         while (task := self._tasks.get()) is not None:
@@ -95,20 +117,29 @@ class TrajectoryAction:
 
         def feed(state: ControllerState) -> None:
             stamp_ns = self._context.world.clock.stamp_ns
-            self._tasks.put(lambda: goal.publish_feedback(self._feedback(state, stamp_ns)))
+            if self._tasks.qsize() < MOST_TASKS:
+                self._tasks.put(lambda: goal.publish_feedback(self._feedback(state, stamp_ns)))
 
         clock, message = self._context.world.clock, goal.get_goal()
         try:
             request = self._follower.check(trajectory_request(message.trajectory), goal_tolerances(message))
             motion = self._context.ask_body(lambda: self._follower.follow(request, clock, feed))
         except InterfaceError as error:
-            code = error.code if isinstance(error, TrajectoryRefusedError) else ErrorCode.INVALID_GOAL
-            log.warning("%s: goal refused: %s", self._context.body.name, error)
-            goal.set_rejected(self._result(code, str(error)), str(error))
+            self._reject(
+                goal, error.code if isinstance(error, TrajectoryRefusedError) else ErrorCode.INVALID_GOAL, error
+            )
+            return
+        except Exception as error:  # nothing that a goal brings along may leave the client without an answer
+            log.exception("a goal failed in a way that is not foreseen")
+            self._reject(goal, ErrorCode.INVALID_GOAL, error)
             return
         goal.set_accepted()
         self._motions[goal] = motion
         motion.result.add_done_callback(lambda _: self._tasks.put(lambda: self._finish(goal)))
+
+    def _reject(self, goal: ServerGoalHandle, code: ErrorCode, error: Exception) -> None:
+        log.warning("%s: goal refused: %s", self._context.body.name, error)
+        goal.set_rejected(self._result(code, str(error)), str(error))
 
     def _cancel(self, goal: ServerGoalHandle) -> None:
         motion = self._motions.get(goal)

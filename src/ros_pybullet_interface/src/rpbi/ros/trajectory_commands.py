@@ -11,12 +11,17 @@ from ..bodies import Body, Robot
 from ..clock import NS_PER_S
 from ..control.trajectory import State
 from .body_context import BodyContext
-from .trajectory_messages import CONTROLLER, QueryTrajectoryState, trajectory_request
+from .trajectory_messages import CONTROLLER, FollowJointTrajectoryAction, QueryTrajectoryState, trajectory_request
 
 
 def of_followers(suffix: str) -> Callable[[Body], Sequence[str]]:
     """Returns the suffixes of something that every robot with a follower of trajectories has once."""
     return lambda body: (f"{CONTROLLER}/{suffix}",) if isinstance(body, Robot) and body.follower is not None else ()
+
+
+def action_suffixes(body: Body) -> Sequence[str]:
+    """Returns the suffix of the action; there is none without control_msgs."""
+    return of_followers("follow_joint_trajectory")(body) if FollowJointTrajectoryAction is not None else ()
 
 
 def query_suffixes(body: Body) -> Sequence[str]:

@@ -55,9 +55,8 @@ def fill_state(message: Any, state: ControllerState, stamp_ns: int) -> Any:
     message.joint_names = state.joint_names
     message.desired = JointTrajectoryPoint(desired.position, desired.velocity, desired.acceleration, (), since_start)
     message.actual = JointTrajectoryPoint(state.position, state.velocity, (), (), since_start)
-    message.error = JointTrajectoryPoint(
-        _difference(desired.position, state.position), _difference(desired.velocity, state.velocity), (), (), since_start
-    )
+    off = _difference(desired.position, state.position), _difference(desired.velocity, state.velocity)
+    message.error = JointTrajectoryPoint(*off, (), (), since_start)
     return message
 
 

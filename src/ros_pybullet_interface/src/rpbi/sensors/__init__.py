@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
+from .base_state import BaseStateSensor
+from .force_torque import ForceTorqueSensor
 from .joint_state import JointStateSensor
 from .link_pose import LinkPoseSensor
 from .rgbd import RgbdSensor
 from .sensor import Sensor
+from .trajectory_state import TrajectoryStateSensor
 
 SENSOR_TYPES: dict[str, type[Sensor]] = {
     "joint_state": JointStateSensor,
     "link_pose": LinkPoseSensor,
+    "base_state": BaseStateSensor,
+    "force_torque": ForceTorqueSensor,
+    "trajectory_state": TrajectoryStateSensor,
     "rgbd": RgbdSensor,
 }
 
-__all__ = ["SENSOR_TYPES", "JointStateSensor", "LinkPoseSensor", "RgbdSensor", "Sensor"]
+__all__ = [
+    "SENSOR_TYPES",
+    "BaseStateSensor",
+    "ForceTorqueSensor",
+    "JointStateSensor",
+    "LinkPoseSensor",
+    "RgbdSensor",
+    "Sensor",
+    "TrajectoryStateSensor",
+]

@@ -34,10 +34,10 @@ class Sensor(ABC):
             PhysicsError: If the world holds something that is not finite.
         """
 
-    def before_step(self, tick: int) -> None:
+    def before_step(self, tick: int) -> None:  # noqa: B027 (most sensors need nothing)
         """Acts just before the physics of each tick, due or not; sensors that need nothing leave it."""
 
-    def after_step(self, tick: int) -> None:
+    def after_step(self, tick: int) -> None:  # noqa: B027
         """Acts just after the physics of each tick, before sensors are read; called where `before_step` is."""
 
     def inputs(self) -> Mapping[str, Input]:

@@ -1,0 +1,94 @@
+"""What is asked of a follower of trajectories, and why it may be refused."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import IntEnum
+from typing import NamedTuple
+
+from custom_ros_tools.errors import InterfaceError
+
+
+class ErrorCode(IntEnum):
+    """How following a trajectory ended; numbers of control_msgs/FollowJointTrajectoryResult."""
+
+    SUCCESSFUL = 0
+    INVALID_GOAL = -1
+    INVALID_JOINTS = -2
+    OLD_HEADER_TIMESTAMP = -3
+    PATH_TOLERANCE_VIOLATED = -4
+    GOAL_TOLERANCE_VIOLATED = -5
+
+
+class TrajectoryRefusedError(InterfaceError):
+    """A trajectory cannot be followed; nothing has moved.
+
+    Args:
+        code: The kind of fault.
+        message: What is wrong, with the joint's name.
+    """
+
+    def __init__(self, code: ErrorCode, message: str) -> None:
+        self.code = code
+        self.message = message
+        super().__init__(code, message)
+
+    def __str__(self) -> str:
+        return self.message
+
+
+class Waypoint(NamedTuple):
+    """Where n joints are to be at one time.
+
+    Attributes:
+        time_s: Time from the start of the trajectory [s].
+        positions: n positions [rad or m].
+        velocities: n velocities [rad/s or m/s], or none.
+        accelerations: n accelerations [rad/s^2 or m/s^2], or none.
+    """
+
+    time_s: float
+    positions: tuple[float, ...]
+    velocities: tuple[float, ...] = ()
+    accelerations: tuple[float, ...] = ()
+
+
+class JointTolerance(NamedTuple):
+    """How far one joint may be off; 0 leaves it to the configuration, less than 0 is no limit.
+
+    Attributes:
+        position: Distance [rad or m].
+        velocity: Difference of velocities [rad/s or m/s].
+    """
+
+    position: float = 0.0
+    velocity: float = 0.0
+
+
+class TrajectoryRequest(NamedTuple):
+    """A trajectory that somebody wants followed.
+
+    Attributes:
+        joint_names: n names, in any order.
+        points: Its points, with increasing times; without any, the joints stop and hold.
+        stamp_ns: Stamp of its start in the world's stamps [ns]; 0 is now.
+    """
+
+    joint_names: tuple[str, ...]
+    points: tuple[Waypoint, ...]
+    stamp_ns: int = 0
+
+
+class GoalTolerances(NamedTuple):
+    """How well a goal is to be reached.
+
+    Attributes:
+        path: Tolerances on the way, by name of joint.
+        goal: Tolerances at the end, by name of joint.
+        goal_time_s: How long after the end the goal may be reached [s]; 0 leaves it to the configuration, less than 0
+            is no limit.
+    """
+
+    path: Mapping[str, JointTolerance] = {}
+    goal: Mapping[str, JointTolerance] = {}
+    goal_time_s: float = 0.0

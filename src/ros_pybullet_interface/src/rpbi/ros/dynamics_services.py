@@ -1,0 +1,87 @@
+"""The services that tell and change how objects and links behave in contact and motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+
+from custom_ros_tools.config import load_configs
+from custom_ros_tools.errors import InterfaceError
+from ros_pybullet_interface.msg import ObjectDynamics
+from ros_pybullet_interface.srv import ChangeDynamics as ChangeDynamicsService
+from ros_pybullet_interface.srv import (
+    ChangeDynamicsRequest,
+    ChangeDynamicsResponse,
+    ChangeObjectDynamics,
+    ChangeObjectDynamicsRequest,
+    ChangeObjectDynamicsResponse,
+    GetObjectDynamics,
+    GetObjectDynamicsRequest,
+    GetObjectDynamicsResponse,
+)
+
+from ..link_dynamics import LinkDynamics, difference
+from ..pybullet_models import ChangeDynamics
+from ..world import World
+from .requests import Requests
+
+DYNAMICS_SERVICES: dict[str, type] = {
+    "rpbi/get_pybullet_object_dynamics": GetObjectDynamics,
+    "rpbi/change_pybullet_object_dynamics": ChangeObjectDynamics,
+    "rpbi/change_dynamics": ChangeDynamicsService,
+}
+"""What is served, in the order of the handlers."""
+
+
+class DynamicsServices:
+    """Reads dynamics and changes them.
+
+    Args:
+        world: The world.
+        ask: Reaches the simulation thread.
+    """
+
+    def __init__(self, world: World, ask: Requests) -> None:
+        self._world, self._ask = world, ask
+        handlers = (self._get, self._change_object, self._change)
+        for (name, service_type), handler in zip(DYNAMICS_SERVICES.items(), handlers, strict=True):
+            rospy.Service(name, service_type, _refusing(handler, service_type._response_class))
+
+    def _get(self, request: GetObjectDynamicsRequest) -> GetObjectDynamicsResponse:
+        present = self._ask(lambda: self._world.dynamics(request.object_name))
+        return GetObjectDynamicsResponse(True, "", ObjectDynamics(**present._asdict()))
+
+    def _change_object(self, request: ChangeObjectDynamicsRequest) -> ChangeObjectDynamicsResponse:
+        asked = request.object_dynamics
+        wanted = LinkDynamics(*(getattr(asked, field) for field in LinkDynamics._fields))
+
+        def change() -> str:
+            changed = difference(self._world.dynamics(request.object_name), wanted)
+            if not changed:
+                return "nothing differs"
+            self._world.change_dynamics(request.object_name, ChangeDynamics(**changed))
+            return f"changed {', '.join(changed)}"
+
+        return ChangeObjectDynamicsResponse(True, self._ask(change))
+
+    def _change(self, request: ChangeDynamicsRequest) -> ChangeDynamicsResponse:
+        change = ChangeDynamics.parse(load_configs(request.config, "config"), "config")
+        keys = ", ".join(change.kwargs())
+        if not keys:
+            raise InterfaceError("config: expected keys of changeDynamics, such as lateralFriction; got none")
+        self._ask(lambda: self._world.change_dynamics(request.object_name, change))
+        return ChangeDynamicsResponse(True, f"changed {keys}")
+
+
+def _refusing(handler: Callable[[Any], Any], response_type: type) -> Callable[[Any], Any]:
+    """Turns what a handler raises for a request that must be refused into `success=False` and its message."""
+
+    def handle(request: Any) -> Any:
+        try:
+            return handler(request)
+        except (InterfaceError, ValueError) as error:
+            return response_type(success=False, message=str(error))
+
+    return handle

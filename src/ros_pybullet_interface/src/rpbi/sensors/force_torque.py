@@ -1,0 +1,140 @@
+"""Force-torque sensors in the joints of a robot."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from custom_ros_tools.errors import PhysicsError
+
+from ..joint_model import Joint
+from ..pose import Vector
+from ..samples import WrenchSample
+from ..subtree import LinkStates, Subtree
+from ..vectors import cross, minus, plus, rotated_back, scaled
+from .force_torque_config import ForceTorqueConfig
+from .low_pass import LowPass
+from .seeded_noise import SeededNoise
+from .sensor import Sensor
+from .zeroing import Zeroing
+
+if TYPE_CHECKING:
+    from ..bodies.jointed import JointedBody
+
+
+class ForceTorqueSensor(Sensor):
+    """Force and moment that a joint transmits, about its origin, in the axes of its child link's URDF frame.
+
+    PyBullet's own reading is of no use here: it lacks the motors' efforts (bullet3 issues 2966, 3204, 4451, 4604), and
+    with them added it is still wrong, see docs/force_torque.md. So the wrench is what changed the momentum of all links
+    below the joint during the last tick, less their weight and less the contact forces on them (Newton-Euler, as an
+    impulse balance). That holds for all types of joints, control modes and limits.
+
+    Args:
+        robot: The robot.
+        joint: The joint.
+        config: Its part of the robot's YAML.
+        default_hz: Rate [Hz] if the configuration has none.
+    """
+
+    Config = ForceTorqueConfig
+    sample_type = WrenchSample
+
+    def __init__(self, robot: JointedBody, joint: Joint, config: ForceTorqueConfig, default_hz: float) -> None:
+        super().__init__(f"{robot.name}/{joint.name}", config.hz or default_hz)
+        self.joint = joint
+        self.frame_id = config.frame_id or f"rpbi/{robot.name}/{joint.link}"
+        self._robot = robot
+        self._subtree = Subtree(robot.pb, robot.body_id, joint.index)
+        self._dynamics_changes = robot.dynamics_changes
+        engine = robot.pb.getPhysicsEngineParameters()
+        self._gravity = tuple(engine[f"gravityAcceleration{axis}"] for axis in "XYZ")
+        self._dt_s: float = engine["fixedTimeStep"]
+        self._contact_factor = max(1, engine["numSubSteps"])
+        """PyBullet divides the impulse of the last sub-step by the whole time step."""
+        self._sign = 1.0 if config.acting == "parent_on_child" else -1.0
+        self._noise = SeededNoise(
+            zlib.crc32(self.name.encode()) if config.seed is None else config.seed,
+            config.noise_force_n + config.noise_torque_nm,
+            config.bias_force_n + config.bias_torque_nm,
+        )
+        self._low_pass = LowPass(config.low_pass_hz, self._dt_s) if config.low_pass_hz else None
+        self._offset: npt.NDArray[np.float64] = np.zeros(6)
+        self._zeroing: Zeroing | None = None
+        self._before: LinkStates | None = None
+        self._sample: WrenchSample | None = None
+
+    def before_step(self, tick: int) -> None:
+        """Notes how the links move."""
+        if self._dynamics_changes != self._robot.dynamics_changes:
+            self._dynamics_changes = self._robot.dynamics_changes
+            self._subtree.take_dynamics()
+        self._before = self._subtree.states()
+        self._sample = None
+
+    def after_step(self, tick: int) -> None:
+        """Feeds the low-pass, which runs at every tick whatever the sensor's rate."""
+        if self._low_pass is not None and self._before is not None:
+            self._low_pass.step(self._wrench(self._before, tick))
+
+    def read(self, tick: int) -> WrenchSample | None:
+        """Returns the wrench of the last tick, None before the first one."""
+        if self._sample is None and self._before is not None:
+            self._sample = self._measure(self._before, tick)
+        return self._sample
+
+    def zero(self, count: int) -> Zeroing:
+        """Takes what the coming samples show on average for zero, as soon as that is known.
+
+        Args:
+            count: Over how many samples; without effect if it is being zeroed already.
+        """
+        if self._zeroing is None:
+            self._zeroing = Zeroing(count)
+        return self._zeroing
+
+    def cancel_zeroing(self) -> None:
+        """Gives a zeroing up that runs; the old zero stays."""
+        self._zeroing = None
+
+    def _measure(self, before: LinkStates, tick: int) -> WrenchSample:
+        filtered = None if self._low_pass is None else self._low_pass.output
+        shown = (self._wrench(before, tick) if filtered is None else filtered) + self._noise.at(tick)
+        if self._zeroing is not None:
+            self._zeroing.take(shown)
+            if self._zeroing.mean.done():
+                self._offset = self._zeroing.mean.result()
+                self._zeroing = None
+        x, y, z, about_x, about_y, about_z = (shown - self._offset).tolist()
+        return WrenchSample(self.name, self.frame_id, (x, y, z), (about_x, about_y, about_z))
+
+    def _wrench(self, before: LinkStates, tick: int) -> npt.NDArray[np.float64]:
+        """Returns force and moment of the last tick, as mean of that tick.
+
+        With momentum p, angular momentum L about the joint's origin, which moves at v, first moment of mass s, weight
+        m g and contacts (f, t): F = dp/dt - m g - f and M = dL/dt + v x p - s x g - t.
+
+        Raises:
+            PhysicsError: If it is not finite.
+        """
+        old, new = self._subtree.momentum(before), self._subtree.momentum(self._subtree.states())
+        contact_force, contact_moment = self._subtree.contact_wrench(old.origin)
+        weight = scaled(self._subtree.mass_kg, self._gravity)
+        force = minus(scaled(1.0 / self._dt_s, minus(new.linear, old.linear)), weight)
+        moment = scaled(1.0 / self._dt_s, minus(new.angular, old.angular))
+        moment = plus(moment, cross(_mean(old.origin_velocity, new.origin_velocity), _mean(old.linear, new.linear)))
+        moment = minus(moment, cross(_mean(old.mass_moment, new.mass_moment), self._gravity))
+        force = minus(force, scaled(self._contact_factor, contact_force))
+        moment = minus(moment, scaled(self._contact_factor, contact_moment))
+        if not math.isfinite(sum(force) + sum(moment)):
+            raise PhysicsError(f"{self.name}: wrench is not finite any more at tick {tick}: {force}, {moment}")
+        quat = new.quat_xyzw
+        return self._sign * np.array(rotated_back(quat, force) + rotated_back(quat, moment))
+
+
+def _mean(a: Vector, b: Vector) -> Vector:
+    return scaled(0.5, plus(a, b))

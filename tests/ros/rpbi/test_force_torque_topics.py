@@ -1,0 +1,138 @@
+"""Force-torque sensors in ROS: topics, rates, frames, and the service that zeroes them."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+import rospy
+from geometry_msgs.msg import WrenchStamped
+from node_world import Rosout, add, main_config, objects, remove
+from ros_system import wait_until
+from std_srvs.srv import Empty, Trigger
+from worlds import iiwa
+
+from ros_pybullet_interface.msg import PybulletObject
+from ros_pybullet_interface.srv import RobotInfo
+
+JOINT = "lbr_iiwa_joint_7"
+TOPIC = f"/rpbi/iiwa/{JOINT}/ft_sensor"
+SENSORS = [
+    {"joint": JOINT, "hz": 200, "bias_force_n": [3.0, 0.0, 0.0], "noise_force_n": 0.05},
+    {"joint": "lbr_iiwa_joint_4", "hz": 40, "frame_id": "elbow"},
+    "lbr_iiwa_joint_2",
+]
+
+
+@pytest.fixture(scope="module")
+def node(module_ros):
+    robot = iiwa(enabled_joint_force_torque_sensors=SENSORS, joint_state_publisher_hz=100)
+    config = main_config(module_ros.folder, robots=(robot,), setAdditionalSearchPath="pybullet_data_path")
+    return module_ros.simulator(config, use_sim_time=True)
+
+
+@pytest.fixture
+def simulator(ros, node):
+    ros.call("/rpbi/start", Trigger)
+    return node
+
+
+def forces(messages):
+    return np.array([[m.wrench.force.x, m.wrench.force.y, m.wrench.force.z] for m in messages])
+
+
+def test_each_sensor_has_a_topic_with_its_rate_and_frame(ros, simulator):
+    expected = {
+        JOINT: (5, "rpbi/iiwa/lbr_iiwa_link_7"),
+        "lbr_iiwa_joint_4": (25, "elbow"),
+        "lbr_iiwa_joint_2": (10, "rpbi/iiwa/lbr_iiwa_link_2"),
+    }
+    for joint, (period_ms, frame) in expected.items():
+        messages = ros.listen(f"/rpbi/iiwa/{joint}/ft_sensor", WrenchStamped).wait_for(20)[:20]
+        stamps = [message.header.stamp.to_nsec() for message in messages]
+        assert {later - earlier for earlier, later in zip(stamps, stamps[1:])} == {period_ms * 1_000_000}
+        assert {message.header.frame_id for message in messages} == {frame}
+
+
+def test_robot_info_names_the_joints_with_sensors(ros, simulator):
+    assert ros.call("/rpbi/iiwa/robot_info", RobotInfo).enabled_ft_sensors == [
+        JOINT,
+        "lbr_iiwa_joint_4",
+        "lbr_iiwa_joint_2",
+    ]
+
+
+def test_zero_service_answers_when_the_sensor_shows_zero(ros, simulator):
+    listener = ros.listen(TOPIC, WrenchStamped)
+    listener.wait_for(50)
+    before = len(listener.messages)
+    ros.call(TOPIC, Empty)
+    during = len(listener.messages)
+    assert during - before >= 95, "a hundred samples came before the answer"
+    listener.wait_for(during + 210)
+    after = forces(listener.messages[during + 10 : during + 210])
+    assert np.abs(forces(listener.messages[:before]).mean(axis=0)).max() > 1.0
+    assert after.mean(axis=0) == pytest.approx([0.0, 0.0, 0.0], abs=0.03)
+
+
+def test_zero_service_of_a_stopped_simulation_says_so(ros, simulator):
+    ros.call("/rpbi/stop", Trigger)
+    with pytest.raises(rospy.ServiceException, match="stopped"):
+        ros.call(TOPIC, Empty)
+
+
+def _fails_with(ros, topic, meanwhile, listener):
+    errors = []
+
+    def call():
+        try:
+            ros.call(topic, Empty)
+        except rospy.ServiceException as error:
+            errors.append(str(error))
+
+    seen = len(listener.messages)
+    thread = threading.Thread(target=call)
+    thread.start()
+    listener.wait_for(seen + 5)
+    meanwhile()
+    thread.join(20.0)
+    assert not thread.is_alive()
+    return errors
+
+
+def test_stop_in_the_middle_of_zeroing_ends_it_with_a_reason(ros, simulator):
+    topic = "/rpbi/iiwa/lbr_iiwa_joint_4/ft_sensor"  # 2.5 s for its hundred samples
+    listener = ros.listen(topic, WrenchStamped)
+    errors = _fails_with(ros, topic, lambda: ros.call("/rpbi/stop", Trigger), listener)
+    assert len(errors) == 1 and "stopped before 100 samples" in errors[0]
+    ros.call("/rpbi/start", Trigger)
+    ros.call(topic, Empty)
+    assert wait_until(lambda: listener.messages[-1].wrench.force.z < 1e-3, "it works the next time")
+
+
+def test_robot_that_goes_in_the_middle_of_zeroing_ends_it_with_a_reason(ros, simulator):
+    sensors = [{"joint": JOINT, "hz": 10}]
+    answer = add(ros, PybulletObject.ROBOT, iiwa("other", enabled_joint_force_torque_sensors=sensors))
+    assert answer.success, answer.message
+    topic = f"/rpbi/other/{JOINT}/ft_sensor"
+    listener = ros.listen(topic, WrenchStamped)
+    errors = _fails_with(ros, topic, lambda: remove(ros, "other"), listener)
+    assert len(errors) == 1
+    wait_until(lambda: topic not in dict(rospy.get_published_topics()), "the topic has gone")
+    assert "other" not in objects(ros)
+
+
+def test_unknown_joint_is_refused_with_the_joints_there_are(ros, simulator):
+    answer = add(ros, PybulletObject.ROBOT, iiwa("wrong", enabled_joint_force_torque_sensors=["joint_7"]))
+    assert not answer.success
+    assert "enabled_joint_force_torque_sensors[0]" in answer.message and "lbr_iiwa_joint_1" in answer.message
+
+
+def test_simulator_with_an_unknown_joint_does_not_start_and_says_why(ros, simulator):
+    robot = iiwa(enabled_joint_force_torque_sensors=["joint_7"])
+    config = main_config(ros.folder, robots=(robot,), setAdditionalSearchPath="pybullet_data_path")
+    rosout = Rosout(ros)
+    failing = ros.simulator(config, use_sim_time=True, wait=False, namespace="/second/")
+    assert failing.wait(40) == 1
+    rosout.wait_for(["enabled_joint_force_torque_sensors[0]"])

@@ -1,0 +1,194 @@
+"""The follower's topics and service, and what becomes of goals when the world around them changes."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+
+import pytest
+import rospy
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from node_world import Rosout, main_config, publishing, registrations, remove
+from ros_system import stop_group, wait_until
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+from trajectory_world import CONTROLLER, HOME, JOINTS, START, Goal, moved, stands, trajectory
+from worlds import iiwa, write_world
+
+from custom_ros_tools.srv import SetString
+from ros_pybullet_interface.msg import JointTrajectoryControllerState
+
+
+def test_without_control_msgs_there_are_topics_and_the_log_tells_what_is_missing(ros, tmp_path):
+    log = Rosout(ros)
+    robot = iiwa(joint_trajectory_controller={"state_publish_rate": 100}, **HOME)
+    ros.simulator(main_config(tmp_path, robots=(robot,)), use_sim_time=True)
+    log.wait_for(["follow_joint_trajectory and the service query_state need control_msgs"])
+    states = ros.listen(f"{CONTROLLER}/state", JointTrajectoryControllerState)
+    with publishing(f"{CONTROLLER}/command", JointTrajectory) as command:
+        command.publish(trajectory((0.5, moved(0.3)), velocity=False))
+        wait_until(
+            lambda: states.messages and states.messages[-1].desired.positions[0] == pytest.approx(0.3, abs=1e-12),
+            "it has come to the end",
+        )
+    message = states.messages[-1]
+    assert message.joint_names == JOINTS
+    assert message.actual.positions[0] == pytest.approx(0.3, abs=1e-3)
+    gaps_ns = {b - a for a, b in zip(states.stamps_ns, states.stamps_ns[1:])}
+    assert gaps_ns == {10_000_000}
+    assert not [name for _, name in registrations() if "follow_joint_trajectory" in name or "query_state" in name]
+
+
+def test_check_lists_the_action_where_control_msgs_is_installed(tmp_path, control_msgs):
+    world = write_world(tmp_path, robots=(iiwa(joint_trajectory_controller={}),))
+    listed = {}
+    for paths in ("", control_msgs):
+        environment = {**os.environ, "PYTHONPATH": f"{paths}:{os.environ.get('PYTHONPATH', '')}"}
+        command = ["rosrun", "ros_pybullet_interface", "check_world.py", world]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        listed[paths] = done.stdout
+    assert "joint_trajectory_controller/command" in listed[""] and "follow_joint_trajectory" not in listed[""]
+    assert "joint_trajectory_controller/follow_joint_trajectory" in listed[control_msgs]
+    assert "control_msgs/QueryTrajectoryState" in listed[control_msgs]
+
+
+def test_robot_without_the_key_has_none_of_it(ros, tmp_path):
+    ros.simulator(main_config(tmp_path, robots=(iiwa(),)))
+    assert not [name for _, name in registrations() if "joint_trajectory_controller" in name]
+
+
+def test_command_replaces_a_goal_and_an_empty_one_makes_the_arm_hold(start):
+    robot = start()
+    goal = Goal(robot, trajectory((5.0, moved(1.2))))
+    goal.wait_until_it_moves()
+    with publishing(f"{CONTROLLER}/command", JointTrajectory) as command:
+        command.publish(trajectory((4.0, moved(-1.2))))
+        status, _, text = goal.wait()
+        assert status == GoalStatus.PREEMPTED and "newer trajectory" in text
+        wait_until(lambda: robot.states.messages[-1].velocity[0] < -0.1, "it moves back")
+        command.publish(JointTrajectory())
+        wait_until(lambda: stands(robot.states), "the arm stands")
+    assert -1.0 < robot.states.messages[-1].position[0]
+
+
+def test_bad_command_is_named_and_changes_nothing(start):
+    robot = start()
+    log = Rosout(robot.ros)
+    goal = Goal(robot, trajectory((1.5, moved(0.5))))
+    goal.wait_until_it_moves()
+    with publishing(f"{CONTROLLER}/command", JointTrajectory) as command:
+        command.publish(trajectory((1.0, moved(9.0))))
+        log.wait_for([f"{CONTROLLER}/command", "'lbr_iiwa_joint_1' must be within"])
+    assert goal.wait()[0] == GoalStatus.SUCCEEDED
+
+
+def test_targets_of_joints_that_a_trajectory_drives_are_refused_until_it_has_ended(start):
+    robot = start()
+    log = Rosout(robot.ros)
+    goal = Goal(robot, trajectory((1.5, moved(0.5))))
+    goal.wait_until_it_moves()
+    with publishing("/rpbi/iiwa/joint_states/target", JointState) as target:
+        target.publish(JointState(name=["lbr_iiwa_joint_1"], position=[-1.0]))
+        log.wait_for(["a motion drives lbr_iiwa_joint_1"])
+        assert goal.wait()[0] == GoalStatus.SUCCEEDED
+        target.publish(JointState(name=["lbr_iiwa_joint_1"], position=[-0.2]))
+        wait_until(lambda: robot.states.messages[-1].position[0] < -0.19, "it follows targets again")
+
+
+def test_removed_robot_answers_its_goal_and_leaves_nothing_behind(start):
+    robot = start()
+    goal = Goal(robot, trajectory((20.0, moved(1.2))))
+    goal.wait_until_it_moves()
+    assert remove(robot.ros, "iiwa").success
+    status, code, text = goal.wait()
+    assert (status, code) == (GoalStatus.ABORTED, -1)
+    assert "removed" in text and "lbr_iiwa_joint_1=" in text
+    assert not [name for _, name in registrations() if "iiwa" in name]
+
+
+def test_node_that_ends_in_the_middle_of_a_goal_ends_cleanly(start):
+    robot = start()
+    goal = Goal(robot, trajectory((20.0, moved(1.2))))
+    goal.wait_until_it_moves()
+    assert stop_group(robot.process) == 0
+    status, _, text = goal.wait()
+    assert status == GoalStatus.ABORTED and "the simulation ended" in text
+    assert "Traceback" not in robot.ros.output(robot.process)
+
+
+def test_stopped_world_freezes_the_goal(start):
+    robot = start()
+    goal = Goal(robot, trajectory((1.5, moved(0.6))))
+    goal.wait_until_it_moves()
+    assert robot.ros.call("/rpbi/stop", Trigger).success
+    frozen = robot.states.messages[-1].position[0]
+    fed = len(goal.feedback)
+    steps = [robot.ros.call("/rpbi/step", Trigger).success for _ in range(20)]
+    assert all(steps)
+    wait_until(lambda: robot.states.messages[-1].position[0] > frozen, "it moves by steps")
+    assert robot.states.messages[-1].position[0] < frozen + 0.03
+    assert len(goal.feedback) <= fed + 2
+    assert goal.handle.get_goal_status() == GoalStatus.ACTIVE
+    assert robot.ros.call("/rpbi/start", Trigger).success
+    status, code, text = goal.wait()
+    assert (status, code) == (GoalStatus.SUCCEEDED, 0), text
+
+
+def test_goal_of_a_stopped_world_can_be_cancelled(start):
+    robot = start(start_pybullet_after_initialization=False)
+    goal = Goal(robot, trajectory((1.0, moved(0.3))))
+    wait_until(lambda: goal.handle.get_goal_status() == GoalStatus.ACTIVE, "the goal is accepted")
+    goal.handle.cancel()
+    status, _, text = goal.wait()
+    assert status == GoalStatus.PREEMPTED and "cancelled" in text
+
+
+@pytest.mark.parametrize("use_sim_time", [True, False])
+def test_goal_begins_at_its_stamp(start, use_sim_time):
+    robot = start(use_sim_time=use_sim_time)
+    stamp = robot.states.messages[-1].header.stamp + rospy.Duration.from_sec(1.0)
+    goal = Goal(robot, trajectory((0.5, moved(0.4)), stamp=stamp))
+    assert goal.wait()[0] == GoalStatus.SUCCEEDED
+    messages = robot.states.messages
+    moving = [message.header.stamp.to_sec() for message in messages if abs(message.velocity[0]) > 0.02]
+    assert moving[0] - stamp.to_sec() == pytest.approx(0.02, abs=0.03)
+
+
+def test_status_and_results_have_the_stamps_of_the_world(start):
+    robot = start()
+    statuses = robot.ros.listen(f"{CONTROLLER}/follow_joint_trajectory/status", GoalStatusArray)
+    for message in list(statuses.wait_for(3)):
+        assert message.header.stamp.to_sec() < 1e6, "a wall stamp"
+
+
+def test_query_tells_where_the_joints_will_be(start):
+    from control_msgs.srv import QueryTrajectoryState
+
+    robot = start()
+    stamp = robot.states.messages[-1].header.stamp + rospy.Duration.from_sec(2.0)
+    goal = Goal(robot, trajectory((2.0, moved(0.8)), stamp=stamp))
+    wait_until(lambda: goal.handle.get_goal_status() == GoalStatus.ACTIVE, "the goal is accepted")
+    answer = robot.ros.call(f"{CONTROLLER}/query_state", QueryTrajectoryState, stamp + rospy.Duration.from_sec(1.0))
+    assert list(answer.name) == JOINTS
+    assert answer.position[0] == pytest.approx(0.4, abs=2e-3)  # the middle of a cubic from rest to rest
+    assert answer.velocity[0] == pytest.approx(0.6, abs=2e-3)  # 3/2 of the mean
+    assert list(answer.position[1:]) == pytest.approx(START[1:], abs=1e-3)
+
+
+def test_goal_is_refused_under_torque_control(start):
+    robot = start()
+    assert robot.ros.call("/rpbi/iiwa/set_control_mode", SetString, "TORQUE_CONTROL").success
+    status, code, text = Goal(robot, trajectory((1.0, moved(0.3)))).wait()
+    assert (status, code) == (GoalStatus.REJECTED, -1)
+    assert "TORQUE_CONTROL" in text
+
+
+def test_changing_the_control_mode_aborts_the_goal(start):
+    robot = start()
+    goal = Goal(robot, trajectory((5.0, moved(0.3))))
+    goal.wait_until_it_moves()
+    assert robot.ros.call("/rpbi/iiwa/set_control_mode", SetString, "VELOCITY_CONTROL").success
+    status, code, text = goal.wait()
+    assert (status, code) == (GoalStatus.ABORTED, -1) and "control mode was changed" in text
+    assert Goal(robot, trajectory((0.5, moved(0.2)))).wait()[0] == GoalStatus.SUCCEEDED
