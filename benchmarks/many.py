@@ -14,7 +14,7 @@ TF = "/tf"
 
 
 def run(quick: bool) -> list[Result]:
-    """Measures whether 1 kHz is held, as seen by a process that takes both arms' joint states, and one that takes TF."""
+    """Measures whether 1 kHz is held, as a process sees it that takes both arms' joint states; another takes TF."""
     seconds = 8.0 if quick else 30.0
     floor = publisher_alone(HZ, seconds / 2)
     with Session() as ros:

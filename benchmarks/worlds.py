@@ -30,6 +30,7 @@ def arm_world(
     """
     arm = yaml.safe_load((CONFIGS / "basic_example_kuka_lwr" / "kuka_lwr.yaml").read_text())
     arm |= {"joint_state_publisher_hz": joint_states_hz or hz, "broadcast_link_states": tf}
+    del arm["enabled_joint_force_torque_sensors"]
     return {
         "connect": {"connection_mode": "DIRECT"},
         "setGravity": {"gravZ": -9.81},

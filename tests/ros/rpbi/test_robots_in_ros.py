@@ -133,8 +133,18 @@ def test_one_file_makes_several_robots(ros, tmp_path):
     config = main_config(tmp_path, robots=(iiwa(),))
     (file,) = config["robots"]
     config["robots"] = [
-        {"file": file, "name": side, "loadURDF": {"basePosition": [0.0, y, 0.0]}} for side, y in (("l", 1.0), ("r", -1.0))
+        {"file": file, "name": side, "loadURDF": {"basePosition": [0.0, y, 0.0]}}
+        for side, y in (("l", 1.0), ("r", -1.0))
     ]
     ros.simulator(config)
     assert objects(ros) == {"l": "robot", "r": "robot"}
     assert rospy.has_param("/rpbi/l/robot_description")
+
+
+def test_two_clocks_on_one_master_are_warned_of(ros, tmp_path):
+    for side in ("left", "right"):
+        (tmp_path / side).mkdir()
+        node = ros.simulator(main_config(tmp_path / side), namespace=f"/{side}/", use_sim_time=True)
+    wait_until(
+        lambda: "/clock is published by /left/ros_pybullet_interface too" in ros.output(node), "the second one says so"
+    )

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,6 +15,8 @@ from actionlib_msgs.msg import GoalStatus
 from ros_system import wait_until
 from trajectory_world import JOINTS, START, Goal, moved, open_world, stands, tolerance, trajectory
 
+from ros_pybullet_interface.msg import JointTrajectoryControllerState
+
 
 @pytest.fixture(scope="module")
 def refusing(module_ros: Any, control_msgs: str, tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
@@ -19,6 +24,15 @@ def refusing(module_ros: Any, control_msgs: str, tmp_path_factory: pytest.TempPa
     robot = open_world(module_ros, control_msgs, tmp_path_factory.mktemp("refusing"))
     wait_until(lambda: stands(robot.states), "the arm stands")
     return robot
+
+
+def test_types_are_the_public_ones(control_msgs):
+    """Else the tests would hold with each other, and no planner with the simulator."""
+    from control_msgs.msg import FollowJointTrajectoryAction
+    from control_msgs.msg import JointTrajectoryControllerState as PublicState
+
+    assert FollowJointTrajectoryAction._md5sum == "bc4f9b743838566551c0390c65f1a248"
+    assert PublicState._md5sum == JointTrajectoryControllerState._md5sum == "10817c60c2486ef6b33e97dcd87f4474"
 
 
 def test_goal_is_reached_with_joints_in_any_order(start):
@@ -33,6 +47,18 @@ def test_goal_is_reached_with_joints_in_any_order(start):
     assert (status, code) == (GoalStatus.SUCCEEDED, 0), text
     reached = dict(zip(robot.states.messages[-1].name, robot.states.messages[-1].position))
     assert [reached[name] for name in JOINTS] == pytest.approx(goal_positions, abs=1e-3)
+
+
+def test_client_with_simulated_time_is_served_in_it(start, control_msgs):
+    robot = start(real_time_factor=3)
+    helpers = Path(__file__).parent
+    paths = [control_msgs, str(helpers), str(helpers.parents[1]), os.environ.get("PYTHONPATH", "")]
+    arguments = [str(value) for value in (3.0, *moved(0.5))]
+    client = robot.ros.start(
+        [sys.executable, str(helpers / "trajectory_client.py"), *arguments], PYTHONPATH=":".join(paths)
+    )
+    assert client.wait(60.0) == 0, robot.ros.output(client)
+    assert f"state {GoalStatus.SUCCEEDED}, code 0, took 3." in robot.ros.output(client)
 
 
 def test_feedback_comes_at_its_rate_of_simulated_time_and_tells_where_the_joints_are_to_be(start):
@@ -78,7 +104,7 @@ def test_cancelled_goal_makes_the_arm_hold(start):
 
 def test_arm_stops_when_it_is_off_its_path_and_says_so(start):
     robot = start()
-    goal = Goal(robot, trajectory((4.0, moved(1.2))), path_tolerance=[tolerance("lbr_iiwa_joint_1", position=1e-5)])
+    goal = Goal(robot, trajectory((4.0, moved(1.2))), path_tolerance=[tolerance("lbr_iiwa_joint_1", position=1e-9)])
     status, code, text = goal.wait()
     assert (status, code) == (GoalStatus.ABORTED, -4)
     assert "'lbr_iiwa_joint_1'" in text and "stop and hold" in text

@@ -8,7 +8,7 @@ import subprocess
 import pytest
 import rospy
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
-from node_world import Rosout, main_config, publishing, registrations, remove
+from node_world import Rosout, add, count, main_config, publishing, registrations, remove
 from ros_system import stop_group, wait_until
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
@@ -17,7 +17,7 @@ from trajectory_world import CONTROLLER, HOME, JOINTS, START, Goal, moved, stand
 from worlds import iiwa, write_world
 
 from custom_ros_tools.srv import SetString
-from ros_pybullet_interface.msg import JointTrajectoryControllerState
+from ros_pybullet_interface.msg import JointTrajectoryControllerState, PybulletObject
 
 
 def test_without_control_msgs_there_are_topics_and_the_log_tells_what_is_missing(ros, tmp_path):
@@ -107,6 +107,28 @@ def test_removed_robot_answers_its_goal_and_leaves_nothing_behind(start):
     assert not [name for _, name in registrations() if "iiwa" in name]
 
 
+def test_robots_that_come_and_go_leave_no_threads_behind(start):
+    robot = start()
+    config = iiwa("second", joint_trajectory_controller={})
+
+    def come_and_go() -> int:
+        assert add(robot.ros, PybulletObject.ROBOT, config).success
+        assert remove(robot.ros, "second").success
+        return count(robot.process.pid, "task")
+
+    first = come_and_go()
+    last = [come_and_go() for _ in range(5)][-1]
+    wait_until(lambda: count(robot.process.pid, "task") <= first + 2, f"of {last} threads about {first} stay")
+
+
+def test_each_of_many_goals_has_its_answer(start):
+    robot = start()
+    goals = [Goal(robot, trajectory((0.5, moved(0.01 * number)))) for number in range(60)]
+    *others, last = [goal.wait()[0] for goal in goals]
+    assert last == GoalStatus.SUCCEEDED
+    assert set(others) == {GoalStatus.PREEMPTED}
+
+
 def test_node_that_ends_in_the_middle_of_a_goal_ends_cleanly(start):
     robot = start()
     goal = Goal(robot, trajectory((20.0, moved(1.2))))
@@ -153,6 +175,21 @@ def test_goal_begins_at_its_stamp(start, use_sim_time):
     messages = robot.states.messages
     moving = [message.header.stamp.to_sec() for message in messages if abs(message.velocity[0]) > 0.02]
     assert moving[0] - stamp.to_sec() == pytest.approx(0.02, abs=0.03)
+
+
+@pytest.mark.parametrize("factor", [0, 0.3, 2])
+def test_trajectory_takes_its_time_in_the_world_whatever_the_wall_clock_says(start, factor):
+    robot = start(real_time_factor=factor)
+    goal = Goal(robot, trajectory((1.0, moved(0.5))))
+    status, code, text = goal.wait()
+    assert (status, code) == (GoalStatus.SUCCEEDED, 0), text
+    assert len(goal.feedback) > 3  # the answer may overtake the last ones
+    stamps_s = [message.header.stamp.to_sec() for message in goal.feedback]
+    since_start_s = [message.desired.time_from_start.to_sec() for message in goal.feedback]
+    for message, stamp_s, t in zip(goal.feedback, stamps_s, since_start_s):
+        assert stamp_s - stamps_s[0] == pytest.approx(t - since_start_s[0], abs=1e-6)
+        cubic = 3 * t**2 - 2 * t**3  # from rest to rest in 1 s
+        assert message.desired.positions[0] == pytest.approx(0.5 * cubic, abs=2e-3)
 
 
 def test_status_and_results_have_the_stamps_of_the_world(start):

@@ -20,6 +20,7 @@ from rpbi.control.trajectory_request import (
     TrajectoryRequest,
     Waypoint,
 )
+from rpbi.joint_model import JointTarget
 from rpbi.world import World
 
 ARM = tuple(f"lbr_iiwa_joint_{number}" for number in range(1, 8))
@@ -214,6 +215,17 @@ def test_joints_that_are_left_out_go_on_with_theirs(tmp_path):
     arm.follow(Waypoint(0.5, (0.3,), (0.0,)), names=ARM[1:2])
     arm.step(2.0)
     assert arm.position[:2] == pytest.approx((0.5, 0.3), abs=1e-3)
+
+
+def test_cancelling_leaves_joints_alone_that_no_trajectory_drives(tmp_path):
+    arm = Arm(tmp_path, {"allow_partial_joints_goal": True})
+    target = arm.world.inputs["iiwa/target"]
+    target.apply(target.check(JointTarget(["lbr_iiwa_joint_7"], [1.5])))
+    arm.follow(Waypoint(2.0, (0.5,), (0.0,)), names=ARM[:1])
+    arm.step(0.05)
+    arm.follower.cancel("enough", arm.world.clock)
+    arm.step(2.0)
+    assert arm.position[6] == pytest.approx(1.5, abs=1e-3)
 
 
 def test_only_its_own_joints_are_driven(tmp_path):

@@ -167,28 +167,36 @@ PUSHER = """<robot name="pusher"><link name="base"/>
 </robot>"""
 
 
-def put_below(world, floor_first, tilt=0.0, **dynamics):
-    """Puts a floor below the arm. Who came first decides who is A and who is B in PyBullet's contacts."""
-    pb = world.pb
+def beside_arm(world, arm_last, put):
+    """Puts something into the world. Who came first decides who is A and who is B in PyBullet's contacts."""
     kind, config = world.log[-1].arguments
-    if floor_first:
+    if arm_last:
         world.remove("arm")
-    shape = pb.createCollisionShape(pb.GEOM_BOX, halfExtents=[9, 9, 0.1])
-    position, quat = [-0.1 * math.sin(tilt), 0.0, -0.1 * math.cos(tilt)], pb.getQuaternionFromEuler([0, tilt, 0])
-    pb.changeDynamics(pb.createMultiBody(0, shape, -1, position, quat), -1, **dynamics)
-    if floor_first:
+    put()
+    if arm_last:
         world.add(kind, config)
 
 
+def put_floor(world, arm_last, tilt=0.0, **dynamics):
+    pb = world.pb
+    position, quat = [-0.1 * math.sin(tilt), 0.0, -0.1 * math.cos(tilt)], pb.getQuaternionFromEuler([0, tilt, 0])
+
+    def put():
+        shape = pb.createCollisionShape(pb.GEOM_BOX, halfExtents=[9, 9, 0.1])
+        pb.changeDynamics(pb.createMultiBody(0, shape, -1, position, quat), -1, **dynamics)
+
+    beside_arm(world, arm_last, put)
+
+
 @pytest.mark.parametrize("substeps", [0, 4])
-@pytest.mark.parametrize("floor_first", [True, False], ids=["floor first", "floor last"])
-def test_payload_that_presses_on_a_slope_reads_the_contact(world_of, substeps, floor_first):
+@pytest.mark.parametrize("arm_last", [True, False], ids=["arm last", "arm first"])
+def test_payload_that_presses_on_a_slope_reads_the_contact(world_of, substeps, arm_last):
     """A ram pushes a ball down on a frictionless slope: statics give all six components without PyBullet."""
     main = {"setPhysicsEngineParameter": {"numSubSteps": substeps}} if substeps else {}
     world = world_of(mode="TORQUE_CONTROL", sensors=["drive", "mount"], main=main, description=PUSHER)
     slope = 0.4
     normal = np.array([math.sin(slope), 0.0, math.cos(slope)])
-    put_below(world, floor_first, slope, lateralFriction=0.0)
+    put_floor(world, arm_last, slope, lateralFriction=0.0)
     world.put("arm/target", JointTarget(["drive"], (), (), [-40.0]))
     found = step(world, 4000)
     load = 40.0 + 1.5 * 9.81
@@ -205,9 +213,9 @@ def test_payload_that_presses_on_a_slope_reads_the_contact(world_of, substeps, f
     assert found["mount"][3:] == pytest.approx(quarter_turn @ moment, rel=0.01, abs=0.02)
 
 
-@pytest.mark.parametrize("floor_first", [True, False], ids=["floor first", "floor last"])
+@pytest.mark.parametrize("arm_last", [True, False], ids=["arm last", "arm first"])
 @pytest.mark.parametrize("shape", ["sphere", "box"])
-def test_payload_that_slides_reads_friction_and_acceleration(world_of, shape, floor_first):
+def test_payload_that_slides_reads_friction_and_acceleration(world_of, shape, arm_last):
     """A carriage drags the ram and its payload over a floor: friction is 0.5 * 0.6 times what presses."""
     carriage = (
         PUSHER.replace('type="revolute"', 'type="prismatic"')
@@ -217,7 +225,7 @@ def test_payload_that_slides_reads_friction_and_acceleration(world_of, shape, fl
     if shape == "box":
         carriage = carriage.replace('<sphere radius="0.05"/>', '<box size="0.1 0.1 0.1"/>')
     world = world_of(mode="TORQUE_CONTROL", sensors=["mount"], description=carriage, enforce_effort_limits=False)
-    put_below(world, floor_first, lateralFriction=0.6)
+    put_floor(world, arm_last, lateralFriction=0.6)
     pb, arm = world.pb, world.bodies["arm"]
     pb.changeDynamics(arm.body_id, arm.model["mount"].index, lateralFriction=0.5)
     world.put("arm/target", JointTarget(["idler", "drive"], (), (), [0.0, -20.0]))
@@ -236,6 +244,38 @@ def test_payload_that_slides_reads_friction_and_acceleration(world_of, shape, fl
         touch, contact = [0.0, 0.03, -0.15], [-0.3 * pressing, 0.0, pressing]
         moment = np.cross([0.0, 0.0, -0.1], [0.5 * acceleration, 0.0, 0.0]) - np.cross(touch, contact)
         assert found[3:] == pytest.approx([moment[1], -moment[0], moment[2]], rel=0.01, abs=0.02)
+
+
+TRAY = """<robot name="tray"><link name="base"/>
+<link name="idle"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="idler" type="revolute"><parent link="base"/><child link="idle"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="5" velocity="5"/></joint>
+<link name="cart"><inertial><mass value="1.0"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
+<limit lower="-9" upper="9" effort="500" velocity="5"/></joint>
+<link name="tray"><inertial><mass value="0.5"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><box size="0.4 0.4 0.02"/></geometry></collision></link>
+<joint name="mount" type="fixed"><parent link="cart"/><child link="tray"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("arm_last", [True, False], ids=["arm last", "arm first"])
+def test_box_on_a_tray_is_carried_and_accelerated_by_friction(world_of, arm_last):
+    world = world_of(mode="TORQUE_CONTROL", sensors=["mount"], description=TRAY)
+    pb = world.pb
+
+    def put_box():
+        pb.createMultiBody(2.0, pb.createCollisionShape(pb.GEOM_BOX, halfExtents=[0.05] * 3), -1, [0.0, 0.0, 0.06])
+
+    beside_arm(world, arm_last, put_box)
+    step(world, 300)
+    world.put("arm/target", JointTarget(["slide"], (), (), [3.0]))
+    found = step(world, 300)["mount"]
+    per_kg = np.array([3.0 / 3.5, 0.0, 9.81])
+    assert found[:3] == pytest.approx(2.5 * per_kg, rel=0.01, abs=0.02)
+    assert found[3:] == pytest.approx(np.cross([0.0, 0.0, 0.06], 2.0 * per_kg), rel=0.02, abs=0.005)
 
 
 def test_robot_in_free_fall_feels_no_weight(world_of):

@@ -41,7 +41,8 @@ def parse_instance(entry: Any) -> Instance:
     """
     file = entry.get(FILE) if isinstance(entry, Mapping) else entry
     if not isinstance(file, str) or not file:
-        raise ValueError(f"expected a file name, or a mapping with '{FILE}' and the keys that differ; got {shown(entry)}")
+        expected = f"expected a file name, or a mapping with '{FILE}' and the keys that differ"
+        raise ValueError(f"{expected}; got {shown(entry)}")
     changes = {key: value for key, value in entry.items() if key != FILE} if isinstance(entry, Mapping) else {}
     return Instance(file, changes)
 

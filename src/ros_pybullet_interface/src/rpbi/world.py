@@ -294,9 +294,8 @@ class World:
         self.log.append(entry)
 
     def _register(self, name: str, sensors: tuple[Sensor, ...], inputs: Any) -> None:
-        self._scheduled[name] = [
-            _Scheduled(sensor, self.clock.dt_ns, self.clock.tick, order) for order, sensor in enumerate(sensors, self._count)
-        ]
+        dt_ns, tick = self.clock.dt_ns, self.clock.tick
+        self._scheduled[name] = [_Scheduled(one, dt_ns, tick, order) for order, one in enumerate(sensors, self._count)]
         self._count += len(sensors)
         self._requeue()
         self._watching += [sensor for sensor in sensors if type(sensor).before_step is not Sensor.before_step]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from custom_ros_tools.schema import ConfigModel, Hz, HzOrOff, KeyedError, ListOf, Name, Seconds, Switch
 
@@ -71,10 +71,17 @@ class RobotConfig(ConfigModel):
     )
     color_alpha: float | None = Field(None, ge=0.0, le=1.0, description="Opacity of the whole robot, 0 to 1.")
 
-    @model_validator(mode="after")
-    def _has_motors_unless_visual(self) -> RobotConfig:
-        if self.setJointMotorControlArray is None and not self.is_visual_robot:
+    @field_validator("setJointMotorControlArray")
+    @classmethod
+    def _has_motors_unless_visual(
+        cls, value: SetJointMotorControlArray | None, info: ValidationInfo
+    ) -> SetJointMotorControlArray | None:
+        if value is None and not info.data.get("is_visual_robot"):
             raise KeyedError("setJointMotorControlArray", "missing; only a visual robot does without")
+        return value
+
+    @model_validator(mode="after")
+    def _follows_only_with_motors(self) -> RobotConfig:
         if self.joint_trajectory_controller is not None and self.is_visual_robot:
             raise KeyedError("joint_trajectory_controller", "a visual robot has no motors that could follow")
         return self

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import pybullet
@@ -101,7 +101,7 @@ class TrajectoryFollower:
             current = trajectories.get(index) or Trajectory([Knot(now_s, measured[index][:1])])
             trajectories[index] = course.joined(current, start_s, from_s)
         if not request.courses:
-            trajectories, from_s = self._stopping(now_s, measured), now_s
+            trajectories, from_s = self._stopping(now_s, measured, trajectories or self._by_index), now_s
         motion = TrajectoryMotion(self._by_index, trajectories, from_s, request.tolerances, self._stop_s)
         if feedback is not None:
             motion.on_advance = self._feeding(feedback, clock)
@@ -119,7 +119,7 @@ class TrajectoryFollower:
         running = self._running
         if running is None or motion not in (None, running):
             return
-        trajectories = self._stopping(clock.time_s, self._robot.joint_motion())
+        trajectories = self._stopping(clock.time_s, self._robot.joint_motion(), running.joints)
         self._run(TrajectoryMotion(self._by_index, trajectories, clock.time_s), reason)
 
     def state(self, time_s: float) -> ControllerState:
@@ -170,8 +170,8 @@ class TrajectoryFollower:
 
         return on_advance
 
-    def _stopping(self, now_s: float, measured: JointMotion) -> dict[int, Trajectory]:
-        return {index: stopping(joint, measured[index], now_s, self._stop_s) for index, joint in self._by_index.items()}
+    def _stopping(self, now_s: float, measured: JointMotion, indices: Iterable[int]) -> dict[int, Trajectory]:
+        return {index: stopping(self._by_index[index], measured[index], now_s, self._stop_s) for index in indices}
 
     def _run(self, motion: TrajectoryMotion, reason: str) -> None:
         """Starts a motion; the reason is for whoever waits for the one before.

@@ -124,8 +124,8 @@ class Motors:
     def track(self, index: int, position: float, velocity: float) -> None:
         """Sets a joint's position [rad or m] and velocity [rad/s or m/s] at the coming tick, in any control mode.
 
-        To the velocity PyBullet adds its gain times how far the joint is from the position before the tick. So this is the
-        position before it, and the velocity the one that leads to where the joint is to be after it.
+        To the velocity PyBullet adds its gain times how far the joint is from the position before the tick. So this is
+        the position before it, and the velocity the one that leads to where the joint is to be after it.
         """
         self._pb.setJointMotorControl2(
             self._body_id,

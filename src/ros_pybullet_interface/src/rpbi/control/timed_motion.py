@@ -24,7 +24,8 @@ PEAK = 15.0 / 8.0
 class TimedMotion(Motion):
     """Moves joints to a goal with minimum jerk; it takes longer than asked if the joints' velocities demand it.
 
-    It succeeds if the measured joints come to rest within `TOLERANCES` of the goal. Joints that are not named are left alone.
+    It succeeds if the measured joints come to rest within `TOLERANCES` of the goal. Joints that are not named are left
+    alone.
 
     Args:
         model: The robot's joints.

@@ -76,7 +76,8 @@ class TrajectoryMotion(Motion):
 
     def preempt(self, reason: str) -> None:
         """Ends because something else is wanted; the joints are left as they are."""
-        self.preempted = not self._fault
+        if not self._fault:
+            self.preempted, self.code = True, ErrorCode.SUCCESSFUL  # as in ros_controllers: nothing went wrong
         self.end(False, self._fault or reason)
 
     def halt(self, reason: str, measured: JointMotion) -> None:
@@ -105,9 +106,9 @@ class TrajectoryMotion(Motion):
     def _finish(self) -> None:
         if self._fault:
             self.end(False, self._fault)
-            return
-        self.code = ErrorCode.SUCCESSFUL
-        self.end(True, "reached the end" if self._tolerances is None else "reached the goal within its tolerances")
+        else:
+            self.code = ErrorCode.SUCCESSFUL
+            self.end(True, "reached the end" if self._tolerances is None else "reached the goal within its tolerances")
 
     def _break_off(self, code: ErrorCode, fault: str, time_s: float, measured: JointMotion) -> JointMotion:
         """Stops the joints where they are; with no time to stop in, it ends at once."""

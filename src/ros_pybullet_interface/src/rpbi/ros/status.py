@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Mapping
 
+import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rosgraph_msgs.msg import Clock as ClockMessage
@@ -15,11 +17,21 @@ from ..pacer import Pacer
 from .stamps import to_ros_time
 from .topics import FastTopic
 
+log = logging.getLogger(__name__)
+
 DIAGNOSTICS_PERIOD_S = 1.0
 STOPPED_CLOCK_PERIOD_S = 0.05
 FREE_RUNNING_CLOCK_HZ = 250.0
 FALLING_BEHIND = 0.98
 """Share of the asked real-time factor below which the diagnostics warn."""
+
+
+def _warn_of_rivals() -> None:
+    """Warns if another node tells the time too: ROS time would jump between the two."""
+    published: list[tuple[str, list[str]]] = rosgraph.Master(rospy.get_name()).getSystemState()[0]
+    rivals = [node for topic, nodes in published if topic == "/clock" for node in nodes if node != rospy.get_name()]
+    if rivals:
+        log.warning("/clock is published by %s too: two worlds cannot both be the clock", ", ".join(rivals))
 
 
 class ClockOutlet:
@@ -33,6 +45,7 @@ class ClockOutlet:
     def __init__(self, clock: Clock, hz: float) -> None:
         self._clock = clock
         self._period_s = 1.0 / hz
+        _warn_of_rivals()
         self._publisher = FastTopic("/clock", ClockMessage)
         self._due_s = 0.0
 

@@ -1,0 +1,92 @@
+"""Values of joints by name, as in a joint state."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from .errors import InterfaceError
+
+QUANTITIES = ("position", "velocity", "effort")
+
+
+class MissingJointsError(InterfaceError):
+    """A joint state lacks joints that are asked for.
+
+    Args:
+        names: The joints it lacks.
+        known: The joints it has.
+    """
+
+    def __init__(self, names: Sequence[str], known: Sequence[str]) -> None:
+        self.names = tuple(names)
+        self.known = tuple(known)
+        super().__init__(self.names, self.known)
+
+    def __str__(self) -> str:
+        missing = ", ".join(f"'{name}'" for name in self.names)
+        has = f"it has {', '.join(self.known)}" if self.known else "it names none"
+        return f"no values for joint{'s' if len(self.names) > 1 else ''} {missing}: {has}"
+
+
+@dataclass(frozen=True)
+class JointValues:
+    """Values of joints that belong together; made by `of`, which checks them.
+
+    Attributes:
+        names: n joint names; empty if the sender names none.
+        position: n positions [rad or m], or none.
+        velocity: n velocities [rad/s or m/s], or none.
+        effort: n torques or forces [N m or N], or none.
+    """
+
+    names: tuple[str, ...]
+    position: tuple[float, ...] = ()
+    velocity: tuple[float, ...] = ()
+    effort: tuple[float, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        names: Iterable[str],
+        position: Iterable[float] | None = None,
+        velocity: Iterable[float] | None = None,
+        effort: Iterable[float] | None = None,
+    ) -> JointValues:
+        """Return checked values; None stands for a quantity that is not given.
+
+        Raises:
+            ValueError: If lengths differ, a joint is named twice or a value is not finite.
+        """
+        joints = tuple(names)
+        if len(set(joints)) != len(joints):
+            raise ValueError(f"joints must be named once each, got {', '.join(joints)}")
+        given = (position, velocity, effort)
+        values = [() if each is None else tuple(map(float, each)) for each in given]
+        count = len(joints) or max(map(len, values))
+        for quantity, numbers in zip(QUANTITIES, values):
+            if len(numbers) not in (0, count):
+                raise ValueError(f"expected {count} values of {quantity}, one a joint, got {len(numbers)}")
+            if not all(map(math.isfinite, numbers)):
+                raise ValueError(f"values must be finite, got {quantity} {', '.join(f'{v:g}' for v in numbers)}")
+        return cls(joints, *values)
+
+    def in_order(self, names: Sequence[str], ns: str = "") -> JointValues:
+        """Return the values of some joints in the order asked for; a quantity that is not given stays so.
+
+        Args:
+            names: The joints, which the result names as they are named here.
+            ns: What their names here begin with, as `ns` in `ns/joint`; empty if they begin with nothing.
+
+        Raises:
+            MissingJointsError: If joints are missing; it names all of them.
+        """
+        prefix = f"{ns.rstrip('/')}/" if ns else ""
+        index = {name: i for i, name in enumerate(self.names)}
+        missing = [prefix + name for name in names if prefix + name not in index]
+        if missing:
+            raise MissingJointsError(missing, self.names)
+        picked = [index[prefix + name] for name in names]
+        quantities = (self.position, self.velocity, self.effort)
+        return JointValues(tuple(names), *(tuple(v[i] for i in picked) if v else () for v in quantities))

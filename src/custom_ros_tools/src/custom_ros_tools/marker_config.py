@@ -1,0 +1,111 @@
+"""What `attach_marker` may be told in `~config`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, Field, model_validator
+
+from .errors import hint
+from .schema import (
+    ConfigModel,
+    Expects,
+    FrameId,
+    Hz,
+    KeyedError,
+    ListOf,
+    NonNegative,
+    Position,
+    Rgba,
+    Switch,
+    Text,
+)
+from .transforms import quat_of
+
+MARKER_TYPES = {
+    "ARROW": 0,
+    "CUBE": 1,
+    "SPHERE": 2,
+    "CYLINDER": 3,
+    "LINE_STRIP": 4,
+    "LINE_LIST": 5,
+    "CUBE_LIST": 6,
+    "SPHERE_LIST": 7,
+    "POINTS": 8,
+    "TEXT_VIEW_FACING": 9,
+    "MESH_RESOURCE": 10,
+    "TRIANGLE_LIST": 11,
+}
+"""Constants of visualization_msgs/Marker, `type`."""
+MARKER_ACTIONS = {"ADD": 0, "MODIFY": 0, "DELETE": 2, "DELETEALL": 3}
+"""Constants of visualization_msgs/Marker, `action`."""
+SHAPES = ("ARROW", "CUBE", "SPHERE", "CYLINDER", "MESH_RESOURCE")
+"""Types that are drawn from what this configuration holds; the others need points or a text."""
+
+
+def _known_type(name: str) -> str:
+    return _known(name, "marker type", MARKER_TYPES)
+
+
+def _known_action(name: str) -> str:
+    return _known(name, "marker action", MARKER_ACTIONS)
+
+
+def _known(name: str, kind: str, constants: dict[str, int]) -> str:
+    if name.upper() not in constants:
+        raise ValueError(f"unknown {kind} '{name}'{hint(name, constants)}")
+    return name.upper()
+
+
+class MarkerNodeConfig(ConfigModel):
+    """How the marker is published."""
+
+    topic_name: Annotated[str, Field(pattern=r"^[~/A-Za-z][A-Za-z0-9_/]*$"), Expects("the name of a topic")]
+    hz: Hz = 50.0
+    broadcast_offset: Switch = False
+    child_frame_id: FrameId | None = None
+
+    @model_validator(mode="after")
+    def _names_the_frame_that_it_broadcasts(self) -> MarkerNodeConfig:
+        if self.broadcast_offset and self.child_frame_id is None:
+            raise KeyedError("child_frame_id", "missing, expected a TF frame since broadcast_offset is true")
+        return self
+
+
+class MarkerConfig(ConfigModel):
+    """A marker at a fixed pose in a TF frame."""
+
+    node: MarkerNodeConfig
+    frame_id: FrameId = "map"
+    type: Annotated[str, AfterValidator(_known_type), Expects("the name of a marker type")]
+    action: Annotated[str, AfterValidator(_known_action), Expects("the name of a marker action")] = "ADD"
+    position: Position = (0.0, 0.0, 0.0)
+    orientation: Annotated[ListOf[float], Expects("roll, pitch, yaw or a quaternion x, y, z, w")] = (0.0, 0.0, 0.0)
+    ori_in_deg: Switch = False
+    rgba: Rgba = (0.0, 0.0, 1.0, 0.9)
+    scale: Annotated[tuple[NonNegative, NonNegative, NonNegative], Field(strict=False)]
+    mesh_resource: Text | None = None
+
+    @model_validator(mode="after")
+    def _can_be_drawn(self) -> MarkerConfig:
+        try:
+            quat_of(self.orientation, self.ori_in_deg)
+        except ValueError as error:
+            raise KeyedError("orientation", str(error).removeprefix("orientation: ")) from None
+        if self.type == "MESH_RESOURCE" and self.mesh_resource is None:
+            raise KeyedError("mesh_resource", "missing, expected a file since type is MESH_RESOURCE")
+        return self
+
+    @property
+    def quat_xyzw(self) -> list[float]:
+        """Its orientation as a unit quaternion x, y, z, w."""
+        quat: Any = quat_of(self.orientation, self.ori_in_deg)
+        return [float(value) for value in quat]
+
+    @property
+    def mesh_uri(self) -> str:
+        """Where RViz finds the mesh; empty if there is none. `{package}/file` and plain paths become URIs."""
+        path = self.mesh_resource or ""
+        if path.startswith("{"):
+            return "package://" + path[1:].replace("}", "", 1)
+        return f"file://{path}" if path.startswith("/") else path

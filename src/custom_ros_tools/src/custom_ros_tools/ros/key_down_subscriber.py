@@ -1,0 +1,36 @@
+"""Calls functions when keys are pressed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from typing import Any
+
+import rospy
+
+from ..errors import MissingDependency
+
+
+class KeyDownSubscriber:
+    """Calls the function of each key that goes down, as told on `keyboard/keydown`.
+
+    Args:
+        callbacks: Functions by key code, such as `{Key.KEY_a: start}`.
+
+    Raises:
+        MissingDependency: If the ROS package `keyboard`, which has the message, is not installed.
+    """
+
+    def __init__(self, callbacks: Mapping[int, Callable[[], Any]]) -> None:
+        self._callbacks = dict(callbacks)
+        try:
+            key_type = import_module("keyboard.msg").Key
+        except ImportError:
+            how = "build the ROS package 'keyboard' (ros-keyboard) in this workspace and source it"
+            raise MissingDependency("keyboard/Key", how) from None
+        self._subscriber = rospy.Subscriber("keyboard/keydown", key_type, self._take, queue_size=100)
+
+    def _take(self, message: Any) -> None:
+        callback = self._callbacks.get(message.code)
+        if callback is not None:
+            callback()

@@ -1,0 +1,41 @@
+"""The node `remap_joint_state_to_floatarray`: joint states as bare numbers, for drivers that take those."""
+
+from __future__ import annotations
+
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+from ..float_array_config import FloatArrayConfig
+from ..joint_values import JointValues
+from .parameters import private_config
+from .remap_node import RemapNode
+from .run_node import run_node
+
+NAME = "remap_joint_state_to_floatarray"
+
+
+class FloatArrayNode(RemapNode):
+    """Publishes one quantity of joint states as numbers, in the order of `~config`.
+
+    Raises:
+        ConfigError: If the configuration is wrong.
+    """
+
+    def __init__(self) -> None:
+        self._config = private_config(FloatArrayConfig)
+        super().__init__(NAME, "joint_states", "joint_states/floatarray", Float64MultiArray, self._numbers)
+
+    def _numbers(self, message: JointState) -> Float64MultiArray:
+        field = self._config.field
+        values = JointValues.of(message.name, **{field: getattr(message, field)})
+        if self._config.joint_names is not None:
+            values = values.in_order(self._config.joint_names)
+        numbers = getattr(values, field)
+        if not numbers:
+            raise ValueError(f"expected {field}, got none")
+        return Float64MultiArray(data=list(numbers))
+
+
+def main() -> None:
+    """Runs the node."""
+    run_node(NAME, FloatArrayNode)

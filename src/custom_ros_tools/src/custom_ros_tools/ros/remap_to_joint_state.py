@@ -1,0 +1,26 @@
+"""The nodes `remap_joint_state` and `remap_joint_state_to_joint_state`: joint states from one topic to another."""
+
+from __future__ import annotations
+
+from sensor_msgs.msg import JointState
+
+from .joint_states import values_in
+from .remap_node import RemapNode
+from .run_node import run_node
+
+NAME = "remap_joint_state_to_joint_state"
+
+
+def main() -> None:
+    """Runs the node."""
+    run_node(NAME, lambda: RemapNode(NAME, "joint_states/from", "joint_states/to", JointState, _sound))
+
+
+def _sound(message: JointState) -> JointState:
+    """Returns the message as it is.
+
+    Raises:
+        ValueError: If it is faulty.
+    """
+    values_in(message)
+    return message

@@ -1,0 +1,47 @@
+"""Proxies of services that may not be there yet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import rospy
+
+PATIENCE_S = 5.0
+"""After how long of waiting it is said what is waited for [s]."""
+
+
+def get_srv_handler(
+    name: str, srv_type: type, persistent: bool = False, headers: dict[str, str] | None = None
+) -> rospy.ServiceProxy:
+    """Waits until a service is there, for ever if need be, and returns what calls it.
+
+    Args:
+        name: The service.
+        srv_type: Its type.
+        persistent: Whether to keep one connection open, which is faster and ends with the server.
+        headers: What else to tell the server when connecting.
+
+    Raises:
+        rospy.ROSInterruptException: If ROS shuts down meanwhile.
+    """
+    try:
+        rospy.wait_for_service(name, timeout=PATIENCE_S)
+    except rospy.ROSInterruptException:
+        raise
+    except rospy.ROSException:
+        rospy.logwarn("still waiting for service %s", rospy.resolve_name(name))
+        rospy.wait_for_service(name)
+    return rospy.ServiceProxy(name, srv_type, persistent=persistent, headers=headers)
+
+
+def get_srv_handlers(services: Mapping[str, type], persistent: bool = False) -> dict[str, rospy.ServiceProxy]:
+    """Does the same for several services.
+
+    Args:
+        services: Their types by name.
+        persistent: As for one.
+
+    Returns:
+        What calls them, by name.
+    """
+    return {name: get_srv_handler(name, srv_type, persistent) for name, srv_type in services.items()}

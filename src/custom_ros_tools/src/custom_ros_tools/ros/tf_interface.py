@@ -1,0 +1,177 @@
+"""TF in one object: tell it, ask it, wait for it, convert it."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import rospy
+import tf2_ros
+from geometry_msgs.msg import Transform, TransformStamped
+from numpy.typing import ArrayLike
+
+from ..transforms import Array, matrix_of, pose_of, rpy_of
+from .transform_messages import position_in, quat_in, transform_message
+
+NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
+POLL_S = 0.01
+
+
+class TfInterface:
+    """Broadcasts transforms and listens to them.
+
+    A transform from parent to child is the pose of the child expressed in the parent: position [m] and quaternion
+    x, y, z, w. Make one object for a node, after `rospy.init_node`; what was sent before it is not known to it.
+
+    Attributes:
+        tf_buffer: The tf2 buffer.
+        tf_broadcaster: The tf2 broadcaster.
+    """
+
+    def __init__(self) -> None:
+        self.tf_buffer = tf2_ros.Buffer()
+        self.tf_broadcaster = tf2_ros.TransformBroadcaster()
+        self._listener = tf2_ros.TransformListener(self.tf_buffer)
+
+    def set_tf(
+        self, parent: str, child: str, pos: ArrayLike, quat: ArrayLike = NO_ROTATION, eul_deg: bool = False
+    ) -> None:
+        """Broadcasts a transform; for the arguments see `pack_tf_msg`."""
+        self.tf_broadcaster.sendTransform(self.pack_tf_msg(parent, child, pos, quat, eul_deg))
+
+    def set_matrix(self, parent: str, child: str, T: ArrayLike) -> None:
+        """Broadcasts a transform given as homogeneous matrix, shape (4, 4).
+
+        Raises:
+            ValueError: If it is no rigid transform.
+        """
+        self.set_tf(parent, child, *pose_of(T))
+
+    def get_tf_msg(self, parent: str, child: str) -> TransformStamped | None:
+        """Returns the newest transform, None if there is none."""
+        try:
+            return self.tf_buffer.lookup_transform(parent.strip("/"), child.strip("/"), rospy.Time(0))
+        except tf2_ros.TransformException:
+            return None
+
+    def get_tf(self, parent: str, child: str) -> tuple[Array, Array] | tuple[None, None]:
+        """Returns position and quaternion of the newest transform, (None, None) if there is none."""
+        return _pose(self.get_tf_msg(parent, child))
+
+    def wait_for_tf_msg(self, parent: str, child: str, timeout: float | None = None) -> TransformStamped | None:
+        """Waits until there is a transform and returns the newest.
+
+        Args:
+            parent: The parent frame.
+            child: The child frame.
+            timeout: How long to wait [s] of wall time; None is for ever.
+
+        Returns:
+            None if there was none in time.
+
+        Raises:
+            rospy.ROSInterruptException: If ROS shuts down meanwhile.
+        """
+        start_s = time.monotonic()
+        while not rospy.is_shutdown():
+            message = self.get_tf_msg(parent, child)
+            if message is not None or (timeout is not None and time.monotonic() - start_s > timeout):
+                return message
+            time.sleep(POLL_S)  # rospy.sleep would hang while simulated time stands still
+        raise rospy.ROSInterruptException(f"shut down while waiting for TF from '{parent}' to '{child}'")
+
+    def wait_for_tf(
+        self, parent: str, child: str, timeout: float | None = None
+    ) -> tuple[Array, Array] | tuple[None, None]:
+        """Waits as `wait_for_tf_msg` does; returns position and quaternion, (None, None) if there was none in time."""
+        return _pose(self.wait_for_tf_msg(parent, child, timeout))
+
+    @staticmethod
+    def pack_tf_msg(
+        parent: str, child: str, pos: ArrayLike, quat: ArrayLike = NO_ROTATION, eul_deg: bool = False
+    ) -> TransformStamped:
+        """Returns a transform with the present stamp.
+
+        Args:
+            parent: The parent frame.
+            child: The child frame.
+            pos: Position x, y, z [m].
+            quat: Quaternion x, y, z, w, or roll, pitch, yaw.
+            eul_deg: Whether roll, pitch, yaw are in degrees rather than radians.
+
+        Raises:
+            ValueError: If lengths are wrong, a number is not finite or the quaternion is zero.
+        """
+        message = TransformStamped(child_frame_id=child, transform=transform_message(pos, quat, eul_deg))
+        message.header.frame_id = parent
+        message.header.stamp = rospy.Time.now()
+        return message
+
+    @staticmethod
+    def pack_tf(pos: ArrayLike, quat: ArrayLike = NO_ROTATION, eul_deg: bool = False) -> Transform:
+        """Returns a transform without frames; for the arguments see `pack_tf_msg`."""
+        return transform_message(pos, quat, eul_deg)
+
+    @staticmethod
+    def tf_msg_to_pos(tf: Transform) -> Array:
+        """Returns the position x, y, z [m] of a Transform."""
+        return position_in(tf)
+
+    @staticmethod
+    def tf_msg_to_quat(tf: Transform) -> Array:
+        """Returns the unit quaternion x, y, z, w of a Transform."""
+        return quat_in(tf)
+
+    @staticmethod
+    def tf_msg_to_eul(tf: Transform) -> Array:
+        """Returns roll, pitch, yaw [rad] of a Transform."""
+        return rpy_of(quat_in(tf))
+
+    @staticmethod
+    def tf_msg_to_pos_magnitude(tf: Transform) -> float:
+        """Returns the distance [m] of a Transform."""
+        return float(np.linalg.norm(position_in(tf)))
+
+    @staticmethod
+    def msg_to_pos(msg: TransformStamped) -> Array:
+        """Returns the position x, y, z [m] of a TransformStamped."""
+        return position_in(msg.transform)
+
+    @staticmethod
+    def msg_to_quat(msg: TransformStamped) -> Array:
+        """Returns the unit quaternion x, y, z, w of a TransformStamped."""
+        return quat_in(msg.transform)
+
+    @staticmethod
+    def msg_to_eul(msg: TransformStamped) -> Array:
+        """Returns roll, pitch, yaw [rad] of a TransformStamped."""
+        return TfInterface.tf_msg_to_eul(msg.transform)
+
+    @staticmethod
+    def msg_to_pos_magnitude(msg: TransformStamped) -> float:
+        """Returns the distance [m] of a TransformStamped."""
+        return TfInterface.tf_msg_to_pos_magnitude(msg.transform)
+
+    @staticmethod
+    def msg_to_pos_quat(msg: TransformStamped) -> tuple[Array, Array]:
+        """Returns position [m] and unit quaternion x, y, z, w of a TransformStamped."""
+        return position_in(msg.transform), quat_in(msg.transform)
+
+    @staticmethod
+    def msg_to_pos_eul(msg: TransformStamped) -> tuple[Array, Array]:
+        """Returns position [m] and roll, pitch, yaw [rad] of a TransformStamped."""
+        return position_in(msg.transform), TfInterface.msg_to_eul(msg)
+
+    @staticmethod
+    def msg_to_matrix(msg: TransformStamped) -> Array:
+        """Returns the homogeneous matrix, shape (4, 4), of a TransformStamped."""
+        return matrix_of(position_in(msg.transform), quat_in(msg.transform))
+
+    @staticmethod
+    def pos_quat_to_matrix(pos: ArrayLike, quat: ArrayLike = NO_ROTATION) -> Array:
+        """Returns the homogeneous matrix, shape (4, 4), of a position [m] and a quaternion x, y, z, w."""
+        return matrix_of(pos, quat)
+
+
+def _pose(message: TransformStamped | None) -> tuple[Array, Array] | tuple[None, None]:
+    return (None, None) if message is None else TfInterface.msg_to_pos_quat(message)

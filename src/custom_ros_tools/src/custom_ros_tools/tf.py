@@ -1,0 +1,5 @@
+"""TF in one object."""
+
+from .ros.tf_interface import TfInterface
+
+__all__ = ["TfInterface"]

@@ -1,0 +1,108 @@
+"""Rotations and poses: between quaternions, roll-pitch-yaw and matrices.
+
+Quaternions are x, y, z, w. Roll, pitch and yaw turn about the fixed x, y and z axis in this order, as in URDF.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+Array = NDArray[np.float64]
+
+MATRIX_TOLERANCE = 1e-3
+"""How far the rows of a rotation matrix may be from unit length and right angles."""
+SMALLEST_NORM = 1e-6
+"""A shorter quaternion counts as zero."""
+
+
+def finite_vector(values: ArrayLike, length: int, name: str) -> Array:
+    """Return values as a vector, shape (length,).
+
+    Raises:
+        ValueError: If there are more or fewer, or one is not finite; it calls them by `name`.
+    """
+    vector = np.asarray(values, dtype=float)
+    if vector.shape != (length,):
+        raise ValueError(f"{name}: expected {length} numbers, got shape {vector.shape}")
+    if not np.isfinite(vector).all():
+        raise ValueError(f"{name}: must be finite, got {', '.join(f'{v:g}' for v in vector)}")
+    return vector
+
+
+def unit_quat(quat_xyzw: ArrayLike) -> Array:
+    """Return a quaternion x, y, z, w of length 1.
+
+    Raises:
+        ValueError: If it has not four finite numbers or is zero.
+    """
+    quat = finite_vector(quat_xyzw, 4, "quaternion")
+    norm = np.linalg.norm(quat)
+    if norm < SMALLEST_NORM:
+        raise ValueError("quaternion: must not be zero; no rotation is 0, 0, 0, 1")
+    return np.asarray(quat / norm)
+
+
+def quat_of(orientation: ArrayLike, in_deg: bool = False) -> Array:
+    """Return an orientation as a unit quaternion x, y, z, w.
+
+    Args:
+        orientation: Either roll, pitch, yaw or a quaternion x, y, z, w.
+        in_deg: Whether roll, pitch and yaw are in degrees rather than radians; a quaternion has no unit.
+
+    Raises:
+        ValueError: If it is neither, is not finite or is a zero quaternion.
+    """
+    values = np.asarray(orientation, dtype=float)
+    if values.shape == (4,):
+        return unit_quat(values)
+    if values.shape != (3,):
+        raise ValueError(
+            f"orientation: expected roll, pitch, yaw or a quaternion x, y, z, w, got shape {values.shape}"
+        )
+    rpy = finite_vector(values, 3, "roll, pitch, yaw")
+    return np.asarray(Rotation.from_euler("xyz", rpy, degrees=in_deg).as_quat())
+
+
+def rpy_of(quat_xyzw: ArrayLike) -> Array:
+    """Return roll, pitch, yaw [rad] of a quaternion x, y, z, w; pitch is within -pi/2 and pi/2.
+
+    Raises:
+        ValueError: If it has not four finite numbers or is zero.
+    """
+    return np.asarray(Rotation.from_quat(unit_quat(quat_xyzw)).as_euler("xyz"))
+
+
+def matrix_of(position: ArrayLike, quat_xyzw: ArrayLike) -> Array:
+    """Return a pose as homogeneous matrix, shape (4, 4).
+
+    Args:
+        position: x, y, z [m].
+        quat_xyzw: Quaternion x, y, z, w.
+
+    Raises:
+        ValueError: If lengths are wrong, a number is not finite or the quaternion is zero.
+    """
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_quat(unit_quat(quat_xyzw)).as_matrix()
+    T[:3, 3] = finite_vector(position, 3, "position")
+    return T
+
+
+def pose_of(matrix: ArrayLike) -> tuple[Array, Array]:
+    """Return position [m] and unit quaternion x, y, z, w of a homogeneous matrix, shape (4, 4).
+
+    Raises:
+        ValueError: If it is no rigid transform, rounding aside.
+    """
+    T = np.asarray(matrix, dtype=float)
+    if T.shape != (4, 4):
+        raise ValueError(f"matrix: expected shape (4, 4), got {T.shape}")
+    if not np.isfinite(T).all():
+        raise ValueError("matrix: must be finite")
+    R = T[:3, :3]
+    is_rotation = np.allclose(R @ R.T, np.eye(3), atol=MATRIX_TOLERANCE) and np.linalg.det(R) > 0
+    if not is_rotation or not np.allclose(T[3], (0, 0, 0, 1)):
+        raise ValueError("matrix: expected a rotation, a translation and the last row 0, 0, 0, 1")
+    return T[:3, 3].copy(), np.asarray(Rotation.from_matrix(R).as_quat())

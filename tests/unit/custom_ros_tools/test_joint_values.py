@@ -1,0 +1,62 @@
+"""Values of joints keep to their joints, whatever the order they come in."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from custom_ros_tools.joint_values import JointValues, MissingJointsError
+
+
+def test_values_follow_their_joints_into_the_order_asked_for() -> None:
+    values = JointValues.of(["a", "b", "c"], [1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0])
+    ordered = values.in_order(["c", "a"])
+    assert ordered == JointValues(("c", "a"), (3.0, 1.0), (6.0, 4.0), (9.0, 7.0))
+
+
+def test_missing_joints_are_all_named_and_shift_nothing() -> None:
+    """Defect 45: with b missing, the release gave its place to the value of c."""
+    with pytest.raises(MissingJointsError) as caught:
+        JointValues.of(["a", "c"], [1.0, 3.0]).in_order(["a", "b", "c", "d"])
+    assert str(caught.value) == "no values for joints 'b', 'd': it has a, c"
+    assert caught.value.names == ("b", "d")
+
+
+@pytest.mark.parametrize("ns", ["left", "left/"])
+def test_namespace_is_looked_up_in_the_message_and_not_handed_on(ns: str) -> None:
+    values = JointValues.of(["right/a", "left/b", "left/a"], [1.0, 2.0, 3.0])
+    assert values.in_order(["a", "b"], ns) == JointValues(("a", "b"), (3.0, 2.0))
+
+
+def test_joint_that_is_missing_in_a_namespace_is_named_with_it() -> None:
+    with pytest.raises(MissingJointsError, match="^no values for joint 'left/a': it has a$"):
+        JointValues.of(["a"], [1.0]).in_order(["a"], "left")
+
+
+def test_state_without_names_has_none_of_the_joints() -> None:
+    with pytest.raises(MissingJointsError, match="'a': it names none"):
+        JointValues.of([], [1.0, 2.0]).in_order(["a"])
+
+
+def test_quantities_that_are_not_given_stay_so() -> None:
+    values = JointValues.of(["a", "b"], velocity=np.array([1.0, 2.0]))
+    assert values.in_order(["b", "a"]) == JointValues(("b", "a"), (), (2.0, 1.0), ())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ((["a", "b"], [1.0]), "expected 2 values of position, one a joint, got 1"),
+        ((["a", "b"], [1.0, 2.0], [1.0, 2.0, 3.0]), "expected 2 values of velocity, one a joint, got 3"),
+        (([], [1.0, 2.0], [1.0]), "expected 2 values of velocity, one a joint, got 1"),
+        ((["a"], [1.0], None, [math.nan]), "values must be finite, got effort nan"),
+        ((["a", "b"], [1.0, -math.inf]), "values must be finite, got position 1, -inf"),
+        ((["a", "b", "a"], [1.0, 2.0, 3.0]), "joints must be named once each, got a, b, a"),
+    ],
+)
+def test_faulty_values_are_refused_whole(arguments: tuple, told: str) -> None:
+    with pytest.raises(ValueError) as caught:
+        JointValues.of(*arguments)
+    assert str(caught.value) == told
