@@ -58,7 +58,9 @@ def test_client_with_simulated_time_is_served_in_it(start, control_msgs):
         [sys.executable, str(helpers / "trajectory_client.py"), *arguments], PYTHONPATH=":".join(paths)
     )
     assert client.wait(60.0) == 0, robot.ros.output(client)
-    assert f"state {GoalStatus.SUCCEEDED}, code 0, took 3." in robot.ros.output(client)
+    printed = robot.ros.output(client)
+    assert f"state {GoalStatus.SUCCEEDED}, code 0, took " in printed
+    assert float(printed.split()[-1]) > 2.9  # by the wall clock it is a second
 
 
 def test_feedback_comes_at_its_rate_of_simulated_time_and_tells_where_the_joints_are_to_be(start):

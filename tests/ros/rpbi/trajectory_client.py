@@ -1,4 +1,4 @@
-"""A planner's part, in a process of its own: sends a goal and prints how it ended. Arguments: seconds, then positions."""
+"""A planner's part, in its own process: sends a goal and prints how it ended. Arguments: seconds, then positions."""
 
 import sys
 
@@ -14,4 +14,4 @@ duration_s, *positions = map(float, sys.argv[1:])
 begin = rospy.Time.now()
 client.send_goal_and_wait(FollowJointTrajectoryGoal(trajectory=trajectory((duration_s, positions))))
 took_s = (rospy.Time.now() - begin).to_sec()
-print(f"state {client.get_state()}, code {client.get_result().error_code}, took {took_s:.1f} s", flush=True)
+print(f"state {client.get_state()}, code {client.get_result().error_code}, took {took_s:g}", flush=True)
