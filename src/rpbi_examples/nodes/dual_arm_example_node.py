@@ -1,6 +1,9 @@
 #!/usr/bin/python3
 """Draws mirrored circles with two arms."""
 
-from rpbi_examples.ros.dual_arm_example import main
+import signal
+
+signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # before any thread starts
+from rpbi_examples.ros.dual_arm_example import main  # noqa: E402
 
 main()

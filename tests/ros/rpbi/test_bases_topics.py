@@ -145,8 +145,10 @@ def test_a_fixed_base_follows_the_tf_frame_that_it_is_told_to(ros):
     carrier.header.frame_id, carrier.header.stamp = "rpbi/world", rospy.Time(1)
     carrier.transform.translation.x, carrier.transform.translation.z = 1.5, 0.4
     carrier.transform.rotation.x = carrier.transform.rotation.w = math.sqrt(0.5)
-    StaticTransformBroadcaster().sendTransform(carrier)
+    broadcaster = StaticTransformBroadcaster()
+    broadcaster.sendTransform(carrier)
     wait_until(lambda: states.messages[-1].pose.pose.position.x > 1.0, "the base has moved")
+    broadcaster.pub_tf.unregister()  # else this process goes on telling it, to all tests to come
     pose = states.messages[-1].pose.pose
     assert (pose.position.x, pose.position.y, pose.position.z) == pytest.approx((1.5, 0.0, 0.4), abs=1e-6)
     assert (pose.orientation.x, pose.orientation.w) == pytest.approx((math.sqrt(0.5), math.sqrt(0.5)), abs=1e-6)

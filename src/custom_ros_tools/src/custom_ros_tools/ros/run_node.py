@@ -21,7 +21,8 @@ def run_node(name: str, start: Callable[[], object], anonymous: bool = False) ->
 
     Args:
         name: The node's name unless it is given another one.
-        start: Opens topics and services; what it returns lives as long as the node.
+        start: Opens topics and services, and perhaps does the node's work itself until ROS shuts down, which
+            `rospy.ROSInterruptException` may tell; what it returns lives as long as the node.
         anonymous: Whether the name is made unique.
     """
     if not wait_for_master():
@@ -36,4 +37,6 @@ def run_node(name: str, start: Callable[[], object], anonymous: bool = False) ->
         except InterfaceError as error:
             log_last_words(str(error).splitlines())
             sys.exit(1)
+        except rospy.ROSInterruptException:
+            return
         ended.wait()

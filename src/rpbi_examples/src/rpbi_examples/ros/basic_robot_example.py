@@ -2,35 +2,27 @@
 
 from __future__ import annotations
 
-import sys
-
 import rospy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Int64
 
+from custom_ros_tools.ros.run_node import run_node
 from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import RobotInfo, RobotInfoResponse
 
 from ..swing import Swing
+from .arguments import robot_name
 
 HZ = 50.0
 
 
 def main() -> None:
     """Runs the node for the robot named by `~robot_name` or the first argument."""
-    rospy.init_node("basic_robot_example")
-    arguments = rospy.myargv(sys.argv)[1:]
-    name = rospy.get_param("~robot_name", arguments[0] if arguments else None)
-    if name is None:
-        rospy.logfatal("which robot? Give its name as ~robot_name or as first argument")
-        sys.exit(1)
-    try:
-        _swing(name)
-    except rospy.ROSInterruptException:
-        pass  # Ctrl-C
+    run_node("basic_robot_example", _swing)
 
 
-def _swing(name: str) -> None:
+def _swing() -> None:
+    name = robot_name()
     rospy.wait_for_service(f"rpbi/{name}/robot_info")
     info: RobotInfoResponse = rospy.ServiceProxy(f"rpbi/{name}/robot_info", RobotInfo)()
     joints = [joint for joint in info.joint_info if not joint.is_fixed]

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import math
-import sys
 
 import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
+from custom_ros_tools.ros.run_node import run_node
+
 from ..route import PlanarPose, Route
+from .arguments import robot_name
 
 
 def main() -> None:
     """Runs the node for the robot named by `~robot_name` or the first argument."""
-    rospy.init_node("drive_around")
-    arguments = rospy.myargv(sys.argv)[1:]
-    name = rospy.get_param("~robot_name", arguments[0] if arguments else None)
-    if name is None:
-        rospy.logfatal("which robot? Give its name as ~robot_name or as first argument")
-        sys.exit(1)
+    run_node("drive_around", _start)
+
+
+def _start() -> rospy.Subscriber:
+    name = robot_name()
     route = Route()
     publisher = rospy.Publisher(f"rpbi/{name}/cmd_vel", Twist, queue_size=1)
 
@@ -29,8 +30,7 @@ def main() -> None:
         command.linear.x, command.linear.y, command.angular.z = velocity
         publisher.publish(command)
 
-    rospy.Subscriber(f"rpbi/{name}/base_state", Odometry, drive, queue_size=1)
-    rospy.spin()
+    return rospy.Subscriber(f"rpbi/{name}/base_state", Odometry, drive, queue_size=1)
 
 
 def _planar(state: Odometry) -> PlanarPose:

@@ -6,6 +6,8 @@ import sys
 
 import rospy
 
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.run_node import run_node
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
 from ros_pybullet_interface.srv import ResetEffState
 
@@ -19,18 +21,17 @@ APPROACH_S = 3.0
 
 def main() -> None:
     """Runs the node for the two robots that the arguments name, the left one first."""
-    rospy.init_node("dual_arm_example")
+    run_node("dual_arm_example", _run)
+
+
+def _run() -> None:
     names = rospy.myargv(sys.argv)[1:]
     if len(names) != 2:
-        rospy.logfatal("expected the names of two robots, got %d", len(names))
-        sys.exit(1)
+        raise InterfaceError(f"expected the names of two robots, got {len(names)}")
     sides = dict(zip(names, (1.0, -1.0)))
-    try:
-        for name, side in sides.items():
-            _approach(name, side)
-        _draw(sides)
-    except rospy.ROSInterruptException:
-        pass  # Ctrl-C
+    for name, side in sides.items():
+        _approach(name, side)
+    _draw(sides)
 
 
 def _problem(time_s: float, side: float) -> CalculateInverseKinematicsProblem:
@@ -44,8 +45,7 @@ def _approach(name: str, side: float) -> None:
     rospy.wait_for_service(service)
     answer = rospy.ServiceProxy(service, ResetEffState)(_problem(0.0, side), APPROACH_S)
     if not answer.success:
-        rospy.logerr("%s: %s", service, answer.message)
-        sys.exit(1)
+        raise InterfaceError(f"{service}: {answer.message}")
 
 
 def _draw(sides: dict[str, float]) -> None:
