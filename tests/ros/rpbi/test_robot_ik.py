@@ -143,7 +143,7 @@ def test_an_unreachable_target_is_no_success_and_the_best_stays_within_limits(ro
     ("fields", "message"),
     [
         ({"link_name": "lbr_iiwa_link_77"}, "unknown link 'lbr_iiwa_link_77': .*did you mean 'lbr_iiwa_link_7'"),
-        ({"link_name": "lbr_iiwa_link_0"}, "unknown link 'lbr_iiwa_link_0'"),
+        ({"link_name": "lbr_iiwa_link_0"}, "link_name: 'lbr_iiwa_link_0' is the root link"),
         ({"targetPosition": [0.1, 0.2]}, "targetPosition: expected 3 values, got 2"),
         ({"targetPosition": [0.1, 0.2, math.nan]}, "targetPosition: values must be finite"),
         ({"targetPosition": [1e308, 1e308, 1e308]}, "targetPosition: .* 1e.09 at most"),

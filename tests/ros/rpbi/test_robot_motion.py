@@ -102,6 +102,8 @@ def test_its_hand_moves_to_a_pose(ros, states):
     problem = CalculateInverseKinematicsProblem(link_name="lbr_iiwa_link_7", targetPosition=[0.5, 0.2, 0.6])
     answer = ros.call("/rpbi/iiwa/move_to_eff_state", ResetEffState, problem, 0.5)
     assert answer.success, answer.message
+    assert "link 'lbr_iiwa_link_7' is " in answer.message
+    assert float(answer.message.split("link 'lbr_iiwa_link_7' is ")[1].split(" mm")[0]) < 2.0
     assert [now(states)[name] for name in here.solution.name] == pytest.approx(
         list(here.solution.position), abs=0.02
     )
@@ -120,7 +122,7 @@ REFUSED = {
     "outside limits": ({"j1": 0.2, "j4": 3.0}, 1.0, f"joint '{FOURTH}' must be within -2.0944 to 2.0944 rad, got 3"),
     "not finite": ({"j1": math.nan}, 1.0, f"values must be finite, got nan for joint '{FIRST}'"),
     "unknown joint": ({"j9": 0.1}, 1.0, "unknown joint 'lbr_iiwa_joint_9': known are"),
-    "duration": ({"j1": 0.2}, -1.0, "duration must be 0 or more [s], got -1"),
+    "duration": ({"j1": 0.2}, -1.0, "duration must be 0 to 1e+06 [s], got -1"),
     "no joint": ({}, 1.0, "expected a position for one joint or more, got none"),
 }
 
@@ -220,3 +222,22 @@ def test_bodies_are_put_somewhere_at_once_and_nonsense_is_refused(ros, node):
     answer = ros.call("/rpbi/box/set_pose", SetTransform, transform)
     assert not answer.success
     assert "must be finite" in answer.message
+
+
+def test_a_motion_is_stopped_by_service_and_stopping_nothing_says_so(ros, states):
+    moving = in_background(lambda: move(ros, 4.0, j1=1.0))
+    wait_until(lambda: now(states)[FIRST] > 0.05, "it is under way")
+    assert ros.call("/rpbi/iiwa/stop_motion", Trigger).success
+    assert "it was stopped before the goal" in moving().message
+    answer = ros.call("/rpbi/iiwa/stop_motion", Trigger)
+    assert not answer.success
+    assert answer.message == "no motion is running"
+
+
+def test_a_base_that_is_put_elsewhere_ends_the_motion(ros, states):
+    moving = in_background(lambda: move(ros, 4.0, j1=1.0))
+    wait_until(lambda: now(states)[FIRST] > 0.05, "it is under way")
+    transform = SetTransform._request_class().transform
+    transform.rotation.w = 1.0
+    assert ros.call("/rpbi/iiwa/set_pose", SetTransform, transform).success
+    assert "the robot was put elsewhere before the goal" in moving().message

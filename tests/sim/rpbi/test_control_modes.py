@@ -196,3 +196,61 @@ def test_joints_are_put_somewhere_at_once_and_held_there(build):
     with pytest.raises(ValueError, match=f"joint '{SECOND}' must be within -2.094"):
         robot.set_joint_state(JointTarget([FIRST, SECOND], [0.1, 3.0]))
     assert state(world)[0] == pytest.approx(0.5, abs=1e-3), "nothing of a refused state is taken over"
+
+
+def test_joints_that_were_not_put_keep_their_targets(build):
+    world = build("POSITION_CONTROL")
+    world.put("iiwa/target", JointTarget([FIRST], [0.8]))
+    run(world, 50)
+    world.bodies["iiwa"].set_joint_state(JointTarget([JOINTS[6]], [0.3]))
+    run(world, 2000)
+    assert (state(world)[0], state(world, JOINTS[6])[0]) == pytest.approx((0.8, 0.3), abs=1e-3)
+
+
+def test_a_position_beyond_the_limit_goes_to_the_limit_and_is_told_once(build, caplog):
+    world = build("POSITION_CONTROL")
+    for _ in range(3):
+        world.put("iiwa/target", JointTarget([SECOND], [30.0]))
+        run(world, 500)
+    assert state(world, SECOND)[0] == pytest.approx(2.0944, abs=0.01)
+    assert len([message for message in caplog.messages if "must be within" in message]) == 1
+
+
+@pytest.mark.parametrize(
+    ("target", "message"),
+    [
+        (JointTarget([FIRST], [0.1], [1e300]), "must be within"),
+        (JointTarget([FIRST], [0.1], [50.0]), f"velocity of joint '{FIRST}' must be within"),
+        (JointTarget([FIRST], [1e300]), "must be within"),
+        (JointTarget([FIRST, SECOND], [0.1]), "expected one value for each"),
+    ],
+)
+def test_a_joint_state_that_cannot_be_is_refused(build, target, message):
+    world = build("POSITION_CONTROL")
+    with pytest.raises(ValueError, match=message):
+        world.bodies["iiwa"].set_joint_state(target)
+    assert state(world) == (0.0, 0.0)
+
+
+def test_a_start_beyond_the_limits_is_a_fault_of_the_file(build):
+    with pytest.raises(ConfigError, match=f"initial_joint_position.{SECOND}: joint '{SECOND}' must be within"):
+        build("POSITION_CONTROL", initial_joint_position={SECOND: 400.0})
+
+
+def test_one_number_is_a_gain_for_all(build):
+    world = build("POSITION_CONTROL", gains={"positionGains": 0.2})
+    run(world, 10)
+
+
+@pytest.mark.parametrize(
+    ("gains", "message"),
+    [
+        ("much", "positionGains: expected a number, a list of numbers or a mapping"),
+        ({FIRST: -1.0}, f"positionGains.{FIRST}: must be >= 0"),
+        ([0.1, 0.1], "expected 1 number or 7"),
+    ],
+)
+def test_gains_that_make_no_sense_are_one_problem(build, gains, message):
+    with pytest.raises(ConfigError, match=message) as caught:
+        build("POSITION_CONTROL", gains={"positionGains": gains})
+    assert len(caught.value.problems) == 1

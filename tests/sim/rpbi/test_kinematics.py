@@ -294,8 +294,13 @@ def test_a_link_on_a_ball_joint_is_refused_and_the_joint_named(slider):
         slider.solve(IKProblem("bob", (0.2, 0.3, 0.2)))
 
 
-@pytest.mark.parametrize("link", ["pne", "rail", ""])
-def test_a_link_that_is_unknown_or_the_root_is_named_with_the_known_ones(slider, link):
+def test_the_root_link_is_refused_as_what_it_is(slider):
+    with pytest.raises(ValueError, match="link_name: 'rail' is the root link, which no joint moves"):
+        slider.solve(IKProblem("rail", (0.2, 0.3, 0.2)))
+
+
+@pytest.mark.parametrize("link", ["pne", ""])
+def test_a_link_that_is_unknown_is_named_with_the_known_ones(slider, link):
     with pytest.raises(UnknownNameError, match=f"unknown link '{link}': known are carriage, disc, pen, bob, cover"):
         slider.solve(IKProblem(link, (0.2, 0.3, 0.2)))
 

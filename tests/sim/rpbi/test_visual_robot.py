@@ -83,7 +83,7 @@ def test_it_is_where_targets_say_also_beyond_limits_which_is_told_by_joint(build
         run(world, 1)
     assert joint(world) == 3.0
     assert [message for message in caplog.messages if "must be within" in message] == [
-        f"ghost: joint '{JOINT}' must be within -2.0944 to 2.0944 rad, got 3"
+        f"ghost: joint '{JOINT}' must be within -2.0944 to 2.0944 rad, got 3; it is shown there"
     ]
 
 
@@ -119,3 +119,44 @@ def test_a_robot_that_is_not_visual_needs_motors(build):
     robot["is_visual_robot"] = False
     with pytest.raises(ConfigError, match="setJointMotorControlArray: missing; only a visual robot does without"):
         build(robot)
+
+
+INERTIAL = (
+    '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
+)
+STONE = f'<robot name="r"><link name="a">{INERTIAL}</link></robot>'
+SPHERICAL = STONE.replace(
+    "</robot>",
+    f'<link name="b">{INERTIAL}</link><joint name="ball" type="spherical"><parent link="a"/><child link="b"/>'
+    '<origin xyz="0 0 0.2"/></joint></robot>',
+)
+
+
+def test_spherical_joints_stay_finite_and_no_motor_moves_them(build, tmp_path):
+    urdf = tmp_path / "ball.urdf"
+    urdf.write_text(SPHERICAL)
+    world = build(ghost(loadURDF={"fileName": str(urdf)}, broadcast_link_states=True))
+    run(world, 200)
+    assert world.bodies["ghost"].base_pose().position == (0.0, 0.0, 0.0)
+    with pytest.raises(ValueError, match=r"expected joints that can be driven, got 'ball' \(JOINT_SPHERICAL\)"):
+        world.bodies["ghost"].set_joint_state(JointTarget(["ball"], [0.5]))
+
+
+def test_gravity_compensation_of_a_spherical_joint_is_refused(build, tmp_path):
+    urdf = tmp_path / "ball.urdf"
+    urdf.write_text(SPHERICAL)
+    with pytest.raises(ConfigError, match="gravity_compensation: works with revolute, prismatic and fixed joints only"):
+        build(iiwa(loadURDF={"fileName": str(urdf)}, gravity_compensation=True))
+
+
+def test_gravity_compensation_of_a_robot_without_joints_does_nothing(build, tmp_path):
+    urdf = tmp_path / "stone.urdf"
+    urdf.write_text(STONE)
+    world = build(
+        iiwa(
+            loadURDF={"fileName": str(urdf)},
+            setJointMotorControlArray={"controlMode": "TORQUE_CONTROL"},
+            gravity_compensation=True,
+        )
+    )
+    run(world, 10)

@@ -32,7 +32,7 @@ def test_relative_path_is_sought_beside_the_file_from_any_working_directory(
 def test_parameter_server_has_no_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "a.urdf").write_text("")
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ValueError, match=rf"^no such file: a.urdf \(looked in {DATA}\)$"):
+    with pytest.raises(ValueError, match=rf"^no such file: a.urdf \(looked in {DATA}\); .* write {{package}}/PATH"):
         find_file("a.urdf", "~config")
 
 

@@ -43,6 +43,8 @@ def find_file(name: str, file: str, search_paths: Sequence[str] = ()) -> str:
     if any(candidate.is_dir() for candidate in candidates):
         raise ValueError(f"expected a file, got the folder {name}")
     where = "" if path.is_absolute() else f" (looked in {', '.join(map(str, folders))})"
+    if where and file.startswith("~"):
+        where += "; what is on the parameter server has no folder: write {package}/PATH or the full path"
     raise ValueError(f"no such file: {path if path.is_absolute() else name}{where}")
 
 

@@ -10,6 +10,9 @@ from typing import Any
 from .pose import Pose
 from .pybullet_models import ObjectTf
 
+FARTHEST_M = 1e6
+"""Beyond this a body would not stay finite [m]."""
+
 
 @dataclass(frozen=True)
 class Input:
@@ -54,6 +57,8 @@ def check_pose(pose: Pose) -> Pose:
     position, quat = pose
     if not all(map(math.isfinite, (*position, *quat))):
         raise ValueError(f"pose must be finite, got {position}, {quat}")
+    if max(map(abs, position)) > FARTHEST_M:
+        raise ValueError(f"position must be within +-{FARTHEST_M:g} m, got {position}")
     norm = math.hypot(*quat)
     if norm < 1e-6:
         raise ValueError(f"quaternion must not be zero, got {quat}")

@@ -19,6 +19,8 @@ _TYPE_NAMES = {
     pybullet.JOINT_FIXED: "JOINT_FIXED",
 }
 
+LARGEST = 1e9
+"""Positions, velocities and efforts beyond this are no use to anybody, and would not stay finite."""
 LIMIT_ROUNDING = 1e-6
 """A position may be this far beyond a limit [rad or m] and still counts as within."""
 
@@ -174,8 +176,23 @@ class JointModel:
             joint = self[name]
             if not math.isfinite(value):
                 raise ValueError(f"values must be finite, got {value} for joint '{name}'")
+            if abs(value) > LARGEST:
+                raise ValueError(f"values must be within +-{LARGEST:g}, got {value:g} for joint '{name}'")
             if joint.is_driven:
                 resolved[joint.index] = float(value)
+        return resolved
+
+    def resolve_driven(self, names: Sequence[str], values: Sequence[float]) -> dict[int, float]:
+        """Does the same as `resolve`, and refuses joints that no motor can move.
+
+        Raises:
+            UnknownNameError: If the robot lacks one of the joints.
+            ValueError: If lengths differ, a joint is named twice or cannot be driven, or a value is not finite.
+        """
+        resolved = self.resolve(names, values)
+        others = [f"'{name}' ({self[name].type_name})" for name in names if not self[name].is_driven]
+        if others and not resolved:
+            raise ValueError(f"expected joints that can be driven, got {', '.join(others)}")
         return resolved
 
     def check_limits(self, positions: Mapping[int, float]) -> None:

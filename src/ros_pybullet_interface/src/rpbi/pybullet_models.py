@@ -6,13 +6,15 @@ it takes each of them, with values of that type.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from custom_ros_tools.schema import (
     ConfigModel,
     Count,
+    Expects,
     FrameId,
     Hz,
     KeyedError,
@@ -44,7 +46,17 @@ from .pybullet_args import (
 HalfExtents = Annotated[tuple[PositiveMetres, PositiveMetres, PositiveMetres], Field(strict=False)]
 
 
-Gains = ListOf[NonNegative] | dict[str, NonNegative]
+def _one_as_list(given: Any) -> Any:
+    return [given] if isinstance(given, (int, float)) and not isinstance(given, bool) else given
+
+
+Gains = Annotated[
+    Annotated[ListOf[NonNegative], Tag("list")] | Annotated[dict[str, NonNegative], Tag("mapping")],
+    Discriminator(lambda given: "mapping" if isinstance(given, Mapping) else "list"),
+    BeforeValidator(_one_as_list),
+    Expects("a number, a list of numbers or a mapping of joints to numbers"),
+]
+"""One gain for all joints, one for each, or some by joint."""
 
 
 class PybulletModel(ConfigModel):

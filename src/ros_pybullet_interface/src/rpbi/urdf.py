@@ -13,7 +13,12 @@ from pathlib import Path
 from custom_ros_tools.config import replace_package
 from custom_ros_tools.errors import ConfigError, Problem
 
-_FILENAME = re.compile(r"""(?P<before>filename\s*=\s*)(?P<quote>["'])(?P<path>.*?)(?P=quote)""")
+_FILENAME = re.compile(
+    r"""(?P<before><(?:mesh|texture)\b[^>]*?\bfilename\s*=\s*)(?P<quote>["'])(?P<path>.*?)(?P=quote)"""
+)
+_NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""Characters that XML 1.0 does not allow (https://www.w3.org/TR/xml/#charsets); PyBullet does not mind them."""
+_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _PACKAGE = "package://"
 
 
@@ -23,6 +28,11 @@ def _folder() -> Path:
     folder = tempfile.TemporaryDirectory(prefix="rpbi-urdf-")
     atexit.register(folder.cleanup)
     return Path(folder.name)
+
+
+def read_urdf(path: str) -> str:
+    """Returns the text of a URDF file without its comments, and without characters that XML does not allow."""
+    return _COMMENT.sub("", _NOT_XML.sub("", Path(path).read_text(encoding="utf-8")))
 
 
 def resolve_meshes(path: str) -> str:
@@ -39,7 +49,7 @@ def resolve_meshes(path: str) -> str:
         ConfigError: If a mesh belongs to an unknown package or does not exist.
     """
     source = Path(path)
-    text = source.read_text(encoding="utf-8")
+    text = read_urdf(path)
     if "package://" not in text:
         return path
     problems: list[Problem] = []
@@ -88,7 +98,7 @@ def description_for_ros(path: str) -> str:
         file = _mesh_file(mesh, source) if _is_of_unknown_package(mesh) else source.parent / mesh
         return f"{match['before']}{match['quote']}file://{file.resolve()}{match['quote']}"
 
-    return _FILENAME.sub(address, source.read_text(encoding="utf-8"))
+    return _FILENAME.sub(address, read_urdf(path))
 
 
 def joint_types(path: str) -> dict[str, str]:
@@ -98,7 +108,7 @@ def joint_types(path: str) -> dict[str, str]:
         ConfigError: If the file is not XML.
     """
     try:
-        joints = ElementTree.parse(path).getroot().iterfind("joint")
+        joints = ElementTree.fromstring(read_urdf(path)).iterfind("joint")
     except ElementTree.ParseError as error:
         raise ConfigError([Problem(path, "", f"is not XML: {error}")]) from None
     return {joint.get("name", ""): joint.get("type", "") for joint in joints}

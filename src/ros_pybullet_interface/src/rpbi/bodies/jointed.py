@@ -122,9 +122,14 @@ class JointedBody(Body):
             UnknownNameError: If the robot lacks one of the joints.
             ValueError: If a number is missing, not finite or outside the joint's limits.
         """
-        positions = self.model.resolve(target.names, target.position)
+        positions = self.model.resolve_driven(target.names, target.position)
         velocities = self.model.resolve(target.names, target.velocity) if target.velocity else {}
         self.model.check_limits(positions)
+        for index, velocity in velocities.items():
+            joint = self.model.joints[index]
+            if abs(velocity) > joint.max_velocity:
+                limit = f"{joint.max_velocity:g} {joint.unit}/s"
+                raise ValueError(f"velocity of joint '{joint.name}' must be within +-{limit}, got {velocity:g}")
         for index, position in positions.items():
             self.pb.resetJointState(self.body_id, index, position, velocities.get(index, 0.0))
 
@@ -136,7 +141,15 @@ class JointedBody(Body):
 
     def _misfits(self) -> list[Problem]:
         """Returns what in the configuration does not fit the robot."""
-        return self._unknown_joints("initial_joint_position", self.config.initial_joint_position)
+        problems = self._unknown_joints("initial_joint_position", self.config.initial_joint_position)
+        if problems:
+            return problems
+        starts = ((self.model.joints[index], position) for index, position in self.start_positions().items())
+        return [
+            Problem(self.name, f"initial_joint_position.{joint.name}", joint.limit_violation(position))
+            for joint, position in starts
+            if joint.name in self.config.initial_joint_position and not joint.allows(position)
+        ]
 
     def _unknown_joints(self, key: str, names: Iterable[str]) -> list[Problem]:
         problems = []

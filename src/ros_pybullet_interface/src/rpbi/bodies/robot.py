@@ -19,6 +19,8 @@ from ..control.motors import Command, Motors
 from ..control.trajectory_config import trajectory_misfits
 from ..inputs import Input
 from ..joint_model import JointTarget
+from ..limit_reports import LimitReports
+from ..pose import Pose
 from ..sensors.force_torque import ForceTorqueSensor
 from ..sensors.joint_state import JointStateSensor
 from ..sensors.sensor import Sensor
@@ -51,6 +53,7 @@ class Robot(JointedBody):
             self.model,
             mode,
             self._gains(),
+            LimitReports(self.name),
             config.enforce_effort_limits,
             config.target_timeout_s,
             self.dt_s,
@@ -121,15 +124,21 @@ class Robot(JointedBody):
             self.halt(reason)
 
     def switch_mode(self, mode: int) -> None:
-        """Changes PyBullet's control mode; a motion that runs is ended."""
-        self.halt("the control mode was changed")
-        self.motors.switch(mode)
+        """Changes PyBullet's control mode, if it is another one; a motion that runs is ended."""
+        if mode != self.motors.mode:
+            self.halt("the control mode was changed")
+            self.motors.switch(mode)
 
     def set_joint_state(self, target: JointTarget) -> None:
         """Puts joints somewhere at once, where the motors then hold them; a motion that runs is ended."""
         super().set_joint_state(target)
         self.halt("its joints were put elsewhere")
-        self.motors.switch(self.motors.mode)
+        self.motors.rest(self.model.resolve(target.names, target.position))
+
+    def teleport(self, pose: Pose) -> None:
+        """Puts the base link's URDF frame at a pose in the world, at rest; a motion that runs is ended."""
+        self.halt("the robot was put elsewhere")
+        super().teleport(pose)
 
     def efforts(self, reported: tuple[float, ...]) -> tuple[float, ...]:
         """Returns the motors' efforts [N m or N] of all joints; PyBullet does not report those of torque control."""
@@ -167,7 +176,7 @@ class Robot(JointedBody):
     def _check_target(self, target: JointTarget) -> Command:
         command = self.motors.check(target)
         motion = self.motion
-        driven = [] if motion is None else [self.joints[i].name for i in command.values if i in motion.joints]
+        driven = [] if motion is None else [self.model.joints[i].name for i in command.values if i in motion.joints]
         if driven:
             raise ValueError(f"a motion drives {', '.join(driven)} until it ends")
         return command
@@ -201,7 +210,15 @@ class Robot(JointedBody):
                 names = ", ".join(joint.name for joint in driven)
                 message = f"expected 1 number or {len(driven)}, one for each of {names}; got {len(gains)}"
                 problems.append(Problem(self.name, path, message))
-        return problems + self._force_torque_misfits()
+        return [*problems, *self._force_torque_misfits(), *self._gravity_misfits()]
+
+    def _gravity_misfits(self) -> list[Problem]:
+        """PyBullet's inverse dynamics know joints of one axis only."""
+        others = [joint.name for joint in self.joints if not (joint.is_driven or joint.is_fixed)]
+        if not (self.config.gravity_compensation and others):
+            return []
+        message = f"works with revolute, prismatic and fixed joints only; there are {', '.join(others)}"
+        return [Problem(self.name, "gravity_compensation", message)]
 
     def _trajectory_misfits(self) -> list[Problem]:
         names = [joint.name for joint in self.model.driven]

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping
 from typing import Any
 
 from ..client import Client
 from ..inputs import Input
 from ..joint_model import JointTarget
+from ..limit_reports import LimitReports
 from .jointed import JointedBody
 from .robot_config import RobotConfig
-
-log = logging.getLogger(__name__)
 
 
 class VisualRobot(JointedBody):
@@ -25,10 +23,11 @@ class VisualRobot(JointedBody):
 
     def __init__(self, pb: Client, config: RobotConfig) -> None:
         super().__init__(pb, config, fixed_base=True)
-        self._beyond: dict[int, bool] = {}
+        self._limit_reports = LimitReports(self.name)
         for link in (-1, *self.joint_indices):
             pb.setCollisionFilterGroupMask(self.body_id, link, 0, 0)
-            pb.changeDynamics(self.body_id, link, mass=0.0)  # what has no mass does not fall
+            # What has no mass does not fall; without inertia, though, spherical joints would not be finite.
+            pb.changeDynamics(self.body_id, link, mass=0.0, localInertiaDiagonal=(1.0, 1.0, 1.0))
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
@@ -45,14 +44,5 @@ class VisualRobot(JointedBody):
     def _show(self, positions: dict[int, float]) -> None:
         for index, position in positions.items():
             self.pb.resetJointState(self.body_id, index, position)
-        if self.config.do_log_joint_limit_violations:
-            self._report_violations(positions)
-
-    def _report_violations(self, positions: dict[int, float]) -> None:
-        """Names each joint that has just gone beyond its limits, once until it has come back."""
-        for index, position in positions.items():
-            joint = self.joints[index]
-            beyond = not joint.allows(position)
-            if beyond and not self._beyond.get(index):
-                log.warning("%s: %s", self.name, joint.limit_violation(position))
-            self._beyond[index] = beyond
+            if self.config.do_log_joint_limit_violations:
+                self._limit_reports.take(self.joints[index], position, "it is shown there")

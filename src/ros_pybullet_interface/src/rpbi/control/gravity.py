@@ -34,6 +34,8 @@ class GravityModel:
 
     def efforts(self) -> dict[int, float]:
         """Returns the efforts [N m or N] by joint index that balance gravity where the robot is."""
+        if not self._driven:
+            return {}
         if self._pb is None:
             self._pb = self._load()
         quat = self._robot.base_pose().quat_xyzw

@@ -10,6 +10,7 @@ import pybullet
 
 from ..client import Client
 from ..joint_model import Joint, JointModel, JointTarget
+from ..limit_reports import LimitReports
 
 QUANTITIES = {
     pybullet.POSITION_CONTROL: "position",
@@ -50,6 +51,7 @@ class Motors:
         model: Its joints.
         mode: Control mode at the start.
         gains: PyBullet's `positionGain` and `velocityGain` by joint index, where they are not PyBullet's own.
+        limit_reports: Tells of positions beyond the joints' limits.
         enforce_effort_limits: Whether motors are held to the efforts of the URDF.
         timeout_s: Age at which velocity and effort targets expire [s] of the world's time.
         dt_s: Length of a tick [s].
@@ -62,11 +64,13 @@ class Motors:
         model: JointModel,
         mode: int,
         gains: Mapping[int, Mapping[str, float]],
+        limit_reports: LimitReports,
         enforce_effort_limits: bool,
         timeout_s: float,
         dt_s: float,
     ) -> None:
         self._pb, self._body_id, self._model = pb, body_id, model
+        self._limit_reports = limit_reports
         self._enforce_effort_limits = enforce_effort_limits
         self._position_arguments = {joint.index: self._arguments(joint, gains) for joint in model.driven}
         self._velocity_arguments = {
@@ -150,6 +154,14 @@ class Motors:
         """What the motors are set to by joint index: positions, velocities or efforts, as the control mode says."""
         return self._targets
 
+    def rest(self, positions: Mapping[int, float]) -> None:
+        """Takes joints by index as put at positions [rad or m]: there they are held, or driven by nothing any more."""
+        for index, position in positions.items():
+            self._expiry.pop(index, None)
+            self._renewed.discard(index)
+            self._targets[index] = position if self.mode == pybullet.POSITION_CONTROL else 0.0
+            self._drive(index, self._targets[index])
+
     def set_feed_forward(self, efforts: Mapping[int, float]) -> None:
         """Sets efforts [N m or N] by joint index that are added to those of the targets under torque control."""
         self._feed_forward = [efforts.get(index, 0.0) for index in self._indices]
@@ -179,8 +191,11 @@ class Motors:
                 self._drive(index, 0.0)
 
     def _limited(self, index: int, value: float) -> float:
-        """Returns a velocity or an effort within what the joint can do; a position as it is."""
+        """Returns a position, velocity or effort within what the joint can do."""
         joint = self._model.joints[index]
+        if self.mode == pybullet.POSITION_CONTROL:
+            self._limit_reports.take(joint, value, "it goes to the limit")
+            return min(max(value, joint.lower), joint.upper)
         if self.mode == pybullet.VELOCITY_CONTROL:
             limit = joint.max_velocity
         elif self.mode == pybullet.TORQUE_CONTROL and self._enforce_effort_limits:

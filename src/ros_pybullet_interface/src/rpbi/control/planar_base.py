@@ -6,6 +6,8 @@ import math
 
 import pybullet
 
+from custom_ros_tools.errors import ConfigError, Problem
+
 from ..client import Client
 from ..pose import Pose
 from .planar_base_config import PlanarBaseConfig
@@ -110,4 +112,6 @@ class PlanarBase:
         mass_kg, yaw_inertia = inertia[0][0], inertia[2][2]
         force = self._config.max_force or mass_kg * GRAVITY
         torque = self._config.max_torque or GRAVITY * math.sqrt(mass_kg * yaw_inertia)
+        if not force or not torque:
+            raise ConfigError([Problem("", "planar_base", "the robot has no mass; give max_force and max_torque")])
         return force, force, torque

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 from custom_ros_tools.errors import ConfigError, Problem
 
-from ..urdf import resolve_meshes, write_description
+from ..urdf import read_urdf, resolve_meshes, write_description
 
 PLANAR_JOINTS = (0, 1, 2)
 """PyBullet's indices of the joints along x and y [m] and about z [rad], and of the links behind them."""
@@ -29,7 +29,7 @@ def with_planar_joints(path: str) -> str:
     """
     source = Path(resolve_meshes(path))
     try:
-        robot = ElementTree.fromstring(source.read_text(encoding="utf-8").strip())
+        robot = ElementTree.fromstring(read_urdf(str(source)).strip())
     except ElementTree.ParseError as error:
         raise ConfigError([Problem(path, path, f"is not XML: {error}")]) from None
     for element in robot.iterfind(".//*[@filename]"):  # meshes and textures

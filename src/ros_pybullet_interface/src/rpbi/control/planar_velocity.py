@@ -7,6 +7,9 @@ from typing import NamedTuple
 
 from ..twist import Twist
 
+ROUNDING = 1e-6
+"""Components out of the plane up to this count as zero [m/s, rad/s]."""
+
 
 class PlanarVelocity(NamedTuple):
     """Velocity of a base in its plane.
@@ -36,7 +39,7 @@ class PlanarVelocity(NamedTuple):
         bad = [f"{key}={value}" for key, value in given.items() if not math.isfinite(value)]
         if bad:
             raise ValueError(f"velocities must be finite, got {', '.join(bad)}")
-        bad = [f"{key}={given[key]:g}" for key in ("linear.z", "angular.x", "angular.y") if given[key]]
+        bad = [f"{key}={given[key]:g}" for key in ("linear.z", "angular.x", "angular.y") if abs(given[key]) > ROUNDING]
         if bad:
             raise ValueError(f"a planar base has linear.x, linear.y and angular.z alone, got {', '.join(bad)}")
         return cls(given["linear.x"], given["linear.y"], given["angular.z"])

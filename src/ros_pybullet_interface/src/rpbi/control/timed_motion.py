@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 from ..joint_model import JointModel
@@ -15,6 +14,8 @@ REST = {"rad": 0.05, "m": 0.005}
 """Speed below which a joint counts as having come to rest there, by unit and second."""
 SETTLING_S = 1.0
 """How long after the last set point the joints may take to come to rest at the goal [s] of the world's time."""
+LONGEST_S = 1e6
+"""Longest motion [s]; what is longer was not meant."""
 SHORTEST_S = 0.04
 """A motion takes at least this long [s], as in the first release."""
 PEAK = 15.0 / 8.0
@@ -39,8 +40,8 @@ class TimedMotion(Motion):
     def __init__(self, model: JointModel, goal: Mapping[int, float], duration_s: float) -> None:
         if not goal:
             raise ValueError("expected a position for one joint or more, got none")
-        if not (math.isfinite(duration_s) and duration_s >= 0.0):
-            raise ValueError(f"duration must be 0 or more [s], got {duration_s:g}")
+        if not 0.0 <= duration_s <= LONGEST_S:
+            raise ValueError(f"duration must be 0 to {LONGEST_S:g} [s], got {duration_s:g}")
         model.check_limits(goal)
         super().__init__(frozenset(goal))
         self._model = model
@@ -55,7 +56,7 @@ class TimedMotion(Motion):
             PEAK * abs(goal - from_) / self._model.joints[index].max_velocity
             for from_, (index, goal) in zip(start, self._goal.items())
         )
-        self._duration_s = max(self._asked_s, shortest)
+        self._duration_s = min(max(self._asked_s, shortest), LONGEST_S)
         self._trajectory = minimum_jerk(start, list(self._goal.values()), time_s, self._duration_s)
         self._time_s, self._set_point = time_s, tuple(start)
 

@@ -140,6 +140,7 @@ class Kinematics:
             write_description(self._skeleton.text()), useFixedBase=True, globalScaling=self._scaling, flags=flags
         )
         joints = [Joint.from_info(pb.getJointInfo(body_id, i)) for i in range(pb.getNumJoints(body_id))]
+        self._root_link = pb.getBodyInfo(body_id)[0].decode()
         pb.removeBody(body_id)
         return joints
 
@@ -148,8 +149,10 @@ class Kinematics:
 
         Raises:
             UnknownNameError: If there is no such link.
-            ValueError: If it hangs on a joint that is neither revolute nor prismatic.
+            ValueError: If it is the root link, or hangs on a joint that is neither revolute nor prismatic.
         """
+        if link_name == self._root_link:
+            raise ValueError(f"link_name: '{link_name}' is the root link, which no joint moves")
         if link_name not in self._links:
             raise UnknownNameError("link", link_name, self._links)
         if link_name not in self._chains:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import rospy
-from std_srvs.srv import Empty
+from std_srvs.srv import Empty, Trigger
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.srv import SetString, SetTransform
@@ -25,7 +25,7 @@ from .force_torque_zero import force_torque_suffixes, zero_force_torque
 from .robot_ik import inverse_kinematics
 from .robot_info import robot_info
 from .robot_motion import move_to_eff_state, move_to_initial_joint_state, move_to_joint_state
-from .robot_switches import set_control_mode, set_joint_state
+from .robot_switches import set_control_mode, set_joint_state, stop_motion
 from .set_pose import set_pose
 from .trajectory_commands import query_state, query_suffixes
 from .trajectory_messages import QueryTrajectoryState
@@ -58,6 +58,7 @@ BODY_SERVICES: tuple[BodyService, ...] = (
     BodyService(SetJointState, set_joint_state, of(JointedBody, "set_joint_state")),
     BodyService(Empty, zero_force_torque, force_torque_suffixes),
     BodyService(SetString, set_control_mode, of(Robot, "set_control_mode")),
+    BodyService(Trigger, stop_motion, of(Robot, "stop_motion")),
     BodyService(ResetJointState, move_to_joint_state, of(Robot, "move_to_joint_state")),
     BodyService(ResetJointState, move_to_initial_joint_state, of(Robot, "move_to_initial_joint_state")),
     BodyService(ResetEffState, move_to_eff_state, of(Robot, "move_to_eff_state")),

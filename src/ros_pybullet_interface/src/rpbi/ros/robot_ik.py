@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import fields, replace
+from typing import NamedTuple
 
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
@@ -18,6 +19,9 @@ from ..kinematics import IKProblem, IKSolution
 from ..pose import Pose
 from .body_context import BodyContext
 from .stamps import to_ros_time
+
+NEAR_M, NEAR_RAD = 0.01, 0.02
+"""A link that was moved has arrived within these: joints within 0.01 rad of their goals may add up to as much."""
 
 
 def ik_topic_suffixes(body: Body) -> tuple[str, ...]:
@@ -59,6 +63,45 @@ def move_by_ik(context: BodyContext, problem: CalculateInverseKinematicsProblem)
         solution.chain, solution.chain_positions, [velocity[name] for name in solution.chain] if velocity else ()
     )
     context.world.put(f"{context.body.name}/target", target)
+
+
+class LinkResidual(NamedTuple):
+    """How far a link is from where it was to be.
+
+    Attributes:
+        position_m: Distance [m].
+        orientation_rad: Angle [rad], None if any orientation would do.
+    """
+
+    position_m: float
+    orientation_rad: float | None
+
+    @property
+    def is_near(self) -> bool:
+        """Whether that is no more than joints within their tolerances may make of it."""
+        return self.position_m <= NEAR_M and (self.orientation_rad or 0.0) <= NEAR_RAD
+
+    def in_words(self, link: str) -> str:
+        """Returns it as part of a message."""
+        angle = "" if self.orientation_rad is None else f" and {self.orientation_rad:.3g} rad"
+        return f"link '{link}' is {self.position_m * 1e3:.3g} mm{angle} from its target"
+
+
+def residual_of_robot(context: BodyContext, message: CalculateInverseKinematicsProblem) -> LinkResidual:
+    """Measures where the link of a problem is now, against the problem's target in the world.
+
+    Raises:
+        InterfaceError: If the robot has gone.
+    """
+    robot: JointedBody = context.body
+    base, positions = context.ask_body(lambda: (robot.base_pose(), robot.joint_positions()))
+    pose = base @ robot.kinematics.forward(list(positions.values()), message.link_name)
+    angle = None
+    if message.targetOrientation:
+        target = message.targetOrientation
+        cosine = abs(sum(a * b for a, b in zip(pose.quat_xyzw, target))) / math.hypot(*target)
+        angle = 2.0 * math.acos(min(1.0, cosine))
+    return LinkResidual(math.dist(pose.position, message.targetPosition), angle)
 
 
 def solve_for_robot(context: BodyContext, message: CalculateInverseKinematicsProblem) -> IKSolution:

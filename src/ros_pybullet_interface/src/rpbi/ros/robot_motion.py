@@ -17,6 +17,7 @@ from ..control.motion import MotionResult
 from ..control.timed_motion import TimedMotion
 from ..joint_model import JointTarget
 from .body_context import BodyContext
+from .robot_ik import residual_of_robot, solve_for_robot
 
 
 def move_to_joint_state(context: BodyContext, request: ResetJointStateRequest) -> ResetJointStateResponse:
@@ -24,7 +25,7 @@ def move_to_joint_state(context: BodyContext, request: ResetJointStateRequest) -
     state = request.joint_state
     target = JointTarget(state.name, state.position, state.velocity, state.effort)
     positions = target.values_of("position", "the goal of a motion is a position")
-    result = _move(context, context.body.model.resolve(target.names, positions), request.duration)
+    result = _move(context, context.body.model.resolve_driven(target.names, positions), request.duration)
     return ResetJointStateResponse(success=result.success, message=result.message)
 
 
@@ -36,14 +37,16 @@ def move_to_initial_joint_state(context: BodyContext, request: ResetJointStateRe
 
 def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> ResetEffStateResponse:
     """Moves a link to a pose by way of inverse kinematics; nothing moves if that fails."""
-    from .robot_ik import solve_for_robot  # noqa: PLC0415
-
     solution = solve_for_robot(context, request.problem)
     if not solution.success:
         return ResetEffStateResponse(success=False, message=f"nothing moved: {solution.message}")
     goal = context.body.model.resolve(solution.chain, solution.chain_positions)
     result = _move(context, goal, request.duration)
-    return ResetEffStateResponse(success=result.success, message=result.message)
+    if not result.success:
+        return ResetEffStateResponse(success=False, message=result.message)
+    residual = residual_of_robot(context, request.problem)
+    message = f"{result.message}; {residual.in_words(request.problem.link_name)}"
+    return ResetEffStateResponse(success=residual.is_near, message=message)
 
 
 def _move(context: BodyContext, goal: Mapping[int, float], duration_s: float) -> MotionResult:

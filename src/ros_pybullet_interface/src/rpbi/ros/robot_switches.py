@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from std_srvs.srv import TriggerRequest, TriggerResponse
+
 from custom_ros_tools.srv import SetStringRequest, SetStringResponse
 from ros_pybullet_interface.srv import SetJointStateRequest, SetJointStateResponse
 
@@ -21,6 +23,18 @@ def set_control_mode(context: BodyContext, request: SetStringRequest) -> SetStri
     before = MODE_NAMES[context.body.motors.mode]
     context.ask_body(lambda: context.body.switch_mode(mode))
     return SetStringResponse(success=True, message=f"{MODE_NAMES[mode]}, was {before}")
+
+
+def stop_motion(context: BodyContext, _: TriggerRequest) -> TriggerResponse:
+    """Ends the motion that runs; its joints hold where they are."""
+
+    def stop() -> bool:
+        was_moving = context.body.motion is not None
+        context.body.halt("it was stopped")
+        return was_moving
+
+    was_moving = context.ask_body(stop)
+    return TriggerResponse(success=was_moving, message="stopped" if was_moving else "no motion is running")
 
 
 def set_joint_state(context: BodyContext, request: SetJointStateRequest) -> SetJointStateResponse:

@@ -1,0 +1,66 @@
+"""Robot descriptions as PyBullet and ROS want them."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+
+from custom_ros_tools.errors import ConfigError
+from rpbi.urdf import description_for_ros, joint_types, resolve_meshes
+
+
+def urdf(folder: Path, inner: str) -> str:
+    path = folder / "robots" / "robot.urdf"
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(f"<robot name='r'><link name='a'>{inner}</link></robot>")
+    return str(path)
+
+
+def mesh(name: str) -> str:
+    return f"<visual><geometry><mesh filename='{name}'/></geometry></visual>"
+
+
+def meshes(text: str) -> list[str | None]:
+    return [element.get("filename") for element in ElementTree.fromstring(text).iter("mesh")]
+
+
+def test_a_file_without_packages_is_loaded_as_it_is(tmp_path):
+    path = urdf(tmp_path, mesh("a.obj"))
+    assert resolve_meshes(path) == path
+
+
+def test_a_folder_beside_or_above_stands_in_for_a_package_as_for_pybullet(tmp_path):
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes/a.obj").write_text("")
+    path = urdf(tmp_path, mesh("package://meshes/a.obj"))
+    assert meshes(Path(resolve_meshes(path)).read_text()) == [str(tmp_path / "meshes/a.obj")]
+    assert meshes(description_for_ros(path)) == [f"file://{tmp_path}/meshes/a.obj"]
+
+
+def test_a_mesh_of_an_unknown_package_is_named(tmp_path):
+    with pytest.raises(ConfigError, match="package://nope/a.obj: unknown ROS package 'nope'"):
+        resolve_meshes(urdf(tmp_path, mesh("package://nope/a.obj")))
+
+
+def test_comments_and_plugins_are_not_meshes(tmp_path):
+    inner = "<!-- <mesh filename='package://nope/old.stl'/> --><plugin filename='libgazebo_ros_control.so'/>"
+    text = Path(resolve_meshes(urdf(tmp_path, inner + "<!-- package:// -->"))).read_text()
+    assert "libgazebo_ros_control.so" in text
+    assert "file://" not in description_for_ros(urdf(tmp_path, inner))
+
+
+def test_ros_gets_relative_meshes_with_their_folder_and_those_of_packages_as_they_are(tmp_path):
+    inner = mesh("../a.obj") + mesh("package://rpbi_examples/robots/b.obj") + mesh("file:///c.obj")
+    assert meshes(description_for_ros(urdf(tmp_path, inner))) == [
+        f"file://{tmp_path}/a.obj",
+        "package://rpbi_examples/robots/b.obj",
+        "file:///c.obj",
+    ]
+
+
+def test_characters_that_are_no_xml_are_left_out(tmp_path):
+    path = urdf(tmp_path, "\0" + mesh("a.obj"))
+    assert len(meshes(description_for_ros(path))) == 1
+    assert joint_types(path) == {}
