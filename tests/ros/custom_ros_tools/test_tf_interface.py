@@ -98,10 +98,13 @@ def test_conversions_give_position_turn_distance_and_matrix():
 
 
 SCRIPT = """
+import threading
 import rospy
 from custom_ros_tools.tf import TfInterface
 rospy.init_node("waits")
-print("ready", flush=True)
+timer = threading.Timer({shutdown_s}, rospy.signal_shutdown, ["the test wants it"])
+timer.daemon = True
+timer.start()
 print(TfInterface().wait_for_tf("world", "box", timeout=float("{timeout}")), flush=True)
 """
 
@@ -110,15 +113,13 @@ def test_waiting_ends_in_time_though_simulated_time_stands_still(ros):
     rospy.set_param("/use_sim_time", True)
     clock = rospy.Publisher("/clock", Clock, latch=True, queue_size=1)
     clock.publish(rospy.Time(5))
-    process = ros.start(["python3", "-c", SCRIPT.format(timeout=0.1)])
+    process = ros.start(["python3", "-c", SCRIPT.format(timeout=0.1, shutdown_s=15.0)])
     assert process.wait(20) == 0, ros.output(process)
     assert "(None, None)" in ros.output(process)
     clock.unregister()
 
 
 def test_waiting_ends_when_ros_shuts_down(ros):
-    process = ros.start(["python3", "-c", SCRIPT.format(timeout="inf")])
-    wait_until(lambda: "ready" in ros.output(process), "it waits")
-    process.send_signal(2)
+    process = ros.start(["python3", "-c", SCRIPT.format(timeout="inf", shutdown_s=1.0)])
     assert process.wait(20) == 1
     assert "ROSInterruptException: shut down while waiting for TF from 'world' to 'box'" in ros.output(process)
