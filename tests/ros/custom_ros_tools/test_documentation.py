@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -45,7 +46,7 @@ def test_example_runs(ros, module):
     box = "rosrun custom_ros_tools resettable_static_transform_publisher 0.5 0 0.1 0 0 0 rpbi/world box"
     ros.start(box.split())
     code = EXAMPLES[module] if "ros_node" in module else f"import rospy\nrospy.init_node('a')\n{EXAMPLES[module]}"
-    process = ros.start(["python3", "-c", code])
+    process = ros.start([sys.executable, "-c", code])
     assert process.wait(30) == 0, ros.output(process)
     states.unregister()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 SCRIPT = """
 from rpbi.ros_node import RosNode
 from sensor_msgs.msg import JointState
@@ -39,7 +41,7 @@ node.spin()
 def test_script_of_the_release_finds_everything_under_its_name(ros):
     from ros_system import stop_group, wait_until
 
-    process = ros.start(["python3", "-c", SCRIPT])
+    process = ros.start([sys.executable, "-c", SCRIPT])
     wait_until(lambda: "done" in ros.output(process) or process.poll() is not None, "it is done")
     assert stop_group(process) == 0, ros.output(process)
     for line in ("answer 2.0", "message ['a']", "tf [1. 2. 3.]", "shut down"):
