@@ -19,7 +19,7 @@ def set_control_mode(context: BodyContext, request: SetStringRequest) -> SetStri
     """
     mode = CONTROL_MODES.parse(request.data)
     before = MODE_NAMES[context.body.motors.mode]
-    context.ask_body(lambda: context.body.switch_mode(mode))
+    context.act("switch_mode", mode)
     return SetStringResponse(success=True, message=f"{MODE_NAMES[mode]}, was {before}")
 
 
@@ -34,5 +34,5 @@ def set_joint_state(context: BodyContext, request: SetJointStateRequest) -> SetJ
     if not state.name:
         raise ValueError("expected one joint or more, got none")
     target = JointTarget(state.name, state.position, state.velocity)
-    context.ask_body(lambda: context.body.set_joint_state(target))
+    context.act("set_joint_state", target)
     return SetJointStateResponse(success=True, message=f"{', '.join(state.name)} put there")
