@@ -18,7 +18,7 @@ from typing import Any
 
 from result import Result, table
 
-BENCHMARKS = ("loop", "many", "load", "camera", "latency", "free_run", "tables")
+BENCHMARKS = ("loop", "many", "load", "camera", "latency", "free_run", "reset", "tables")
 FIND_RENDERER = """
 from rpbi.camera import Intrinsics
 from rpbi.render.frame import Camera

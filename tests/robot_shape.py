@@ -30,7 +30,7 @@ def link_triangles(description: Path, package: Path) -> dict[str, Array]:
         meshes = []
         for visual in link.iter("visual"):
             name = visual.find("geometry/mesh").attrib["filename"]
-            mesh = _read_obj(package / name.removeprefix(f"package://{package.name}/"))
+            mesh = read_obj(package / name.removeprefix(f"package://{package.name}/"))
             origin = visual.find("origin")
             attributes = {} if origin is None else origin.attrib
             xyz = [float(number) for number in attributes.get("xyz", "0 0 0").split()]
@@ -55,7 +55,8 @@ def moved(points: Array, pose: Array) -> Array:
     return points @ pose[:3, :3].T + pose[:3, 3]
 
 
-def _read_obj(path: Path) -> Array:
+def read_obj(path: Path) -> Array:
+    """Returns the triangles of a Wavefront mesh, shape (n, 3, 3)."""
     vertices, faces = [], []
     for line in path.read_text().splitlines():
         kind, *words = line.split() or [""]

@@ -70,6 +70,11 @@ class Listener:
         return self._subscriber.resolved_name
 
     @property
+    def is_connected(self) -> bool:
+        """Whether somebody publishes it and we are connected."""
+        return bool(self._subscriber.get_num_connections() > 0)
+
+    @property
     def stamps_ns(self) -> list[int]:
         """Stamps of the messages' headers [ns]."""
         return [message.header.stamp.to_nsec() for message in self.messages]

@@ -57,6 +57,8 @@ def write_world(
     collision: tuple[dict[str, Any], ...] = (),
     dynamic: tuple[dict[str, Any], ...] = (),
     robots: tuple[dict[str, Any], ...] = (),
+    soft: tuple[dict[str, Any], ...] = (),
+    urdfs: tuple[dict[str, Any], ...] = (),
     **main: Any,
 ) -> str:
     """Writes a world's files into a folder and returns the path of the main one."""
@@ -66,7 +68,14 @@ def write_world(
         "timeStep": 0.001,
         **main,
     }
-    sections = {"visual_objects": visual, "collision_objects": collision, "dynamic_objects": dynamic, "robots": robots}
+    sections = {
+        "visual_objects": visual,
+        "collision_objects": collision,
+        "dynamic_objects": dynamic,
+        "robots": robots,
+        "soft_objects": soft,
+        "urdfs": urdfs,
+    }
     for section, objects in sections.items():
         for item in objects:
             (folder / f"{item['name']}.yaml").write_text(yaml.safe_dump(item))

@@ -10,11 +10,11 @@ import numpy as np
 import pybullet
 import pytest
 import rosgraph
+from pybullet_window import HEIGHT, SLOW_S, WIDTH, floating_ball, middle, mostly, window
 from ros_system import wait_until
 from sensor_msgs.msg import Image, JointState
 from worlds import FLOOR, iiwa
 
-WIDTH, HEIGHT = 480, 360
 FIELD_OF_VIEW = math.radians(90.0)
 """Vertical opening of the window's camera."""
 BACKGROUND = [0.1, 0.3, 0.1]
@@ -24,53 +24,6 @@ CAMERA = {
     "cameraPitch": -25.0,
     "cameraTargetPosition": [3.0, -1.0, 2.0],
 }
-SLOW_S = 60.0
-
-
-def marker(ros, name, rgba, position, radius_m=0.15):
-    """Writes the configuration of a ball that floats; returns its file."""
-    shape = {
-        "shapeType": "GEOM_SPHERE",
-        "radius": radius_m,
-        "rgbaColor": rgba,
-        "specularColor": [0.0, 0.0, 0.0],
-        "visualFramePosition": position,
-    }
-    return ros.write_yaml(f"{name}.yaml", {"name": name, "createVisualShape": shape})
-
-
-@pytest.fixture
-def start(ros, screen):
-    """Starts a simulator with a window and waits until that is there; returns its process."""
-
-    def start(**main):
-        config = {
-            "connect": {"connection_mode": "GUI", "options": f"--width={WIDTH} --height={HEIGHT}"},
-            "timeStep": 0.01,
-            **main,
-        }
-        node = ros.simulator(config, use_sim_time=True, **screen.environment)
-        wait_until(lambda: window(screen), "there is a window", SLOW_S)
-        return node
-
-    return start
-
-
-def window(screen):
-    """Returns PyBullet's window, None if there is none."""
-    return next((each for each in screen.windows() if each.title.startswith("Bullet Physics")), None)
-
-
-def mostly(picture, channel):
-    """Returns the pixels of a picture that are red (0), green (1) or blue (2) above all."""
-    others = np.delete(picture.astype(int), channel, axis=-1)
-    return picture[..., channel] > 2 * others.max(axis=-1) + 20
-
-
-def middle(mask):
-    """Returns column and row of the middle of a mask [px]."""
-    rows, columns = np.nonzero(mask)
-    return columns.mean(), rows.mean()
 
 
 def test_window_looks_where_the_config_says_and_shows_what_it_says(ros, screen, start):
@@ -80,8 +33,8 @@ def test_window_looks_where_the_config_says_and_shows_what_it_says(ros, screen, 
         resetDebugVisualizerCamera=CAMERA,
         configureDebugVisualizer={"flag": "COV_ENABLE_GUI|COV_ENABLE_SHADOWS", "rgbBackground": BACKGROUND},
         visual_objects=[
-            marker(ros, "red", [1.0, 0.0, 0.0, 1.0], target.tolist()),
-            marker(ros, "blue", [0.0, 0.0, 1.0, 1.0], aside.tolist()),
+            floating_ball(ros, "red", [1.0, 0.0, 0.0, 1.0], target.tolist()),
+            floating_ball(ros, "blue", [0.0, 0.0, 1.0, 1.0], aside.tolist()),
         ],
     )
 
@@ -138,6 +91,7 @@ def test_closed_window_ends_the_node_with_one_line_and_exit_code_1(ros, screen, 
         setAdditionalSearchPath="pybullet_data_path",
         robots=[ros.write_yaml("iiwa.yaml", iiwa())],
         start_pybullet_after_initialization=running,
+        enable_keyboard_publisher=running,  # which takes the other keys away from the window
     )
     place = window(screen)
     screen.run("xdotool", "mousemove", str(place.x + WIDTH // 2), str(place.y + HEIGHT // 2), "key", "Escape")

@@ -25,6 +25,7 @@ CONFIG_FILE = EXAMPLES / "rviz/basic_example_kuka_lwr.rviz"
 CONFIG = yaml.safe_load(CONFIG_FILE.read_text())["Visualization Manager"]
 ARM = link_triangles(EXAMPLES / "robots/kuka_lwr.urdf", EXAMPLES)
 CAMERA = "/rpbi/camera"
+BOX_SIZE_M = np.array([0.20, 0.16, 0.12])
 
 FIELD_OF_VIEW = math.radians(45.0)
 """Vertical opening of RViz's view."""
@@ -268,3 +269,28 @@ def test_depth_display_paints_what_the_camera_sees_in_its_colours(show, bare, cl
     assert 0.2 < covered.mean() < 0.8
     assert (~differs(picture, expected))[covered].mean() > 0.95
     assert (~differs(picture, bare))[~grown(covered, 2)].mean() > 0.99
+
+
+def test_marker_display_paints_the_box_where_tf_says_on_a_floor_and_leaves_the_robot_out(show, bare, frames, links):
+    box = moved(cube_triangles() * BOX_SIZE_M, frames["rpbi/box"])
+
+    def is_orange(picture):
+        red, green, blue = np.moveaxis(picture.astype(int), -1, 0)
+        return (red > 1.4 * green) & (green > 1.4 * blue)
+
+    def is_shown(picture, view):
+        return picture.shape == bare.shape and is_orange(picture)[view.silhouette(box)].mean() > 0.9
+
+    picture, view = show({"rviz/Grid", "rviz/MarkerArray"}, is_shown, "the box is shown")
+    silhouette, orange = view.silhouette(box), is_orange(picture)
+    assert silhouette.sum() > 1000
+    assert (orange & silhouette).sum() > 0.95 * (orange | silhouette).sum()  # and with it no orange ring of the arm
+    floor = view.silhouette(links["lwr_arm_0_link"])  # where the arm stands
+    assert differs(picture, bare)[floor].mean() > 0.99
+
+
+def cube_triangles():
+    """Returns the surface of a cube with edges of 1 m around the origin; shape (12, 3, 3)."""
+    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    sides = [(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)]
+    return corners[[triangle for a, b, c, d in sides for triangle in ((a, b, c), (a, c, d))]]

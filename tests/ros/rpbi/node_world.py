@@ -20,7 +20,7 @@ from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import PybulletObject
 from ros_pybullet_interface.srv import AddPybulletObject, ListObjects
 
-SECTIONS = ("visual_objects", "collision_objects", "dynamic_objects", "robots")
+SECTIONS = ("visual_objects", "collision_objects", "dynamic_objects", "robots", "soft_objects", "urdfs")
 
 
 def main_config(folder: Path, **parts: Any) -> dict[str, Any]:

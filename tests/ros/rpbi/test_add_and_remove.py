@@ -157,7 +157,12 @@ def _urdf(ros, body):
 REFUSED = {
     "neither file nor text": (DYNAMIC, "", "", ["expected a filename or a config; got neither"]),
     "unknown type": (77, box(), "", ["object_type: expected one of 0 (visual_objects)", "got 77"]),
-    "type that is not there yet": (PybulletObject.SOFT, box(), "", ["object_type: expected one of", "got 4"]),
+    "soft body in a world of rigid ones": (
+        PybulletObject.SOFT,
+        {"name": "cloth", "loadSoftBody": {"fileName": "cloth_z_up.obj"}},
+        "",
+        ["soft bodies need resetSimulation: {flags: RESET_USE_DEFORMABLE_WORLD} in the main file"],
+    ),
     "no such file": (DYNAMIC, "", "/none/box.yaml", ["no such file: /none/box.yaml"]),
     "file without a folder": (DYNAMIC, "", "none.yaml", ["no such file: none.yaml (looked in "]),
     "file in an unknown package": (DYNAMIC, "", "{rpbi_exampels}/box.yaml", ["did you mean 'rpbi_examples'"]),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +18,26 @@ DEMAND_FILE = "demand.json"
 class FolderSink:
     """Writes `CAMERA-TICK.npz` into the folder that `--folder=` names."""
 
-    def __init__(self, cameras: Sequence[Camera]) -> None:
+    def __init__(self) -> None:
+        self.cameras: set[str] = set()
         self._folder = Path(next(item for item in sys.argv if item.startswith("--folder="))[len("--folder=") :])
+
+    def add(self, camera: Camera) -> None:
+        self.cameras.add(camera.name)
+
+    def remove(self, name: str) -> None:
+        self.cameras.remove(name)
 
     def demands(self) -> Mapping[str, Demand]:
         try:
             demands: dict[str, Any] = json.loads((self._folder / DEMAND_FILE).read_text())
         except (FileNotFoundError, json.JSONDecodeError):
             return {}
-        return {name: Demand(frozenset(streams), seen) for name, (streams, seen) in demands.items()}
+        return {
+            name: Demand(frozenset(streams), seen)
+            for name, (streams, seen) in demands.items()
+            if name in self.cameras
+        }
 
     def write(self, frame: Frame) -> None:
         images = {name: getattr(frame, name) for name in ("colour", "depth", "segmentation")}

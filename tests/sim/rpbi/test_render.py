@@ -16,7 +16,8 @@ import pytest
 import worlds
 from rendering import ALL, CAMERA, INTRINSICS, Rendering
 
-from rpbi.camera import back_project, project, rotation_matrix
+from rpbi.camera import Intrinsics, back_project, project, rotation_matrix
+from rpbi.depth_noise import DepthNoise
 from rpbi.pose import Pose
 from rpbi.render.frame import Camera
 from rpbi.world import World
@@ -24,6 +25,19 @@ from rpbi.world import World
 HALF_EXTENTS_M = (0.3, 0.2, 0.1)
 RED = [0.9, 0.1, 0.1, 1.0]
 BLUE = [0.1, 0.1, 0.9, 1.0]
+
+BALL_RADIUS_M = 0.2
+CORNERS_M = [[-0.2, -0.2, 0.0], [0.2, -0.2, 0.0], [0.0, 0.2, 0.0]]
+PLANE = {"name": "plane", "createVisualShape": {"shapeType": "GEOM_PLANE", "planeNormal": [0.0, 0.0, 1.0]}}
+TRIANGLE = {
+    "name": "triangle",
+    "createVisualShape": {
+        "shapeType": "GEOM_MESH",
+        "vertices": CORNERS_M,
+        "indices": [0, 1, 2, 0, 2, 1],
+        "rgbaColor": BLUE,
+    },
+}
 
 EYE = Pose((1.2, -0.7, 0.9), pybullet.getQuaternionFromEuler([-2.1, 0.2, 0.6]))
 """A camera pose with nothing special about it."""
@@ -43,8 +57,13 @@ def make_world(folder: Path) -> World:
     return World.from_file(
         worlds.write_world(
             folder,
+            visual=(PLANE, TRIANGLE),
             collision=(worlds.FLOOR,),
             dynamic=(
+                worlds.ball("ball", BALL_RADIUS_M),
+                coloured_box("glass", [0.9, 0.1, 0.1, 0.25], (0.3, 0.3, 0.01)),
+                coloured_box("more_glass", [0.1, 0.9, 0.1, 0.5], (0.3, 0.3, 0.01)),
+                coloured_box("hidden", [1.0, 1.0, 1.0, 0.0]),
                 coloured_box("red", RED),
                 coloured_box("blue", BLUE),
                 coloured_box("wall", BLUE, (5, 5, 0.1)),
@@ -122,6 +141,111 @@ def test_depth_of_a_wall_is_right_to_a_millimetre_though_the_near_plane_is_at_a_
     rendering.world.bodies["wall"].set_base_pose(in_front(distance_m + 0.1))
     depth = rendering.look(EYE)["depth"]
     assert np.abs(depth - distance_m).max() < 1e-3
+
+
+def rays():
+    """Returns a vector along the ray of each pixel in the optical frame, with z = 1."""
+    return back_project(np.ones((INTRINSICS.height_px, INTRINSICS.width_px)), INTRINSICS.K)
+
+
+def test_depth_of_a_ball_is_right_to_two_millimetres_at_a_metre(rendering):
+    clear_view(rendering.world)
+    ball = rendering.world.bodies["ball"]
+    centre = np.array([0.1, -0.05, 1.0 + BALL_RADIUS_M])
+    ball.set_base_pose(in_front(centre[2], *centre[:2]))
+    frame = rendering.look(EYE)
+    towards = rays() @ centre
+    length = (rays() ** 2).sum(axis=-1)
+    below_root = towards**2 - length * (centre @ centre - BALL_RADIUS_M**2)
+    expected_m = (towards - np.sqrt(np.maximum(below_root, 0.0))) / length
+    cosine = np.sqrt(np.maximum(below_root, 0.0) / length) / BALL_RADIUS_M  # of the angle between ray and normal
+    steep = cosine > 0.3
+    assert steep.sum() > 4000
+    assert np.all(frame["segmentation"][steep] == ball.body_id)
+    assert np.abs(frame["depth"] - expected_m)[steep].max() < 2e-3
+
+
+def test_depth_of_a_slanted_plane_is_right_to_two_millimetres(rendering):
+    clear_view(rendering.world)
+    plane = rendering.world.bodies["plane"]
+    pose = in_front(1.0, 0.0, 0.0, (0.5, 2.8, 0.0))
+    plane.set_base_pose(pose)
+    normal = rotation_matrix(pose.quat_xyzw)[:, 2] @ rotation_matrix(EYE.quat_xyzw)
+    expected_m = normal[2] / (rays() @ normal)
+    near = (expected_m > 0.0) & (expected_m < 1.5)
+    frame = rendering.look(EYE)
+    assert near.sum() > 30_000
+    assert np.all(frame["segmentation"][near] == plane.body_id)
+    assert np.abs(frame["depth"] - expected_m)[near].max() < 2e-3
+
+
+def test_mesh_whose_corners_stand_in_the_yaml_is_drawn(rendering):
+    clear_view(rendering.world)
+    triangle = rendering.world.bodies["triangle"]
+    triangle.set_base_pose(in_front(1.0))
+    frame = rendering.look(EYE)
+    seen = frame["segmentation"] == triangle.body_id
+    assert seen.sum() == pytest.approx(0.5 * 0.4 * 0.4 * INTRINSICS.K[0, 0] ** 2, rel=0.03)
+    assert np.abs(frame["depth"][seen] - 1.0).max() < 1e-3
+    red, _, blue = frame["colour"][seen].astype(int).mean(axis=0)
+    assert blue > 2 * red
+
+
+def test_glass_tints_what_is_behind_it_and_is_what_depth_and_segmentation_tell(rendering):
+    clear_view(rendering.world)
+    bodies = rendering.world.bodies
+    bodies["wall"].set_base_pose(in_front(2.1))
+    plain = rendering.look(EYE)["colour"][120, 160].astype(int)
+    bodies["glass"].set_base_pose(in_front(1.01))
+    frame = rendering.look(EYE)
+    glass = frame["segmentation"] == bodies["glass"].body_id
+    assert glass.sum() == pytest.approx(0.36 * INTRINSICS.K[0, 0] ** 2, rel=0.03)
+    assert np.abs(frame["depth"][glass] - 1.0).max() < 1e-3
+    assert np.abs(frame["depth"][frame["segmentation"] == bodies["wall"].body_id] - 2.0).max() < 1e-3
+    tinted = frame["colour"][120, 160].astype(int)
+    assert tinted[2] == pytest.approx(0.75 * plain[2], abs=8)  # a quarter opaque
+    assert tinted[0] > plain[0] + 10
+
+
+def test_of_several_panes_the_nearest_is_in_depth_and_segmentation(rendering):
+    clear_view(rendering.world)
+    bodies = rendering.world.bodies
+    bodies["wall"].set_base_pose(in_front(2.1))
+    for nearer, farther in (("glass", "more_glass"), ("more_glass", "glass")):
+        bodies[farther].set_base_pose(in_front(1.51))
+        bodies[nearer].set_base_pose(in_front(1.01))
+        frame = rendering.look(EYE)
+        assert frame["segmentation"][120, 160] == bodies[nearer].body_id
+        assert frame["depth"][120, 160] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_what_has_no_opacity_is_in_no_image(rendering):
+    clear_view(rendering.world)
+    bodies = rendering.world.bodies
+    bodies["wall"].set_base_pose(in_front(2.1))
+    bodies["glass"].set_base_pose(in_front(1.5, 0.5))
+    plain = rendering.look(EYE)
+    bodies["hidden"].set_base_pose(in_front(1.0))
+    frame = rendering.look(EYE)
+    for image in ALL:
+        assert np.array_equal(frame[image], plain[image])
+
+
+def test_glass_is_drawn_the_same_after_bodies_came_and_went(rendering):
+    world = rendering.world
+    glass = next(entry.arguments for entry in world.log if entry.name == "glass" and entry.what == "add")
+    clear_view(world)
+    world.bodies["wall"].set_base_pose(in_front(2.1))
+    world.bodies["glass"].set_base_pose(in_front(1.01))
+    before = rendering.look(EYE)
+    world.remove("glass")
+    opaque = world.add("dynamic", type(glass[1]).parse(coloured_box("brick", RED), "brick.yaml"))
+    opaque.set_base_pose(in_front(1.0 + HALF_EXTENTS_M[2]))
+    assert rendering.look(EYE)["colour"][120, 160, 2] < 60  # nothing of the blue wall
+    world.remove("brick")
+    world.add(*glass).set_base_pose(in_front(1.01))
+    after = rendering.look(EYE)
+    assert np.array_equal(before["colour"], after["colour"]) and np.array_equal(before["depth"], after["depth"])
 
 
 def test_pixels_that_see_nothing_tell_the_far_plane_and_no_body(rendering):
@@ -308,6 +432,60 @@ def test_two_cameras_each_have_their_own_size_and_view(tmp_path):
         rendering.close()
 
 
+def test_camera_that_comes_later_and_is_larger_is_drawn_whole_and_goes_again(quick):
+    world = quick.world
+    clear_view(world)
+    red = world.bodies["red"]
+    red.set_base_pose(in_front(1.0))
+    quick.demand("segmentation")
+    quick.look(EYE)
+    process_id = quick.client.process_id
+    quick.client.add(Camera("late", "rpbi/late", Intrinsics(width_px=1000, height_px=600, fov_deg=50.0)))
+    quick.demand("segmentation", camera="late")
+    sample = quick.sample(EYE, "late")
+    quick.client.send(sample)
+    path = quick.folder / f"late-{sample.tick}.npz"
+    quick.until(path.exists, f"{path.name} came")
+    segmentation = np.load(path)["segmentation"]
+    assert segmentation.shape == (600, 1000) and segmentation[300, 500] == red.body_id
+    quick.client.remove("late")
+    assert not quick.client.knows_demand("late")
+    quick.demand("segmentation")
+    assert quick.look(EYE)["segmentation"][120, 160] == red.body_id
+    assert quick.client.process_id == process_id
+
+
+def test_synchronous_camera_tells_when_its_frame_is_out(tmp_path):
+    rendering = Rendering(tmp_path, make_world(tmp_path), cameras=(CAMERA._replace(synchronous=True),))
+    try:
+        rendering.demand("depth")
+        for _ in range(3):
+            sample = rendering.sample(EYE)
+            assert not rendering.client.has_shown("eye", sample.stamp_ns)
+            rendering.client.send(sample)
+            rendering.until(lambda sample=sample: rendering.client.has_shown("eye", sample.stamp_ns), "it is out")
+            assert (tmp_path / f"eye-{sample.tick}.npz").exists()
+    finally:
+        rendering.close()
+
+
+def test_noise_of_a_camera_is_in_its_depth_and_the_same_in_another_process(tmp_path):
+    noise = DepthNoise(0.01, 0.0, 5)
+    images = []
+    for folder in (tmp_path / "one", tmp_path / "other"):
+        folder.mkdir()
+        rendering = Rendering(folder, make_world(folder), cameras=(CAMERA._replace(noise=noise),))
+        try:
+            rendering.demand("depth")
+            clear_view(rendering.world)
+            rendering.world.bodies["wall"].set_base_pose(in_front(1.1))
+            images.append(rendering.look(EYE)["depth"])
+        finally:
+            rendering.close()
+    assert images[0].std() == pytest.approx(0.01, rel=0.03)
+    assert np.array_equal(*images)
+
+
 def test_renderer_ends_in_order_when_it_is_stopped(tmp_path):
     rendering = Rendering(tmp_path, make_world(tmp_path))
     rendering.demand("depth")
@@ -327,7 +505,7 @@ from test_render import make_world
 folder = Path(sys.argv[1])
 rendering = Rendering(folder, make_world(folder))
 rendering.demand("depth")
-print(rendering.client.process_id, flush=True)
+print(f"\\n{rendering.client.process_id}", flush=True)  # PyBullet leaves a line unfinished
 time.sleep(60)
 """
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import pytest
+import yaml
 from worlds import FLOOR, box, iiwa, write_world
 
+from custom_ros_tools.errors import ConfigError, UnknownNameError
 from rpbi.pose import Pose
+from rpbi.rgbd_config import RgbdSensorConfig
 from rpbi.world import World
 
 CAMERA = {"name": "eye", "hz": 25, "object_tf": {"tf_id": "rpbi/eye"}}
@@ -71,7 +74,74 @@ def test_scene_tells_where_every_body_is(world):
         assert state.joints == tuple(world.pb.getJointState(body.body_id, index)[0] for index in body.joint_indices)
 
 
-@pytest.mark.parametrize("key", ["pointcloud", "synchronous"])
-def test_what_is_not_there_yet_is_said(tmp_path, caplog, key):
-    make_world(tmp_path, **{key: True}).close()
-    assert f"{key}: has no effect yet" in caplog.text
+def further(folder, name):
+    (folder / f"{name}.yaml").write_text(yaml.safe_dump({**CAMERA, "name": name}))
+    return f"{name}.yaml"
+
+
+def topic_names(world):
+    return {name: camera.topic_name for name, camera in world.cameras.items()}
+
+
+def test_first_camera_is_called_camera_in_topics_and_others_by_their_names(tmp_path):
+    files = [further(tmp_path, "left"), {"file": "left.yaml", "name": "right"}]
+    world = World.from_file(write_world(tmp_path, rgbd_sensor=CAMERA, rgbd_sensors=files))
+    assert topic_names(world) == {"eye": "camera", "left": "left", "right": "right"}
+    world.close()
+    world = World.from_file(write_world(tmp_path, rgbd_sensors=files))
+    assert topic_names(world) == {"left": "camera", "right": "right"}
+    world.close()
+
+
+def test_cameras_come_and_go_and_their_names_are_free_again(world):
+    config = RgbdSensorConfig.parse({**CAMERA, "name": "late"}, "late.yaml")
+    world.add_camera(config)
+    world.put("late/pose", POSE)
+    world.cameras["late"].wanted = True
+    assert any(getattr(sample, "name", None) == "late" for _ in range(100) for sample in world.step())
+    world.remove("late")
+    with pytest.raises(UnknownNameError):
+        world.put("late/pose", POSE)
+    assert not any(getattr(sample, "name", None) == "late" for _ in range(100) for sample in world.step())
+    world.add_camera(config)
+    assert topic_names(world) == {"eye": "camera", "late": "late"}
+
+
+@pytest.mark.parametrize("name, complaint", [("eye", "is taken"), ("box", "is taken"), ("camera", "the first camera")])
+def test_camera_whose_name_is_taken_is_refused_and_the_world_is_as_it_was(world, name, complaint):
+    cameras = dict(world.cameras)
+    with pytest.raises(ConfigError, match=f"late.yaml: name: .*{complaint}"):
+        world.add_camera(RgbdSensorConfig.parse({**CAMERA, "name": name}, "late.yaml"), "late.yaml")
+    assert world.cameras == cameras
+
+
+def test_reset_keeps_the_pose_of_cameras_and_drops_those_that_came_later(world):
+    world.put("eye/pose", POSE)
+    world.step()
+    world.add_camera(RgbdSensorConfig.parse({**CAMERA, "name": "late"}, "late.yaml"))
+    world.reset()
+    assert topic_names(world) == {"eye": "camera"}
+    assert world.cameras["eye"].pose == pytest.approx(POSE)
+    world.remove("eye")
+    world.reset()
+    assert topic_names(world) == {"eye": "camera"}
+
+
+def test_all_problems_of_further_cameras_are_told_with_their_files(tmp_path):
+    (tmp_path / "bad.yaml").write_text("{name: eye, hz: fast, depth_noise_m: -1.0}")
+    (tmp_path / "camera.yaml").write_text("{name: camera, object_tf: {tf_id: eye}}")
+    files = ["bad.yaml", "camera.yaml", "nowhere.yaml", 3]
+    path = write_world(tmp_path, rgbd_sensor=CAMERA, rgbd_sensors=files)
+    with pytest.raises(ConfigError) as error:
+        World.from_file(path)
+    text = str(error.value)
+    for expected in (
+        "bad.yaml: name: 'eye' is taken by",
+        "bad.yaml: hz: expected a number [Hz], got",
+        "bad.yaml: depth_noise_m: must be >= 0 [m]",
+        "bad.yaml: object_tf: missing",
+        "camera.yaml: name: 'camera' is what the topics of the first camera are called",
+        "rgbd_sensors[2]",
+        "rgbd_sensors[3]",
+    ):
+        assert expected in text, text

@@ -211,3 +211,11 @@ def test_json_schema_carries_units_and_descriptions() -> None:
     }
     assert schema["$defs"]["Lens"]["properties"]["fov"]["unit"] == "deg"
     assert schema["additionalProperties"] is False
+
+
+def test_a_quaternion_that_was_normalised_once_stays_as_it_is_to_the_last_bit():
+    class Turned(ConfigModel):
+        quat: Quat
+
+    once = Turned(quat=(0.0, 0.0, 0.259, 0.966)).quat
+    assert Turned(quat=once).quat == once

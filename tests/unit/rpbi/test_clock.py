@@ -82,3 +82,16 @@ def test_a_span_of_ticks_is_due_if_any_in_it_is():
     schedule = Schedule(50, 1_000_000)
     assert schedule.is_due(25, since=15)
     assert not schedule.is_due(39, since=20)
+
+
+@pytest.mark.parametrize("simulated", [True, False])
+def test_a_restart_counts_from_0_and_goes_on_with_the_stamps(simulated):
+    clock = Clock(0.001, simulated)
+    for _ in range(5):
+        clock.advance()
+    before_ns = clock.stamp_ns
+    clock.restart()
+    assert (clock.tick, clock.time_s) == (0, 0.0)
+    assert clock.stamp_ns > before_ns
+    if simulated:
+        assert clock.stamp_ns == before_ns + clock.dt_ns

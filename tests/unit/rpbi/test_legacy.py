@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 
 from custom_ros_tools.errors import ConfigError
-from custom_ros_tools.schema import ConfigModel, Hz
+from custom_ros_tools.schema import ConfigModel
 from rpbi.bodies import BODY_TYPES
 from rpbi.config import load_object, load_world_dict
-from rpbi.legacy import LEGACY_KEYS, PLANNED_KEYS, modernise
+from rpbi.legacy import LEGACY_KEYS
 
 ROBOT: dict[str, Any] = {
     "name": "iiwa",
@@ -80,9 +80,6 @@ def test_fault_in_an_old_spelling_is_told_as_the_user_spelt_it() -> None:
             {"setPhysicsEngineParameter": {"fixedTimeStep": 0.01}},
             "~config: setPhysicsEngineParameter.fixedTimeStep: has no effect: write timeStep",
         ),
-        ({"enable_keyboard_publisher": True}, "~config: enable_keyboard_publisher: has no effect yet"),
-        ({"soft_objects": ["torus.yaml"]}, "~config: soft_objects: has no effect yet"),
-        ({"publish_visualizer_image_hz": 10}, "~config: publish_visualizer_image_hz: has no effect yet"),
     ],
 )
 def test_key_without_effect_is_warned_of(
@@ -93,32 +90,8 @@ def test_key_without_effect_is_warned_of(
     assert message.startswith(told)
 
 
-def test_planned_key_that_asks_for_nothing_is_silent(caplog: pytest.LogCaptureFixture) -> None:
-    nothing = {
-        "soft_objects": [],
-        "urdfs": [],
-        "enable_keyboard_publisher": False,
-        "enable_mouse_publisher": False,
-        "publish_visualizer_image_hz": 0,
-        "visualizer_image_width": 320,
-    }
-    load_world_dict(nothing, "~config", BODY_TYPES)
-    robot(start_ik_callback=False, enabled_joint_force_torque_sensors=[], log_joint_limit_violations_hz=10)
-    assert caplog.messages == []
-
-
 def test_ignored_motor_arguments_are_warned_of(caplog: pytest.LogCaptureFixture) -> None:
     robot(setJointMotorControlArray={"controlMode": "POSITION_CONTROL", "forces": [1.0]})
     assert caplog.messages == [
         "iiwa.yaml: setJointMotorControlArray.forces: has no effect: efforts are limited by the URDF"
     ]
-
-
-def test_planned_key_is_left_alone_once_the_model_has_it(caplog: pytest.LogCaptureFixture) -> None:
-    class Later(ConfigModel):
-        publish_visualizer_image_hz: Hz
-
-    assert "publish_visualizer_image_hz" in PLANNED_KEYS["main"]
-    current, _, _ = modernise("main", {"publish_visualizer_image_hz": 10}, "f", Later)
-    assert current == {"publish_visualizer_image_hz": 10}
-    assert caplog.messages == []

@@ -89,3 +89,14 @@ def test_many_threads_lose_no_request_and_keep_the_newest_value():
     assert len(made) == 4 * count
     taken = mailbox.take()
     assert {taken.get(f"slot{number}") for number in range(4)} == {count - 1}
+
+
+def test_what_waits_is_dropped_and_so_is_what_belongs_to_an_earlier_era():
+    mailbox = Mailbox()
+    era = mailbox.era
+    mailbox.put("kuka/target", 1)
+    mailbox.drop()
+    mailbox.put("kuka/target", 2, era=era)
+    assert dict(mailbox.take()) == {}
+    mailbox.put("kuka/target", 3, era=mailbox.era)
+    assert dict(mailbox.take()) == {"kuka/target": 3}

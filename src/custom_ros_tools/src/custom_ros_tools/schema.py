@@ -68,6 +68,8 @@ def _unit_quaternion(value: tuple[float, ...]) -> tuple[float, ...]:
     norm = math.sqrt(sum(v * v for v in value))
     if norm < 1e-6:
         raise ValueError("a quaternion cannot be all zeros; no rotation is [0, 0, 0, 1]")
+    if abs(norm - 1.0) < 1e-12:
+        return value  # so that what was normalised once stays as it is, to the last bit
     return tuple(v / norm for v in value)
 
 

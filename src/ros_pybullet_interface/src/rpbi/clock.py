@@ -12,7 +12,8 @@ class Clock:
     """Counts ticks and gives each its stamp.
 
     Stamps never repeat and never go back while the clock lives. Simulated stamps are exact: tick `n` is stamped
-    `(n + 1) * dt`, so the initial state has the stamp dt, since ROS takes a stamp of 0 for "no time yet".
+    `(n + 1) * dt`, so the initial state has the stamp dt, since ROS takes a stamp of 0 for "no time yet". Ticks are the
+    world's: they begin at 0 again when it is reset, while the stamps go on.
 
     Args:
         time_step_s: Length of a tick [s], rounded to whole nanoseconds.
@@ -37,7 +38,7 @@ class Clock:
 
     @property
     def time_s(self) -> float:
-        """Simulated time since the world was built [s]."""
+        """Simulated time since the world was built or reset [s]."""
         return self.tick * self.dt_ns / NS_PER_S
 
     def advance(self) -> None:
@@ -47,6 +48,11 @@ class Clock:
             self.stamp_ns += self.dt_ns
         else:
             self.restamp()
+
+    def restart(self) -> None:
+        """Counts ticks from 0 again, for a world that was reset; stamps go on."""
+        self.advance()
+        self.tick = 0
 
     def restamp(self) -> None:
         """Renews a wall-time stamp within the same tick, for state that is sent again while stopped."""

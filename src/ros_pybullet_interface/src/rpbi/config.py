@@ -6,7 +6,7 @@ import contextlib
 import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from custom_ros_tools.config import load_config, replace_package
 from custom_ros_tools.errors import ConfigError, Problem
@@ -15,11 +15,27 @@ from .asset_files import ROBOT_DESCRIPTION, find_file, find_folder
 from .instance import Instance, parse_instance
 from .legacy import MAIN
 from .object_config import BodyType, ObjectConfig, load_object, name_in, parse_section, type_of
+from .rgbd_config import FIRST_TOPIC_NAME, RgbdSensorConfig
 from .world_config import WorldConfig
 
 __all__ = ["LoadedWorld", "ObjectConfig", "WorldConfig", "load_object", "load_world", "load_world_dict", "type_of"]
 
 log = logging.getLogger(__name__)
+
+CAMERAS = "rgbd_sensors"
+"""List of the main file that names the files of cameras."""
+
+
+class CameraConfig(NamedTuple):
+    """A camera to be put into a world.
+
+    Attributes:
+        config: What it is.
+        file: The file it came from, as the user wrote it.
+    """
+
+    config: RgbdSensorConfig
+    file: str
 
 
 @dataclass(frozen=True)
@@ -29,12 +45,14 @@ class LoadedWorld:
     Attributes:
         config: What the main file says.
         objects: The objects, in the order in which they are loaded.
+        cameras: The cameras, the first one first.
         file: The main file, `"~config"` if it came from the parameter server.
     """
 
     config: WorldConfig
     objects: tuple[ObjectConfig, ...]
     file: str
+    cameras: tuple[CameraConfig, ...] = ()
 
 
 def load_world(
@@ -107,43 +125,55 @@ class _Reader:
         except ConfigError as error:
             self._problems += error.problems
         objects = tuple(self._objects()) if isinstance(self._data, Mapping) else ()
+        further = tuple(self._further_cameras()) if isinstance(self._data, Mapping) else ()
         if self._problems:
             raise ConfigError(self._problems)
+        first = () if config.rgbd_sensor is None else (CameraConfig(config.rgbd_sensor, self._file),)
         if config.step_pybullet_manually:
             log.info("%s: step_pybullet_manually: has no effect: every step is explicit", self._file)
-        return LoadedWorld(config, objects, self._file)
+        return LoadedWorld(config, objects, self._file, first + further)
 
     def _objects(self) -> Iterator[ObjectConfig]:
-        search_paths = self._search_paths()
         for section in dict.fromkeys(body_type.section for body_type in self._body_types.values()):
-            for index, instance in _instances(self._data.get(section)):
-                key = f"{section}[{index}]"
-                try:
-                    path = find_file(instance.file, self._path, search_paths)
-                except ValueError as error:
-                    self._problems.append(Problem(self._file, key, str(error)))
-                    continue
-                context = {
-                    "file": path,
-                    "search_paths": search_paths,
-                    ROBOT_DESCRIPTION: self._robot_description,
-                }
-                file = f"{instance.file} (changed by {key})" if instance.changes else instance.file
-                try:
-                    yield self._object(section, instance, file, context)
-                except ConfigError as error:
-                    self._problems += [
-                        Problem(file, problem.key, problem.message) for problem in error.problems
-                    ]
+            for data, file, context in self._files(section):
+                with self._noting_problems(file):
+                    kind = type_of(section, data, self._body_types)
+                    yield ObjectConfig(kind, load_object(kind, data, file, self._body_types, context), file)
         self._claim_name(self._data.get("rgbd_sensor"), self._file, "rgbd_sensor.name")
 
-    def _object(
-        self, section: str, instance: Instance, file: str, context: Mapping[str, Any]
-    ) -> ObjectConfig:
-        data = instance.apply_changes(load_config(context["file"]))
-        self._claim_name(data, file, "name")
-        kind = type_of(section, data, self._body_types)
-        return ObjectConfig(kind, load_object(kind, data, file, self._body_types, context), file)
+    def _further_cameras(self) -> Iterator[CameraConfig]:
+        is_first = self._data.get("rgbd_sensor") is None
+        for data, file, _ in self._files(CAMERAS):
+            if not is_first and name_in(data) == FIRST_TOPIC_NAME:
+                message = f"'{FIRST_TOPIC_NAME}' is what the topics of the first camera are called; use another name"
+                self._problems.append(Problem(file, "name", message))
+            is_first = False
+            with self._noting_problems(file):
+                yield CameraConfig(RgbdSensorConfig.parse(data, file), file)
+
+    def _files(self, section: str) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
+        """Yield what each file of a list says, what to call it, and the context of reading it; note its name."""
+        search_paths = self._search_paths()
+        for index, instance in _instances(self._data.get(section)):
+            key = f"{section}[{index}]"
+            try:
+                path = find_file(instance.file, self._path, search_paths)
+            except ValueError as error:
+                self._problems.append(Problem(self._file, key, str(error)))
+                continue
+            file = f"{instance.file} (changed by {key})" if instance.changes else instance.file
+            with self._noting_problems(file):
+                data = instance.apply_changes(load_config(path))
+                self._claim_name(data, file, "name")
+                context = {"file": path, "search_paths": search_paths, ROBOT_DESCRIPTION: self._robot_description}
+                yield data, file, context
+
+    @contextlib.contextmanager
+    def _noting_problems(self, file: str) -> Iterator[None]:
+        try:
+            yield
+        except ConfigError as error:
+            self._problems += [Problem(file, problem.key, problem.message) for problem in error.problems]
 
     def _claim_name(self, data: Any, file: str, key: str) -> None:
         """Note the name of an object, so that no other has it."""

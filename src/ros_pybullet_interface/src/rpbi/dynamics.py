@@ -30,7 +30,10 @@ def link_index(body: Body, link: str) -> int:
 
     Raises:
         UnknownNameError: If the body has no such link.
+        ValueError: If the body is soft.
     """
+    if body.is_soft:
+        raise ValueError(f"'{body.name}' is soft: what it is made of stands in its file and does not change")
     links = {body.pb.getJointInfo(body.body_id, index)[12].decode(): index for index in body.joint_indices}
     known = [body.root_link, *(name for name, index in links.items() if index in body.link_indices)]
     wanted = link or body.root_link

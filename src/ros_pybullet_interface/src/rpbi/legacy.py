@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from custom_ros_tools.errors import Problem
-from custom_ros_tools.schema import ConfigModel
 
 log = logging.getLogger(__name__)
 
@@ -43,33 +42,16 @@ NO_EFFECT: dict[str, dict[str, str]] = {
 }
 """By section: a key that older worlds carry and that never did anything, and what to do instead."""
 
-ANY = object()
-PLANNED_KEYS: dict[str, dict[str, Any]] = {
-    MAIN: {
-        "soft_objects": [],
-        "urdfs": [],
-        "enable_keyboard_publisher": False,
-        "enable_mouse_publisher": False,
-        "publish_visualizer_image_hz": 0,
-        "visualizer_image_width": ANY,
-        "visualizer_image_height": ANY,
-    },
-}
-"""By section: a key that does nothing yet, and the value that asks for nothing (ANY if every value does)."""
-
 
 def modernise(
-    section: str, data: Mapping[str, Any], file: str, model: type[ConfigModel]
+    section: str, data: Mapping[str, Any], file: str
 ) -> tuple[dict[str, Any], dict[str, str], list[Problem]]:
     """Bring a mapping up to date, with a logged warning for each key that was changed or has no effect.
-
-    A planned key that the model has by now is left alone.
 
     Args:
         section: `"main"`, or the list of the main file that names the object's file.
         data: What the file says; it is not changed.
         file: Name of the file.
-        model: The model that the result is for.
 
     Returns:
         The mapping with today's keys, the old spelling of each renamed key, and the problems found.
@@ -92,11 +74,6 @@ def modernise(
     for key, advice in NO_EFFECT.get(section, {}).items():
         if _take(current, key) is not None:
             log.warning("%s: %s: has no effect: %s", file, key, advice)
-    for key, nothing in PLANNED_KEYS.get(section, {}).items():
-        if key in current and key not in model.model_fields:
-            value = current.pop(key)
-            if nothing is not ANY and value != nothing and value is not None:
-                log.warning("%s: %s: has no effect yet", file, key)
     return current, spellings, problems
 
 

@@ -54,7 +54,10 @@ def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:
     if entry.what == "world":
         _set_up(pb, entry.arguments)
     elif entry.what == "remove":
-        bodies.pop(entry.name).remove()
+        body = bodies.pop(entry.name)
+        for other in bodies.values():
+            other.untie(entry.name)
+        body.remove()
     elif entry.what == "dynamics":
         change_dynamics(bodies[entry.name], *entry.arguments)
     else:
@@ -62,7 +65,9 @@ def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:
         before = _body_ids(pb)
         try:
             make: Any = BODY_TYPES[kind]  # each with a constructor of its own
-            bodies[entry.name] = make(pb, config)
+            body = make(pb, config)
+            body.tie(bodies)
+            bodies[entry.name] = body
         except BaseException as error:
             for body_id in _body_ids(pb) - before:
                 pb.removeBody(body_id)
@@ -86,6 +91,7 @@ def replay(pb: Client, entries: Iterable[LogEntry]) -> dict[str, Body]:
 def _set_up(pb: Client, config: WorldConfig) -> None:
     """Clears the client and sets gravity, time step and the engine's parameters."""
     pb.resetSimulation(**config.resetSimulation.kwargs())
+    pb.is_deformable = bool((config.resetSimulation.flags or 0) & pybullet.RESET_USE_DEFORMABLE_WORLD)
     for path in config.search_paths():
         pb.setAdditionalSearchPath(path)
     gravity = config.setGravity

@@ -103,7 +103,7 @@ def parse_section(
     """Validate a mapping, old spellings included; problems name the key as the user spelt it."""
     if not isinstance(data, Mapping):
         return model.parse(data, file)
-    current, spellings, problems = modernise(section, data, file, model)
+    current, spellings, problems = modernise(section, data, file)
     try:
         result = model.parse(current, file, context)
     except ConfigError as error:

@@ -6,9 +6,22 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from custom_ros_tools.schema import ConfigModel, Hz, KeyedError, Name, PositiveMetres, Switch
+from custom_ros_tools.schema import (
+    ConfigModel,
+    Count,
+    Hz,
+    KeyedError,
+    Name,
+    NonNegative,
+    PositiveMetres,
+    Switch,
+    Unit,
+)
 
 from .pybullet_models import ObjectTf
+
+FIRST_TOPIC_NAME = "camera"
+"""What the first camera is called in topics, whatever its name."""
 
 ImageSide = Annotated[int, Field(gt=0, le=8192, json_schema_extra={"unit": "px"})]
 
@@ -40,6 +53,13 @@ class RgbdSensorConfig(ConfigModel):
     hz: Hz = Field(30.0, description="Images in a second.")
     pointcloud: Switch = Field(False, description="Whether point clouds are published too.")
     synchronous: Switch = Field(False, description="Whether the simulation waits for every image.")
+    depth_noise_m: Annotated[NonNegative, Unit("m")] = Field(
+        0.0, description="Standard deviation of the depths' noise."
+    )
+    depth_noise_growth_per_m: Annotated[NonNegative, Unit("1/m")] = Field(
+        0.0, description="What the squared depth adds to that deviation; about 0.0014 for a structured-light camera."
+    )
+    seed: Count | None = Field(None, description="Seed of the noise; without it, one that follows from the name.")
     intrinsics: IntrinsicsConfig = Field(
         IntrinsicsConfig(), description="Image size, field of view and range."
     )

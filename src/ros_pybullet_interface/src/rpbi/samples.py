@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .pose import Pose, Vector
+from .pose import Pose, Quaternion, Vector
 from .twist import Twist
+from .vectors import plus, scaled
 
 
 class JointStateSample(NamedTuple):
@@ -62,12 +63,14 @@ class BodyState(NamedTuple):
     Attributes:
         name: The body.
         base: Position [m] and quaternion xyzw of the base's inertial frame, as PyBullet gives and takes it.
-        joints: Positions of all joints [rad or m], in index order.
+        joints: Positions of all joints [rad or m] in index order, of a ball joint its turn as x, y, z, w.
+        nodes: Where the simulated corners of a soft body are [m]; rigid bodies have none.
     """
 
     name: str
     base: tuple[float, float, float, float, float, float, float]
-    joints: tuple[float, ...]
+    joints: tuple[float | Quaternion, ...]
+    nodes: tuple[Vector, ...] = ()
 
 
 class SceneSample(NamedTuple):
@@ -102,3 +105,84 @@ class WrenchSample(NamedTuple):
     frame_id: str
     force: Vector
     torque: Vector
+
+
+class ContactPoint(NamedTuple):
+    """A point where a body touches another, or one of its links another one.
+
+    Forces are those on the body, as mean over the last tick.
+
+    Attributes:
+        link: The body's link.
+        other_body: What it touches; the body itself if two of its links touch.
+        other_link: That one's link.
+        position: Where, on the surface of the body [m].
+        normal: Unit vector of the contact, from the other one towards the body.
+        depth: How deep the two are in each other [m]; negative where force bridges a gap.
+        normal_force: Force along the normal [N], not negative.
+        friction_directions: Two unit vectors across the normal.
+        friction_forces: Forces along these two [N].
+    """
+
+    link: str
+    other_body: str
+    other_link: str
+    position: Vector
+    normal: Vector
+    depth: float
+    normal_force: float
+    friction_directions: tuple[Vector, Vector]
+    friction_forces: tuple[float, float]
+
+    @property
+    def force(self) -> Vector:
+        """The whole force on the body [N]."""
+        first, second = map(scaled, self.friction_forces, self.friction_directions)
+        return plus(scaled(self.normal_force, self.normal), plus(first, second))
+
+
+class ContactsSample(NamedTuple):
+    """Where a body touches others.
+
+    Attributes:
+        name: The body.
+        points: All points that touch.
+    """
+
+    name: str
+    points: tuple[ContactPoint, ...]
+
+    @property
+    def force(self) -> Vector:
+        """Sum of the forces of others on the body [N]."""
+        total = (0.0, 0.0, 0.0)
+        for point in self.points:
+            if point.other_body != self.name:
+                total = plus(total, point.force)
+        return total
+
+
+class ContactArrowsSample(NamedTuple):
+    """Forces on a body as arrows.
+
+    Attributes:
+        name: The body.
+        arrows: Start and end of each [m].
+    """
+
+    name: str
+    arrows: tuple[tuple[Vector, Vector], ...]
+
+
+class SurfaceSample(NamedTuple):
+    """The surface of a soft body.
+
+    Attributes:
+        name: The body.
+        corners: Corners of its triangles, three for each [m].
+        rgba: Its colour and opacity, each from 0 to 1.
+    """
+
+    name: str
+    corners: tuple[Vector, ...]
+    rgba: tuple[float, float, float, float]

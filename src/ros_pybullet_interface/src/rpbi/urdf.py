@@ -77,6 +77,11 @@ def write_description(text: str) -> str:
     return _write("robot_description", text)
 
 
+def is_temporary(path: str) -> bool:
+    """Tells whether a file is one of this module's, which go when the process ends."""
+    return Path(path).parent == _folder()
+
+
 def description_for_ros(path: str) -> str:
     """Returns a URDF file as ROS wants it, which does not know where the file is.
 
@@ -112,6 +117,20 @@ def joint_types(path: str) -> dict[str, str]:
     except ElementTree.ParseError as error:
         raise ConfigError([Problem(path, "", f"is not XML: {error}")]) from None
     return {joint.get("name", ""): joint.get("type", "") for joint in joints}
+
+
+def deformable_meshes(path: str) -> list[str]:
+    """Returns the files that the soft body of a URDF file is made of; none if it describes none.
+
+    Raises:
+        ConfigError: If the file is not XML, or a mesh does not exist.
+    """
+    try:
+        deformables = ElementTree.parse(path).getroot().findall("deformable")
+    except (ElementTree.ParseError, OSError) as error:
+        raise ConfigError([Problem(path, "", f"is not XML: {error}")]) from None
+    names = [part.get("filename") for deformable in deformables for part in deformable]
+    return [str(_mesh_file(name, Path(path))) for name in dict.fromkeys(names) if name]
 
 
 def _mesh_file(mesh: str, source: Path) -> Path:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pybullet
@@ -12,18 +12,24 @@ import pybullet
 from custom_ros_tools.errors import ConfigError, PhysicsError, Problem, UnknownNameError
 from custom_ros_tools.schema import ConfigModel
 
+from .actions import ACTIONS
 from .bodies import BODY_TYPES, Body
 from .client import Client
 from .clock import Clock, Schedule
+from .command_log import CommandLog, WorldCommand
 from .config import LoadedWorld, load_world
+from .contact_reader import ContactReader
 from .dynamics import read_dynamics
 from .inputs import Input
 from .link_dynamics import LinkDynamics
 from .load_log import LogEntry, apply
 from .mailbox import Mailbox
 from .pybullet_models import ChangeDynamics
+from .rgbd_config import FIRST_TOPIC_NAME, RgbdSensorConfig
 from .sensors import RgbdSensor
 from .sensors.sensor import Sensor
+from .state_hash import state_hash
+from .window import Window, check_recording
 
 log = logging.getLogger(__name__)
 
@@ -73,6 +79,15 @@ class World:
         self.bodies: dict[str, Body] = {}
         self.cameras: dict[str, RgbdSensor] = {}
         self.log: list[LogEntry] = []
+        self.commands = CommandLog()
+        """What entered it since it was built or reset."""
+        self.resets = 0
+        """How often it was reset."""
+        self.loaded = loaded
+        """What it was built from, and is again when it is reset."""
+        self._is_built = False
+        self._built_entries = 0
+        """How many entries of the log are of building it."""
         self._inputs: dict[str, Input] = {}
         self._scheduled: dict[str, list[_Scheduled]] = {}
         self._stepping: list[Body] = []
@@ -83,11 +98,15 @@ class World:
         connect = self.config.connect.kwargs()
         configured_mode = connect.pop("connection_mode")
         mode = configured_mode if connection_mode is None else connection_mode
+        if mode != pybullet.DIRECT:
+            check_recording(connect.get("options", ""))
         self.pb = Client(mode, **connect)
+        self.window = None if mode == pybullet.DIRECT else Window(self.pb)
+        self.contacts = ContactReader(self.pb, self.bodies)
         try:
             if mode == pybullet.GUI:
                 self._set_up_window()
-            self._build(loaded)
+            self._build()
         except BaseException:
             self.close()
             raise
@@ -118,29 +137,55 @@ class World:
             PhysicsError: If PyBullet refuses.
         """
         name: str = config.name  # type: ignore[attr-defined]
-        if name in self._scheduled:
-            message = f"'{name}' is taken already; names are unique in a world"
-            raise ConfigError([Problem(file or name, "name", message)])
+        self._require_new(name, file)
         try:
             self._append(LogEntry(name, "add", (kind, config)))
         except ConfigError as error:
             raise ConfigError([Problem(file or name, each.key, each.message) for each in error.problems]) from None
         body = self.bodies[name]
+        self._note(name, "add", (kind, config))
         self._register(name, body.sensors(), body.inputs())
         if type(body).before_step is not Body.before_step:
             self._stepping.append(body)
         return body
 
+    def add_camera(self, config: RgbdSensorConfig, file: str | None = None) -> RgbdSensor:
+        """Adds a camera; when it raises, the world is as it was.
+
+        The first one, and the next to come once that has gone, has the topics `rpbi/camera/...`.
+
+        Args:
+            config: What it is.
+            file: Where it came from, for messages; without it, they have the camera's name.
+
+        Raises:
+            ConfigError: If the name is taken.
+        """
+        self._require_new(config.name, file)
+        taken = {camera.topic_name for camera in self.cameras.values()}
+        topic_name = config.name if FIRST_TOPIC_NAME in taken else FIRST_TOPIC_NAME
+        if topic_name in taken:
+            message = f"'{topic_name}' is what the topics of the first camera are called; use another name"
+            raise ConfigError([Problem(file or config.name, "name", message)])
+        camera = RgbdSensor(config, self.bodies, self.clock, topic_name)
+        self.cameras = {**self.cameras, camera.name: camera}
+        self._register(camera.name, (camera,), camera.inputs())
+        return camera
+
     def remove(self, name: str) -> None:
-        """Removes a body.
+        """Removes a body or a camera.
 
         Raises:
             UnknownNameError: If there is none of that name.
         """
-        body = self.bodies.get(name)
-        self._append(LogEntry(name, "remove"))
-        if body in self._stepping:
-            self._stepping.remove(body)
+        if name in self.cameras:
+            self.cameras = {other: camera for other, camera in self.cameras.items() if other != name}
+        else:
+            body = self.bodies.get(name)
+            self._append(LogEntry(name, "remove"))
+            self._note(name, "remove", None)
+            if body in self._stepping:
+                self._stepping.remove(body)
         gone = [each.sensor for each in self._scheduled.pop(name)]
         self._requeue()
         self._watching = [sensor for sensor in self._watching if sensor not in gone]
@@ -175,6 +220,30 @@ class World:
         """
         name, _, link = object_name.partition("/")
         self._append(LogEntry(name, "dynamics", (link, change)))
+        self._note(object_name, "dynamics", change)
+
+    def act(self, name: str, what: str, value: Any, do: Callable[[Any], Any] | None = None) -> Any:
+        """Does something to a body, and notes it as a command; when it raises, nothing is noted.
+
+        Args:
+            name: The body.
+            what: A key of ACTIONS.
+            value: What that takes.
+            do: Does the same to the body in another way, for instance with something prepared by another thread.
+
+        Returns:
+            What the action returns.
+
+        Raises:
+            UnknownNameError: If there is no such body.
+            ValueError: If the value is refused.
+        """
+        body = self.bodies.get(name)
+        if body is None:
+            raise UnknownNameError("object", name, list(self.bodies))
+        result = ACTIONS[what](body, self.clock, value) if do is None else do(body)
+        self._note(name, what, value)
+        return result
 
     def put(self, slot: str, value: Any) -> None:
         """Hands a value to a body or sensor before the next tick; any thread may call it.
@@ -187,10 +256,11 @@ class World:
             UnknownNameError: If there is no such input, or the value names something unknown.
             ValueError: If the value is refused, for instance because it is not finite.
         """
+        era = self.mailbox.era
         taken = self._inputs.get(slot)
         if taken is None:
             raise UnknownNameError("input", slot, list(self._inputs))
-        self.mailbox.put(slot, taken.check(value), taken.merge)
+        self.mailbox.put(slot, taken.check(value), taken.merge, era)
 
     @property
     def inputs(self) -> dict[str, Input]:
@@ -213,7 +283,13 @@ class World:
         """
         for slot, value in self.mailbox.take().items():
             if slot in self._inputs:
-                self._inputs[slot].apply(value)
+                self.take_input(slot, value)
+
+    def take_input(self, slot: str, value: Any) -> None:
+        """Acts on a value that was checked, and notes it if it is for a body."""
+        self._inputs[slot].apply(value)
+        if slot.split("/")[0] in self.bodies:
+            self._note(slot, "input", value)
 
     def step(self) -> list[Any]:
         """Goes one tick on.
@@ -230,6 +306,7 @@ class World:
         for sensor in self._watching:
             sensor.before_step(self.clock.tick)
         self.pb.stepSimulation()
+        self.contacts.outdate()
         self.clock.advance()
         for sensor in self._watching:
             sensor.after_step(self.clock.tick)
@@ -251,11 +328,53 @@ class World:
         """Breaks off what bodies were about to do over the coming ticks, such as timed motions."""
         for body in self.bodies.values():
             body.halt(reason)
+        self._note("", "halt", reason)
 
     def pause(self, reason: str) -> None:
         """Breaks off what cannot wait until the world, which is stopped, runs again."""
         for body in self.bodies.values():
             body.pause(reason)
+        self._note("", "pause", reason)
+
+    def reset(self) -> None:
+        """Makes the world what it was when it was built, to the last bit; stamps go on.
+
+        Objects that came later go, those that were removed come back. Motions end with a reason; inputs that wait are
+        dropped. Cameras stay, with the pose that they have. Bodies and their sensors are new objects.
+
+        Raises:
+            ConfigError: If something cannot be loaded any more, for instance because its file has gone; then the
+                world lacks it.
+        """
+        self.halt("the world was reset")
+        for body in self.bodies.values():
+            body.remove()
+        self.bodies.clear()
+        self.log.clear()
+        self._scheduled.clear()
+        self._stepping.clear()
+        self._watching.clear()
+        self._requeue()
+        self.clock.restart()
+        self.resets += 1
+        old = self._inputs  # they stay till their like has come, for those who put meanwhile
+        self._is_built = False
+        try:
+            self._build()
+        finally:
+            self._is_built = True
+            self.contacts.outdate()
+            self._inputs = {slot: taken for slot, taken in self._inputs.items() if taken is not old.get(slot)}
+            self.commands.clear()
+            self.mailbox.drop()
+
+    def changed_names(self) -> set[str]:
+        """Returns the names of all objects that came or went since the world was built or reset."""
+        return {entry.name for entry in self.log[self._built_entries :] if entry.what in ("add", "remove")}
+
+    def state_hash(self) -> str:
+        """Returns a text that is the same for worlds in the same state at the same tick, see `state_hash`."""
+        return state_hash(self.clock.tick, self.bodies)
 
     def close(self) -> None:
         """Disconnects from PyBullet and fails the requests that wait."""
@@ -271,10 +390,10 @@ class World:
             self.pb.configureDebugVisualizer(**arguments)
         self.pb.resetDebugVisualizerCamera(**self.config.resetDebugVisualizerCamera.kwargs())
 
-    def _build(self, loaded: LoadedWorld) -> None:
+    def _build(self) -> None:
         self._append(LogEntry("", "world", self.config))
         problems: list[Problem] = []
-        for item in loaded.objects:
+        for item in self.loaded.objects:
             try:
                 self.add(item.type, item.config, item.file)
             except ConfigError as error:
@@ -283,18 +402,41 @@ class World:
                 problems.append(Problem(item.file, "", str(error)))
         if problems:
             raise ConfigError(problems)
-        if self.config.rgbd_sensor is not None:
-            camera = RgbdSensor(self.config.rgbd_sensor, self.bodies, self.clock)
-            self.cameras[camera.name] = camera
-            self._register(camera.name, (camera,), camera.inputs())
+        self._build_cameras()
+        self._built_entries = len(self.log)
+        self._is_built = True
+
+    def _build_cameras(self) -> None:
+        """Adds the cameras; those that have been there since the last time stay, with the pose that they have."""
+        before, self.cameras = self.cameras, {}
+        configs = [item.config for item in self.loaded.cameras]
+        for name, camera in before.items():
+            if any(camera.config is config for config in configs):
+                self.cameras = {**self.cameras, name: camera}
+                self._register(name, (camera,), camera.inputs())
+        for config, file in self.loaded.cameras:
+            if config.name not in self.cameras:
+                self.add_camera(config, file)
+
+    def _require_new(self, name: str, file: str | None) -> None:
+        if name in self._scheduled:
+            message = f"'{name}' is taken already; names are unique in a world"
+            raise ConfigError([Problem(file or name, "name", message)])
 
     def _append(self, entry: LogEntry) -> None:
         """The one way into the world: does what the entry says and logs it."""
+        self.contacts.outdate()
         apply(self.pb, self.bodies, entry)
         self.log.append(entry)
 
+    def _note(self, name: str, what: str, value: Any) -> None:
+        if self._is_built:
+            self.commands.note(WorldCommand(self.clock.tick, name, what, value))
+
     def _register(self, name: str, sensors: tuple[Sensor, ...], inputs: Any) -> None:
         dt_ns, tick = self.clock.dt_ns, self.clock.tick
+        for sensor in sensors:
+            sensor.enter(self)
         self._scheduled[name] = [_Scheduled(one, dt_ns, tick, order) for order, one in enumerate(sensors, self._count)]
         self._count += len(sensors)
         self._requeue()

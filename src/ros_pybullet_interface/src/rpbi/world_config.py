@@ -6,7 +6,19 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
-from custom_ros_tools.schema import ConfigModel, FrameId, Hz, ListOf, Name, NonNegative, Seconds, Switch, Text
+from custom_ros_tools.schema import (
+    ConfigModel,
+    FrameId,
+    Hz,
+    HzOrOff,
+    ListOf,
+    Name,
+    NonNegative,
+    Pixels,
+    Seconds,
+    Switch,
+    Text,
+)
 
 from .asset_files import find_folder
 from .instance import ObjectEntry
@@ -77,19 +89,40 @@ class WorldConfig(ConfigModel):
         True, description="Whether the world runs at once, else from the first `rpbi/start`."
     )
     status_hz: Hz = Field(50.0, description="Rate of `rpbi/status`.")
+    state_hz: HzOrOff = Field(10.0, description="Rate of `rpbi/state`, in wall time; 0 is off.")
+    state_hash_hz: HzOrOff = Field(
+        1.0, description="Rate of the hashes in `rpbi/state`, in the world's time, by which recordings are replayed."
+    )
     configureDebugVisualizer: ConfigureDebugVisualizer = Field(
         ConfigureDebugVisualizer(), description="What PyBullet's window shows."
     )
     resetDebugVisualizerCamera: ResetDebugVisualizerCamera = Field(
         ResetDebugVisualizerCamera(), description="Where PyBullet's window looks from."
     )
+    enable_keyboard_publisher: Switch = Field(
+        False, description="Whether keys pressed in PyBullet's window are on `rpbi/keyboard`."
+    )
+    enable_mouse_publisher: Switch = Field(
+        False, description="Whether what the mouse does in PyBullet's window is on `rpbi/mouse`."
+    )
+    publish_visualizer_image_hz: HzOrOff = Field(
+        0.0, description="Rate of `rpbi/visualizer_image`, what PyBullet's window shows, in wall time; 0 is off."
+    )
+    visualizer_image_width: Pixels = Field(640, description="Columns of that image.")
+    visualizer_image_height: Pixels = Field(480, description="Its rows.")
+    markers_hz: HzOrOff = Field(
+        10.0, description="How often `rpbi/markers` is looked after, in wall time; 0 is off."
+    )
     visual_objects: ListOf[ObjectEntry] = Field((), description="Files of objects that are seen and never felt.")
     collision_objects: ListOf[ObjectEntry] = Field((), description="Files of objects that nothing moves.")
     dynamic_objects: ListOf[ObjectEntry] = Field((), description="Files of objects that physics moves.")
     robots: ListOf[ObjectEntry] = Field((), description="Files of robots.")
+    soft_objects: ListOf[ObjectEntry] = Field((), description="Files of soft bodies.")
+    urdfs: ListOf[ObjectEntry] = Field((), description="Files of objects that come from a URDF and have no motors.")
     rgbd_sensor: RgbdSensorConfig | None = Field(
-        None, description="Camera of colour, depth and segmentation."
+        None, description="Camera of colour, depth and segmentation; the first one if there are several."
     )
+    rgbd_sensors: ListOf[ObjectEntry] = Field((), description="Files of further cameras.")
     controls: ControlsConfig | None = Field(None, description="What the control window works on.")
 
     def search_paths(self) -> tuple[str, ...]:

@@ -7,6 +7,8 @@ from .collision import CollisionObject
 from .dynamic import DynamicObject
 from .mobile_robot import MobileRobot
 from .robot import Robot
+from .soft import SoftObject
+from .urdf_object import UrdfObject
 from .visual import VisualObject
 from .visual_robot import VisualRobot
 
@@ -17,8 +19,10 @@ BODY_TYPES: dict[str, type[Body]] = {
     "robot": Robot,
     "mobile_robot": MobileRobot,
     "visual_robot": VisualRobot,
+    "urdf": UrdfObject,
+    "soft": SoftObject,
 }
-"""In the order in which a world loads them."""
+"""In the order in which a world loads them; soft bodies may be tied to any of the others."""
 
 __all__ = [
     "BODY_TYPES",
@@ -27,6 +31,8 @@ __all__ = [
     "DynamicObject",
     "MobileRobot",
     "Robot",
+    "SoftObject",
+    "UrdfObject",
     "VisualObject",
     "VisualRobot",
 ]

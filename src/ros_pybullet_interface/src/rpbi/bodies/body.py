@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any, ClassVar
+
+import pybullet
 
 from custom_ros_tools.errors import PhysicsError
 from custom_ros_tools.schema import ConfigModel
@@ -30,6 +33,8 @@ class Body:
     """
 
     Config: ClassVar[type[ConfigModel]]
+    is_soft: ClassVar[bool] = False
+    """Whether it has neither links nor a fixed shape."""
     section: ClassVar[str]
     """The list of the main YAML file that names objects of this type."""
 
@@ -49,6 +54,16 @@ class Body:
         self.dynamics_changes = 0
         """How often its dynamics were changed, for those who keep what they know of them."""
 
+    def link_name(self, index: int) -> str:
+        """Returns the name of a link by PyBullet's index, -1 for the base."""
+        return self._link_names[index]
+
+    @cached_property
+    def _link_names(self) -> dict[int, str]:
+        base = self.pb.getBodyInfo(self.body_id)[0].decode()
+        infos = [self.pb.getJointInfo(self.body_id, index) for index in self.joint_indices]
+        return {-1: base, **{info[0]: info[12].decode() for info in infos}}
+
     def before_step(self, tick: int) -> None:
         """Acts just before the physics of each tick; bodies that need nothing leave it."""
 
@@ -66,6 +81,19 @@ class Body:
             reason: Why, for whoever waits for it.
         """
         self.halt(reason)
+
+    def tie(self, bodies: Mapping[str, Body]) -> None:
+        """Ties it to other bodies when it comes into their world; most bodies are tied to none.
+
+        Args:
+            bodies: Those that are there already, by name.
+
+        Raises:
+            ConfigError: If it cannot be done.
+        """
+
+    def untie(self, name: str | None = None) -> None:
+        """Undoes what `tie` did with a body that is about to go, or with all."""
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
@@ -103,7 +131,27 @@ class Body:
         """Returns where the body is."""
         position, quat = self.pb.getBasePositionAndOrientation(self.body_id)
         joints = self.pb.getJointStates(self.body_id, self.joint_indices) if self.joint_indices else ()
-        return BodyState(self.name, position + quat, tuple(joint[0] for joint in joints))
+        positions = [joint[0] for joint in joints]
+        for index in self._ball_joints:
+            positions[index] = self.pb.getJointStateMultiDof(self.body_id, index)[0]
+        return BodyState(self.name, position + quat, tuple(positions))
+
+    @cached_property
+    def _ball_joints(self) -> tuple[int, ...]:
+        """PyBullet's indices of joints that turn about three axes."""
+        types = [self.pb.getJointInfo(self.body_id, index)[2] for index in self.joint_indices]
+        return tuple(index for index, kind in zip(self.joint_indices, types) if kind == pybullet.JOINT_SPHERICAL)
+
+    def motion_state(self) -> tuple[float, ...]:
+        """Returns all that is known of where the body is and how it moves, for comparison to the last bit.
+
+        Returns:
+            Position and orientation of the base, its velocities, and positions and velocities of all joints.
+        """
+        position, quat = self.pb.getBasePositionAndOrientation(self.body_id)
+        linear, angular = self.pb.getBaseVelocity(self.body_id)
+        joints = self.pb.getJointStatesMultiDof(self.body_id, self.joint_indices) if self.joint_indices else ()
+        return (*position, *quat, *linear, *angular, *(each for joint in joints for part in joint[:2] for each in part))
 
     def remove(self) -> None:
         """Takes the body out of the world."""

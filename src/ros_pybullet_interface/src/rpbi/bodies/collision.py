@@ -8,6 +8,8 @@ from custom_ros_tools.schema import ConfigModel, Name
 
 from ..client import Client
 from ..pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ObjectTf
+from ..sensors.contacts_config import ContactsConfig, contact_sensors
+from ..sensors.sensor import Sensor
 from .shape_object import ShapeObject
 
 
@@ -19,6 +21,7 @@ class CollisionObjectConfig(ConfigModel):
     createCollisionShape: CreateCollisionShape = Field(description="What it feels like.")
     changeDynamics: ChangeDynamics | None = Field(None, description="Friction, restitution and the like.")
     object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, it stays at the origin.")
+    contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
 
 
 class CollisionObject(ShapeObject):
@@ -33,3 +36,8 @@ class CollisionObject(ShapeObject):
         )
         if config.changeDynamics is not None:
             pb.changeDynamics(self.body_id, -1, **config.changeDynamics.kwargs())
+        self._contacts = config.contacts
+
+    def sensors(self) -> tuple[Sensor, ...]:
+        """Its contacts, if they are asked for."""
+        return contact_sensors(self, self._contacts)

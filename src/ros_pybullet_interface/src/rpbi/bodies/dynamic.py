@@ -9,6 +9,7 @@ from custom_ros_tools.schema import ConfigModel, HzOrOff, Name, Position, Positi
 from ..client import Client
 from ..pose import Pose
 from ..pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ResetBaseVelocity
+from ..sensors.contacts_config import ContactsConfig, contact_sensors
 from ..sensors.link_pose import LinkPoseSensor
 from ..sensors.sensor import Sensor
 from .shape_object import ShapeObject
@@ -26,6 +27,7 @@ class DynamicObjectConfig(ConfigModel):
     baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Start orientation, x, y, z, w.")
     resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity.")
     broadcast_hz: HzOrOff = Field(0.0, description="Rate of its pose on TF; 0 is off.")
+    contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
 
 
 class DynamicObject(ShapeObject):
@@ -47,9 +49,11 @@ class DynamicObject(ShapeObject):
         if config.resetBaseVelocity is not None:
             pb.resetBaseVelocity(self.body_id, **config.resetBaseVelocity.kwargs())
         self._broadcast_hz = config.broadcast_hz
+        self._contacts = config.contacts
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """Its pose, if it is to be broadcast."""
+        """Its pose, if it is to be broadcast, and its contacts, if they are asked for."""
+        contacts = contact_sensors(self, self._contacts)
         if not self._broadcast_hz:
-            return ()
-        return (LinkPoseSensor(self, self._broadcast_hz, links=False, root_frame=f"rpbi/{self.name}"),)
+            return contacts
+        return (LinkPoseSensor(self, self._broadcast_hz, links=False, root_frame=f"rpbi/{self.name}"), *contacts)

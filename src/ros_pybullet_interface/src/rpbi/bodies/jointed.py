@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
-from typing import Any, ClassVar
-
-import pybullet
+from typing import ClassVar
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 
@@ -22,7 +20,7 @@ from ..sensors.sensor import Sensor
 from ..urdf import resolve_meshes
 from .body import Body
 from .robot_config import RobotConfig
-from .urdf_faults import urdf_faults
+from .urdf_loading import load_urdf
 
 DEFAULT_BASE_STATE_HZ = 50.0
 """Rate of the state of a base that physics moves [Hz]."""
@@ -54,7 +52,7 @@ class JointedBody(Body):
         if fixed_base or self.base_joints:
             arguments["useFixedBase"] = True
         self.has_fixed_base = bool(arguments.get("useFixedBase", False)) and not self.base_joints
-        super().__init__(pb, config.name, _load(pb, config.name, arguments, self.prepare_urdf))
+        super().__init__(pb, config.name, load_urdf(pb, config.name, arguments, self.prepare_urdf))
         self.config = config
         joints = [Joint.from_info(pb.getJointInfo(self.body_id, i)) for i in self.joint_indices]
         self.model = JointModel(joints, self.base_joints)
@@ -164,14 +162,3 @@ class JointedBody(Body):
         """Makes every visual shape as opaque as asked."""
         for shape in self.pb.getVisualShapeData(self.body_id):
             self.pb.changeVisualShape(self.body_id, shape[1], rgbaColor=(*shape[7][:3], alpha))
-
-
-def _load(pb: Client, name: str, arguments: dict[str, Any], prepare: Callable[[str], str]) -> int:
-    """Loads a robot and returns PyBullet's id of it; what is wrong with its file is told by what PyBullet needs."""
-    try:
-        return int(pb.loadURDF(**{**arguments, "fileName": prepare(arguments["fileName"])}))
-    except ConfigError as error:
-        messages = [f"{problem.key}: {problem.message}" for problem in error.problems]
-    except (pybullet.error, OSError, UnicodeDecodeError) as error:
-        messages = urdf_faults(arguments["fileName"]) or [f"PyBullet could not load it: {error}"]
-    raise ConfigError([Problem(name, "loadURDF.fileName", message) for message in messages])

@@ -21,6 +21,7 @@ from ..inputs import Input
 from ..joint_model import JointTarget
 from ..limit_reports import LimitReports
 from ..pose import Pose
+from ..sensors.contacts_config import contact_sensors
 from ..sensors.force_torque import ForceTorqueSensor
 from ..sensors.joint_state import JointStateSensor
 from ..sensors.sensor import Sensor
@@ -80,10 +81,11 @@ class Robot(JointedBody):
         return data.get("is_visual_robot") not in (True, 1) and data.get("planar_base") is None
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """Joint states, force-torque sensors and the state of the follower of trajectories, beside link poses."""
+        """Joint states, force-torque sensors, the follower's state and contacts, beside link poses."""
         joint_states = JointStateSensor(self, self.config.joint_state_publisher_hz)
         trajectory = () if self.follower is None else (TrajectoryStateSensor(self, self.follower),)
-        return (joint_states, *self.force_torque_sensors, *trajectory, *super().sensors())
+        contacts = contact_sensors(self, self.config.contacts)
+        return (joint_states, *self.force_torque_sensors, *trajectory, *contacts, *super().sensors())
 
     def inputs(self) -> Mapping[str, Input]:
         """Takes `target`, a JointTarget of what the control mode asks for, beside the pose of its base."""

@@ -9,6 +9,7 @@ from custom_ros_tools.schema import ConfigModel, Hz, HzOrOff, KeyedError, ListOf
 from ..control.planar_base_config import PlanarBaseConfig
 from ..control.trajectory_config import JointTrajectoryControllerConfig
 from ..pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity, SetJointMotorControlArray
+from ..sensors.contacts_config import ContactsConfig
 from ..sensors.force_torque_config import ForceTorqueEntry
 
 
@@ -69,6 +70,7 @@ class RobotConfig(ConfigModel):
     start_ik_callback: Switch = Field(
         False, description="Whether it moves to what inverse kinematics finds for problems on the topic `ik`."
     )
+    contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
     color_alpha: float | None = Field(None, ge=0.0, le=1.0, description="Opacity of the whole robot, 0 to 1.")
 
     @field_validator("setJointMotorControlArray")
@@ -84,6 +86,12 @@ class RobotConfig(ConfigModel):
     def _follows_only_with_motors(self) -> RobotConfig:
         if self.joint_trajectory_controller is not None and self.is_visual_robot:
             raise KeyedError("joint_trajectory_controller", "a visual robot has no motors that could follow")
+        return self
+
+    @model_validator(mode="after")
+    def _touches_only_if_felt(self) -> RobotConfig:
+        if self.contacts is not None and self.is_visual_robot:
+            raise KeyedError("contacts", "a visual robot touches nothing")
         return self
 
     @model_validator(mode="after")

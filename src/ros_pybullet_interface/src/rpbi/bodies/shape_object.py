@@ -50,6 +50,7 @@ class ShapeObject(Body):
             baseMass=mass_kg, basePosition=pose.position, baseOrientation=pose.quat_xyzw, **shapes
         )
         super().__init__(pb, name, body_id)
+        self.visual = visual
         self._object_tf = object_tf
 
     def inputs(self) -> Mapping[str, Input]:

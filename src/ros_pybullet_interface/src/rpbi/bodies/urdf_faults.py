@@ -29,7 +29,7 @@ def urdf_faults(path: str) -> list[str]:
         return [f"{path} is not XML: {error}"]
     if root.tag != "robot":
         return [f"{path}: expected <robot> at the top, got <{root.tag}>"]
-    if root.find("link") is None:
+    if root.find("link") is None and root.find("deformable") is None:
         return [f"{path}: the robot has no <link>"]
     faults = []
     for mesh in dict.fromkeys(element.get("filename", "") for element in root.iter("mesh")):

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import argparse
 import logging
-import os
 import signal
 import socket
 from functools import partial
 
 from .channel import Channel
 from .frame import make_sink
+from .priority import give_way
 from .process import RenderProcess, ReportHandler
 
 
@@ -23,7 +23,7 @@ def main() -> None:
     parser.add_argument("--socket", type=int, required=True, help="file descriptor of the connection")
     parser.add_argument("--sink", required=True, help="module:factory of what takes the frames")
     arguments, _ = parser.parse_known_args()
-    _give_way()
+    give_way()
     # Ctrl-C goes to the whole process group; the simulator decides when we end.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     channel = Channel(socket.socket(fileno=arguments.socket))
@@ -32,14 +32,6 @@ def main() -> None:
     logger.propagate = False
     logger.addHandler(ReportHandler(channel))
     RenderProcess(channel, partial(make_sink, arguments.sink)).run()
-
-
-def _give_way() -> None:
-    """Lets physics go first: what is idle gets only what nobody else needs."""
-    try:
-        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
-    except OSError:  # some containers do not allow it
-        os.nice(19)
 
 
 if __name__ == "__main__":

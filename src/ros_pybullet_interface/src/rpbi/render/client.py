@@ -16,7 +16,7 @@ from ..load_log import LogEntry
 from ..samples import SceneSample
 from .channel import Channel
 from .frame import NO_DEMAND, Camera, Demand
-from .messages import Demanded, Ready, Report, Scene, SetUp, Taken, WorldChanged
+from .messages import CameraAdded, CameraRemoved, Demanded, Ready, Report, Scene, SetUp, Shown, Taken, WorldChanged
 
 log = logging.getLogger(__name__)
 
@@ -26,13 +26,13 @@ STOP_TIMEOUT_S = 5.0
 
 
 class RenderClient:
-    """Keeps a renderer process alive and fed, without ever waiting for it.
+    """Keeps a renderer process alive and fed, without waiting for it unless it is asked to.
 
     All methods are for the simulation thread. At most one scene per camera is under way; as long as the
-    renderer has not taken it, newer ones replace each other here.
+    renderer has not taken it, newer ones replace each other here. There is no process before there is a camera.
 
     Args:
-        cameras: All cameras, the first one first.
+        cameras: The cameras that there are from the start.
         load_log: The world's load log, which may grow at any time; the process gets all of it.
         body_ids: Returns PyBullet's body ids by name.
         sink: `module:factory` of what takes the frames in the other process (see `frame.Sink`).
@@ -53,7 +53,7 @@ class RenderClient:
         """Names of the cameras that somebody looks at."""
         self.renderer = ""
         """What draws, once it does."""
-        self._cameras = tuple(cameras)
+        self._cameras = {camera.name: camera for camera in cameras}
         self._log = load_log
         self._body_ids = body_ids
         self._command = ("-P", "-m", "rpbi.render", "--sink", sink, *arguments)
@@ -64,10 +64,12 @@ class RenderClient:
         self._start_at_s = 0.0
         self._failures = 0
         self._last: dict[str, Scene] = {}
+        self._first_entry: LogEntry | None = None
         self._forget()
         self._do: dict[type, Callable[[Any], None]] = {
             Ready: self._take_ready,
             Taken: self._take_taken,
+            Shown: self._take_shown,
             Demanded: self._take_demands,
             Report: lambda report: log.log(report.level, "camera: %s", report.text),
         }
@@ -82,7 +84,7 @@ class RenderClient:
         if self._channel is None:
             if self._process is not None:
                 self._bury()
-            elif time.monotonic() >= self._start_at_s:
+            elif self._cameras and time.monotonic() >= self._start_at_s:
                 self._start()
             return
         self._channel.flush()
@@ -92,6 +94,42 @@ class RenderClient:
             self._channel.close()
             self._channel = None
             self._forget()
+
+    def add(self, camera: Camera) -> None:
+        """Takes a camera up."""
+        self._cameras[camera.name] = camera
+        if self._channel is not None:
+            self._channel.send(CameraAdded(camera))
+
+    def remove(self, name: str) -> None:
+        """Gives a camera up."""
+        del self._cameras[name]
+        for known in (self._demands, self._waiting, self._last, self._served, self._shown_ns):
+            known.pop(name, None)
+        self._under_way.discard(name)
+        self.wanted -= {name}
+        if self._channel is not None:
+            self._channel.send(CameraRemoved(name))
+
+    def knows_demand(self, name: str) -> bool:
+        """Tells whether it is known who looks at a camera; that is not so before the process is up."""
+        return name in self._demands
+
+    def has_shown(self, name: str, stamp_ns: int) -> bool:
+        """Tells whether the scene of that stamp, the last of a synchronous camera, was drawn and handed on."""
+        return self._shown_ns.get(name) == stamp_ns
+
+    @property
+    def is_up(self) -> bool:
+        """Whether there is a process, as far as is known."""
+        return self._channel is not None
+
+    def wait(self, timeout_s: float) -> None:
+        """Waits until the process says something, for at most so long [s]."""
+        if self._channel is None:
+            time.sleep(min(timeout_s, 0.01))
+        else:
+            self._channel.wait(timeout_s)
 
     def send(self, sample: SceneSample) -> None:
         """Has a scene drawn, or a newer one in its place if the renderer is not ready for it in time."""
@@ -104,6 +142,11 @@ class RenderClient:
             if self._demands.get(name, NO_DEMAND).seen > self._served.get(name, 0):
                 self._waiting.setdefault(name, scene)
                 self._send_waiting(name)
+
+    def forget_scenes(self) -> None:
+        """Drops the scenes that were not drawn yet or might be drawn again."""
+        self._waiting.clear()
+        self._last.clear()
 
     def stop(self) -> None:
         """Ends the process, and waits for that for a moment."""
@@ -131,7 +174,7 @@ class RenderClient:
             )
         self._started_s = time.monotonic()
         self._channel = Channel(ours)
-        self._channel.send(SetUp(self._cameras, self._use_egl))
+        self._channel.send(SetUp(tuple(self._cameras.values()), self._use_egl))
         self._send_log()
 
     def _bury(self) -> None:
@@ -157,13 +200,16 @@ class RenderClient:
     def _forget(self) -> None:
         """Forgets what the process knew."""
         self.wanted = frozenset()
-        self._demands: Mapping[str, Demand] = {}
+        self._demands: dict[str, Demand] = {}
         self._logged = 0
         self._waiting: dict[str, Scene] = {}
         self._under_way: set[str] = set()
         self._served: dict[str, int] = {}
+        self._shown_ns: dict[str, int] = {}
 
     def _send_log(self) -> None:
+        if self._log and self._log[0] is not self._first_entry:  # the log of a world that was reset begins anew
+            self._first_entry, self._logged = self._log[0], 0
         if len(self._log) != self._logged and self._channel is not None:
             self._channel.send(WorldChanged(tuple(self._log[self._logged :])))
             self._logged = len(self._log)
@@ -186,6 +232,9 @@ class RenderClient:
         self._under_way.discard(message.camera)
         self._send_waiting(message.camera)
 
+    def _take_shown(self, message: Shown) -> None:
+        self._shown_ns[message.camera] = message.stamp_ns
+
     def _take_demands(self, message: Demanded) -> None:
-        self._demands = message.demands
-        self.wanted = frozenset(name for name, demand in message.demands.items() if demand.streams)
+        self._demands = {name: demand for name, demand in message.demands.items() if name in self._cameras}
+        self.wanted = frozenset(name for name, demand in self._demands.items() if demand.streams)

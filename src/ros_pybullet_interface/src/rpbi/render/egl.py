@@ -14,6 +14,9 @@ import logging
 from ctypes import c_char_p, c_int, c_uint, c_void_p
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 log = logging.getLogger(__name__)
 
 DEPTH_BITS = 24
@@ -24,7 +27,7 @@ _BLUE, _GREEN, _RED, _DEPTH = 0x3022, 0x3023, 0x3024, 0x3025
 _SURFACE_TYPE, _PBUFFER_BIT = 0x3033, 0x0001
 _RENDERABLE_TYPE, _OPENGL_BIT = 0x3040, 0x0008
 _HEIGHT, _WIDTH, _DRAW = 0x3056, 0x3057, 0x3059
-_GL_RENDERER = 0x1F01
+_GL_RENDERER, _GL_DEPTH_COMPONENT, _GL_FLOAT = 0x1F01, 0x1902, 0x1406
 
 
 class EglError(RuntimeError):
@@ -51,11 +54,15 @@ class Egl:
 
     def renderer(self) -> str:
         """Returns what draws, as the driver calls it."""
-        address = self._call("eglGetProcAddress", c_void_p, c_char_p(b"glGetString"))
-        if not address:
-            return "unknown"
-        text = ctypes.CFUNCTYPE(c_char_p, c_uint)(address)(_GL_RENDERER)
+        text = self._gl("glGetString", c_char_p, c_uint)(_GL_RENDERER)
         return text.decode(errors="replace") if text else "unknown"
+
+    def read_depth(self, width_px: int, height_px: int) -> npt.NDArray[np.float32]:
+        """Returns the depth buffer as the last pass has left it, shape (height, width), its first row on top."""
+        depth = np.empty((height_px, width_px), np.float32)
+        read = self._gl("glReadPixels", None, c_int, c_int, c_int, c_int, c_uint, c_uint, c_void_p)
+        read(0, 0, width_px, height_px, _GL_DEPTH_COMPONENT, _GL_FLOAT, depth.ctypes.data)
+        return depth[::-1]
 
     def deepen(self, width_px: int, height_px: int) -> None:
         """Makes a context with a deep enough depth buffer current; call it before any shape is loaded.
@@ -75,8 +82,7 @@ class Egl:
             "eglChooseConfig", c_uint, self._display, _integers(wanted), config, c_int(1), ctypes.byref(count)
         ):
             raise EglError("EGL has no such configuration")
-        size = _integers([_WIDTH, width_px, _HEIGHT, height_px, _NONE])
-        surface = self._call("eglCreatePbufferSurface", c_void_p, self._display, self._config, size)
+        surface = self._surface(width_px, height_px)
         context = self._call(
             "eglCreateContext",
             c_void_p,
@@ -87,9 +93,37 @@ class Egl:
         )
         if not (count.value and surface and context):
             raise EglError("EGL cannot make a surface or context")
-        arguments = (c_void_p(surface), c_void_p(surface), c_void_p(context))
-        if not self._call("eglMakeCurrent", c_uint, self._display, *arguments):
+        self._use(surface, context)
+
+    def resize(self, width_px: int, height_px: int) -> None:
+        """Makes a surface of another size current; needs `deepen` before.
+
+        Raises:
+            EglError: If EGL has none; the old one is then still current.
+        """
+        surface = self._surface(width_px, height_px)
+        if not (self._config and surface):
+            raise EglError(f"EGL cannot make a surface of {width_px} x {height_px} pixels")
+        self._use(surface, self._context)
+
+    def _surface(self, width_px: int, height_px: int) -> int | None:
+        size = _integers([_WIDTH, width_px, _HEIGHT, height_px, _NONE])
+        surface: int | None = self._call("eglCreatePbufferSurface", c_void_p, self._display, self._config, size)
+        return surface
+
+    def _use(self, surface: int | None, context: int | None) -> None:
+        if not self._call(
+            "eglMakeCurrent", c_uint, self._display, c_void_p(surface), c_void_p(surface), c_void_p(context)
+        ):
             raise EglError("EGL cannot make the context current")
+        self._context = context
+
+    def _gl(self, name: str, result: Any, *arguments: Any) -> Any:
+        """Returns a function of OpenGL."""
+        address = self._call("eglGetProcAddress", c_void_p, c_char_p(name.encode()))
+        if not address:
+            raise EglError(f"the driver has no {name}")
+        return ctypes.CFUNCTYPE(result, *arguments)(address)
 
     def _call(self, name: str, result: Any, *arguments: Any) -> Any:
         function = getattr(self._egl, name)

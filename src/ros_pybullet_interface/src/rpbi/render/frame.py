@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from ..camera import Intrinsics
+from ..depth_noise import DepthNoise
 
 
 class Camera(NamedTuple):
@@ -19,11 +20,19 @@ class Camera(NamedTuple):
         name: Its unique name.
         frame_id: TF frame of its optical frame.
         intrinsics: What it sees of the space before it.
+        topic_name: Its name in topics, which need not be its own.
+        pointcloud: Whether point clouds may be asked for.
+        synchronous: Whether the simulation waits for its frames, so that none may be dropped.
+        noise: Noise of its depths, None for exact ones.
     """
 
     name: str
     frame_id: str
     intrinsics: Intrinsics
+    topic_name: str = ""
+    pointcloud: bool = False
+    synchronous: bool = False
+    noise: DepthNoise | None = None
 
 
 class Frame(NamedTuple):
@@ -51,7 +60,8 @@ class Demand(NamedTuple):
     """Who looks at a camera.
 
     Attributes:
-        streams: What is looked at, out of `colour`, `depth`, `segmentation` and `info`.
+        streams: What is looked at, out of `colour`, `depth`, `segmentation`, `points` (which take colour and depth)
+            and `info`.
         seen: How many viewers have ever come; a larger number than before means that somebody is new.
     """
 
@@ -65,27 +75,32 @@ NO_DEMAND = Demand()
 class Sink(Protocol):
     """Takes the frames, in the renderer process.
 
-    A sink is made by a factory that gets the cameras: `--sink module:factory`.
+    A sink is made by a factory: `--sink module:factory`.
     """
+
+    def add(self, camera: Camera) -> None:
+        """Prepares for the frames of a camera."""
+
+    def remove(self, name: str) -> None:
+        """Forgets a camera."""
 
     def demands(self) -> Mapping[str, Demand]:
         """Returns who looks at which camera, by its name; cameras left out are not looked at."""
 
     def write(self, frame: Frame) -> None:
-        """Takes a frame; it must not wait for anybody."""
+        """Takes a frame; it must not wait for anybody, unless the camera is synchronous."""
 
     def close(self) -> None:
         """Ends it."""
 
 
-def make_sink(factory: str, cameras: Sequence[Camera]) -> Sink:
+def make_sink(factory: str) -> Sink:
     """Makes a sink.
 
     Args:
         factory: `module:factory`.
-        cameras: The cameras, the first one first.
     """
     module, _, name = factory.partition(":")
     make: Any = getattr(importlib.import_module(module), name)
-    sink: Sink = make(cameras)
+    sink: Sink = make()
     return sink

@@ -14,12 +14,24 @@ class SetUp(NamedTuple):
     """To the renderer, first of all.
 
     Attributes:
-        cameras: All cameras, the first one first.
+        cameras: All cameras.
         use_egl: Whether to try the fast renderer.
     """
 
     cameras: tuple[Camera, ...]
     use_egl: bool
+
+
+class CameraAdded(NamedTuple):
+    """To the renderer: there is another camera."""
+
+    camera: Camera
+
+
+class CameraRemoved(NamedTuple):
+    """To the renderer: a camera has gone."""
+
+    name: str
 
 
 class WorldChanged(NamedTuple):
@@ -54,6 +66,18 @@ class Taken(NamedTuple):
     """To the simulator: the scene of this camera is being drawn, the next one may come."""
 
     camera: str
+
+
+class Shown(NamedTuple):
+    """To the simulator: the frame of a synchronous camera was handed on, or nobody looks at it.
+
+    Attributes:
+        camera: The camera.
+        stamp_ns: Stamp of the scene [ns].
+    """
+
+    camera: str
+    stamp_ns: int
 
 
 class Demanded(NamedTuple):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,9 @@ from ..bodies import Body
 from ..client import Client
 from ..load_log import LogEntry, apply
 from ..samples import BodyState
+from .fine_shapes import FineShapes
+from .soft_shapes import SoftShapes
+from .transparency import GlassyShape, Transparency
 
 log = logging.getLogger(__name__)
 
@@ -27,19 +30,60 @@ class Mirror:
         self._pb = pb
         self._bodies: dict[str, Body] = {}
         self._shown: dict[str, BodyState] = {}
+        self._fine_shapes = FineShapes()
+        self._transparency = Transparency(pb)
+        self._soft_shapes = SoftShapes(pb)
+
+    @property
+    def glassy(self) -> tuple[GlassyShape, ...]:
+        """The shapes that can be seen through."""
+        return self._transparency.shapes
 
     def apply(self, entry: LogEntry) -> None:
         """Does what was done to the world; what cannot be done is left out of the images."""
         if entry.what == "world":
             self._bodies.clear()
+            self._shown.clear()
+            self._transparency.update(set())
         self._shown.pop(entry.name, None)
         try:
-            apply(self._pb, self._bodies, entry)
+            apply(self._pb, self._bodies, self._as_drawn(entry))
+            if entry.what == "world":
+                self._soft_shapes = SoftShapes(self._pb)
+            elif entry.what == "add":
+                self._soft_shapes.still(self._bodies[entry.name])
         except Exception as error:
             log.warning("images lack '%s': %s", entry.name, error)
+        self._transparency.update({body.body_id for body in self._bodies.values()})
+
+    def close(self) -> None:
+        """Deletes the files that it made."""
+        self._fine_shapes.close()
+
+    def _as_drawn(self, entry: LogEntry) -> LogEntry:
+        """Returns the entry with the shape that is to be drawn."""
+        if entry.what != "add":
+            return entry
+        kind, config = entry.arguments
+        shape = getattr(config, "createVisualShape", None)
+        if shape is None:
+            return entry
+        drawn = config.model_copy(update={"createVisualShape": self._fine_shapes.of(shape)})
+        return entry._replace(arguments=(kind, drawn))
+
+    def show(self, states: Iterable[BodyState]) -> None:
+        """Puts all bodies where they were in the simulator."""
+        states = tuple(states)
+        soft = [state for state in states if state.nodes and state.name in self._bodies]
+        if any(self._shown.get(state.name) != state for state in soft):
+            self._soft_shapes.show([(self._bodies[state.name], state.nodes) for state in soft])
+            self._shown = {state.name: state for state in soft}  # the step may have moved all others
+        for state in states:
+            if not state.nodes:
+                self.pose(state)
 
     def pose(self, state: BodyState) -> None:
-        """Puts a body where it was in the simulator."""
+        """Puts a rigid body where it was in the simulator."""
         body = self._bodies.get(state.name)
         shown = self._shown.get(state.name)
         if body is None or shown == state:
@@ -48,7 +92,9 @@ class Mirror:
             self._pb.resetBasePositionAndOrientation(body.body_id, state.base[:3], state.base[3:])
         before = shown.joints if shown else (None,) * len(state.joints)
         for index, (old, new) in enumerate(zip(before, state.joints)):
-            if old != new:
+            if old != new and isinstance(new, tuple):
+                self._pb.resetJointStateMultiDof(body.body_id, index, new)
+            elif old != new:
                 self._pb.resetJointState(body.body_id, index, new)
         self._shown[state.name] = state
 

@@ -6,7 +6,7 @@ import faulthandler
 import logging
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,9 +14,11 @@ import numpy.typing as npt
 
 from ..camera import depth_in_metres
 from .channel import Channel
+from .egl import EglError
 from .frame import NO_DEMAND, Camera, Demand, Frame, Sink
-from .messages import Demanded, Ready, Report, Scene, SetUp, Taken, WorldChanged
+from .messages import CameraAdded, CameraRemoved, Demanded, Ready, Report, Scene, SetUp, Shown, Taken, WorldChanged
 from .mirror import Mirror
+from .priority import take_part
 from .renderers import Renderer, open_renderer
 
 log = logging.getLogger(__name__)
@@ -34,10 +36,10 @@ class RenderProcess:
 
     Args:
         channel: To the simulator.
-        make_sink: Makes the sink once the cameras are known.
+        make_sink: Makes the sink.
     """
 
-    def __init__(self, channel: Channel, make_sink: Callable[[Sequence[Camera]], Sink]) -> None:
+    def __init__(self, channel: Channel, make_sink: Callable[[], Sink]) -> None:
         self._channel = channel
         self._make_sink = make_sink
         self._cameras: dict[str, Camera] = {}
@@ -49,6 +51,8 @@ class RenderProcess:
         self._sink: Sink | None = None
         self._do: dict[type, Callable[[Any], None]] = {
             SetUp: self._set_up,
+            CameraAdded: lambda message: self._add(message.camera),
+            CameraRemoved: lambda message: self._remove(message.name),
             WorldChanged: self._change_world,
             Scene: self._show,
         }
@@ -66,13 +70,32 @@ class RenderProcess:
         finally:
             if self._sink is not None:
                 self._sink.close()
+            if self._mirror is not None:
+                self._mirror.close()
 
     def _set_up(self, message: SetUp) -> None:
-        self._cameras = {camera.name: camera for camera in message.cameras}
         self._renderer = open_renderer(message.cameras, message.use_egl)
         self._mirror = Mirror(self._renderer.pb)
         self._channel.send(Ready(self._renderer.name))
-        self._sink = self._make_sink(message.cameras)
+        self._sink = self._make_sink()
+        for camera in message.cameras:
+            self._add(camera)
+
+    def _add(self, camera: Camera) -> None:
+        assert self._renderer is not None and self._sink is not None
+        if camera.synchronous:  # physics waits for it, so it has nobody to give way to
+            take_part(os.getpid())
+        try:
+            self._renderer.make_room(camera.intrinsics)
+        except EglError as error:
+            log.warning("images of '%s' are cut off: %s", camera.name, error)
+        self._cameras[camera.name] = camera
+        self._sink.add(camera)
+
+    def _remove(self, name: str) -> None:
+        assert self._sink is not None
+        del self._cameras[name]
+        self._sink.remove(name)
 
     def _change_world(self, message: WorldChanged) -> None:
         assert self._mirror is not None
@@ -83,27 +106,37 @@ class RenderProcess:
         """Draws a scene, as far as anybody looks at it."""
         sample = scene.sample
         self._channel.send(Taken(sample.name))
-        assert self._mirror is not None and self._sink is not None
+        assert self._sink is not None
+        camera = self._cameras.get(sample.name)
         streams = self._sink.demands().get(sample.name, NO_DEMAND).streams
-        if not streams:
+        if camera is None:
             return
-        camera = self._cameras[sample.name]
+        if streams:
+            self._sink.write(self._frame(scene, camera, streams))
+        if camera.synchronous:
+            self._channel.send(Shown(sample.name, sample.stamp_ns))
+
+    def _frame(self, scene: Scene, camera: Camera, streams: frozenset[str]) -> Frame:
+        sample = scene.sample
         frame = Frame(camera, sample.tick, sample.stamp_ns)
-        if streams - {"info"}:
-            for state in sample.bodies:
-                self._mirror.pose(state)
-            frame = frame._replace(**self._draw(scene, camera, streams))
-        self._sink.write(frame)
+        if streams == {"info"}:
+            return frame
+        assert self._mirror is not None
+        self._mirror.show(sample.bodies)
+        return frame._replace(**self._draw(scene, camera, streams))
 
     def _draw(self, scene: Scene, camera: Camera, streams: frozenset[str]) -> Mapping[str, Any]:
-        assert self._renderer is not None and self._mirror is not None and scene.sample.camera is not None
+        sample, intrinsics = scene.sample, camera.intrinsics
+        assert self._renderer is not None and self._mirror is not None and sample.camera is not None
         segmentation = "segmentation" in streams
-        drawing = self._renderer.draw(camera.intrinsics, scene.sample.camera, segmentation)
+        drawing = self._renderer.draw(intrinsics, sample.camera, segmentation, self._mirror.glassy)
         images: dict[str, npt.NDArray[Any]] = {}
-        if "colour" in streams:
+        if streams & {"colour", "points"}:
             images["colour"] = _without_alpha(drawing.rgba)
-        if "depth" in streams:
-            images["depth"] = depth_in_metres(drawing.depth_buffer, camera.intrinsics)
+        if streams & {"depth", "points"}:
+            images["depth"] = depth_in_metres(drawing.depth_buffer, intrinsics)
+            if camera.noise is not None:
+                camera.noise.add_to(images["depth"], sample.tick, intrinsics.near_m, intrinsics.far_m)
         if segmentation:
             images["segmentation"] = self._mirror.to_simulator_ids(drawing.body_ids, scene.body_ids)
         return images

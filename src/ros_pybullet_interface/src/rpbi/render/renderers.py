@@ -15,8 +15,13 @@ from ..client import Client
 from ..pose import Pose
 from .egl import Egl, EglError
 from .frame import Camera
+from .transparency import GlassyShape
 
 log = logging.getLogger(__name__)
+
+
+_LINK_SHIFT = 24
+"""PyBullet tells a body and a link by one number: `body + ((link + 1) << 24)`."""
 
 
 class Drawing(NamedTuple):
@@ -36,6 +41,9 @@ class Drawing(NamedTuple):
 class Renderer(Protocol):
     """Draws what is in its client.
 
+    A glassy shape tints what is behind it in the colours; depth and segmentation tell of the shape itself, so that
+    all images of a frame show the same bodies.
+
     Attributes:
         name: What it is, for people.
         pb: The client, empty at first.
@@ -44,13 +52,19 @@ class Renderer(Protocol):
     name: str
     pb: Client
 
-    def draw(self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True) -> Drawing:
+    def make_room(self, intrinsics: Intrinsics) -> None:
+        """Prepares for a camera that is new."""
+
+    def draw(
+        self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, glassy: Sequence[GlassyShape] = ()
+    ) -> Drawing:
         """Draws what a camera sees.
 
         Args:
             intrinsics: The camera.
             camera: Pose of its optical frame in the world.
             segmentation: Whether to tell bodies apart, which costs a second pass.
+            glassy: The shapes that can be seen through; they cost a second pass too.
         """
 
 
@@ -67,12 +81,41 @@ class TinyRenderer:
     def __init__(self) -> None:
         self.pb = Client()
 
-    def draw(self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True) -> Drawing:
-        """Draws what a camera sees; segmentation is free here."""
+    def make_room(self, intrinsics: Intrinsics) -> None:
+        """Needs nothing."""
+
+    def draw(
+        self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, glassy: Sequence[GlassyShape] = ()
+    ) -> Drawing:
+        """Draws what a camera sees; segmentation is free here.
+
+        It draws glassy shapes as if they were opaque, so they are blended with a second image without them. Glass
+        behind glass does not show.
+        """
         projection = intrinsics.projection
         projection[0, 2] += 1.0 / intrinsics.width_px
         projection[1, 2] += 1.0 / intrinsics.height_px
-        return _draw(self.pb, intrinsics, projection, camera, renderer=self.pb.ER_TINY_RENDERER)
+        how: dict[str, Any] = {"renderer": self.pb.ER_TINY_RENDERER}
+        if not glassy:
+            return _draw(self.pb, intrinsics, projection, camera, **how)
+        with_links = {**how, "flags": self.pb.ER_SEGMENTATION_MASK_OBJECT_AND_LINKINDEX}
+        drawing = _draw(self.pb, intrinsics, projection, camera, **with_links)
+        self._set_opacity(glassy, 0.0)
+        behind = _draw(self.pb, intrinsics, projection, camera, **how)
+        self._set_opacity(glassy)
+        rgba = drawing.rgba.copy()
+        for shape in glassy:
+            seen = drawing.body_ids == shape.body_id + ((shape.link_index + 1) << _LINK_SHIFT)
+            opacity = shape.rgba[3]
+            rgba[seen] = np.rint(opacity * drawing.rgba[seen] + (1.0 - opacity) * behind.rgba[seen])
+        nothing = drawing.body_ids < 0
+        body_ids = np.where(nothing, -1, drawing.body_ids & ((1 << _LINK_SHIFT) - 1)).astype(np.int32)
+        return Drawing(rgba, drawing.depth_buffer, body_ids)
+
+    def _set_opacity(self, glassy: Sequence[GlassyShape], opacity: float | None = None) -> None:
+        for body_id, link_index, shape_index, rgba in glassy:
+            colour = [*rgba[:3], rgba[3] if opacity is None else opacity]
+            self.pb.changeVisualShape(body_id, link_index, shape_index, rgbaColor=colour)
 
 
 class EglRenderer:
@@ -94,20 +137,42 @@ class EglRenderer:
         self.pb = Client()
         if self.pb.loadPlugin(plugin.origin, "_eglRendererPlugin") < 0:
             raise EglError("PyBullet does not load its EGL plugin")
-        egl = Egl()
-        self.name = f"EGL ({egl.renderer()})"
+        self._egl = Egl()
+        self.name = f"EGL ({self._egl.renderer()})"
         sizes = [(camera.intrinsics.width_px, camera.intrinsics.height_px) for camera in cameras]
+        self._width_px, self._height_px = (max(side) for side in zip(*sizes))
         try:
-            egl.deepen(*(max(side) for side in zip(*sizes)))
+            self._egl.deepen(self._width_px, self._height_px)
         except EglError as error:
             log.warning("depth images have 16 bits only: %s", error)
         _check(self)
 
-    def draw(self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True) -> Drawing:
-        """Draws what a camera sees."""
-        flags = 0 if segmentation else self.pb.ER_NO_SEGMENTATION_MASK
+    def make_room(self, intrinsics: Intrinsics) -> None:
+        """Makes the surface that is drawn to large enough.
+
+        Raises:
+            EglError: If EGL has none of that size.
+        """
+        width_px, height_px = max(self._width_px, intrinsics.width_px), max(self._height_px, intrinsics.height_px)
+        if (width_px, height_px) != (self._width_px, self._height_px):
+            self._egl.resize(width_px, height_px)
+            self._width_px, self._height_px = width_px, height_px
+
+    def draw(
+        self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, glassy: Sequence[GlassyShape] = ()
+    ) -> Drawing:
+        """Draws what a camera sees.
+
+        The colours' pass leaves glassy shapes out of the depth buffer, that of the segmentation does not, and what
+        it leaves there can be read.
+        """
+        both = segmentation or bool(glassy)
+        flags = 0 if both else self.pb.ER_NO_SEGMENTATION_MASK
         hardware = self.pb.ER_BULLET_HARDWARE_OPENGL
-        return _draw(self.pb, intrinsics, intrinsics.projection, camera, renderer=hardware, flags=flags)
+        drawing = _draw(self.pb, intrinsics, intrinsics.projection, camera, renderer=hardware, flags=flags)
+        if glassy:
+            drawing = drawing._replace(depth_buffer=self._egl.read_depth(intrinsics.width_px, intrinsics.height_px))
+        return drawing
 
 
 def open_renderer(cameras: Sequence[Camera], use_egl: bool = True) -> Renderer:

@@ -57,4 +57,4 @@ class BodyEndpoints:
             stack.close()
 
     def _context(self, body: Body, suffix: str) -> BodyContext:
-        return BodyContext(body, suffix, self._world, self._simulation, self._ask)
+        return BodyContext(body.name, suffix, self._world, self._simulation, self._ask)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 
 
 class CameraTopic(NamedTuple):
@@ -21,15 +21,23 @@ class CameraTopic(NamedTuple):
     message_type: type
 
 
-CAMERA_TOPICS = (
+IMAGE_TOPICS = (
     CameraTopic("colour", "colour/image", Image),
     CameraTopic("depth", "depth/image", Image),
     CameraTopic("segmentation", "segmentation", Image),
     CameraTopic("info", "colour/camera_info", CameraInfo),
     CameraTopic("info", "depth/camera_info", CameraInfo),
+    CameraTopic("info", "camera_info", CameraInfo),  # that of `segmentation`, by the rule of image_transport
 )
+CLOUD_TOPIC = CameraTopic("points", "pointcloud", PointCloud2)
 
 
-def camera_prefix(name: str, index: int) -> str:
-    """Returns what the topics of a camera begin with: the first one's do not depend on its name."""
-    return "rpbi/camera" if index == 0 else f"rpbi/{name}"
+def camera_topics(topic_name: str, pointcloud: bool) -> dict[str, CameraTopic]:
+    """Returns the topics of a camera by their relative names.
+
+    Args:
+        topic_name: What it is called in topics.
+        pointcloud: Whether it has point clouds.
+    """
+    topics = (*IMAGE_TOPICS, CLOUD_TOPIC) if pointcloud else IMAGE_TOPICS
+    return {f"rpbi/{topic_name}/{topic.suffix}": topic for topic in topics}

@@ -33,7 +33,8 @@ def zero_force_torque(context: BodyContext, _: EmptyRequest) -> EmptyResponse:
         InterfaceError: If the simulation is stopped, before or meanwhile, or the robot goes; the old zero stays then.
     """
     joint = context.suffix.removesuffix(_SUFFIX)
-    sensor = next(each for each in context.body.force_torque_sensors if each.joint.name == joint)
+    body = context.body
+    sensor = next(each for each in body.force_torque_sensors if each.joint.name == joint)
 
     def start() -> Zeroing:
         if not context.simulation.running:
@@ -46,7 +47,7 @@ def zero_force_torque(context: BodyContext, _: EmptyRequest) -> EmptyResponse:
             sensor.cancel_zeroing()
             raise InterfaceError(f"the simulation was stopped before {SAMPLES} samples had come; the old zero stays")
 
-    zeroing = context.ask_body(start)
+    zeroing = context.ask_body(start, body)
     while not wait([zeroing.mean], timeout=LOOK_AGAIN_AFTER_S).done:
-        context.ask_body(check)
+        context.ask_body(check, body)
     return EmptyResponse()

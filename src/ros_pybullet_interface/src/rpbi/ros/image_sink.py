@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
+import rosgraph
 import rospy
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
 
+from ..point_cloud import PointCloud
 from ..render.frame import Camera, Demand, Frame
-from .camera_topics import CAMERA_TOPICS, CameraTopic, camera_prefix
+from .camera_messages import camera_info, cloud_message, image_message
+from .camera_topics import CameraTopic, camera_topics
 from .stamps import to_ros_time
 from .topics import StateTopic
 
@@ -20,22 +22,27 @@ SINK = "rpbi.ros.image_sink:ImageSink"
 
 QUEUE_SIZE = 2
 """Images kept for a slow subscriber: a stopped one must not fill the memory."""
+LONGEST_WAIT_S = 5.0
+"""How long subscribers are waited for that the master knows of [s]."""
 
 
 class ImageSink:
-    """Publishes frames on the topics of each camera, and only those that somebody subscribes to.
+    """Publishes frames on the topics of each camera, and only those that somebody subscribes to."""
 
-    Args:
-        cameras: The cameras, the first one first.
-    """
-
-    def __init__(self, cameras: Sequence[Camera]) -> None:
+    def __init__(self) -> None:
         # Without ROS time, since it must never wait for the clock: stamps come with the frames.
         rospy.init_node("rpbi_camera", disable_rostime=True, disable_signals=True)
-        self._cameras = {
-            camera.name: _CameraTopics(camera, camera_prefix(camera.name, index))
-            for index, camera in enumerate(cameras)
-        }
+        self._cameras: dict[str, _CameraTopics] = {}
+
+    def add(self, camera: Camera) -> None:
+        """Advertises the topics of a camera; if it is synchronous, waits for those who subscribe to them already."""
+        topics = self._cameras[camera.name] = _CameraTopics(camera)
+        if camera.synchronous:
+            topics.wait_for_subscribers()
+
+    def remove(self, name: str) -> None:
+        """Ends the topics of a camera."""
+        self._cameras.pop(name).close()
 
     def demands(self) -> Mapping[str, Demand]:
         """Returns what is subscribed to, by camera."""
@@ -66,43 +73,66 @@ def sink_arguments(node_name: str, argv: Sequence[str]) -> list[str]:
 
 
 class _Topic(StateTopic):
-    """A topic that also counts who has ever come."""
+    """A topic that also counts who has ever come.
 
-    def __init__(self, topic: str, message_type: type) -> None:
+    Args:
+        topic: Its name.
+        message_type: Its ROS type.
+        waits: Whether it waits until each message is taken, instead of dropping some.
+    """
+
+    def __init__(self, topic: str, message_type: type, waits: bool) -> None:
         self.seen = 0
-        super().__init__(topic, message_type, queue_size=QUEUE_SIZE)
+        super().__init__(topic, message_type, QUEUE_SIZE)
+        if waits:
+            self._publisher.impl.set_queue_size(None)  # rospy then sends in the caller's thread
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Any) -> None:
         super().peer_subscribe(topic_name, topic_publish, peer_publish)
         self.seen += 1
 
+    def subscriber_count(self) -> int:
+        """Returns how many subscribers are connected."""
+        count: int = self._publisher.get_num_connections()
+        return count
+
 
 class _CameraTopics:
     """The topics of one camera."""
 
-    def __init__(self, camera: Camera, prefix: str) -> None:
+    def __init__(self, camera: Camera) -> None:
         self._frame_id = camera.frame_id
         self._info = camera_info(camera)
-        self._topics: list[tuple[CameraTopic, _Topic]] = [
-            (topic, _Topic(f"{prefix}/{topic.suffix}", topic.message_type)) for topic in CAMERA_TOPICS
-        ]
+        self._cloud = PointCloud(camera.intrinsics) if camera.pointcloud else None
+        self._topics: dict[str, tuple[CameraTopic, _Topic]] = {
+            name: (topic, _Topic(name, topic.message_type, camera.synchronous))
+            for name, topic in camera_topics(camera.topic_name, camera.pointcloud).items()
+        }
         self._published_ns = -1
+
+    def wait_for_subscribers(self) -> None:
+        """Waits until all who have subscribed at the master are connected; but not for ever, some may be dead."""
+        registered = dict(rosgraph.Master(rospy.get_name()).getSystemState()[1])
+        end_s = time.monotonic() + LONGEST_WAIT_S
+        for name, (_, ros_topic) in self._topics.items():
+            expected = len(registered.get(rospy.resolve_name(name), ()))
+            while ros_topic.subscriber_count() < expected and time.monotonic() < end_s:
+                time.sleep(0.01)
 
     def demand(self) -> Demand:
         """Returns what is subscribed to."""
-        streams = frozenset(topic.stream for topic, ros_topic in self._topics if ros_topic.has_subscribers)
-        return Demand(streams, sum(ros_topic.seen for _, ros_topic in self._topics))
+        topics = self._topics.values()
+        streams = frozenset(topic.stream for topic, ros_topic in topics if ros_topic.has_subscribers)
+        return Demand(streams, sum(ros_topic.seen for _, ros_topic in topics))
 
     def publish(self, frame: Frame) -> None:
         """Publishes a frame; one with the last stamp again goes only to who has come since."""
         header = Header(stamp=to_ros_time(frame.stamp_ns), frame_id=self._frame_id)
-        self._info.header = header
         again = frame.stamp_ns == self._published_ns
-        messages: dict[str, Image | CameraInfo] = {"info": self._info}
-        for topic, ros_topic in self._topics:
+        for topic, ros_topic in self._topics.values():
             if not ros_topic.has_subscribers:
                 continue
-            message = messages.get(topic.stream) or image_message(topic.stream, frame, header)
+            message = self._message(topic.stream, frame, header)
             if message is None:
                 continue  # its first subscriber came while the frame was drawn
             if again:
@@ -111,41 +141,17 @@ class _CameraTopics:
                 ros_topic.publish(message)
         self._published_ns = frame.stamp_ns
 
+    def close(self) -> None:
+        """Ends the topics."""
+        for _, ros_topic in self._topics.values():
+            ros_topic.close()
 
-def camera_info(camera: Camera) -> CameraInfo:
-    """Returns what ROS has to know of a camera that distorts nothing."""
-    info = CameraInfo(width=camera.intrinsics.width_px, height=camera.intrinsics.height_px)
-    K = camera.intrinsics.K
-    info.K = K.ravel().tolist()
-    info.distortion_model = "plumb_bob"
-    info.D = [0.0] * 5
-    info.R = np.eye(3).ravel().tolist()
-    info.P = np.hstack([K, np.zeros((3, 1))]).ravel().tolist()
-    return info
-
-
-def image_message(stream: str, frame: Frame, header: Header) -> Image | None:
-    """Returns an image of a frame as a message, None if the frame has none of it.
-
-    Args:
-        stream: `colour` (rgb8), `depth` (32FC1, metres) or `segmentation` (mono16, 65535 where nothing is).
-        frame: The frame.
-        header: Stamp and frame of the message.
-    """
-    if stream == "colour":
-        encoding, pixels = "rgb8", frame.colour
-    elif stream == "depth":
-        encoding, pixels = "32FC1", frame.depth
-    else:
-        encoding, pixels = "mono16", _as_mono16(frame.segmentation)
-    if pixels is None:
-        return None
-    height, width = pixels.shape[:2]
-    image = Image(header=header, height=height, width=width, encoding=encoding, is_bigendian=0)
-    image.step = pixels.nbytes // height
-    image.data = pixels.tobytes()
-    return image
-
-
-def _as_mono16(body_ids: npt.NDArray[np.int32] | None) -> npt.NDArray[np.uint16] | None:
-    return None if body_ids is None else body_ids.astype(np.uint16)  # -1 becomes 65535
+    def _message(self, stream: str, frame: Frame, header: Header) -> CameraInfo | Image | PointCloud2 | None:
+        if stream == "info":
+            self._info.header = header
+            return self._info
+        if stream == "points":
+            if self._cloud is None or frame.depth is None or frame.colour is None:
+                return None
+            return cloud_message(self._cloud.of(frame.depth, frame.colour), header)
+        return image_message(stream, frame, header)

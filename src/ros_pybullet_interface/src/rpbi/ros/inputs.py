@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import threading
 import time
@@ -91,6 +92,10 @@ class Inputs:
             subscriber.unregister()
         self._tf.leave(name)
 
+    def repeat_poses(self) -> None:
+        """Hands the last poses of TF frames to a world that has forgotten them; any thread may call it."""
+        self._tf.repeat()
+
     def _subscribe(self, name: str, key: str, topic_input: TopicInput) -> rospy.Subscriber:
         topic = rospy.resolve_name(topic_input.topic.format(name=name))
 
@@ -144,6 +149,13 @@ class _TfFollower:
     def leave(self, name: str) -> None:
         """Follows nothing for a body or sensor any more."""
         self._followed = tuple(followed for followed in self._followed if followed.name != name)
+
+    def repeat(self) -> None:
+        """Puts all last poses again."""
+        for followed in self._followed:
+            if followed.last_pose is not None:
+                with contextlib.suppress(InterfaceError, ValueError):  # a body that has gone meanwhile
+                    self._put(followed.slot, followed.last_pose)
 
     def _run(self, listener: TfListener) -> None:
         while not rospy.is_shutdown():

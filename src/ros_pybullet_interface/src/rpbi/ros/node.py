@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import sys
 import threading
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import pybullet
@@ -18,11 +19,14 @@ from custom_ros_tools.ros.logging_bridge import attach_logging
 from ..asset_files import ROBOT_DESCRIPTION
 from ..bodies import BODY_TYPES
 from ..config import load_world_dict
+from ..rgbd_config import RgbdSensorConfig
 from ..samples import LinkPoseSample, SceneSample
+from ..sensors import RgbdSensor
 from ..urdf import write_description
 from ..world import World
 from .body_endpoints import BodyEndpoints
 from .camera_outlet import CameraOutlet
+from .camera_services import CameraServices
 from .dynamics_services import DynamicsServices
 from .frames import use_prefix
 from .initial_state import start_where_robots_are, with_initial_state
@@ -32,7 +36,10 @@ from .requests import Requests
 from .services import NodeServices
 from .simulation import Simulation
 from .status import FREE_RUNNING_CLOCK_HZ, ClockOutlet
+from .time_services import TimeServices
 from .topics import FastTopic
+from .window_topics import WindowTopics
+from .world_markers import WorldMarkers
 
 log = logging.getLogger(__name__)
 
@@ -68,25 +75,37 @@ class SimulatorNode:
         self._topics = {sample_type: SampleOutlet(topic) for sample_type, topic in TOPICS.items()}
         self._transforms = TransformOutlet()
         outlets: dict[type, Outlet] = {**self._topics, LinkPoseSample: self._transforms}
-        self._cameras = CameraOutlet(self._world) if self._world.cameras else None
-        if self._cameras is not None:
-            outlets[SceneSample] = self._cameras
+        self._cameras = outlets[SceneSample] = CameraOutlet(self._world)
         clock = ClockOutlet(self._world.clock, _clock_hz(config)) if simulated else None
-        cameras = {} if self._cameras is None else {"helpers": (self._cameras.poll,), "facts": self._cameras.facts}
+        helpers: list[Callable[[], None]] = []
+        if config.markers_hz:
+            helpers.append(WorldMarkers(self._world, config.markers_hz).poll)
+        window = WindowTopics(self._world)
+        helpers += (self._cameras.poll, *window.polls)
         self._simulation = Simulation(
-            self._world, outlets, config.real_time_factor, config.status_hz, clock, **cameras
+            self._world,
+            outlets,
+            config.real_time_factor,
+            config.status_hz,
+            clock,
+            helpers,
+            self._cameras.facts,
+            self._cameras.before_tick,
         )
         self._inputs = Inputs(self._world)
         self._ask = Requests(self._simulation)
         self._endpoints = BodyEndpoints(self._world, self._simulation, self._ask)
         self._objects_lock = threading.Lock()  # one object comes or goes at a time
-        for name, camera in self._world.cameras.items():
-            self._inputs.open(name, camera.inputs())
+        self._placed_cameras: Mapping[str, RgbdSensor] = {}
+        self._place_cameras()
         for name in self._world.bodies:
             self._open(name)
         context = {"search_paths": config.search_paths(), ROBOT_DESCRIPTION: description}
         NodeServices(self._simulation, self._ask, self._add, self._remove, context)
+        CameraServices(self._add_camera, config.search_paths())
         DynamicsServices(self._world, self._ask)
+        window.serve(self._ask)
+        TimeServices(self._simulation, self._ask, self._reset)
         if config.start_pybullet_after_initialization:
             self._simulation.start()
 
@@ -107,8 +126,7 @@ class SimulatorNode:
                 raise
         finally:
             has_gone = not self._world.is_connected
-            if self._cameras is not None:
-                self._cameras.close()
+            self._cameras.close()
             self._world.close()  # from here on, no object comes or goes
             # Topics that are just being opened or closed would lock rospy up. Who waits for them ends with the process.
             self._objects_lock.acquire(timeout=LONGEST_END_S)
@@ -126,11 +144,58 @@ class SimulatorNode:
                 self._withdraw(config.name)
                 raise InterfaceError(f"{config.name}: its topics could not be opened: {error}") from error
 
+    def _add_camera(self, config: RgbdSensorConfig, file: str) -> None:
+        with self._objects_lock:
+            self._ask(lambda: self._world.add_camera(config, file))
+            self._place_cameras()
+
+    def _place_cameras(self) -> None:
+        """Follows the TF frames of the cameras that there are now, and no others."""
+        cameras = self._world.cameras
+        for name, camera in self._placed_cameras.items():
+            if cameras.get(name) is not camera:
+                self._inputs.close(name)
+        for name, camera in cameras.items():
+            if self._placed_cameras.get(name) is not camera:
+                self._inputs.open(name, camera.inputs())
+        self._placed_cameras = cameras
+
     def _remove(self, name: str) -> None:
         with self._objects_lock:
-            if name not in self._world.bodies:
-                raise UnknownNameError("object", name, list(self._world.bodies))
-            self._withdraw(name)
+            if name in self._world.cameras:
+                self._ask(lambda: self._world.remove(name))
+                self._place_cameras()
+            elif name in self._world.bodies:
+                self._withdraw(name)
+            else:
+                raise UnknownNameError("object", name, [*self._world.bodies, *self._world.cameras])
+
+    def _reset(self) -> None:
+        """Makes the world what it was; what ROS has of bodies that were there all the time stays open."""
+        with self._objects_lock:
+            for name in self._ask(self._world.changed_names):
+                self._inputs.close(name)
+            changed, topics, error = self._ask(self._start_again)
+            for topic in topics:
+                topic.close()
+            for name in changed:
+                self._endpoints.close(name)
+            for name in self._world.bodies:
+                if name in changed:
+                    self._open(name)
+            self._place_cameras()
+            if error is not None:
+                raise error
+
+    def _start_again(self) -> tuple[set[str], list[FastTopic], InterfaceError | None]:
+        """Does the simulation thread's part of it; returns what is left to open and close, and what went wrong."""
+        changed = self._world.changed_names()
+        topics = [topic for name in changed & self._world.bodies.keys() for topic in self._take_out(name)]
+        try:
+            self._simulation.reset(self._inputs.repeat_poses)
+        except InterfaceError as error:
+            return changed, topics, error
+        return changed, topics, None
 
     def _open(self, name: str) -> None:
         """Opens the topics and services of a body."""

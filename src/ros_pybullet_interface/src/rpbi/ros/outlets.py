@@ -9,12 +9,25 @@ from geometry_msgs.msg import TransformStamped, Vector3, Wrench, WrenchStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker, MarkerArray
+
+from ros_pybullet_interface.msg import Contacts
 
 from ..control.controller_state import ControllerState
-from ..samples import BaseStateSample, JointStateSample, LinkPoseSample, WrenchSample
+from ..samples import (
+    BaseStateSample,
+    ContactArrowsSample,
+    ContactsSample,
+    JointStateSample,
+    LinkPoseSample,
+    SurfaceSample,
+    WrenchSample,
+)
+from .contacts_messages import contact_arrows_message, contacts_message
 from .frames import prefixed, world_frame
 from .odometry import odometry_message
 from .stamps import to_ros_time
+from .surface_message import surface_message
 from .topics import FastTopic
 from .trajectory_messages import CONTROLLER, JointTrajectoryControllerState, state_message
 
@@ -47,6 +60,9 @@ class Outlet(Protocol):
 
     def forget(self, name: str) -> FastTopic | None:
         """Drops what it keeps of a body or sensor that has gone; returns its topic, if it has one to close."""
+
+    def restart(self) -> None:
+        """Drops what it keeps of all samples: the world was reset."""
 
 
 class SampleOutlet:
@@ -81,6 +97,10 @@ class SampleOutlet:
         for name, topic in self._topics.items():
             if name in self._last:
                 topic.serve_late(lambda last=self._last[name]: self._to_message(*last))
+
+    def restart(self) -> None:
+        """Drops what it keeps of all samples; the topics stay."""
+        self._last.clear()
 
     def forget(self, name: str) -> FastTopic | None:
         """Drops what it keeps of a sensor.
@@ -127,6 +147,10 @@ class TransformOutlet:
         """Gives all last poses to who has come since."""
         self._topic.serve_late(lambda: TFMessage([one for body in self._last.values() for one in body]))
 
+    def restart(self) -> None:
+        """Drops all poses."""
+        self._last.clear()
+
     def forget(self, name: str) -> None:
         """Leaves a body out from now on."""
         self._last.pop(name, None)
@@ -158,6 +182,9 @@ TOPICS: dict[type, SampleTopic] = {
     WrenchSample: SampleTopic("rpbi/{name}/ft_sensor", WrenchStamped, wrench_message),
     JointStateSample: SampleTopic("rpbi/{name}/joint_states", JointState, joint_state_message),
     BaseStateSample: SampleTopic("rpbi/{name}/base_state", Odometry, odometry_message),
+    ContactsSample: SampleTopic("rpbi/{name}/contacts", Contacts, contacts_message),
+    SurfaceSample: SampleTopic("rpbi/{name}/surface", Marker, surface_message),
+    ContactArrowsSample: SampleTopic("rpbi/{name}/contacts/arrows", MarkerArray, contact_arrows_message),
     ControllerState: SampleTopic(f"rpbi/{{name}}/{CONTROLLER}/state", JointTrajectoryControllerState, state_message),
 }
 """The topic of each type of samples that has topics of its own."""

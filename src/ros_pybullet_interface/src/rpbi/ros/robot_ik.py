@@ -62,7 +62,7 @@ def move_by_ik(context: BodyContext, problem: CalculateInverseKinematicsProblem)
     target = JointTarget(
         solution.chain, solution.chain_positions, [velocity[name] for name in solution.chain] if velocity else ()
     )
-    context.world.put(f"{context.body.name}/target", target)
+    context.world.put(f"{context.name}/target", target)
 
 
 class LinkResidual(NamedTuple):
@@ -118,7 +118,7 @@ def solve_for_robot(context: BodyContext, message: CalculateInverseKinematicsPro
     problem = IKProblem(**{field.name: getattr(message, field.name) for field in fields(IKProblem)})
     if not (math.isfinite(message.dt) and message.dt >= 0.0):
         raise ValueError(f"dt: must not be negative, got {message.dt}")
-    base, positions = context.ask_body(lambda: (robot.base_pose(), robot.joint_positions()))
+    base, positions = context.ask_body(lambda: (robot.base_pose(), robot.joint_positions()), robot)
     orientation = problem.targetOrientation or Pose().quat_xyzw
     target = base.inverse() @ Pose(problem.targetPosition, orientation)
     in_base = replace(

@@ -33,7 +33,7 @@ def robot_info(context: BodyContext, _: RobotInfoRequest) -> RobotInfoResponse:
             current_joint_state=joint_state_message(state, clock.stamp_ns),
         )
 
-    return context.ask_body(read)
+    return context.ask_body(read, robot)
 
 
 def _joint_info(info: tuple, joint: Joint) -> JointInfo:

@@ -12,9 +12,8 @@ from ros_pybullet_interface.srv import (
     ResetJointStateResponse,
 )
 
-from ..bodies import Robot
-from ..control.motion import MotionResult
-from ..control.timed_motion import TimedMotion
+from ..actions import TimedGoal
+from ..control.motion import Motion, MotionResult
 from ..joint_model import JointTarget
 from .body_context import BodyContext
 from .robot_ik import residual_of_robot, solve_for_robot
@@ -56,13 +55,11 @@ def _move(context: BodyContext, goal: Mapping[int, float], duration_s: float) ->
         InterfaceError: If the simulation is stopped, has ended or makes no progress.
         ValueError: If the goal or the duration is refused; nothing moves then.
     """
-    robot: Robot = context.body
-    motion = TimedMotion(robot.model, goal, duration_s)
 
-    def start() -> None:
+    def start() -> Motion:
         if not context.simulation.running:
             raise InterfaceError("the simulation is stopped: start it, else nothing moves")
-        robot.run(motion)
+        motion: Motion = context.world.act(context.name, "move", TimedGoal(goal, duration_s))
+        return motion
 
-    context.ask_body(start)
-    return context.ask.wait_for(motion.result)
+    return context.ask.wait_for(context.ask_body(start).result)

@@ -21,19 +21,13 @@ def set_control_mode(context: BodyContext, request: SetStringRequest) -> SetStri
     """
     mode = CONTROL_MODES.parse(request.data)
     before = MODE_NAMES[context.body.motors.mode]
-    context.ask_body(lambda: context.body.switch_mode(mode))
+    context.act("switch_mode", mode)
     return SetStringResponse(success=True, message=f"{MODE_NAMES[mode]}, was {before}")
 
 
 def stop_motion(context: BodyContext, _: TriggerRequest) -> TriggerResponse:
     """Ends the motion that runs; its joints hold where they are."""
-
-    def stop() -> bool:
-        was_moving = context.body.motion is not None
-        context.body.halt("it was stopped")
-        return was_moving
-
-    was_moving = context.ask_body(stop)
+    was_moving = context.act("stop_motion", "it was stopped")
     return TriggerResponse(success=was_moving, message="stopped" if was_moving else "no motion is running")
 
 
@@ -48,5 +42,5 @@ def set_joint_state(context: BodyContext, request: SetJointStateRequest) -> SetJ
     if not state.name:
         raise ValueError("expected one joint or more, got none")
     target = JointTarget(state.name, state.position, state.velocity)
-    context.ask_body(lambda: context.body.set_joint_state(target))
+    context.act("set_joint_state", target)
     return SetJointStateResponse(success=True, message=f"{', '.join(state.name)} put there")

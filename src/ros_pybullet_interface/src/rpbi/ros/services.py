@@ -23,7 +23,7 @@ from ros_pybullet_interface.srv import (
 )
 
 from ..asset_files import find_file
-from ..bodies import BODY_TYPES, CollisionObject, DynamicObject, Robot, VisualObject
+from ..bodies import BODY_TYPES, CollisionObject, DynamicObject, Robot, SoftObject, UrdfObject, VisualObject
 from ..clock import NS_PER_S
 from ..config import load_object, type_of
 from .requests import Requests
@@ -38,6 +38,8 @@ OBJECT_TYPES = {
     PybulletObject.COLLISION: CollisionObject.section,
     PybulletObject.DYNAMIC: DynamicObject.section,
     PybulletObject.ROBOT: Robot.section,
+    PybulletObject.SOFT: SoftObject.section,
+    PybulletObject.URDF: UrdfObject.section,
 }
 """List of the main file for each number in PybulletObject."""
 
@@ -92,13 +94,8 @@ class NodeServices:
         return TriggerResponse(success=changed, message=done if changed else refused)
 
     def _step(self, _: TriggerRequest) -> TriggerResponse:
-        def step() -> tuple[int, int]:
-            if self._simulation.running:
-                raise InterfaceError("the simulation is running: stop it before stepping")
-            return self._simulation.step()
-
         try:
-            tick, stamp_ns = self._ask(step)
+            tick, stamp_ns = self._ask(self._simulation.step)
         except InterfaceError as error:
             return TriggerResponse(success=False, message=str(error))
         seconds, nanoseconds = divmod(stamp_ns, NS_PER_S)
@@ -147,5 +144,7 @@ class NodeServices:
 
     def _list_objects(self, _: ListObjectsRequest) -> ListObjectsResponse:
         kinds = {body_type: kind for kind, body_type in BODY_TYPES.items()}
-        bodies = self._ask.or_service_error(lambda: dict(self._simulation.world.bodies))
-        return ListObjectsResponse(names=list(bodies), types=[kinds[type(body)] for body in bodies.values()])
+        world = self._simulation.world
+        bodies, cameras = self._ask.or_service_error(lambda: (dict(world.bodies), list(world.cameras)))
+        types = [kinds[type(body)] for body in bodies.values()] + ["rgbd_sensor"] * len(cameras)
+        return ListObjectsResponse(names=[*bodies, *cameras], types=types)

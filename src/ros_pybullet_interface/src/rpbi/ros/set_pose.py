@@ -21,5 +21,5 @@ def set_pose(context: BodyContext, request: SetTransformRequest) -> SetTransform
     for taken in body.inputs().values():
         if isinstance(taken, PoseInput):
             raise ValueError(f"'{body.name}' follows the TF frame '{taken.tf_id}': move that")
-    context.ask_body(lambda: body.teleport(pose))
+    context.act("teleport", pose)
     return SetTransformResponse(success=True, message=f"'{body.name}' was put there")

@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from typing import Any
 
-from custom_ros_tools.errors import PhysicsError
+from custom_ros_tools.errors import InterfaceError, PhysicsError
 
 from ..pacer import Pacer
 from ..world import World
+from .command_topic import CommandOutlet
 from .outlets import Outlet
+from .state_topic import StateOutlet
 from .status import ClockOutlet, StatusOutlet
+from .step_burst import StepBurst
 
 log = logging.getLogger(__name__)
 
 IDLE_PERIOD_S = 0.001
 """Shortest time between two looks at requests while stopped [s]."""
+BURST_S = 0.01
+"""How long ticks follow each other before the loop looks at requests [s]."""
 
 
 class Simulation:
@@ -32,6 +39,7 @@ class Simulation:
         clock: Publishes /clock if stamps are simulated time.
         helpers: Called at every pass; they must return at once.
         facts: Tells what else the diagnostics should have.
+        before_tick: Called before each tick, which waits for it.
     """
 
     def __init__(
@@ -43,30 +51,39 @@ class Simulation:
         clock: ClockOutlet | None = None,
         helpers: Sequence[Callable[[], None]] = (),
         facts: Callable[[], Mapping[str, str]] = dict,
+        before_tick: Callable[[], None] = lambda: None,
     ) -> None:
         self.world = world
         self.running = False
         self._broken = False
+        self._burst: StepBurst | None = None
         self.passes = 0
         """Grows as long as the loop is alive."""
         self._outlets = outlets
         self._distinct_outlets = list(dict.fromkeys(outlets.values()))
         self._clock = clock
         self._helpers = helpers
+        self._before_tick = before_tick
         self._pacer = Pacer(world.clock.dt_s, real_time_factor)
         self._idle_pacer = Pacer(max(world.clock.dt_s, IDLE_PERIOD_S))
         self._idle_ticks_a_pass = max(1, round(IDLE_PERIOD_S / world.clock.dt_s))
         self._idle_tick = 0
         self._status = StatusOutlet(world.clock, self._pacer, status_hz, real_time_factor, facts)
+        self._state = StateOutlet(world, self._pacer, real_time_factor)
+        self._commands = CommandOutlet(world)
 
     def start(self) -> bool:
         """Lets the world run.
 
         Returns:
             False if it runs already.
+
+        Raises:
+            InterfaceError: If it is about the ticks of a request.
         """
         if self.running:
             return False
+        self._refuse_while_stepping()
         self.running, self._broken = True, False
         self._pacer.restart()
         self._status.publish(True)
@@ -78,6 +95,9 @@ class Simulation:
         Returns:
             False if it stands still already.
         """
+        if self._burst is not None:
+            self._break_burst(InterfaceError(f"stopped {self._burst}"))
+            return True
         if not self.running:
             return False
         self._halt()
@@ -90,16 +110,66 @@ class Simulation:
             The new tick and its stamp [ns].
 
         Raises:
+            InterfaceError: If the world runs, or is about the ticks of another request.
             PhysicsError: If something in the world is not finite any more.
         """
+        self._refuse_while_moving()
         self._broken = False
         self._status.publish(True)
-        samples = self.world.step()
-        if self._clock is not None:
-            self._clock.publish_now()
-        self._publish(samples + self.world.read_rest())
+        self._take_last_tick()
         self._status.publish(False)
         return self.world.clock.tick, self.world.clock.stamp_ns
+
+    def step_n(self, steps: int) -> Future[tuple[int, int]]:
+        """Goes some ticks on, as fast as it goes; other requests are served meanwhile, a stop ends it.
+
+        Args:
+            steps: How many ticks; 0 is none.
+
+        Returns:
+            The last tick and its stamp [ns], once everything of it has been handed to every subscriber.
+
+        Raises:
+            InterfaceError: If the world runs, or is about the ticks of another request.
+        """
+        self._refuse_while_moving()
+        burst = StepBurst(steps)
+        if not steps:
+            burst.finish(self.world.clock.tick, self.world.clock.stamp_ns)
+            return burst.done
+        self._broken = False
+        self._burst, self._state.is_stepping = burst, True
+        self._status.publish(True)
+        return burst.done
+
+    def reset(self, refill: Callable[[], None] = lambda: None) -> None:
+        """Makes the world what it was when it was built; it goes on running or standing still, and so does its time.
+
+        Args:
+            refill: Puts inputs that the world is to have at its new start.
+
+        Raises:
+            InterfaceError: If something cannot be loaded any more; then it stands still.
+        """
+        if self._burst is not None:
+            burst = self._end_burst()
+            burst.fail(InterfaceError(f"the world was reset {burst}"))
+        try:
+            self.world.reset()
+        except InterfaceError as error:
+            self._break_off(error)
+            raise
+        self._broken = False
+        refill()
+        self.world.take_inputs()
+        self._pacer.restart()
+        self._idle_tick = 0
+        for outlet in self._distinct_outlets:
+            outlet.restart()
+        if self._clock is not None:
+            self._clock.publish_now()
+        self._publish(self.world.read_rest())
+        self._state.restart()
 
     def run(self, is_over: Callable[[], bool]) -> None:
         """Loops until it is over."""
@@ -107,7 +177,9 @@ class Simulation:
             self.passes += 1
             self.world.mailbox.run_requests()
             try:
-                if self.running:
+                if self._burst is not None:
+                    self._advance_burst(self._burst)
+                elif self.running:
                     self._advance()
                 else:
                     self._idle()
@@ -115,22 +187,72 @@ class Simulation:
                 self._break_off(error)
             for help_out in self._helpers:
                 help_out()
-            self._status.spin(self.running)
-            (self._pacer if self.running else self._idle_pacer).wait()
+            self._status.spin(self.running, self._burst is not None)
+            self._state.spin(self.running or self._burst is not None)
+            self._commands.spin()
+            if self._burst is None:
+                (self._pacer if self.running else self._idle_pacer).wait()
 
     def _advance(self) -> None:
-        if not self._pacer.is_due():
-            return
+        if self._pacer.is_due():
+            self._take_tick()
+
+    def _take_tick(self) -> None:
+        self._before_tick()
         samples = self.world.step()
         if self._clock is not None:
             self._clock.publish_tick()
         if samples:
             self._publish(samples)
+        self._state.take_tick()
 
-    def _break_off(self, error: PhysicsError) -> None:
+    def _take_last_tick(self) -> None:
+        """Goes one tick on before standing still: all of it is told, whatever is due."""
+        self._before_tick()
+        samples = self.world.step()
+        if self._clock is not None:
+            self._clock.publish_now()
+        self._publish(samples + self.world.read_rest())
+        self._state.take_tick()
+
+    def _advance_burst(self, burst: StepBurst) -> None:
+        end_s = time.monotonic() + BURST_S
+        while burst.left > 1 and time.monotonic() < end_s:
+            self._take_tick()
+            burst.left -= 1
+        if burst.left == 1:
+            self._take_last_tick()
+            burst.left = 0
+            self._end_burst()
+            self._status.publish(False)
+            burst.finish(self.world.clock.tick, self.world.clock.stamp_ns)
+
+    def _end_burst(self) -> StepBurst:
+        assert self._burst is not None
+        burst, self._burst, self._state.is_stepping = self._burst, None, False
+        return burst
+
+    def _break_burst(self, error: Exception) -> None:
+        """Ends the ticks of a request before their time, with all of the last one told."""
+        burst = self._end_burst()
+        self._halt()
+        burst.fail(error)
+
+    def _refuse_while_moving(self) -> None:
+        if self.running:
+            raise InterfaceError("the simulation is running: stop it before stepping")
+        self._refuse_while_stepping()
+
+    def _refuse_while_stepping(self) -> None:
+        if self._burst is not None:
+            raise InterfaceError("the simulation is stepping: wait for that, or stop it")
+
+    def _break_off(self, error: Exception) -> None:
         """Stands still, and tells no more of a world that is broken; until somebody starts or steps it again."""
         log.error("simulation stopped: %s", error)
         self.running, self._broken = False, True
+        if self._burst is not None:
+            self._end_burst().fail(error)
         self.world.halt("the simulation broke off")
         self._idle_tick = self.world.clock.tick
         if self._clock is not None:

@@ -99,26 +99,31 @@ class StatusOutlet:
         self._diagnostics_due_s = time.monotonic() + DIAGNOSTICS_PERIOD_S
         self._overruns = 0
 
-    def spin(self, running: bool) -> None:
-        """Publishes what is due by the wall clock."""
+    def spin(self, running: bool, stepping: bool = False) -> None:
+        """Publishes what is due by the wall clock.
+
+        Args:
+            running: Whether the world runs.
+            stepping: Whether it is about the ticks of a request.
+        """
         now_s = time.monotonic()
         if now_s >= self._due_s:
             self._due_s = max(self._due_s + self._period_s, now_s)
-            self.publish(running)
+            self.publish(running or stepping)
         if now_s >= self._diagnostics_due_s:
             self._diagnostics_due_s = max(self._diagnostics_due_s + DIAGNOSTICS_PERIOD_S, now_s)
-            self._publish_diagnostics(running)
+            self._publish_diagnostics(running, stepping)
 
     def publish(self, running: bool) -> None:
         """Publishes 1 for running, 0 for stopped."""
         self._status.publish(Int64(int(running)))
 
-    def _publish_diagnostics(self, running: bool) -> None:
+    def _publish_diagnostics(self, running: bool, stepping: bool) -> None:
         factor = self._pacer.measure()
         overruns = self._pacer.overruns - self._overruns
         self._overruns = self._pacer.overruns
         status = DiagnosticStatus(name=f"{rospy.get_name()}: simulation", hardware_id="rpbi", level=DiagnosticStatus.OK)
-        status.message = "running" if running else "stopped"
+        status.message = "running" if running else "stepping" if stepping else "stopped"
         if running and factor < FALLING_BEHIND * self._wanted_factor:
             status.level = DiagnosticStatus.WARN
             status.message = f"too slow: real-time factor {factor:.3f} instead of {self._wanted_factor:g}"

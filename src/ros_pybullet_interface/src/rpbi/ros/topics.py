@@ -81,13 +81,17 @@ class FastTopic(StateTopic):
 
     def publish(self, message: Any) -> None:
         """Sends a message to all subscribers, or keeps it for those that are slow."""
+        self.be_patient()
+        super().publish(message)
+
+    def be_patient(self) -> None:
+        """Sees to it that sending never waits for anybody, not for those either that have just come."""
         connections = self._publisher.impl.connections  # rospy makes a new list whenever somebody comes or goes
         if connections is not self._connections:
             for connection in connections:
                 if isinstance(connection.socket, socket.socket):
                     connection.socket = PatientSocket(connection.socket, self._queue_size)
             self._connections = connections
-        super().publish(message)
 
     def flush(self) -> None:
         """Sends what slow subscribers have not taken yet; for a time in which nothing new is published."""

@@ -16,6 +16,7 @@ from actionlib_msgs.msg import GoalStatus
 
 from custom_ros_tools.errors import InterfaceError
 
+from ..actions import RecordedTrajectory
 from ..bodies import Robot
 from ..control.controller_state import ControllerState
 from ..control.trajectory_motion import TrajectoryMotion
@@ -46,8 +47,8 @@ def open_trajectory_action(context: BodyContext) -> Callable[[], None] | None:
         log.warning(
             "%s: rpbi/%s/%s has its topics only: the action follow_joint_trajectory and the service query_state need "
             "control_msgs, which is not installed (docs/trajectories.md tells how)",
-            context.body.name,
-            context.body.name,
+            context.name,
+            context.name,
             CONTROLLER,
         )
         return None
@@ -75,12 +76,11 @@ class TrajectoryAction:
 
     def __init__(self, context: BodyContext) -> None:
         self._context = context
-        self._follower = context.body.follower
         self._motions: dict[ServerGoalHandle, TrajectoryMotion] = {}
         self._tasks: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
-        self._thread = threading.Thread(target=self._work, name=f"{context.body.name} trajectories", daemon=True)
+        self._thread = threading.Thread(target=self._work, name=f"{context.name} trajectories", daemon=True)
         self._server = StampedActionServer(
-            f"rpbi/{context.body.name}/{CONTROLLER}/follow_joint_trajectory",
+            f"rpbi/{context.name}/{CONTROLLER}/follow_joint_trajectory",
             FollowJointTrajectoryAction,
             context.world.clock,
             take_goal=lambda goal: self._tasks.put(lambda: self._begin(goal)),
@@ -108,7 +108,7 @@ class TrajectoryAction:
             try:
                 task()
             except Exception:  # the next goals shall have their answers all the same
-                log.exception("%s: a goal could not be served", self._context.body.name)
+                log.exception("%s: a goal could not be served", self._context.name)
 
     def _begin(self, goal: ServerGoalHandle) -> None:
         if goal.get_goal_status().status == GoalStatus.RECALLING:
@@ -122,8 +122,17 @@ class TrajectoryAction:
 
         clock, message = self._context.world.clock, goal.get_goal()
         try:
-            request = self._follower.check(trajectory_request(message.trajectory), goal_tolerances(message))
-            motion = self._context.ask_body(lambda: self._follower.follow(request, clock, feed))
+            request, tolerances = trajectory_request(message.trajectory), goal_tolerances(message)
+            checked = self._context.body.follower.check(request, tolerances)
+
+            def follow() -> TrajectoryMotion:
+                record = RecordedTrajectory.of(request, tolerances, clock)
+                motion: TrajectoryMotion = self._context.world.act(
+                    self._context.name, "follow", record, lambda body: body.follower.follow(checked, clock, feed)
+                )
+                return motion
+
+            motion = self._context.ask_body(follow)
         except InterfaceError as error:
             self._reject(
                 goal, error.code if isinstance(error, TrajectoryRefusedError) else ErrorCode.INVALID_GOAL, error
@@ -138,7 +147,7 @@ class TrajectoryAction:
         motion.result.add_done_callback(lambda _: self._tasks.put(lambda: self._finish(goal)))
 
     def _reject(self, goal: ServerGoalHandle, code: ErrorCode, error: Exception) -> None:
-        log.warning("%s: goal refused: %s", self._context.body.name, error)
+        log.warning("%s: goal refused: %s", self._context.name, error)
         goal.set_rejected(self._result(code, str(error)), str(error))
 
     def _cancel(self, goal: ServerGoalHandle) -> None:
@@ -146,11 +155,13 @@ class TrajectoryAction:
         if motion is None:
             return  # it has ended meanwhile
         try:
-            self._context.ask_body(
-                lambda: self._follower.cancel("cancelled; the joints hold", self._context.world.clock, motion)
-            )
+            self._context.ask_body(lambda: self._stop_motion(motion))
         except InterfaceError as error:
-            log.warning("%s: could not cancel a goal: %s", self._context.body.name, error)
+            log.warning("%s: could not cancel a goal: %s", self._context.name, error)
+
+    def _stop_motion(self, motion: TrajectoryMotion) -> None:
+        if self._context.body.motion is motion:  # else a newer one has replaced it
+            self._context.world.act(self._context.name, "cancel", "cancelled; the joints hold")
 
     def _finish(self, goal: ServerGoalHandle) -> None:
         motion = self._motions.pop(goal)
@@ -161,7 +172,7 @@ class TrajectoryAction:
         elif motion.preempted:
             goal.set_canceled(result, message)
         else:
-            log.warning("%s: goal aborted: %s", self._context.body.name, message)
+            log.warning("%s: goal aborted: %s", self._context.name, message)
             goal.set_aborted(result, message)
 
     def _feedback(self, state: ControllerState, stamp_ns: int) -> Any:

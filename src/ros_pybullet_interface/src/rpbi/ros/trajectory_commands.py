@@ -7,6 +7,7 @@ from typing import Any
 
 from trajectory_msgs.msg import JointTrajectory
 
+from ..actions import RecordedTrajectory
 from ..bodies import Body, Robot
 from ..clock import NS_PER_S
 from ..control.trajectory import State
@@ -32,8 +33,14 @@ def query_suffixes(body: Body) -> Sequence[str]:
 def follow_command(context: BodyContext, message: JointTrajectory) -> None:
     """Follows a trajectory without looking at how well; a goal of the action is cancelled."""
     follower, clock = context.body.follower, context.world.clock
-    request = follower.check(trajectory_request(message))
-    context.ask_body(lambda: follower.follow(request, clock))
+    request = trajectory_request(message)
+    checked = follower.check(request)
+
+    def follow() -> None:
+        record = RecordedTrajectory.of(request, None, clock)
+        context.world.act(context.name, "follow", record, lambda body: body.follower.follow(checked, clock))
+
+    context.ask_body(follow)
 
 
 def query_state(context: BodyContext, request: Any) -> Any:

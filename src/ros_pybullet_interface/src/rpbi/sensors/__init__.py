@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from .base_state import BaseStateSensor
+from .contact_arrows import ContactArrowsSensor
+from .contacts import ContactsSensor
 from .force_torque import ForceTorqueSensor
 from .joint_state import JointStateSensor
 from .link_pose import LinkPoseSensor
 from .rgbd import RgbdSensor
 from .sensor import Sensor
+from .surface import SurfaceSensor
 from .trajectory_state import TrajectoryStateSensor
 
 SENSOR_TYPES: dict[str, type[Sensor]] = {
@@ -16,16 +19,22 @@ SENSOR_TYPES: dict[str, type[Sensor]] = {
     "base_state": BaseStateSensor,
     "force_torque": ForceTorqueSensor,
     "trajectory_state": TrajectoryStateSensor,
+    "contacts": ContactsSensor,
+    "contact_arrows": ContactArrowsSensor,
+    "surface": SurfaceSensor,
     "rgbd": RgbdSensor,
 }
 
 __all__ = [
     "SENSOR_TYPES",
     "BaseStateSensor",
+    "ContactArrowsSensor",
+    "ContactsSensor",
     "ForceTorqueSensor",
     "JointStateSensor",
     "LinkPoseSensor",
     "RgbdSensor",
     "Sensor",
+    "SurfaceSensor",
     "TrajectoryStateSensor",
 ]

@@ -33,7 +33,8 @@ class LinkPoseSensor(Sensor):
         frame = f"rpbi/{body.name}"
         self._indices = body.link_indices if links else ()
         names = [body.pb.getJointInfo(body.body_id, index)[12].decode() for index in self._indices]
-        self._frames = (root_frame or f"{frame}/{body.root_link}", *(f"{frame}/{name}" for name in names))
+        self.root_frame = root_frame or f"{frame}/{body.root_link}"
+        self._frames = (self.root_frame, *(f"{frame}/{name}" for name in names))
 
     def read(self, tick: int) -> LinkPoseSample:
         """Reads the base and all links."""

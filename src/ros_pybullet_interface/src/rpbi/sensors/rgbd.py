@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -16,34 +15,33 @@ from .sensor import Sensor
 if TYPE_CHECKING:
     from ..bodies.body import Body
 
-log = logging.getLogger(__name__)
-
-PLANNED = ("pointcloud", "synchronous")
-"""Keys that are accepted and do nothing yet."""
-
 
 class RgbdSensor(Sensor):
     """Collects the scene for the renderer while somebody looks at the camera's images.
 
     Args:
-        config: Its part of the main YAML file.
+        config: What the YAML says of it.
         bodies: The world's bodies by name.
         clock: The world's clock.
+        topic_name: Its name in topics.
+
+    Attributes:
+        pose: Pose of the optical frame in the world, None as long as it is unknown.
     """
 
     Config = RgbdSensorConfig
     sample_type = SceneSample
 
-    def __init__(self, config: RgbdSensorConfig, bodies: Mapping[str, Body], clock: Clock) -> None:
+    def __init__(
+        self, config: RgbdSensorConfig, bodies: Mapping[str, Body], clock: Clock, topic_name: str
+    ) -> None:
         super().__init__(config.name, config.hz)
-        for key in PLANNED:
-            if getattr(config, key):
-                log.warning("rgbd_sensor: %s: has no effect yet", key)
         self.config = config
+        self.topic_name = topic_name
         self.wanted = False
+        self.pose: Pose | None = None
         self._bodies = bodies
         self._clock = clock
-        self._pose: Pose | None = None
 
     def inputs(self) -> Mapping[str, Input]:
         """Takes `pose`, the pose of the optical frame in the world."""
@@ -51,10 +49,10 @@ class RgbdSensor(Sensor):
 
     def read(self, tick: int) -> SceneSample | None:
         """Returns where everything is, None as long as the camera's own pose is unknown."""
-        if self._pose is None:
+        if self.pose is None:
             return None
         bodies = tuple(body.state() for body in self._bodies.values())
-        return SceneSample(self.name, tick, self._clock.stamp_ns, self._pose, bodies)
+        return SceneSample(self.name, tick, self._clock.stamp_ns, self.pose, bodies)
 
     def _set_pose(self, pose: Pose) -> None:
-        self._pose = pose
+        self.pose = pose

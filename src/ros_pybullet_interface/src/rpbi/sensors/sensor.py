@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..inputs import Input
+
+if TYPE_CHECKING:
+    from ..world import World
 
 
 class Sensor(ABC):
@@ -25,6 +28,9 @@ class Sensor(ABC):
     def __init__(self, name: str, hz: float) -> None:
         self.name = name
         self.hz = hz
+
+    def enter(self, world: World) -> None:  # noqa: B027 (most sensors need nothing but their body)
+        """Gets to know the world that it is in, before it is read for the first time."""
 
     @abstractmethod
     def read(self, tick: int) -> Any:

@@ -41,6 +41,7 @@ class BagReader:
     Attributes:
         path: The file.
         types: The message types of each topic, in the order of their names; nearly always one a topic.
+        md5sums: Their md5 sums.
         counts: Number of messages of each topic.
 
     Raises:
@@ -67,9 +68,11 @@ class BagReader:
             self.close()
             raise BagError(self.path, str(error)) from error
         self.types: dict[str, set[MessageType]] = {}
+        self.md5sums: dict[str, set[str]] = {}
         for connection in self._connections:
             message_type = self._types[connection.datatype, connection.md5sum]
             self.types.setdefault(connection.topic, set()).add(message_type)
+            self.md5sums.setdefault(connection.topic, set()).add(connection.md5sum)
         self.counts: dict[str, int] = {topic: info[topic].message_count for topic in self.types}
 
     def __enter__(self) -> BagReader:

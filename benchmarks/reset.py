@@ -1,0 +1,48 @@
+"""How long `rpbi/reset` takes for the KUKA scene, beside loading it, and what the hash of a state costs."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import yaml
+from result import Result, Target
+from session import JOINT_STATES, PROGRAMS, Session
+from worlds import CONFIGS
+
+RESETS, QUICK_RESETS = 1000, 50
+TARGET_MS = 200.0
+
+
+def run(quick: bool) -> list[Result]:
+    """Resets the running scene again and again, with a TF listener, a recorder and a controller attached.
+
+    Args:
+        quick: Whether fewer resets will do.
+    """
+    resets = QUICK_RESETS if quick else RESETS
+    main = CONFIGS / "basic_example_kuka_lwr" / "config.yaml"
+    with Session() as ros:
+        ros.simulator(yaml.safe_load(main.read_text()))
+        ros.place_camera()
+        ros.start(["rosrun", "tf2_ros", "static_transform_publisher", *"0 0 0 0 0 0 rpbi/world rpbi/floor".split()])
+        ros.start(["rosbag", "record", "-O", str(ros.folder / "resets.bag"), "/tf", "/clock", JOINT_STATES])
+        program = ros.program("reset_often", resets)
+        found = ros.result_of(program)
+        told = [line for line in ros.output(program).splitlines() if "warning: " in line or "TF_" in line]
+    print("\n".join(told), end="", file=sys.stderr)
+    alone = subprocess.run(
+        [sys.executable, str(PROGRAMS / "reset_alone.py"), str(main)], capture_output=True, text=True, check=True
+    )
+    line = next(line for line in alone.stdout.splitlines() if line.startswith("result: "))
+    floor = json.loads(line.partition(": ")[2])
+    of = f"of {resets} resets"
+    return [
+        Result("reset", f"median {of}", found["median_ms"], "ms", floor["load_ms"], Target(TARGET_MS)),
+        Result("reset", f"slowest {of}", found["slowest_ms"], "ms"),
+        Result("reset", f"memory after {of}", found["grown_mb"], "MB more", None, Target(5.0)),
+        Result("reset", f"threads and files after {of}", found["grown_handles"], "more", None, Target(0)),
+        Result("reset", f"warnings during {of}", len(told), "", None, Target(0)),
+        Result("reset", "hash of the state", floor["hash_us"], "us", floor["tick_us"]),
+    ]

@@ -1,0 +1,176 @@
+"""Soft bodies: cloth and solids that give way."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pybullet
+from pydantic import Field, model_validator
+
+from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, Problem
+from custom_ros_tools.schema import ConfigModel, HzOrOff, KeyedError, ListOf, Name
+
+from ..client import Client
+from ..dynamics import link_index
+from ..pose import Pose
+from ..pybullet_models import LoadURDF
+from ..pybullet_soft_models import AnchorEntry, ChangeVisualShape, CreateSoftBodyAnchor, LoadSoftBody
+from ..samples import BodyState
+from ..sensors.contacts_config import ContactsConfig, contact_sensors
+from ..sensors.sensor import Sensor
+from ..sensors.surface import SurfaceSensor
+from ..twist import Twist
+from ..urdf import deformable_meshes
+from .body import Body
+from .soft_mesh_faults import soft_mesh_faults
+from .urdf_loading import load_urdf
+
+
+class SoftObjectConfig(ConfigModel):
+    """YAML of a soft body."""
+
+    name: Name = Field(description="Unique name; topics are named after it.")
+    loadSoftBody: LoadSoftBody | None = Field(None, description="Its mesh and what it is made of; this or loadURDF.")
+    loadURDF: LoadURDF | None = Field(None, description="A URDF with a <deformable>; this or loadSoftBody.")
+    createSoftBodyAnchor: ListOf[AnchorEntry] = Field(
+        (), description="Corners tied to bodies or the world, each [node, body, link, position]."
+    )
+    changeVisualShape: ChangeVisualShape | None = Field(None, description="Its colour.")
+    surface_hz: HzOrOff = Field(20.0, description="Rate of its surface for RViz; 0 is off.")
+    contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
+
+    @model_validator(mode="after")
+    def _comes_from_one_place(self) -> SoftObjectConfig:
+        if self.loadSoftBody is None and self.loadURDF is None:
+            raise KeyedError("loadSoftBody", "missing; a soft body needs it, or loadURDF")
+        if self.loadSoftBody is not None and self.loadURDF is not None:
+            raise KeyedError("loadURDF", "does not go with loadSoftBody: remove one")
+        return self
+
+
+class SoftObject(Body):
+    """A body without a fixed shape, in a world that was set up for such.
+
+    Its base pose is the mean of its corners' places and their mean turn. It has no velocity of its own that PyBullet
+    would tell, and no part in what replays promise.
+
+    Raises:
+        ConfigError: If the mesh is broken, or the world is not one for soft bodies.
+        PhysicsError: If PyBullet refuses.
+    """
+
+    Config = SoftObjectConfig
+    section = "soft_objects"
+    is_soft = True
+
+    def __init__(self, pb: Client, config: SoftObjectConfig) -> None:
+        if not pb.is_deformable:
+            message = "soft bodies need resetSimulation: {flags: RESET_USE_DEFORMABLE_WORLD} in the main file"
+            raise ConfigError([Problem(config.name, "", message)])
+        super().__init__(pb, config.name, _load(pb, config))
+        self.config = config
+        self.inertial_pose_in_base = self._base_pose_in_inertial = Pose()  # PyBullet has nothing sensible to tell
+        self._anchors: list[tuple[str | None, int]] = []
+        """Name of the body that each anchor ties to, None for the world, and PyBullet's id of the anchor."""
+        if config.changeVisualShape is not None:
+            pb.changeVisualShape(self.body_id, -1, **config.changeVisualShape.kwargs())
+
+    def tie(self, bodies: Mapping[str, Body]) -> None:
+        """Makes its anchors.
+
+        Raises:
+            ConfigError: If an anchor names a body, link or node that does not exist.
+        """
+        problems = []
+        for index, anchor in enumerate(self.config.createSoftBodyAnchor):
+            try:
+                self._anchors.append((anchor.body, self._anchor(anchor, bodies)))
+            except (InterfaceError, ValueError, pybullet.error) as error:
+                problems.append(Problem(self.name, f"createSoftBodyAnchor[{index}]", str(error)))
+        if problems:
+            self.untie()
+            raise ConfigError(problems)
+
+    def untie(self, name: str | None = None) -> None:
+        """Removes the anchors to a body, or all."""
+        for body, anchor_id in self._anchors:
+            if name is None or body == name:
+                self.pb.removeConstraint(anchor_id)
+        self._anchors = [each for each in self._anchors if name is not None and each[0] != name]
+
+    def sensors(self) -> tuple[Sensor, ...]:
+        """Its surface, and its contacts, if they are asked for."""
+        surface = (SurfaceSensor(self, self.config.surface_hz),) if self.config.surface_hz else ()
+        return surface + contact_sensors(self, self.config.contacts)
+
+    def base_twist(self) -> Twist:
+        """Has nothing to return: what PyBullet tells is something else.
+
+        Raises:
+            PhysicsError: Always.
+        """
+        raise PhysicsError(f"{self.name}: a soft body has no twist")
+
+    def motion_state(self) -> tuple[float, ...]:
+        """Returns nothing: soft bodies do not move the same every time."""
+        return ()
+
+    def state(self) -> BodyState:
+        """Returns where its simulated corners are."""
+        position, quat = self.pb.getBasePositionAndOrientation(self.body_id)
+        _, nodes = self.pb.getMeshData(self.body_id, -1, flags=pybullet.MESH_DATA_SIMULATION_MESH)
+        return BodyState(self.name, position + quat, (), nodes)
+
+    def remove(self) -> None:
+        """Takes it out of the world, its anchors first."""
+        self.untie()
+        super().remove()
+
+    def _anchor(self, anchor: CreateSoftBodyAnchor, bodies: Mapping[str, Body]) -> int:
+        count, _ = self.pb.getMeshData(self.body_id, -1, flags=pybullet.MESH_DATA_SIMULATION_MESH)
+        if anchor.node >= count:
+            raise ValueError(f"expected a node from 0 to {count - 1}, got {anchor.node}")
+        if anchor.body is None:
+            return int(self.pb.createSoftBodyAnchor(self.body_id, anchor.node, -1, -1))
+        if anchor.body not in bodies or bodies[anchor.body].is_soft:
+            known = ", ".join(name for name, each in bodies.items() if not each.is_soft)
+            raise ValueError(f"expected the name of a rigid body that is there already, got '{anchor.body}': {known}")
+        body = bodies[anchor.body]
+        if isinstance(anchor.link, str):
+            link = link_index(body, anchor.link)
+        elif anchor.link < len(body.joint_indices):
+            link = anchor.link
+        else:
+            raise ValueError(f"'{body.name}' has {len(body.joint_indices)} links beside the base, got {anchor.link}")
+        return int(self.pb.createSoftBodyAnchor(self.body_id, anchor.node, body.body_id, link))
+
+
+def _load(pb: Client, config: SoftObjectConfig) -> int:
+    """Loads a soft body, whose meshes are looked at before: PyBullet may crash on a broken one."""
+    if config.loadSoftBody is not None:
+        load = config.loadSoftBody
+        meshes = {"loadSoftBody.fileName": load.fileName}
+        if load.simFileName is not None:
+            meshes["loadSoftBody.simFileName"] = load.simFileName
+        _refuse_faults(config.name, [(key, soft_mesh_faults(path)) for key, path in meshes.items()])
+        if load.useNeoHookean and Path(load.simFileName or load.fileName).suffix.lower() != ".vtk":
+            message = "a solid needs tetrahedra (.vtk); for a surface use useMassSpring"
+            raise ConfigError([Problem(config.name, "loadSoftBody.useNeoHookean", message)])
+        try:
+            return int(pb.loadSoftBody(**load.kwargs()))
+        except pybullet.error as error:
+            raise ConfigError([Problem(config.name, "loadSoftBody", f"PyBullet could not load it: {error}")]) from None
+    assert config.loadURDF is not None  # the model demands one of both
+    urdf = config.loadURDF.fileName
+    faults = [fault for mesh in deformable_meshes(urdf) for fault in soft_mesh_faults(mesh)]
+    if not deformable_meshes(urdf):
+        faults = [f"{urdf}: expected a <deformable> with a mesh; rigid objects belong to the list `urdfs`"]
+    _refuse_faults(config.name, [("loadURDF.fileName", faults)])
+    return load_urdf(pb, config.name, config.loadURDF.kwargs())
+
+
+def _refuse_faults(name: str, faults: list[tuple[str, list[str]]]) -> None:
+    problems = [Problem(name, key, message) for key, messages in faults for message in messages]
+    if problems:
+        raise ConfigError(problems)

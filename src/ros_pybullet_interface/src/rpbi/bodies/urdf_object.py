@@ -1,0 +1,110 @@
+"""URDF objects: things with links and joints, but without motors."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+
+import pybullet
+from pydantic import Field
+
+from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.schema import ConfigModel, HzOrOff, Name
+
+from ..client import Client
+from ..inputs import Input, PoseInput
+from ..pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity
+from ..sensors.contacts_config import ContactsConfig, contact_sensors
+from ..sensors.link_pose import LinkPoseSensor
+from ..sensors.sensor import Sensor
+from ..urdf import deformable_meshes
+from .body import Body
+from .urdf_loading import load_urdf
+
+log = logging.getLogger(__name__)
+
+
+class UrdfObjectConfig(ConfigModel):
+    """YAML of a URDF object."""
+
+    name: Name = Field(description="Unique name; topics and TF frames are named after it.")
+    loadURDF: LoadURDF = Field(description="Its description and where its base is.")
+    object_tf: ObjectTf | None = Field(None, description="TF frame that a fixed base follows.")
+    resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity of a floating base.")
+    broadcast_hz: HzOrOff = Field(0.0, description="Rate of its links' poses on TF; 0 is off.")
+    contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
+
+
+class UrdfObject(Body):
+    """A thing that others push and open, such as a cup, a door or a drawer.
+
+    Its joints move freely within their limits, but for the damping and the friction of the URDF's `dynamics`.
+
+    Raises:
+        ConfigError: If the URDF cannot be loaded.
+        PhysicsError: If PyBullet refuses.
+    """
+
+    Config = UrdfObjectConfig
+    section = "urdfs"
+
+    def __init__(self, pb: Client, config: UrdfObjectConfig) -> None:
+        _refuse_soft(config)
+        super().__init__(pb, config.name, load_urdf(pb, config.name, config.loadURDF.kwargs()))
+        self.config = config
+        # PyBullet fixes a base without mass.
+        self.has_fixed_base = bool(config.loadURDF.useFixedBase) or pb.getDynamicsInfo(self.body_id, -1)[0] == 0.0
+        for index in self.joint_indices:
+            self._release(index)
+        if config.resetBaseVelocity is not None and self.has_fixed_base:
+            log.warning("%s: resetBaseVelocity: has no effect: the base is fixed", self.name)
+        elif config.resetBaseVelocity is not None:
+            pb.resetBaseVelocity(self.body_id, **config.resetBaseVelocity.kwargs())
+        if config.object_tf is not None and not self.has_fixed_base:
+            log.warning("%s: object_tf: has no effect: physics moves a base that is not fixed", self.name)
+
+    def sensors(self) -> tuple[Sensor, ...]:
+        """The poses of its links, if they are to be broadcast, and its contacts, if they are asked for."""
+        hz = self.config.broadcast_hz
+        return ((LinkPoseSensor(self, hz),) if hz else ()) + contact_sensors(self, self.config.contacts)
+
+    def inputs(self) -> Mapping[str, Input]:
+        """Takes `pose`, the pose of the TF frame that its base follows, if it follows one."""
+        if self.config.object_tf is None or not self.has_fixed_base:
+            return {}
+        return {"pose": PoseInput.following(self.config.object_tf, self.set_base_pose)}
+
+    def _release(self, index: int) -> None:
+        """Leaves of the motor that PyBullet gives each joint what the URDF's friction is.
+
+        PyBullet applies a URDF's damping itself, its friction not. A motor that brakes with the friction's force or
+        torque at most, and with what stops the joint if that is less, is Coulomb friction.
+        """
+        info = self.pb.getJointInfo(self.body_id, index)
+        kind, friction = info[2], info[7]
+        if kind in (pybullet.JOINT_REVOLUTE, pybullet.JOINT_PRISMATIC):
+            self.pb.setJointMotorControl2(
+                self.body_id, index, pybullet.VELOCITY_CONTROL, targetVelocity=0.0, force=friction
+            )
+        elif kind == pybullet.JOINT_SPHERICAL:
+            self.pb.setJointMotorControlMultiDof(
+                self.body_id,
+                index,
+                pybullet.POSITION_CONTROL,
+                targetPosition=(0.0, 0.0, 0.0, 1.0),
+                targetVelocity=(0.0, 0.0, 0.0),
+                positionGain=0.0,
+                velocityGain=1.0,
+                force=(friction, friction, friction),
+            )
+
+
+def _refuse_soft(config: UrdfObjectConfig) -> None:
+    file = config.loadURDF.fileName
+    try:
+        is_soft = bool(deformable_meshes(file))
+    except (ConfigError, OSError):
+        return  # loading it tells what is wrong
+    if is_soft:
+        message = f"{file} has a <deformable>: soft bodies belong to the list `soft_objects`"
+        raise ConfigError([Problem(config.name, "loadURDF.fileName", message)])

@@ -1,0 +1,57 @@
+"""What enters a world after its start, by tick."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any, NamedTuple
+
+KEPT = 5_000
+"""Commands that are kept, some megabytes at most."""
+
+
+class WorldCommand(NamedTuple):
+    """Something that entered a world.
+
+    Attributes:
+        tick: The world's tick at which it did: after that tick's physics, before the next.
+        name: The body that it concerns, `NAME/LINK` for dynamics, `NAME/INPUT` for inputs, empty for the whole world.
+        what: `input`, `add`, `remove`, `dynamics`, `halt`, `pause`, or a key of ACTIONS.
+        value: What it was.
+    """
+
+    tick: int
+    name: str
+    what: str
+    value: Any
+
+
+class CommandLog:
+    """The newest commands since a world was built or reset, and how many there were.
+
+    Attributes:
+        count: How many there were.
+    """
+
+    def __init__(self) -> None:
+        self.clear()
+
+    def note(self, command: WorldCommand) -> None:
+        """Appends one; the oldest is forgotten if there are too many."""
+        self._kept.append(command)
+        self.count += 1
+
+    def since(self, index: int, most: int = KEPT) -> tuple[int, tuple[WorldCommand, ...]]:
+        """Returns the commands from an index on, as far as they are kept, and the index of the first.
+
+        Args:
+            index: The first to return.
+            most: How many to return at most.
+        """
+        first = max(index, self.count - len(self._kept))
+        end = min(first + most, self.count)
+        return first, tuple(self._kept[each - self.count] for each in range(first, end))
+
+    def clear(self) -> None:
+        """Begins afresh."""
+        self._kept: deque[WorldCommand] = deque(maxlen=KEPT)
+        self.count = 0

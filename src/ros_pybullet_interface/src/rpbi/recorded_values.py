@@ -1,0 +1,88 @@
+"""Values that enter a world as text that reads back exactly."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from custom_ros_tools.schema import ConfigModel
+
+PAIRS = "pairs"
+"""Key of a mapping whose keys are no texts, as a list of pairs."""
+
+
+def to_text(value: Any) -> str:
+    """Returns a value as JSON.
+
+    Floats read back to the last bit (Python writes the shortest text that does). Named tuples and configurations become
+    `{"module:Class": fields}`.
+
+    Raises:
+        TypeError: If it holds something that has no such text.
+    """
+    return json.dumps(_plain(value), separators=(",", ":"))
+
+
+def from_text(text: str) -> Any:
+    """Returns the value that `to_text` was given; lists come back as tuples.
+
+    Raises:
+        ValueError: If the text is none that `to_text` writes, or names a class that is not there.
+        ConfigError: If a configuration in it does not hold here, for instance because a file is missing.
+    """
+    return _value(json.loads(text))
+
+
+def _plain(value: Any) -> Any:
+    if value is None or isinstance(value, (bool, str)):
+        return value
+    if isinstance(value, int):
+        return int(value)
+    if isinstance(value, float):
+        return float(value)
+    if isinstance(value, ConfigModel):
+        # Only what was written: what PyBullet is told depends on that, defaults or not.
+        return {_class_name(value): value.model_dump(mode="json", exclude_unset=True)}
+    if isinstance(value, Mapping):
+        return {PAIRS: [[_plain(key), _plain(item)] for key, item in value.items()]}
+    if isinstance(value, tuple) and hasattr(value, "_fields"):
+        return {_class_name(value): [_plain(item) for item in value]}
+    if isinstance(value, Sequence):
+        return [_plain(item) for item in value]
+    raise TypeError(f"{type(value).__name__} cannot be recorded; expected numbers, texts, tuples, named tuples")
+
+
+def _value(plain: Any) -> Any:
+    if isinstance(plain, list):
+        return tuple(map(_value, plain))
+    if not isinstance(plain, dict):
+        return plain
+    if len(plain) != 1:
+        raise ValueError(f"expected one key, got {', '.join(plain)}")
+    ((key, content),) = plain.items()
+    if key == PAIRS:
+        return {_value(name): _value(item) for name, item in content}
+    made = _class_of(key)
+    if issubclass(made, ConfigModel):
+        return made.model_validate(content, context={"file": "~recorded"})
+    return made(*map(_value, content))
+
+
+def _class_name(value: Any) -> str:
+    return f"{type(value).__module__}:{type(value).__qualname__}"
+
+
+def _class_of(name: str) -> type:
+    """Returns a class of values; no other can be named, so that a file cannot have just anything called."""
+    module, _, class_name = name.partition(":")
+    try:
+        found = getattr(importlib.import_module(module), class_name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise ValueError(f"'{name}' is not known here: {error}") from None
+    if isinstance(found, type) and (
+        issubclass(found, ConfigModel) or (issubclass(found, tuple) and hasattr(found, "_fields"))
+    ):
+        return found
+    raise ValueError(f"'{name}' is neither a named tuple nor a configuration")

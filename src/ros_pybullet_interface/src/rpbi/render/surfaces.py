@@ -1,0 +1,127 @@
+"""Surfaces of simple bodies as triangles with normals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+AROUND = 96
+"""Corners of a circle: the triangles of a sphere of radius 0.2 m are within 0.3 mm of it."""
+PLANE_HALF_WIDTH_M = 100.0
+"""Half the edge of the square that stands for a plane without end."""
+
+
+class Surface(NamedTuple):
+    """Triangles with a normal at each corner.
+
+    Attributes:
+        points: Corners [m], shape (n, 3).
+        normals: Outward unit normals at them, shape (n, 3).
+        triangles: Numbers of three corners each, anticlockwise as seen from outside, shape (m, 3).
+    """
+
+    points: Array
+    normals: Array
+    triangles: npt.NDArray[np.int64]
+
+    def as_obj(self) -> str:
+        """Returns the text of a Wavefront OBJ file."""
+        lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in self.points]
+        lines += [f"vn {x:.9g} {y:.9g} {z:.9g}" for x, y, z in self.normals]
+        lines += [f"f {a}//{a} {b}//{b} {c}//{c}" for a, b, c in self.triangles + 1]
+        return "\n".join(lines) + "\n"
+
+
+def box(half_extents: Sequence[float]) -> Surface:
+    """Returns a box about the origin, each side with its own normal."""
+    sides = [_square(axis, sign) for axis in np.eye(3) for sign in (1.0, -1.0)]
+    unit = _joined(sides)
+    return unit._replace(points=unit.points * np.asarray(half_extents))
+
+
+def plane(normal: Sequence[float]) -> Surface:
+    """Returns a large square through the origin, visible from both sides."""
+    upwards = np.asarray(normal) / np.linalg.norm(normal)
+    both = _joined([_square(upwards, 1.0), _square(upwards, -1.0)])
+    on_plane = both.points - (both.points @ upwards)[:, None] * upwards
+    return both._replace(points=PLANE_HALF_WIDTH_M * on_plane)
+
+
+def capsule(radius: float, length: float) -> Surface:
+    """Returns a capsule about the origin along z; `length` is that of its cylinder, 0 makes it a sphere."""
+    latitude = np.linspace(-np.pi / 2, np.pi / 2, AROUND // 2 + 1)
+    if length > 0.0:
+        latitude = np.insert(latitude, AROUND // 4, 0.0)  # the equator twice, a length apart
+    profile = np.stack([np.cos(latitude), np.sin(latitude)], axis=1)
+    shift = np.where(np.arange(len(latitude)) <= AROUND // 4, -length / 2, length / 2)
+    return _turned(radius * profile + np.stack([0.0 * shift, shift], axis=1), profile)
+
+
+def cylinder(radius: float, length: float) -> Surface:
+    """Returns a cylinder about the origin along z, its ends closed."""
+    half = length / 2
+    outline = np.array([[0, -half], [radius, -half], [radius, -half], [radius, half], [radius, half], [0, half]])
+    normals = np.array([[0, -1], [0, -1], [1, 0], [1, 0], [0, 1], [0, 1]], float)
+    parts = [_turned(outline[begin : begin + 2], normals[begin : begin + 2]) for begin in (0, 2, 4)]
+    return _joined(parts)
+
+
+def mesh(points: Array, triangles: npt.NDArray[Any], normals: Array | None = None) -> Surface:
+    """Returns given triangles; without normals, each is flat."""
+    if normals is not None:
+        return Surface(points, normals, triangles)
+    corners = points[triangles]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    flat = np.divide(across, length, out=np.zeros_like(across), where=length > 0.0)
+    return Surface(corners.reshape(-1, 3), np.repeat(flat, 3, axis=0), np.arange(corners.size // 3).reshape(-1, 3))
+
+
+def _square(axis: Array, sign: float) -> Surface:
+    """Returns the side of a cube of edge 2 whose outward normal is `sign * axis`, of unit length."""
+    outward = sign * np.asarray(axis)
+    first = np.roll(np.eye(3)[np.argmax(np.abs(outward))], 1)
+    u = np.cross(outward, first)
+    u /= np.linalg.norm(u)
+    v = np.cross(outward, u)
+    points = np.array([outward - u - v, outward + u - v, outward + u + v, outward - u + v])
+    return Surface(points, np.tile(outward, (4, 1)), np.array([[0, 1, 2], [0, 2, 3]]))
+
+
+def _turned(profile: Array, normals: Array) -> Surface:
+    """Returns the surface that an outline makes when it turns about z.
+
+    Args:
+        profile: Distance from the axis and height of n points, upwards along the outside, shape (n, 2).
+        normals: Their normals in the same plane, shape (n, 2).
+    """
+    angle = np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
+    around = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+    def turn(outline: Array) -> Array:
+        flat = outline[:, None, :1] * around
+        height = np.broadcast_to(outline[:, None, 1:], (*flat.shape[:2], 1))
+        return np.concatenate([flat, height], axis=2).reshape(-1, 3)
+
+    rows, columns = np.meshgrid(np.arange(len(profile) - 1), np.arange(AROUND), indexing="ij")
+    corner = (rows * (AROUND + 1) + columns).ravel()
+    right, up = corner + 1, corner + AROUND + 1
+    triangles = np.concatenate([np.stack([corner, right, up + 1], 1), np.stack([corner, up + 1, up], 1)])
+    points = turn(profile)
+    a, b, c = (points[triangles[:, index]] for index in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return Surface(points, turn(normals), triangles[area > 1e-12 * max(area.max(), 1e-300)])
+
+
+def _joined(parts: Sequence[Surface]) -> Surface:
+    begins = np.cumsum([0] + [len(part.points) for part in parts[:-1]])
+    return Surface(
+        np.concatenate([part.points for part in parts]),
+        np.concatenate([part.normals for part in parts]),
+        np.concatenate([part.triangles + begin for part, begin in zip(parts, begins)]),
+    )

@@ -1,0 +1,90 @@
+"""All that PyBullet's window has in ROS."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator
+
+import pybullet
+from sensor_msgs.msg import Image
+from std_msgs.msg import Int64MultiArray
+
+from ros_pybullet_interface.msg import KeyboardEvent, MouseEvent, ResetDebugVisualizerCamera
+
+from ..clock import Clock
+from ..window import RECORD, Window
+from ..world import World
+from ..world_config import WorldConfig
+from .debug_camera import CAMERA_TOPIC, DebugCamera
+from .gui_events import KEYBOARD_TOPIC, MOUSE_TOPIC, GuiEvents
+from .requests import Requests
+from .visualizer_image import IMAGE_TOPIC, NUMBERS_TOPIC, VisualizerImage
+
+log = logging.getLogger(__name__)
+
+OPTIONAL_TOPICS: dict[str, dict[str, type]] = {
+    "enable_keyboard_publisher": {KEYBOARD_TOPIC: KeyboardEvent},
+    "enable_mouse_publisher": {MOUSE_TOPIC: MouseEvent},
+    "publish_visualizer_image_hz": {IMAGE_TOPIC: Image, NUMBERS_TOPIC: Int64MultiArray},
+}
+"""By key of the main file: the topics that it opens, and their types."""
+
+
+class WindowTopics:
+    """Opens the topics of the window that the configuration asks for, and says so if there is no window.
+
+    Args:
+        world: The world.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._camera = DebugCamera(world.window)
+        self.polls: tuple[Callable[[], None], ...] = ()
+        """To be called at every pass of the loop."""
+        if world.window is None:
+            _warn_of_idle_keys(world.config)
+        else:
+            self.polls = (self._camera.poll, *_open(world.window, world.config, world.clock))
+
+    def serve(self, ask: Requests) -> None:
+        """Opens what needs the simulation thread to answer.
+
+        Args:
+            ask: Reaches it.
+        """
+        self._camera.serve(ask)
+
+
+def _open(window: Window, config: WorldConfig, clock: Clock) -> Iterator[Callable[[], None]]:
+    keyboard, mouse = config.enable_keyboard_publisher, config.enable_mouse_publisher
+    if keyboard and not _asks_for_shortcuts(config):
+        window.leave_keys_to_others()
+    if keyboard or mouse:
+        yield GuiEvents(window, clock, keyboard, mouse).poll
+    if config.publish_visualizer_image_hz:
+        size = config.visualizer_image_width, config.visualizer_image_height
+        yield VisualizerImage(window, clock, config.publish_visualizer_image_hz, *size).poll
+
+
+def published_topics(config: WorldConfig) -> dict[str, type]:
+    """Returns the topics of the window that a world with this configuration publishes, and their types."""
+    if config.connect.connection_mode == pybullet.DIRECT:
+        return {}
+    topics: dict[str, type] = {CAMERA_TOPIC: ResetDebugVisualizerCamera}
+    for key, opened in OPTIONAL_TOPICS.items():
+        if getattr(config, key):
+            topics |= opened
+    return topics
+
+
+def _warn_of_idle_keys(config: WorldConfig) -> None:
+    keys = [key for key in OPTIONAL_TOPICS if getattr(config, key)]
+    if RECORD in (config.connect.options or ""):
+        keys.append(f"connect.options {RECORD}")
+    if keys:
+        log.warning("%s: no effect without a window (connection_mode: DIRECT)", ", ".join(keys))
+
+
+def _asks_for_shortcuts(config: WorldConfig) -> bool:
+    configured = config.configureDebugVisualizer
+    return configured.enable and pybullet.COV_ENABLE_KEYBOARD_SHORTCUTS in configured.flag

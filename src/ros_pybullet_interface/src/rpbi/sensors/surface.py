@@ -1,0 +1,37 @@
+"""The surface of a soft body."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from custom_ros_tools.errors import PhysicsError
+
+from ..samples import SurfaceSample
+from .sensor import Sensor
+
+if TYPE_CHECKING:
+    from ..bodies.body import Body
+
+
+class SurfaceSensor(Sensor):
+    """Where the triangles of a soft body's surface are.
+
+    Args:
+        body: The soft body.
+        hz: Rate [Hz].
+    """
+
+    sample_type = SurfaceSample
+
+    def __init__(self, body: Body, hz: float) -> None:
+        super().__init__(body.name, hz)
+        self._body = body
+        self._rgba = body.pb.getVisualShapeData(body.body_id)[0][7]
+
+    def read(self, tick: int) -> SurfaceSample:
+        """Reads the corners."""
+        _, corners = self._body.pb.getMeshData(self._body.body_id, -1)
+        if not math.isfinite(sum(map(sum, corners))):
+            raise PhysicsError(f"{self.name}: surface is not finite any more at tick {tick}")
+        return SurfaceSample(self.name, corners, self._rgba)

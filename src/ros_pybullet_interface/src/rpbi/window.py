@@ -1,0 +1,128 @@
+"""PyBullet's own window: its keys and mouse, where it looks from, and what it shows."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import pybullet
+
+from custom_ros_tools.errors import MissingDependency
+
+from .button_history import ButtonHistory
+from .client import Client
+from .pybullet_world_models import ResetDebugVisualizerCamera
+
+RECORD = "--mp4="
+"""Beginning of the option of `connect` that records the window."""
+
+
+class KeyEvent(NamedTuple):
+    """Something that happened to a key.
+
+    Attributes:
+        key: ASCII code, or PyBullet's code of a key without one.
+        state: Sum of pybullet.KEY_IS_DOWN, KEY_WAS_TRIGGERED and KEY_WAS_RELEASED.
+    """
+
+    key: int
+    state: int
+
+
+class MouseEvent(NamedTuple):
+    """Something that the mouse did.
+
+    Attributes:
+        kind: 1 it moved, 2 a button changed.
+        x: From the left edge of the window [px].
+        y: From its top edge [px].
+        button: 0 left, 1 middle, 2 right; -1 on a move.
+        state: Of the button, as of a key.
+    """
+
+    kind: int
+    x: float
+    y: float
+    button: int
+    state: int
+
+
+class Window:
+    """The window of a client, if it has one; only the simulation thread may use it.
+
+    Args:
+        pb: The client.
+    """
+
+    def __init__(self, pb: Client) -> None:
+        self._pb = pb
+        self._keys, self._buttons = ButtonHistory(), ButtonHistory()
+
+    def leave_keys_to_others(self) -> None:
+        """Switches off what keys do in the window itself: `i` holds it up, for instance; Escape still closes it."""
+        self._pb.configureDebugVisualizer(pybullet.COV_ENABLE_KEYBOARD_SHORTCUTS, 0)
+
+    def key_events(self) -> Iterator[KeyEvent]:
+        """Yields what keys did since the last time, and one event of each that is held; it takes half a microsecond."""
+        for key, state in self._pb.getKeyboardEvents().items():
+            if key >= 0:  # keys that PyBullet has no code of are all -1
+                for happened in self._keys.take(key, state):
+                    yield KeyEvent(key, happened)
+
+    def mouse_events(self) -> Iterator[MouseEvent]:
+        """Yields what the mouse did since the last time."""
+        for kind, x, y, button, state in self._pb.getMouseEvents():
+            if button < 0:
+                yield MouseEvent(kind, x, y, button, 0)
+            else:
+                for happened in self._buttons.take(button, state):
+                    yield MouseEvent(kind, x, y, button, happened)
+
+    def camera(self) -> ResetDebugVisualizerCamera:
+        """Returns from where the window looks, as the mouse has left it."""
+        found = self._pb.getDebugVisualizerCamera()
+        yaw, pitch, distance, target = found[8:12]
+        return ResetDebugVisualizerCamera.model_construct(
+            cameraDistance=distance, cameraYaw=yaw, cameraPitch=pitch, cameraTargetPosition=target
+        )
+
+    def look(self, camera: ResetDebugVisualizerCamera) -> None:
+        """Looks from somewhere else."""
+        self._pb.resetDebugVisualizerCamera(**camera.kwargs())
+
+    def image(self, width_px: int, height_px: int) -> npt.NDArray[np.uint8]:
+        """Returns what the window looks at, as high as it, drawn anew in another size.
+
+        The world stands still meanwhile.
+
+        Returns:
+            Colours red, green, blue, alpha; shape (height, width, 4).
+        """
+        found = self._pb.getDebugVisualizerCamera()
+        projection = list(found[3])
+        projection[0] = projection[5] * height_px / width_px  # else it would be as wide as the window, squeezed
+        image = self._pb.getCameraImage(
+            width_px,
+            height_px,
+            found[2],
+            projection,
+            renderer=pybullet.ER_BULLET_HARDWARE_OPENGL,
+            flags=pybullet.ER_NO_SEGMENTATION_MASK,
+        )
+        return np.asarray(image[2], np.uint8).reshape(height_px, width_px, 4)
+
+
+def check_recording(options: str) -> None:
+    """Sees to it that a video of the window that is asked for will be made.
+
+    Args:
+        options: Those of `connect`.
+
+    Raises:
+        MissingDependency: If ffmpeg is missing, of which PyBullet says nothing.
+    """
+    if RECORD in options and shutil.which("ffmpeg") is None:
+        raise MissingDependency("ffmpeg", f"connect.options {RECORD} needs it: apt-get install ffmpeg")

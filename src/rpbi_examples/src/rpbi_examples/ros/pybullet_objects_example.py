@@ -1,0 +1,40 @@
+"""Throws a box into the world again and again."""
+
+from __future__ import annotations
+
+import rospy
+
+from custom_ros_tools.srv import SetString
+from ros_pybullet_interface.msg import PybulletObject
+from ros_pybullet_interface.srv import AddPybulletObject
+
+BOX = "{rpbi_examples}/configs/pybullet_objects_example/box.yaml"
+NAME = "box"
+STAY_S = 3.0
+"""How long each box stays [s] of ROS time."""
+
+
+def main() -> None:
+    """Runs the node."""
+    rospy.init_node("pybullet_objects_example")
+    try:
+        _throw_boxes()
+    except rospy.ROSInterruptException:
+        pass  # Ctrl-C
+
+
+def _throw_boxes() -> None:
+    rospy.wait_for_service("rpbi/add_pybullet_object")
+    add = rospy.ServiceProxy("rpbi/add_pybullet_object", AddPybulletObject)
+    remove = rospy.ServiceProxy("rpbi/remove_pybullet_object", SetString)
+    box = PybulletObject(object_type=PybulletObject.DYNAMIC, filename=BOX)
+    while not rospy.is_shutdown():
+        try:
+            answer = add(box)
+            if not answer.success:
+                rospy.logwarn("the box was refused: %s", answer.message)
+            rospy.sleep(STAY_S)
+            remove(NAME)
+        except rospy.ServiceException as error:
+            rospy.logwarn("the simulator does not answer: %s", error)
+            rospy.sleep(STAY_S)

@@ -1,0 +1,136 @@
+"""The command `replay`: runs a recorded session again and compares its states."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import rospy
+from std_msgs.msg import String
+from tqdm import tqdm
+
+from custom_ros_tools.errors import InterfaceError
+from ros_pybullet_interface.msg import SimulationState, WorldCommands
+from rpbi.replay import Checkpoint, RecordedCommand, Recording, Replay, ReplayResult
+from rpbi.world_description import WorldDescription
+from rpbi_utils.errors import BagError
+from rpbi_utils.ros.bag_reader import BagReader
+
+_NAME = "replay"
+_TYPES: dict[str, Any] = {
+    "rpbi/world_description": String,
+    "rpbi/state": SimulationState,
+    "rpbi/commands": WorldCommands,
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs the command.
+
+    Args:
+        argv: Its arguments; by default those of the process.
+
+    Returns:
+        The exit code: 0 if all states agree, else 1.
+    """
+    parser = argparse.ArgumentParser(
+        prog=_NAME, description="Runs a recorded session again, without ROS, and compares the hashes of its states."
+    )
+    parser.add_argument("bag", type=Path, metavar="BAG", help="has rpbi/world_description, rpbi/state, rpbi/commands")
+    parser.add_argument("--ns", default="/", help="namespace of the simulator; default: %(default)s")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar")
+    arguments = parser.parse_args(rospy.myargv(sys.argv)[1:] if argv is None else argv)
+    logging.basicConfig(format=f"{_NAME}: %(message)s", level=logging.ERROR)
+    try:
+        recording = read_recording(arguments.bag, arguments.ns)
+        for warning in recording.description.warnings:
+            print(f"{_NAME}: warning: {warning}", file=sys.stderr)
+        ticks = sum(_last_ticks(recording))
+        with tqdm(total=ticks, unit=" ticks", unit_scale=True, leave=False, disable=arguments.quiet) as bar:
+            result = Replay(recording, bar.update).run()
+    except (InterfaceError, OSError) as error:
+        print(f"{_NAME}: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    return _report(result)
+
+
+def read_recording(path: Path, namespace: str = "/") -> Recording:
+    """Reads what a bag has of a session.
+
+    Args:
+        path: The bag.
+        namespace: Namespace of the simulator.
+
+    Raises:
+        BagError: If there is no such bag, or it lacks what a replay needs.
+    """
+    prefix = f"/{namespace.strip('/')}/" if namespace.strip("/") else "/"
+    topics = {f"{prefix}{name}": message_type for name, message_type in _TYPES.items()}
+    with BagReader(path) as bag:
+        _check(bag, topics, prefix)
+        descriptions: list[str] = []
+        checkpoints: set[Checkpoint] = set()
+        commands: dict[int, dict[int, RecordedCommand]] = {}
+        for topic, _, raw, _ in bag.messages([topic for topic in topics if topic in bag.types]):
+            message = topics[topic]()
+            message.deserialize(raw)
+            if isinstance(message, String):
+                descriptions.append(message.data)
+            elif isinstance(message, SimulationState):
+                if message.state_hash:
+                    state = Checkpoint(message.resets, message.tick, message.commands, message.state_hash)
+                    checkpoints.add(state)
+            else:
+                numbered = enumerate(message.commands, message.first)
+                of_life = commands.setdefault(message.resets, {})
+                of_life.update({i: RecordedCommand(one.tick, one.name, one.what, one.data) for i, one in numbered})
+    if len(set(descriptions)) != 1:
+        raise BagError(path, "the simulator was started anew during the recording; a replay needs a bag of one session")
+    if not any(checkpoint.tick for checkpoint in checkpoints):
+        raise BagError(path, "no hashes in rpbi/state to compare (state_hash_hz in the main file is their rate)")
+    try:
+        return Recording(WorldDescription(descriptions[0]), commands, checkpoints)
+    except ValueError as error:
+        raise BagError(path, str(error)) from None
+
+
+def _check(bag: BagReader, topics: dict[str, Any], prefix: str) -> None:
+    """Raises a BagError if the bag lacks topics, or has them from another version."""
+    needed = [f"{prefix}rpbi/world_description", f"{prefix}rpbi/state"]
+    missing = [topic for topic in needed if not bag.counts.get(topic)]
+    if missing:
+        others = sorted(topic for topic in bag.types if topic.endswith("/rpbi/world_description"))
+        elsewhere = f"; it has {', '.join(others)}: use --ns" if others else ""
+        raise BagError(bag.path, f"no messages of {', '.join(missing)}, which a replay needs{elsewhere}")
+    for topic, message_type in topics.items():
+        for md5sum in bag.md5sums.get(topic, ()):
+            if md5sum != message_type._md5sum:
+                raise BagError(bag.path, f"{topic} is not {message_type._type} of this version")
+
+
+def _last_ticks(recording: Recording) -> list[int]:
+    """Returns the last recorded tick of each life of the world."""
+    last: dict[int, int] = {}
+    for each in recording.checkpoints:
+        last[each.resets] = max(each.tick, last.get(each.resets, 0))
+    return list(last.values())
+
+
+def _report(result: ReplayResult) -> int:
+    for text in result.left_out:
+        print(f"not replayed {text}")
+    difference = result.difference
+    if difference is not None:
+        agreement = difference.last_agreement
+        since = "from the start on" if agreement is None else f"after tick {agreement.tick}, where all was the same"
+        recorded = difference.checkpoint.state_hash
+        print(f"first difference at {difference.checkpoint}, {since}: recorded {recorded}, now {difference.state_hash}")
+        return 1
+    print(f"{result.agreed} states agree over {result.ticks} ticks")
+    return 1 if result.left_out else 0

@@ -1,0 +1,200 @@
+"""What PyBullet's window has in ROS: its keys, mouse, camera and images, with real key presses and mouse moves."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+import pytest
+import rospy
+from pybullet_window import SLOW_S, floating_ball, middle, mostly, open_window, window
+from ros_system import wait_until
+from rosgraph_msgs.msg import Log
+from sensor_msgs.msg import Image
+from std_msgs.msg import Int64MultiArray
+
+from ros_pybullet_interface.msg import KeyboardEvent, MouseEvent, ResetDebugVisualizerCamera
+from ros_pybullet_interface.srv import GetDebugVisualizerCamera
+
+IMAGE_WIDTH, IMAGE_HEIGHT = 80, 60
+TARGET = [0.5, 0.0, 1.0]
+PRESSED, HELD, RELEASED = 3, 1, 4
+WORDS = {PRESSED: "", HELD: "key_is_down", RELEASED: "key_was_released"}
+LEFT_ARROW = 65295
+"""PyBullet's code."""
+CAMERA = {"cameraDistance": 2.0, "cameraYaw": 30.0, "cameraPitch": -20.0, "cameraTargetPosition": TARGET}
+
+
+@pytest.fixture(scope="module")
+def place(module_ros, screen):
+    """Where the window of a simulator with all that windows have is; the mouse is in the middle of it."""
+    red = floating_ball(module_ros, "red", [1.0, 0.0, 0.0, 1.0], TARGET, radius_m=0.4)
+    open_window(
+        module_ros,
+        screen,
+        enable_keyboard_publisher=True,
+        enable_mouse_publisher=True,
+        publish_visualizer_image_hz=20,
+        visualizer_image_width=IMAGE_WIDTH,
+        visualizer_image_height=IMAGE_HEIGHT,
+        resetDebugVisualizerCamera=CAMERA,
+        visual_objects=[red],
+    )
+    found = window(screen)
+    move(screen, found, 200, 150)
+    return found
+
+
+@pytest.fixture
+def keys(ros, place):
+    """Key events."""
+    listener = ros.listen("/rpbi/keyboard", KeyboardEvent)
+    wait_until(lambda: listener.is_connected, "the keyboard is heard")
+    return listener
+
+
+@pytest.fixture
+def mouse(ros, place):
+    """Mouse events."""
+    listener = ros.listen("/rpbi/mouse", MouseEvent)
+    wait_until(lambda: listener.is_connected, "the mouse is heard")
+    return listener
+
+
+def move(screen, place, column, row):
+    """Moves the mouse to a pixel of the window."""
+    screen.run("xdotool", "mousemove", str(place.x + column), str(place.y + row))
+
+
+def happened(listener):
+    """Returns what happened to keys, but for those that are held: code and state each."""
+    return [(each.key, each.state) for each in list(listener.messages) if each.state != HELD]
+
+
+def present_camera(ros):
+    """Returns the window's camera as numbers: distance, yaw, pitch, target."""
+    camera = ros.call("/rpbi/get_debug_visualizer_camera", GetDebugVisualizerCamera).debug_visualizer_config
+    return (camera.cameraDistance, camera.cameraYaw, camera.cameraPitch, *camera.cameraTargetPosition)
+
+
+def test_held_key_is_pressed_once_held_and_released_once(screen, keys):
+    screen.run("xdotool", "keydown", "a")
+    time.sleep(1.5)  # long enough for a keyboard that repeats keys
+    screen.run("xdotool", "keyup", "a")
+    wait_until(lambda: happened(keys)[-1:] == [(97, RELEASED)], "the key is released", SLOW_S)
+    assert happened(keys) == [(97, PRESSED), (97, RELEASED)]
+    states = [each.state for each in keys.messages]
+    assert states == [PRESSED, *[HELD] * (len(states) - 2), RELEASED]
+    assert len(states) > 5
+    assert {(each.state, each.state_str) for each in keys.messages} == set(WORDS.items())
+    assert all(each.header.stamp.to_nsec() > 0 for each in keys.messages)
+
+
+def test_taps_are_neither_lost_nor_doubled(screen, keys):
+    letters = "qwertyuiop"
+    for letter in letters:
+        screen.run("xdotool", "key", letter)
+    wait_until(lambda: len(happened(keys)) >= 2 * len(letters), "all taps have come", SLOW_S)
+    time.sleep(0.3)
+    assert sorted(happened(keys)) == sorted((ord(each), state) for each in letters for state in (PRESSED, RELEASED))
+    for letter in letters:
+        assert [state for key, state in happened(keys) if key == ord(letter)] == [PRESSED, RELEASED]
+
+
+def test_keys_without_a_letter_have_pybullets_code_and_unknown_ones_are_left_out(screen, keys):
+    screen.run("xdotool", "key", "Tab")
+    screen.run("xdotool", "key", "Left")
+    wait_until(lambda: (LEFT_ARROW, RELEASED) in happened(keys), "the arrow key has come", SLOW_S)
+    assert happened(keys) == [(LEFT_ARROW, PRESSED), (LEFT_ARROW, RELEASED)]
+
+
+def test_mouse_tells_where_it_moves_and_what_its_buttons_do(screen, place, mouse):
+    move(screen, place, 100, 70)
+    wait_until(lambda: mouse.messages, "it has moved", SLOW_S)
+    for button in ("mousedown", "mouseup"):
+        screen.run("xdotool", button, "1")
+        time.sleep(0.2)
+    move(screen, place, 120, 90)
+    wait_until(lambda: mouse.messages[-1].mouse_pos_x == 120.0, "it has moved on", SLOW_S)
+    told = [
+        (each.event_type, each.event_type_str, each.mouse_pos_x, each.mouse_pos_y, each.button_index, each.button_state)
+        for each in mouse.messages
+    ]
+    assert told == [
+        (1, "mouse_move_event", 100.0, 70.0, 255, 0),
+        (2, "mouse_button_event", 100.0, 70.0, 0, PRESSED),
+        (2, "mouse_button_event", 100.0, 70.0, 0, RELEASED),
+        (1, "mouse_move_event", 120.0, 90.0, 255, 0),
+    ]
+    assert [each.button_state_str for each in mouse.messages] == [each.button_state for each in mouse.messages]
+
+
+def test_camera_goes_where_it_is_sent_and_tells_where_the_mouse_has_turned_it(ros, screen, place):
+    told = ros.listen("/rpbi/debug_visualizer_camera", ResetDebugVisualizerCamera)
+    told.wait_for(1, SLOW_S)
+    publisher = rospy.Publisher("/rpbi/reset_debug_visualizer_camera", ResetDebugVisualizerCamera, queue_size=1)
+    wait_until(publisher.get_num_connections, "the simulator listens")
+    wanted = (2.5, 50.0, -30.0, 0.25, 0.0, 0.5)
+    publisher.publish(ResetDebugVisualizerCamera(*wanted[:3], wanted[3:]))
+    wait_until(lambda: present_camera(ros) == pytest.approx(wanted), "it looks from there", SLOW_S)
+
+    move(screen, place, 240, 180)
+    screen.run("xdotool", "keydown", "ctrl", "mousedown", "1")
+    time.sleep(0.3)
+    move(screen, place, 300, 180)
+    time.sleep(0.3)
+    screen.run("xdotool", "mouseup", "1", "keyup", "ctrl")
+    wait_until(lambda: abs(present_camera(ros)[1] - wanted[1]) > 5.0, "the mouse has turned it", SLOW_S)
+    time.sleep(0.3)
+    told.messages.clear()
+    last = told.wait_for(1, SLOW_S)[-1]
+    topic = (last.cameraDistance, last.cameraYaw, last.cameraPitch, *last.cameraTargetPosition)
+    assert topic == pytest.approx(present_camera(ros))
+
+
+@pytest.mark.parametrize(
+    ("values", "complaint"),
+    [
+        ((math.nan, 0.0, 0.0, [0.0] * 3), "cameraDistance"),
+        ((0.0, 0.0, 0.0, [0.0] * 3), "cameraDistance"),
+        ((1.0, math.inf, 0.0, [0.0] * 3), "cameraYaw"),
+        ((1.0, 0.0, 0.0, [0.0, 0.0]), "cameraTargetPosition"),
+    ],
+)
+def test_camera_that_makes_no_sense_is_refused_and_named(ros, place, values, complaint):
+    before = present_camera(ros)
+    logs = ros.listen("/rosout", Log)
+    publisher = rospy.Publisher("/rpbi/reset_debug_visualizer_camera", ResetDebugVisualizerCamera, queue_size=1)
+    wait_until(publisher.get_num_connections, "the simulator listens")
+    wait_until(lambda: logs.is_connected, "the log is heard")
+
+    def is_told():
+        publisher.publish(ResetDebugVisualizerCamera(*values))
+        time.sleep(0.2)
+        return any(f"message refused: {complaint}" in log.msg for log in logs.messages)
+
+    wait_until(is_told, f"{complaint} is refused", 20.0)
+    assert present_camera(ros) == before
+
+
+def test_images_show_what_the_window_shows(ros, screen, place):
+    publisher = rospy.Publisher("/rpbi/reset_debug_visualizer_camera", ResetDebugVisualizerCamera, queue_size=1)
+    wait_until(publisher.get_num_connections, "the simulator listens")
+    publisher.publish(ResetDebugVisualizerCamera(*CAMERA.values()))
+    wait_until(lambda: present_camera(ros)[0] == pytest.approx(2.0), "it looks from there", SLOW_S)
+    images = ros.listen("/rpbi/visualizer_image", Image)
+    numbers = ros.listen("/rpbi/visualizer_image_int", Int64MultiArray)
+    numbers.wait_for(2, SLOW_S)
+    image = images.wait_for(3, SLOW_S)[-1]
+    assert (image.width, image.height, image.step) == (IMAGE_WIDTH, IMAGE_HEIGHT, 3 * IMAGE_WIDTH)
+    assert (image.encoding, image.header.frame_id) == ("rgb8", "")
+    assert all(np.diff(images.stamps_ns) > 0)
+    picture = np.frombuffer(image.data, np.uint8).reshape(IMAGE_HEIGHT, IMAGE_WIDTH, 3)
+    red = mostly(picture, 0)
+    assert middle(red) == pytest.approx((IMAGE_WIDTH / 2 - 0.5, IMAGE_HEIGHT / 2 - 0.5), abs=1.0)
+    radius_px = IMAGE_HEIGHT / 2 * 0.4 / math.sqrt(2.0**2 - 0.4**2)  # it opens 90 deg vertically
+    assert red.sum() == pytest.approx(math.pi * radius_px**2, rel=0.15)
+    rgba = np.reshape(numbers.messages[-1].data, (IMAGE_HEIGHT, IMAGE_WIDTH, 4))
+    assert (rgba[..., :3] == picture).mean() > 0.99
+    assert numbers.messages[-1].layout.dim == []

@@ -1,0 +1,34 @@
+"""RViz, as the example with the orbiting camera opens it, shows the coloured point cloud."""
+
+from __future__ import annotations
+
+import pytest
+from ros_system import RosSystem, wait_until
+from sensor_msgs.msg import PointCloud2
+
+SLOW_S = 120.0
+
+
+@pytest.fixture
+def example(ros_master, screen, tmp_path):
+    system = RosSystem(tmp_path)
+    screen.environment.update({"HOME": str(tmp_path), "XDG_RUNTIME_DIR": str(tmp_path)})  # for what RViz writes there
+    try:
+        command = ["roslaunch", "rpbi_examples", "pybullet_rgbd_example.launch", "headless:=false"]
+        system.start(command, **screen.environment)
+        yield system
+    finally:
+        system.close()
+
+
+def cyan_pixels(screen):
+    """Returns how many pixels of RViz's 3-D view have the ball's colour; the image panel is left of it."""
+    picture = screen.grab().astype(int)
+    view = picture[:, picture.shape[1] // 3 :]
+    red, green, blue = view[..., 0], view[..., 1], view[..., 2]
+    return int(((green > 60) & (blue > 60) & (red < 30) & (abs(green - blue) < 20)).sum())
+
+
+def test_ball_is_in_the_cloud_in_its_own_colour(example, screen):
+    example.listen("/rpbi/camera/pointcloud", PointCloud2).wait_for(3, SLOW_S)
+    wait_until(lambda: cyan_pixels(screen) > 500, "RViz shows the cyan ball, which only the cloud has", SLOW_S)

@@ -1,0 +1,58 @@
+"""A world for tests of cameras in ROS: a box on a floor, from above."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import rospy
+from geometry_msgs.msg import TransformStamped
+from tf2_msgs.msg import TFMessage
+from worlds import FLOOR, box
+
+CAMERA = {
+    "name": "eye",
+    "hz": 30,
+    "intrinsics": {"width": 160, "height": 120, "fov": 50.0, "range": [0.1, 10.0]},
+    "object_tf": {"tf_id": "rpbi/eye"},
+}
+HEIGHT_M = 2.0
+
+
+def box_world(ros: Any, **more: Any) -> dict[str, Any]:
+    """Returns the main configuration of a red box that rests on a floor."""
+    shape = {"shapeType": "GEOM_BOX", "halfExtents": [0.1, 0.1, 0.1], "rgbaColor": [0.9, 0.1, 0.1, 1.0]}
+    red = box(createVisualShape=shape, basePosition=[0.0, 0.0, 0.1])
+    return {
+        "connect": {"connection_mode": "DIRECT"},
+        "setGravity": {"gravZ": -9.81},
+        "timeStep": 0.01,
+        "collision_objects": [ros.write_yaml("floor.yaml", FLOOR)],
+        "dynamic_objects": [ros.write_yaml("box.yaml", red)],
+        **more,
+    }
+
+
+def place(*frames: str, height_m: float = HEIGHT_M) -> Iterator[None]:
+    """Puts frames above the floor, looking straight down, until it is closed."""
+    message = TFMessage()
+    for frame in frames:
+        transform = TransformStamped(child_frame_id=frame)
+        transform.header.frame_id = "rpbi/world"
+        transform.transform.translation.z = height_m
+        transform.transform.rotation.x = 1.0
+        message.transforms.append(transform)
+    publisher = rospy.Publisher("/tf_static", TFMessage, latch=True, queue_size=1)
+    publisher.publish(message)
+    yield
+    publisher.unregister()
+
+
+def points_of(cloud: Any) -> npt.NDArray[np.float32]:
+    """Returns x, y, z and the packed colour of a cloud, shape (height, width, 4)."""
+    assert [(field.name, field.offset, field.datatype) for field in cloud.fields] == [
+        ("x", 0, 7), ("y", 4, 7), ("z", 8, 7), ("rgb", 12, 7)
+    ]  # fmt: skip
+    return np.frombuffer(cloud.data, np.float32).reshape(cloud.height, cloud.width, 4)

@@ -1,0 +1,183 @@
+"""Contacts: what the sensor tells agrees with statics, Coulomb and Newton, and with what PyBullet was asked."""
+
+from __future__ import annotations
+
+import math
+
+import pybullet
+import pytest
+from worlds import FLOOR, ball, box, iiwa, write_world
+
+from custom_ros_tools.errors import ConfigError
+from rpbi.bodies import BODY_TYPES
+from rpbi.config import load_object
+from rpbi.pose import Pose
+from rpbi.samples import ContactArrowsSample, ContactsSample
+from rpbi.world import World
+
+MASS_KG = 2.0
+GRAVITY = 9.81
+TOLD = {"hz": 1000, "arrows_hz": 100}
+
+
+@pytest.fixture
+def build(tmp_path):
+    worlds = []
+
+    def build_world(*dynamic, floor=FLOOR, **more) -> World:
+        worlds.append(World.from_file(write_world(tmp_path, collision=(floor,), dynamic=dynamic, **more)))
+        return worlds[-1]
+
+    yield build_world
+    for world in worlds:
+        world.close()
+
+
+def resting_box(name="box", height_m=0.1, **more):
+    config = {"baseMass": MASS_KG, "basePosition": [0.0, 0.0, height_m], "contacts": TOLD, **more}
+    return box(name, **config)
+
+
+def run(world, ticks):
+    """Steps and returns the last contacts of each body."""
+    latest = {}
+    for _ in range(ticks):
+        for sample in world.step():
+            if isinstance(sample, ContactsSample):
+                latest[sample.name] = sample
+    return latest
+
+
+@pytest.mark.parametrize("sub_steps", [0, 1, 4])
+def test_forces_on_a_resting_box_add_up_to_its_weight(build, sub_steps):
+    world = build(resting_box(), setPhysicsEngineParameter={"numSubSteps": sub_steps})
+    contacts = run(world, 1000)["box"]
+    assert contacts.force == pytest.approx((0.0, 0.0, MASS_KG * GRAVITY), rel=0.01, abs=0.01)
+
+
+def test_a_contact_names_both_ends_and_points_towards_the_body(build):
+    world = build(resting_box(), floor={**FLOOR, "contacts": TOLD})
+    latest = run(world, 500)
+    for name, other, up in (("box", "floor", 1.0), ("floor", "box", -1.0)):
+        assert latest[name].points
+        for point in latest[name].points:
+            assert (point.other_body, point.link, point.other_link) == (other, "link0", "link0")
+            assert point.normal == pytest.approx((0.0, 0.0, up), abs=1e-6)
+            assert point.normal_force >= 0.0
+            assert point.position[2] == pytest.approx(0.0, abs=1e-3)
+            assert abs(point.depth) < 1e-3
+    assert latest["box"].force == pytest.approx(tuple(-each for each in latest["floor"].force), abs=1e-9)
+
+
+def test_links_are_told_by_name(build):
+    world = build(
+        ball("ball", 0.1, basePosition=[0.0, 0.0, 1.45], contacts=TOLD),
+        robots=(iiwa(contacts=TOLD),),
+    )
+    touched = set()
+    for _ in range(600):
+        for sample in world.step():
+            if isinstance(sample, ContactsSample) and sample.name == "ball":
+                touched |= {(point.other_body, point.other_link) for point in sample.points}
+    assert ("iiwa", "lbr_iiwa_link_7") in touched
+
+
+def test_a_stack_shares_its_weight_out(build):
+    world = build(resting_box("lower"), resting_box("upper", 0.3))
+    latest = run(world, 2000)
+    weight_n = MASS_KG * GRAVITY
+    by_floor = sum(point.force[2] for point in latest["lower"].points if point.other_body == "floor")
+    by_upper = sum(point.force[2] for point in latest["lower"].points if point.other_body == "upper")
+    assert by_floor == pytest.approx(2.0 * weight_n, rel=0.01)
+    assert by_upper == pytest.approx(-weight_n, rel=0.01)
+    assert latest["lower"].force[2] == pytest.approx(weight_n, rel=0.01)
+
+
+@pytest.mark.parametrize("friction", [0.2, 0.5, 0.8])
+@pytest.mark.parametrize("beyond_rad", [-0.02, -0.01, 0.01, 0.02])
+def test_a_box_slides_iff_the_slope_exceeds_friction(build, friction, beyond_rad):
+    angle = math.atan(friction) + beyond_rad
+    quat = pybullet.getQuaternionFromEuler([0.0, angle, 0.0])
+    position = pybullet.rotateVector(quat, (0.0, 0.0, 0.05))
+    flat = resting_box(
+        half_extents_m=(0.2, 0.2, 0.05),
+        basePosition=list(position),
+        baseOrientation=list(quat),
+        changeDynamics={"lateralFriction": friction},
+    )
+    world = build(flat, floor={**FLOOR, "object_tf": {"tf_id": "slope"}})
+    world.put("floor/pose", Pose((0.0, 0.0, 0.0), quat))
+    contacts = run(world, 1000)["box"]
+    downhill = pybullet.rotateVector(quat, (1.0, 0.0, 0.0))
+    speed = sum(a * b for a, b in zip(world.bodies["box"].base_twist().linear, downhill))
+    if beyond_rad < 0.0:
+        assert abs(speed) < 1e-3
+        assert contacts.force == pytest.approx((0.0, 0.0, MASS_KG * GRAVITY), abs=0.01 * MASS_KG * GRAVITY)
+    else:
+        after_1_s = GRAVITY * (math.sin(angle) - friction * math.cos(angle))
+        assert speed == pytest.approx(after_1_s, rel=0.1)
+
+
+def test_forces_on_a_sliding_box_account_for_what_it_loses_in_speed(build):
+    world = build(
+        resting_box(
+            half_extents_m=(0.2, 0.2, 0.05),
+            basePosition=[0.0, 0.0, 0.05],
+            changeDynamics={"lateralFriction": 0.3, "linearDamping": 0.0},
+            resetBaseVelocity={"linearVelocity": [2.0, 1.0, 0.0]},
+        )
+    )
+    run(world, 100)
+    before = world.pb.getBaseVelocity(world.bodies["box"].body_id)[0]
+    forces = [run(world, 1)["box"].force for _ in range(200)]
+    after = world.pb.getBaseVelocity(world.bodies["box"].body_id)[0]
+    mean = [sum(force[axis] for force in forces) / len(forces) for axis in range(3)]
+    lost = [MASS_KG * (new - old) / 0.2 for old, new in zip(before, after)]
+    assert mean == pytest.approx([lost[0], lost[1], lost[2] + MASS_KG * GRAVITY], rel=0.01)
+    assert mean[0] == pytest.approx(2.0 * mean[1], rel=0.01)
+    assert mean[0] < -4.0
+
+
+def test_what_is_near_but_does_not_touch_is_no_contact(build):
+    world = build(resting_box(height_m=0.11))
+    assert run(world, 10)["box"].points == ()
+
+
+def test_pybullet_is_asked_once_a_tick_for_all(build, monkeypatch):
+    world = build(resting_box("a"), resting_box("b", 0.3), floor={**FLOOR, "contacts": TOLD})
+    run(world, 100)
+    asked = []
+    original = world.pb.getContactPoints
+    monkeypatch.setattr(world.pb, "getContactPoints", lambda *given: asked.append(given) or original(*given))
+    run(world, 10)
+    assert asked == [()] * 10
+
+
+def test_arrows_are_the_forces_to_scale(build):
+    world = build(resting_box(contacts={"arrows_hz": 100, "arrow_metres_per_newton": 0.02}))
+    arrows = [sample for _ in range(500) for sample in world.step() if isinstance(sample, ContactArrowsSample)]
+    assert len(arrows) == 50
+    heights = [end[2] - start[2] for start, end in arrows[-1].arrows]
+    assert sum(heights) == pytest.approx(0.02 * MASS_KG * GRAVITY, rel=0.01)
+
+
+def test_contacts_of_what_was_removed_are_gone_before_the_next_tick(build):
+    world = build(resting_box("lower"), resting_box("upper", 0.3))
+    run(world, 500)
+    world.remove("upper")
+    (lower,) = (sensor for sensor in world.sensors_of("lower") if sensor.sample_type is ContactsSample)
+    assert {point.other_body for point in lower.read(world.clock.tick).points} == {"floor"}
+
+
+def test_contacts_come_back_after_a_reset(build):
+    world = build(resting_box())
+    first = run(world, 300)["box"]
+    world.reset()
+    assert run(world, 300)["box"] == first
+
+
+def test_without_the_key_there_are_none_and_a_visual_robot_has_none(build):
+    assert run(build(box(basePosition=[0.0, 0.0, 0.1])), 10) == {}
+    robot = {"name": "ghost", "loadURDF": {"fileName": "kuka_iiwa/model.urdf"}, "is_visual_robot": True}
+    with pytest.raises(ConfigError, match="contacts: a visual robot touches nothing"):
+        load_object("visual_robot", {**robot, "contacts": {}}, "ghost.yaml", BODY_TYPES)

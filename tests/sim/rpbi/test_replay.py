@@ -1,0 +1,152 @@
+"""Recorded sessions, replayed in another process."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import scripted_session as script
+
+from custom_ros_tools.errors import ConfigError
+from rpbi.bodies import BODY_TYPES
+from rpbi.config import load_world
+from rpbi.control.motors import Command
+from rpbi.pose import Pose
+from rpbi.pybullet_models import ChangeDynamics
+from rpbi.recorded_values import from_text, to_text
+from rpbi.replay import Replay
+from rpbi.world_description import WorldDescription
+
+TICKS = 3000
+EXAMPLES = Path(__file__).resolve().parents[3] / "src" / "rpbi_examples" / "configs"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("session")
+
+
+@pytest.fixture(scope="module")
+def session(folder):
+    return script.record(1, TICKS, folder)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_session_with_contacts_is_the_same_in_a_new_process(seed, folder):
+    recorded = script.record(seed, TICKS, folder)
+    kinds = {command.what for _, command in recorded["commands"]}
+    assert {"input", "add", "switch_mode"} <= kinds
+    printed = subprocess.run(
+        [sys.executable, script.__file__], input=json.dumps(recorded), capture_output=True, text=True, check=True
+    ).stdout
+    agreed, difference, left_out = json.loads(printed.partition("result: ")[2])
+    assert (agreed, difference, left_out) == (1 + TICKS // 500, None, [])
+
+
+def test_a_command_that_is_changed_a_little_is_found(session):
+    index, command = next((i, c) for i, c in session["commands"] if c.name == "mobile/cmd_vel" and c.tick > 1000)
+    velocity = from_text(command.data)
+    changed = command._replace(data=to_text(velocity._replace(x=velocity.x + 1e-12)))
+    assert changed != command
+    commands = {**dict(session["commands"]), index: changed}
+    result = Replay(script.read({**session, "commands": list(commands.items())})).run()
+    assert result.difference is not None
+    agreed, differing = result.difference.last_agreement, result.difference.checkpoint
+    assert agreed.tick <= command.tick < differing.tick == agreed.tick + 500
+
+
+def test_a_recording_that_lacks_a_command_says_so_and_goes_no_further(session):
+    lost = next(index for index, command in session["commands"] if command.tick > 1000)
+    commands = [(index, command) for index, command in session["commands"] if index != lost]
+    result = Replay(script.read({**session, "commands": commands})).run()
+    assert result.difference is None
+    assert result.agreed == 3  # the start, 500 and 1000
+    assert f"command {lost}" in result.left_out[0]
+
+
+def test_a_reset_is_a_new_start_and_can_be_replayed_alone(folder):
+    world = script.build(folder)
+    description = script.describe(world)
+    script.run(world, 5, 200)
+    world.reset()
+    checkpoints = script.run(world, 6, 1000)
+    recording = script.Recording(WorldDescription(description), {1: script.recorded(world)}, set(checkpoints))
+    world.close()
+    result = Replay(recording).run()
+    assert (result.agreed, result.difference, result.left_out) == (3, None, ())
+
+
+def test_a_world_whose_file_changed_is_warned_of(folder, session):
+    path = folder / "mobile_base.urdf"
+    text = path.read_text()
+    path.write_text(text.replace("40.0", "41.0"))
+    try:
+        assert [warning for warning in WorldDescription(session["description"]).warnings if str(path) in warning]
+        result = Replay(script.read(session)).run()
+    finally:
+        path.write_text(text)
+    assert result.difference is not None
+
+
+def test_a_world_whose_file_has_gone_is_refused(folder, session):
+    path = folder / "mobile_base.urdf"
+    text = path.read_text()
+    path.unlink()
+    try:
+        with pytest.raises(ConfigError, match=r"mobile_base\.urdf"):
+            Replay(script.read(session))
+    finally:
+        path.write_text(text)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": 99}'])
+def test_what_is_no_description_is_refused(text):
+    with pytest.raises(ValueError, match="description"):
+        WorldDescription(text)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        0.1 + 0.2,
+        5e-324,
+        -0.0,
+        float("inf"),
+        2**53 + 1,
+        None,
+        "ä",
+        (1, 2.0, (3,)),
+        Pose((1 / 3, 0.0, 1.0)),
+        Command(2, {3: 0.1, 0: 1e-17}),
+        ("dynamic", ChangeDynamics(mass=0.1, lateralFriction=1 / 3)),
+    ],
+    ids=str,
+)
+def test_values_read_back_to_the_last_bit(value):
+    assert repr(from_text(to_text(value))) == repr(value)
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.rglob("config.yaml")), ids=lambda path: path.parent.name)
+def test_the_configuration_of_every_example_reads_back_as_it_was(path):
+    loaded = load_world(str(path), BODY_TYPES)
+    for config in (loaded.config, *(item.config for item in loaded.objects)):
+        again = from_text(to_text(config))
+        assert again == config
+        assert again.model_fields_set == config.model_fields_set
+
+
+def test_what_cannot_be_recorded_says_so():
+    with pytest.raises(TypeError, match="object"):
+        to_text((1, object()))
+
+
+@pytest.mark.parametrize(
+    "text",
+    ['{"os:system": ["true"]}', '{"subprocess:Popen": [["true"]]}', '{"nowhere:Class": []}', "{", '{"a": 1, "b": 2}'],
+)
+def test_a_recording_can_have_nothing_called_but_values(text):
+    with pytest.raises(ValueError):
+        from_text(text)
