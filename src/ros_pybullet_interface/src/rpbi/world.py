@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import heapq
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pybullet
@@ -15,7 +14,7 @@ from custom_ros_tools.schema import ConfigModel
 from .actions import ACTIONS
 from .bodies import BODY_TYPES, Body
 from .client import Client
-from .clock import Clock, Schedule
+from .clock import Clock
 from .command_log import CommandLog, WorldCommand
 from .config import LoadedWorld, load_world
 from .contact_reader import ContactReader
@@ -26,32 +25,13 @@ from .load_log import LogEntry, apply
 from .mailbox import Mailbox
 from .pybullet_models import ChangeDynamics
 from .rgbd_config import FIRST_TOPIC_NAME, RgbdSensorConfig
+from .sensor_schedule import SensorSchedule
 from .sensors import RgbdSensor
 from .sensors.sensor import Sensor
 from .state_hash import state_hash
 from .window import Window, check_recording
 
 log = logging.getLogger(__name__)
-
-
-class _Scheduled:
-    """A sensor and when it is due."""
-
-    def __init__(self, sensor: Sensor, dt_ns: int, tick: int, order: int) -> None:
-        self.sensor = sensor
-        self.order = order
-        self.schedule = Schedule(sensor.hz, dt_ns)
-        if self.schedule.clamped:
-            log.warning("%s: %s Hz is more than a sample a tick; it gets one a tick", sensor.name, sensor.hz)
-        self.next_tick = self.schedule.next_due(tick)
-        self.read_tick = -1
-        """Tick of the last sample, -1 before the first."""
-
-    def read(self, tick: int) -> Any:
-        sample = self.sensor.read(tick)
-        if sample is not None:
-            self.read_tick = tick
-        return sample
 
 
 class World:
@@ -89,12 +69,8 @@ class World:
         self._built_entries = 0
         """How many entries of the log are of building it."""
         self._inputs: dict[str, Input] = {}
-        self._scheduled: dict[str, list[_Scheduled]] = {}
+        self._sensors = SensorSchedule(self.clock)
         self._stepping: list[Body] = []
-        self._watching: list[Sensor] = []
-        self._queue: list[tuple[int, int, _Scheduled]] = []
-        """A heap of when each sensor is due, in which order it came, and the sensor."""
-        self._count = 0
         connect = self.config.connect.kwargs()
         configured_mode = connect.pop("connection_mode")
         mode = configured_mode if connection_mode is None else connection_mode
@@ -186,9 +162,7 @@ class World:
             self._note(name, "remove", None)
             if body in self._stepping:
                 self._stepping.remove(body)
-        gone = [each.sensor for each in self._scheduled.pop(name)]
-        self._requeue()
-        self._watching = [sensor for sensor in self._watching if sensor not in gone]
+        self._sensors.remove(name)
         self._inputs = {slot: taken for slot, taken in self._inputs.items() if slot.split("/")[0] != name}
         self.take_inputs()  # what still waits for it must not meet a later body of the same name
 
@@ -269,7 +243,7 @@ class World:
 
     def sensors_of(self, name: str) -> list[Sensor]:
         """Returns the sensors of a body, or the camera of that name."""
-        return [each.sensor for each in self._scheduled[name]]
+        return self._sensors[name]
 
     @property
     def is_connected(self) -> bool:
@@ -303,26 +277,20 @@ class World:
         self.take_inputs()
         for body in self._stepping:
             body.before_step(self.clock.tick)
-        for sensor in self._watching:
-            sensor.before_step(self.clock.tick)
+        self._sensors.before_step()
         self.pb.stepSimulation()
         self.contacts.outdate()
         self.clock.advance()
-        for sensor in self._watching:
-            sensor.after_step(self.clock.tick)
-        return self._read_due()
+        self._sensors.after_step()
+        return self._sensors.read_due()
 
     def read_rest(self) -> list[Any]:
         """Returns samples of the sensors that were not read at this tick yet."""
-        tick = self.clock.tick
-        return _present(each.read(tick) for each in self._all() if each.read_tick != tick and each.sensor.wanted)
+        return self._sensors.read_rest()
 
     def read_idle(self, tick: int, since: int) -> list[Any]:
         """Returns the samples that would have come due between two ticks, had the world not stood still."""
-        now = self.clock.tick
-        return _present(
-            each.read(now) for each in self._all() if each.sensor.wanted and each.schedule.is_due(tick, since)
-        )
+        return self._sensors.read_idle(tick, since)
 
     def halt(self, reason: str) -> None:
         """Breaks off what bodies were about to do over the coming ticks, such as timed motions."""
@@ -351,10 +319,8 @@ class World:
             body.remove()
         self.bodies.clear()
         self.log.clear()
-        self._scheduled.clear()
+        self._sensors.clear()
         self._stepping.clear()
-        self._watching.clear()
-        self._requeue()
         self.clock.restart()
         self.resets += 1
         old = self._inputs  # they stay till their like has come, for those who put meanwhile
@@ -419,7 +385,7 @@ class World:
                 self.add_camera(config, file)
 
     def _require_new(self, name: str, file: str | None) -> None:
-        if name in self._scheduled:
+        if name in self._sensors:
             message = f"'{name}' is taken already; names are unique in a world"
             raise ConfigError([Problem(file or name, "name", message)])
 
@@ -434,36 +400,7 @@ class World:
             self.commands.note(WorldCommand(self.clock.tick, name, what, value))
 
     def _register(self, name: str, sensors: tuple[Sensor, ...], inputs: Any) -> None:
-        dt_ns, tick = self.clock.dt_ns, self.clock.tick
         for sensor in sensors:
             sensor.enter(self)
-        self._scheduled[name] = [_Scheduled(one, dt_ns, tick, order) for order, one in enumerate(sensors, self._count)]
-        self._count += len(sensors)
-        self._requeue()
-        self._watching += [sensor for sensor in sensors if type(sensor).before_step is not Sensor.before_step]
+        self._sensors.add(name, sensors)
         self._inputs = {**self._inputs, **{f"{name}/{key}": value for key, value in inputs.items()}}
-
-    def _requeue(self) -> None:
-        self._queue = [(each.next_tick, each.order, each) for each in self._all()]
-        heapq.heapify(self._queue)
-
-    def _all(self) -> Iterator[_Scheduled]:
-        for scheduled in self._scheduled.values():
-            yield from scheduled
-
-    def _read_due(self) -> list[Any]:
-        tick = self.clock.tick
-        queue = self._queue
-        samples: list[Any] = []
-        while queue and queue[0][0] <= tick:
-            _, order, each = queue[0]
-            each.next_tick = each.schedule.next_due(tick)
-            heapq.heapreplace(queue, (each.next_tick, order, each))
-            if each.sensor.wanted:
-                samples.append(each.read(tick))
-        return _present(samples)
-
-
-def _present(samples: Any) -> list[Any]:
-    """Leaves out sensors that had nothing to tell."""
-    return [sample for sample in samples if sample is not None]
