@@ -129,12 +129,14 @@ class RosSystem:
         rospy.set_param("/use_sim_time", use_sim_time)
         name = f"{namespace}ros_pybullet_interface"
         rospy.set_param(f"{name}/config", world)
+        service = f"{namespace}rpbi/list_objects"
+        before = _provider(service)  # one that was killed is still registered
         process = self.start(
             ["rosrun", "ros_pybullet_interface", "ros_pybullet_interface_node.py", f"__ns:={namespace}"], **environment
         )
         if wait:
             wait_until(
-                lambda: process.poll() is not None or _has_service(f"{namespace}rpbi/list_objects"),
+                lambda: process.poll() is not None or _provider(service) not in (None, before),
                 "the node is up",
                 40.0,
             )
@@ -175,9 +177,9 @@ class RosSystem:
             raise AssertionError("\n".join(late))
 
 
-def _has_service(name: str) -> bool:
+def _provider(service: str) -> str | None:
+    """Returns where a service is served, None if nowhere."""
     try:
-        rosgraph.Master("/tests").lookupService(name)
-        return True
+        return str(rosgraph.Master("/tests").lookupService(service))
     except rosgraph.MasterError:
-        return False
+        return None

@@ -217,15 +217,18 @@ def test_a_hundred_resets_leave_no_trace(ros, start, tmp_path):
         before = [count(process.pid, what) for what in ("task", "fd")], resident_mb(process.pid)
         for _ in range(90):
             _reset(ros)
-        after = [count(process.pid, what) for what in ("task", "fd")], resident_mb(process.pid)
+        megabytes = resident_mb(process.pid)
+        wait_until(  # the answer to the last request may still hold one
+            lambda: all(count(process.pid, what) <= was for what, was in zip(("task", "fd"), before[0])),
+            "there are no more threads and files than before",
+        )
         stop.set()
         thread.join()
-    assert after[0] == before[0]
-    assert after[1] < before[1] + 5.0, "megabytes"
+    assert megabytes < before[1] + 5.0
     heard = len(ros.output(listener))
     wait_until(lambda: len(ros.output(listener)) > heard, "TF is still known")
     assert rosout.logs("refused") == []
-    assert [log.msg for log in rosout.logs() if log.level > 2] == []
+    assert [log.msg for log in rosout.logs() if log.level > 2 and log.name == "/ros_pybullet_interface"] == []
     assert "TF_" not in ros.output(listener), "TF_OLD_DATA and the like"
     last: dict[str, int] = {}
     with rosbag.Bag(str(bag)) as recorded:
