@@ -39,6 +39,8 @@ def run(quick: bool) -> list[Result]:
         found = ros.watch(JOINT_STATES, seconds=seconds, stock=False).arrivals()[JOINT_STATES]
         seen = images.arrivals()
         ros.stop(recorder)
+        if not bag.exists():
+            raise RuntimeError(f"nothing was recorded:\n{ros.output(recorder)}")
         recorded = _recorded(bag)
     return [
         Result("load", "physics alone", alone_s * 1e6, "us/step"),
