@@ -58,3 +58,15 @@ def test_folder_is_found_beside_the_file_or_by_its_word(tmp_path: Path) -> None:
     assert find_folder("pybullet_data_path", "~config") == DATA
     with pytest.raises(ValueError, match=f"^no such folder: {tmp_path}/none$"):
         find_folder("none", f"{tmp_path}/world.yaml")
+
+
+@pytest.mark.parametrize("start", ["{example-robot-data}", "package://example-robot-data"])
+def test_robots_of_the_extra_assets_are_named_as_if_they_were_a_ros_package(start):
+    found = find_file(f"{start}/robots/talos_data/robots/talos_reduced.urdf", "~")
+    assert Path(found).is_file() and found.endswith("/talos_reduced.urdf")
+
+
+def test_without_the_extra_it_is_said_what_to_install(monkeypatch):
+    monkeypatch.setattr("sys.path", [])
+    with pytest.raises(ValueError, match="'example-robot-data' is not installed: ./rpbi setup assets"):
+        find_file("{example-robot-data}/robots/talos.urdf", "~")

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from rpbi.camera import rotation_matrix
-from rpbi_examples import figure_eight, orbit
+from rpbi_examples import orbit
+from rpbi_examples.figure_eight import FigureEight
 
 
 @pytest.mark.parametrize("time_s", [0.0, 3.0, 11.0])
@@ -27,10 +28,22 @@ def test_orbit_takes_sixteen_seconds():
 
 
 def test_figure_eight_crosses_itself_in_the_middle_and_closes():
-    period_s = figure_eight.PERIOD_S
-    assert figure_eight.position(0.0) == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
-    assert figure_eight.position(period_s / 2) == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
-    assert figure_eight.position(1.3) == pytest.approx(figure_eight.position(1.3 + period_s))
-    points = np.array([figure_eight.position(period_s * share) for share in np.linspace(0.0, 1.0, 400)])
-    assert np.ptp(points[:, 1]) == pytest.approx(figure_eight.WIDTH, rel=1e-3)
-    assert np.ptp(points[:, 0]) == pytest.approx(figure_eight.HEIGHT, rel=1e-3)
+    figure = FigureEight(width=0.8, height=0.4, period_s=8.0)
+    period_s = figure.period_s
+    assert figure.position(0.0) == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+    assert figure.position(period_s / 2) == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+    assert figure.position(1.3) == pytest.approx(figure.position(1.3 + period_s))
+    points = np.array([figure.position(period_s * share) for share in np.linspace(0.0, 1.0, 400)])
+    assert np.ptp(points[:, 1]) == pytest.approx(figure.width, rel=1e-3)
+    assert np.ptp(points[:, 0]) == pytest.approx(figure.height, rel=1e-3)
+
+
+def test_figure_eight_is_by_default_the_one_that_controllers_were_written_for():
+    for time_s in (0.0, 0.4, 3.1, 7.7):
+        x, y = 0.1 * math.sin(0.4 * math.pi * time_s), 0.2 * math.sin(0.2 * math.pi * time_s)
+        assert FigureEight().position(time_s) == pytest.approx((x, y, 0.0))
+
+
+def test_frames_of_a_figure_eight_are_named_after_its_namespace():
+    assert FigureEight().frame("figure_eight") == "figure_eight"
+    assert FigureEight(tf_ns="/rpbi/").frame("figure_eight") == "rpbi/figure_eight"

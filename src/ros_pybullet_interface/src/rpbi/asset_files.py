@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -10,13 +11,15 @@ import pybullet_data
 from pydantic import AfterValidator, ValidationInfo
 
 from custom_ros_tools.config import replace_package
-from custom_ros_tools.errors import ConfigError
+from custom_ros_tools.errors import ConfigError, MissingDependency
 from custom_ros_tools.schema import Expects, Text
 
 ROBOT_DESCRIPTION = "robot_description"
 """The word that stands for the robot description on the parameter server in place of a file name."""
 PYBULLET_DATA_PATH = "pybullet_data_path"
 """The word that stands for the folder of PyBullet's data in search paths."""
+ASSETS = "example-robot-data"
+"""Robots of the extra `assets`: they are named as if this were a ROS package, `{example-robot-data}/robots/...`."""
 
 
 def find_file(name: str, file: str, search_paths: Sequence[str] = ()) -> str:
@@ -80,10 +83,21 @@ def find_folder(name: str, file: str) -> str:
 
 
 def _resolve_package(name: str) -> Path:
+    for prefix in (f"{{{ASSETS}}}/", f"package://{ASSETS}/"):
+        if name.startswith(prefix):
+            return _assets() / name.removeprefix(prefix)
     try:
         return Path(replace_package(name))
     except ConfigError as error:
         raise ValueError(str(error)) from None
+
+
+def _assets() -> Path:
+    folders = (Path(entry) / "cmeel.prefix" / "share" / ASSETS for entry in sys.path)
+    found = next((folder for folder in folders if folder.is_dir()), None)
+    if found is None:
+        raise ValueError(str(MissingDependency(ASSETS, "./rpbi setup assets")))
+    return found
 
 
 ExistingFile = Annotated[Text, AfterValidator(_existing), Expects("a file name")]

@@ -1,16 +1,44 @@
-"""Moves a frame in a figure eight."""
+"""Moves a frame in a figure eight, `figure_eight` in `figure_eight_base`."""
 
 from __future__ import annotations
 
-import rospy
+from custom_ros_tools.on_off import OnOff
+from custom_ros_tools.ros.parameters import private_parameters
+from custom_ros_tools.ros.run_node import run_node
+from custom_ros_tools.ros.toggle_service import ToggleService
 
-from ..figure_eight import position
+from ..figure_eight import FigureEight
 from .moving_frame import NO_ROTATION, move_frame
 
 
+class FigureEightNode:
+    """Broadcasts the frame; it stands where it is while the node is switched off.
+
+    Raises:
+        ConfigError: If a parameter is wrong.
+    """
+
+    def __init__(self) -> None:
+        figure = private_parameters(FigureEight)
+        self._time_s, self._last_s, self._moves = 0.0, 0.0, False
+        moving = OnOff("figure eight", lambda: self._switch(True), lambda: self._switch(False))
+        if figure.start_on_init:
+            moving.on()
+        ToggleService("toggle_figure_eight", moving.on, moving.off)
+        parent, child = figure.frame("figure_eight_base"), figure.frame("figure_eight")
+        move_frame(parent, child, lambda now_s: (figure.position(self._own_time_s(now_s)), NO_ROTATION), figure.hz)
+
+    def _switch(self, on: bool) -> None:
+        self._moves = on
+
+    def _own_time_s(self, now_s: float) -> float:
+        """Returns the time that it has moved [s]."""
+        if self._moves:
+            self._time_s += now_s - self._last_s
+        self._last_s = now_s
+        return self._time_s
+
+
 def main() -> None:
-    """Runs the node; the frame is `~child_frame_id` in `~parent_frame_id`."""
-    rospy.init_node("figure_eight")
-    parent = rospy.get_param("~parent_frame_id", "rpbi/figure_eight_base")
-    child = rospy.get_param("~child_frame_id", "rpbi/figure_eight")
-    move_frame(parent, child, lambda time_s: (position(time_s), NO_ROTATION))
+    """Runs the node."""
+    run_node("figure_eight", FigureEightNode)

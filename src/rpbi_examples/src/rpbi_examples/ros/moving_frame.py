@@ -14,7 +14,7 @@ NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 
 
 def move_frame(
-    parent: str, child: str, pose: Callable[[float], tuple[Sequence[float], Sequence[float]]]
+    parent: str, child: str, pose: Callable[[float], tuple[Sequence[float], Sequence[float]]], hz: float = HZ
 ) -> None:
     """Broadcasts a frame until ROS shuts down.
 
@@ -22,10 +22,11 @@ def move_frame(
         parent: The frame that it is in.
         child: Its name.
         pose: Position [m] and orientation (x, y, z, w) at a time since the start [s] of ROS time.
+        hz: How often.
     """
     tf = TfInterface()
     start = last = rospy.Time.now()
-    rate = rospy.Rate(HZ)
+    rate = rospy.Rate(hz)
     try:
         while not rospy.is_shutdown():
             now = rospy.Time.now()

@@ -1,0 +1,1 @@
+"""Inverse kinematics with exchangeable solvers behind one interface."""

@@ -1,0 +1,224 @@
+"""What every solver has to do, as tests for pytest; derive from `SolverConformance` to try a solver of your own."""
+
+from __future__ import annotations
+
+import math
+import os
+import pickle
+import random
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, ClassVar
+
+import pytest
+
+from custom_ros_tools.errors import UnknownNameError
+from rpbi.kinematics import Kinematics
+from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
+from rpbi.pose import Pose, Quaternion
+
+from .limits import Limits
+from .lookup import make_solver
+from .problem import IKProblem
+from .solution import IKSolution
+from .solver import Solver
+
+PROBLEMS = "IK_CONFORMANCE_PROBLEMS"
+"""Environment variable: how many random problems to solve in place of `random_problems`."""
+_IN_ANOTHER_PROCESS = """
+import pickle, sys
+from ik_ros.lookup import make_solver
+name, options, problems = pickle.load(sys.stdin.buffer)
+solver = make_solver(name, options)
+pickle.dump([solver.solve(problem) for problem in problems], open(sys.argv[1], "wb"))
+"""
+
+
+class SolverConformance:
+    """Tests that any solver of a link's pose passes.
+
+    A subclass names the solver and its robot, and overrides what is not so with its solver.
+
+    Attributes:
+        solver_name: What `make_solver` is asked for: a name of the table, or `"their_package.module:Class"`.
+        options: Its options. `urdf_filename`, `base_link` and `tip_link` tell where `forward` finds the robot.
+        least_share: The least share of reachable problems to be solved.
+        reachable_problems: How many of those to try.
+        random_problems: How many problems to try, reachable or not, of which only limits and finiteness count.
+        reach_m: How far from the base random targets are [m].
+    """
+
+    solver_name: ClassVar[str]
+    options: ClassVar[Mapping[str, Any]]
+    least_share: ClassVar[float] = 0.99
+    reachable_problems: ClassVar[int] = 100
+    random_problems: ClassVar[int] = 500
+    reach_m: ClassVar[float] = 1.5
+
+    # --- What a subclass may override.
+
+    def make(self) -> Solver:
+        """Returns a new solver."""
+        return make_solver(self.solver_name, self.options)
+
+    def problem(self, target: Pose, start: Mapping[str, float], seed: int = 0) -> IKProblem:
+        """Returns the problem of going to a target."""
+        return IKProblem(target=target, start=start, seed=seed)
+
+    def forward(self, positions: Sequence[float]) -> Pose:
+        """Returns where the link is in the base, by other means than the solver's own: PyBullet's."""
+        at = dict(zip(self.solver.joint_names, positions))
+        q = [at.get(name, 0.0) for name in self.robot.joint_names]
+        base, tip = (self._link_pose(q, str(self.options[link])) for link in ("base_link", "tip_link"))
+        return base.inverse() @ tip
+
+    def positions(self, generator: random.Random) -> list[float]:
+        """Returns random positions within limits."""
+        return self.limits.random(generator, self.limits.middle)
+
+    # --- What the tests use.
+
+    @cached_property
+    def solver(self) -> Solver:
+        """The solver."""
+        return self.make()
+
+    @cached_property
+    def limits(self) -> Limits:
+        """Its limits, without which joints are tried half a turn both ways."""
+        return Limits(self.solver.lower, self.solver.upper, [True] * len(self.solver.joint_names))
+
+    @cached_property
+    def robot(self) -> Kinematics:
+        """The robot in PyBullet."""
+        return Kinematics(str(self.options["urdf_filename"]))
+
+    def _link_pose(self, q: Sequence[float], link: str) -> Pose:
+        """Returns where a link is in the robot's root."""
+        try:
+            return self.robot.forward(q, link)
+        except ValueError:  # the root, which is where it is
+            return Pose()
+
+    def start_at(self, positions: Sequence[float]) -> dict[str, float]:
+        """Returns positions by joint."""
+        return dict(zip(self.solver.joint_names, positions))
+
+    def reachable(self, generator: random.Random, count: int) -> list[IKProblem]:
+        """Returns problems that have solutions, from anywhere."""
+        return [
+            self.problem(self.forward(self.positions(generator)), self.start_at(self.positions(generator)))
+            for _ in range(count)
+        ]
+
+    def check_shape(self, solution: IKSolution) -> None:
+        """Checks what holds for every answer: order, length, finiteness, limits, words."""
+        assert solution.joint_names == self.solver.joint_names, "joints are told in another order"
+        assert len(solution.positions) == len(self.solver.joint_names), solution
+        for positions in (solution.positions, *solution.alternatives):
+            assert all(map(math.isfinite, positions)), f"not finite: {solution}"
+            for position, lower, upper in zip(positions, self.solver.lower, self.solver.upper):
+                assert lower <= position <= upper, f"outside limits: {solution}"
+        assert math.isfinite(solution.position_error_m + solution.orientation_error_rad), solution
+        assert solution.message, "no word on how well it went"
+
+    def check_met(self, positions: Sequence[float], target: Pose) -> None:
+        """Checks that positions bring the link to the target."""
+        distance, angle = distances(self.forward(positions), target)
+        assert distance <= 1.01 * POSITION_TOLERANCE_M, f"told to be solved, and {distance:g} m off"
+        assert angle <= 1.01 * ORIENTATION_TOLERANCE_RAD, f"told to be solved, and {angle:g} rad off"
+
+    # --- The tests.
+
+    def test_its_joints_and_limits_belong_together(self) -> None:
+        """Names are unique, and each has limits in order."""
+        names, lower, upper = self.solver.joint_names, self.solver.lower, self.solver.upper
+        assert names and len(set(names)) == len(names) == len(lower) == len(upper)
+        assert all(low <= high for low, high in zip(lower, upper))
+
+    def test_reachable_targets_are_reached(self) -> None:
+        """Successes are true, and there are enough of them: always answering false fails here."""
+        solved = 0
+        for problem in self.reachable(random.Random(1), self.reachable_problems):
+            solution = self.solver.solve(problem)
+            self.check_shape(solution)
+            if solution.success:
+                assert problem.target is not None
+                solved += 1
+                for positions in (solution.positions, *solution.alternatives):
+                    self.check_met(positions, problem.target)
+        share = solved / self.reachable_problems
+        assert share >= self.least_share, f"only {share:.1%} of the reachable targets are reached"
+
+    def test_an_unreachable_target_is_answered_with_the_best_and_how_far_it_is_off(self) -> None:
+        """Failure is a value."""
+        start = self.start_at(self.limits.middle)
+        target = Pose((0.0, 0.0, 100.0))
+        solution = self.solver.solve(self.problem(target, start))
+        self.check_shape(solution)
+        assert not solution.success
+        distance, angle = distances(self.forward(solution.positions), target)
+        assert abs(distance - solution.position_error_m) < 1e-3, (distance, solution)
+        assert abs(angle - solution.orientation_error_rad) < 0.01, (angle, solution)
+
+    def test_whatever_is_asked_answers_are_finite_and_within_limits(self) -> None:
+        """Targets reachable or not, starts within limits or not."""
+        generator = random.Random(2)
+        for seed in range(int(os.environ.get(PROBLEMS, self.random_problems))):
+            x, y, z = (generator.uniform(-self.reach_m, self.reach_m) for _ in range(3))
+            start = [position + generator.gauss(0.0, 2.0) for position in self.positions(generator)]
+            problem = self.problem(Pose((x, y, z), random_quat(generator)), self.start_at(start), seed)
+            solution = self.solver.solve(problem)
+            self.check_shape(solution)
+            if solution.success:
+                assert problem.target is not None
+                self.check_met(solution.positions, problem.target)
+
+    def test_a_target_that_is_not_finite_is_refused(self) -> None:
+        """It must not get as far as the solver."""
+        for bad in (math.nan, math.inf, 1e300):
+            for target in (Pose((0.1, bad, 0.3)), Pose((0.1, 0.2, 0.3), (0.0, 0.0, bad, 1.0))):
+                with pytest.raises(ValueError, match="finite"):
+                    self.solver.solve(self.problem(target, {}))
+
+    def test_an_unknown_joint_is_refused_and_the_known_ones_are_named(self) -> None:
+        """A misspelt joint would start somewhere else unnoticed."""
+        problem = self.problem(self.forward(self.limits.middle), {"no_such_joint": 0.0})
+        with pytest.raises(UnknownNameError, match=f"no_such_joint.*{self.solver.joint_names[0]}"):
+            self.solver.solve(problem)
+
+    def test_equal_problems_have_equal_answers(self) -> None:
+        """Whatever was solved before, in a new solver, and in another process; if it is declared deterministic."""
+        if not self.solver.deterministic:
+            pytest.skip(f"'{self.solver_name}' is not declared deterministic")
+        problems = self.reachable(random.Random(3), 10) + [self.problem(Pose((0.0, 0.0, 100.0)), {})]
+        first = [self.solver.solve(problem) for problem in problems]
+        assert [self.solver.solve(problem) for problem in reversed(problems)] == first[::-1], "what was before counts"
+        fresh = self.make()
+        assert [fresh.solve(problem) for problem in problems] == first, "another solver answers otherwise"
+        assert self._in_another_process(problems) == first, "another process answers otherwise"
+
+    def _in_another_process(self, problems: Sequence[IKProblem]) -> Any:
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+        with tempfile.NamedTemporaryFile() as answers:
+            asked = pickle.dumps((self.solver_name, self.options, list(problems)))
+            command = [sys.executable, "-c", _IN_ANOTHER_PROCESS, answers.name]
+            subprocess.run(command, input=asked, env=environment, check=True, timeout=120.0)
+            return pickle.loads(answers.read())
+
+
+def distances(pose: Pose, other: Pose) -> tuple[float, float]:
+    """Returns distance [m] and angle [rad] between two poses."""
+    same_side = math.copysign(1.0, sum(a * b for a, b in zip(pose.quat_xyzw, other.quat_xyzw)))
+    chord = math.dist(pose.quat_xyzw, [same_side * component for component in other.quat_xyzw])
+    return math.dist(pose.position, other.position), 4.0 * math.asin(min(1.0, chord / 2.0))
+
+
+def random_quat(generator: random.Random) -> Quaternion:
+    """Returns a random rotation, any as likely as any other."""
+    x, y, z, w = (generator.gauss(0.0, 1.0) for _ in range(4))
+    norm = math.hypot(x, y, z, w) or 1.0
+    return x / norm, y / norm, z / norm, w / norm

@@ -1,0 +1,102 @@
+"""Questions to inverse kinematics, the same for every solver."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from rpbi.pose import Pose
+
+Vector = tuple[float, float, float]
+JointPositions = Mapping[str, float]
+"""Positions by joint [rad or m]."""
+
+LARGEST = 1e9
+"""Largest number that is taken, whatever it means; squares of larger ones are soon beyond what a float can hold."""
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """What a link passes at a time.
+
+    Attributes:
+        time_s: When, from the start [s].
+        pose: The link's pose in the solver's base frame; positions [m], unit quaternion x, y, z, w.
+    """
+
+    time_s: float
+    pose: Pose
+
+
+@dataclass(frozen=True)
+class IKProblem:
+    """What a solver is asked; what a problem does not need stays empty.
+
+    Attributes:
+        target: Pose of the solver's link in its base frame; quaternions of any length but 0.
+        position_tolerance: How far off the target the link may be along each axis of the target, both ways [m].
+        rotation_tolerance: How far it may be turned about each of them, both ways [rad]; from pi on, as it likes.
+        start: Where the search starts, by joint [rad or m]; joints that are left out start at the middle of their
+            limits. Positions outside limits are brought in, with a warning.
+        previous: Previous solutions, newest last; solvers that can stay near them.
+        goals: Values of the goals of tasks by the name of the task, for solvers that have tasks.
+        waypoints: What the link passes, by time, for solvers of trajectories.
+        seed: Of whatever is random: solvers that are deterministic give equal problems equal answers.
+
+    Raises:
+        ValueError: If a number is not finite or out of its range; it names the field.
+    """
+
+    target: Pose | None = None
+    position_tolerance: Vector = (0.0, 0.0, 0.0)
+    rotation_tolerance: Vector = (0.0, 0.0, 0.0)
+    start: JointPositions = field(default_factory=dict)
+    previous: tuple[JointPositions, ...] = ()
+    goals: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    waypoints: tuple[Waypoint, ...] = ()
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.target is not None:
+            object.__setattr__(self, "target", _pose("target", self.target))
+        waypoints = tuple(
+            Waypoint(_number(f"waypoints[{i}].time_s", one.time_s), _pose(f"waypoints[{i}]", one.pose))
+            for i, one in enumerate(self.waypoints)
+        )
+        object.__setattr__(self, "waypoints", waypoints)
+        for name in ("position_tolerance", "rotation_tolerance"):
+            values = _numbers(name, getattr(self, name), 3)
+            if min(values) < 0.0:
+                raise ValueError(f"{name}: must not be negative, got {values}")
+            object.__setattr__(self, name, values)
+        for joint, position in self.start.items():
+            _number(f"start: {joint}", position)
+        for i, solution in enumerate(self.previous):
+            for joint, position in solution.items():
+                _number(f"previous[{i}]: {joint}", position)
+        goals = {task: _numbers(f"goals: {task}", values) for task, values in self.goals.items()}
+        object.__setattr__(self, "goals", goals)
+
+
+def _pose(what: str, pose: Pose) -> Pose:
+    x, y, z = _numbers(f"{what}: position", pose.position, 3)
+    quaternion = _numbers(f"{what}: quaternion", pose.quat_xyzw, 4)
+    norm = math.hypot(*quaternion)
+    if norm < 1e-6:
+        raise ValueError(f"{what}: quaternion: must not be zero, got {quaternion}")
+    qx, qy, qz, qw = (component / norm for component in quaternion)
+    return Pose((x, y, z), (qx, qy, qz, qw))
+
+
+def _numbers(what: str, values: Sequence[float], count: int | None = None) -> tuple[float, ...]:
+    if count is not None and len(values) != count:
+        raise ValueError(f"{what}: expected {count} values, got {len(values)}")
+    return tuple(_number(what, value) for value in values)
+
+
+def _number(what: str, value: float) -> float:
+    value = float(value)
+    if not abs(value) <= LARGEST:
+        raise ValueError(f"{what}: expected finite numbers, {LARGEST:g} at most; got {value:g}")
+    return value

@@ -1,0 +1,72 @@
+"""`interactive_target_node.py`: a TF frame that is dragged and turned in RViz."""
+
+from __future__ import annotations
+
+import math
+
+from interactive_markers.interactive_marker_server import InteractiveMarkerServer
+from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, InteractiveMarkerFeedback
+
+from custom_ros_tools.ros.parameters import private_parameters
+from custom_ros_tools.ros.run_node import run_node
+from custom_ros_tools.ros.throttle import ThrottledWarning
+from custom_ros_tools.ros.transform_messages import transform_message
+from custom_ros_tools.ros.transform_topic import TransformTopic
+from custom_ros_tools.ros.wall_timer import WallTimer
+from rpbi.pose import Pose
+
+from ..interactive_target_config import InteractiveTargetConfig
+from .messages import pose_in, pose_message
+
+NAMESPACE = "ik_target"
+"""RViz's display InteractiveMarkers takes `/ik_target/update`."""
+HALF_TURN = math.sqrt(0.5)
+AXES = {"x": (HALF_TURN, 0.0, 0.0), "y": (0.0, 0.0, HALF_TURN), "z": (0.0, HALF_TURN, 0.0)}
+"""For each axis, x, y, z of the quaternion that turns a handle's own x axis there; its w is that too."""
+
+
+class InteractiveTarget:
+    """Shows handles and broadcasts the frame where they are.
+
+    Raises:
+        ConfigError: If a parameter is wrong.
+    """
+
+    def __init__(self) -> None:
+        config = private_parameters(InteractiveTargetConfig)
+        self._topic = TransformTopic(config.parent_frame_id, config.child_frame_id)
+        self._transform = transform_message(config.position, config.quat_xyzw)
+        self._warn = ThrottledWarning()
+        self._server = InteractiveMarkerServer(NAMESPACE)
+        self._server.insert(_marker(config), self._take)
+        self._server.applyChanges()
+        WallTimer(config.hz, lambda: self._topic.send(self._transform))
+
+    def _take(self, feedback: InteractiveMarkerFeedback) -> None:
+        pose = pose_in(feedback.pose)
+        try:
+            self._transform = transform_message(pose.position, pose.quat_xyzw)
+        except ValueError as error:
+            self._warn(f"{NAMESPACE}/feedback", f"pose refused: {error}")
+
+
+def _marker(config: InteractiveTargetConfig) -> InteractiveMarker:
+    """Returns handles to shift it along, and turn it about, each of its axes."""
+    marker = InteractiveMarker(name=config.child_frame_id, scale=config.size_m)
+    marker.header.frame_id = config.parent_frame_id
+    marker.pose = pose_message(Pose(config.position, config.quat_xyzw))
+    for axis, (x, y, z) in AXES.items():
+        for name, mode in (
+            ("move", InteractiveMarkerControl.MOVE_AXIS),
+            ("turn", InteractiveMarkerControl.ROTATE_AXIS),
+        ):
+            control = InteractiveMarkerControl(name=f"{name}_{axis}", interaction_mode=mode)
+            orientation = control.orientation
+            orientation.x, orientation.y, orientation.z, orientation.w = x, y, z, HALF_TURN
+            marker.controls.append(control)
+    return marker
+
+
+def main() -> None:
+    """Runs the node."""
+    run_node("interactive_target", InteractiveTarget, anonymous=True)

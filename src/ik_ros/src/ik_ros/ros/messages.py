@@ -1,0 +1,129 @@
+"""Problems and solutions as messages."""
+
+from __future__ import annotations
+
+import rospy
+from geometry_msgs.msg import Point, Quaternion, Vector3
+from geometry_msgs.msg import Pose as PoseMessage
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from custom_ros_tools.joint_values import JointValues
+from ik_ros.msg import IKProblem as IKProblemMessage
+from ik_ros.msg import TaskGoal, TracIKProblem
+from ik_ros.msg import Waypoint as WaypointMessage
+from rpbi.pose import Pose
+
+from ..problem import IKProblem, JointPositions, Vector, Waypoint
+from ..solution import IKSolution
+from ..solution import JointTrajectory as Trajectory
+
+
+def problem_in(message: IKProblemMessage) -> IKProblem:
+    """Returns the problem in a message, poses as they are there.
+
+    Raises:
+        ValueError: If a number is not finite or out of its range, or lengths differ; it names the field.
+    """
+    return IKProblem(
+        target=pose_in(message.target) if message.has_target else None,
+        position_tolerance=_vector_in(message.position_tolerance),
+        rotation_tolerance=_vector_in(message.rotation_tolerance),
+        start=positions_in("start", message.start),
+        previous=tuple(
+            positions_in(f"previous_solutions[{i}]", one) for i, one in enumerate(message.previous_solutions)
+        ),
+        goals={goal.task: goal.values for goal in message.goals},
+        waypoints=tuple(Waypoint(one.time_from_start.to_sec(), pose_in(one.pose)) for one in message.waypoints),
+        seed=message.seed,
+    )
+
+
+def problem_in_trac_ik(message: TracIKProblem) -> IKProblem:
+    """Returns the problem in a message of the release's.
+
+    Raises:
+        ValueError: As for `problem_in`.
+    """
+    translation, rotation = message.goal.translation, message.goal.rotation
+    return IKProblem(
+        target=Pose(
+            (translation.x, translation.y, translation.z), (rotation.x, rotation.y, rotation.z, rotation.w)
+        ),
+        position_tolerance=(message.bx, message.by, message.bz),
+        rotation_tolerance=(message.brx, message.bry, message.brz),
+        start=positions_in("qinit", message.qinit),
+    )
+
+
+def problem_message(problem: IKProblem, header: Header) -> IKProblemMessage:
+    """Returns a problem as a message."""
+    message = IKProblemMessage(header=header, has_target=problem.target is not None, seed=problem.seed)
+    if problem.target is not None:
+        message.target = pose_message(problem.target)
+    message.position_tolerance = Vector3(*problem.position_tolerance)
+    message.rotation_tolerance = Vector3(*problem.rotation_tolerance)
+    message.start = positions_message(problem.start)
+    message.previous_solutions = [positions_message(one) for one in problem.previous]
+    message.goals = [TaskGoal(task, list(values)) for task, values in problem.goals.items()]
+    message.waypoints = [
+        WaypointMessage(rospy.Duration.from_sec(one.time_s), pose_message(one.pose)) for one in problem.waypoints
+    ]
+    return message
+
+
+def positions_in(what: str, message: JointState) -> JointPositions:
+    """Returns positions by joint; none if the message has none.
+
+    Raises:
+        ValueError: If lengths differ, a joint is named twice or a value is not finite; it names `what`.
+    """
+    try:
+        values = JointValues.of(message.name, message.position)
+    except ValueError as error:
+        raise ValueError(f"{what}: {error}") from None
+    if values.position and not values.names:
+        raise ValueError(f"{what}: expected the names of its {len(values.position)} joints, got none")
+    return dict(zip(values.names, values.position))
+
+
+def positions_message(positions: JointPositions) -> JointState:
+    """Returns positions by joint as a message."""
+    return JointState(name=list(positions), position=list(positions.values()))
+
+
+def solution_message(solution: IKSolution) -> JointState:
+    """Returns the positions of a solution."""
+    return JointState(name=list(solution.joint_names), position=list(solution.positions))
+
+
+def trajectory_message(joint_names: tuple[str, ...], trajectory: Trajectory | None) -> JointTrajectory:
+    """Returns a trajectory as a message, to be followed from when it arrives; without one, it is empty."""
+    if trajectory is None:
+        return JointTrajectory()
+    points = zip(trajectory.times_s, trajectory.positions, trajectory.velocities)
+    return JointTrajectory(
+        joint_names=list(joint_names),
+        points=[
+            JointTrajectoryPoint(
+                positions=list(positions), velocities=list(velocities), time_from_start=rospy.Duration.from_sec(time_s)
+            )
+            for time_s, positions, velocities in points
+        ],
+    )
+
+
+def pose_in(message: PoseMessage) -> Pose:
+    """Returns the pose in a message; its numbers are not checked."""
+    p, q = message.position, message.orientation
+    return Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
+
+
+def pose_message(pose: Pose) -> PoseMessage:
+    """Returns a pose as a message."""
+    return PoseMessage(Point(*pose.position), Quaternion(*pose.quat_xyzw))
+
+
+def _vector_in(message: Vector3) -> Vector:
+    return message.x, message.y, message.z

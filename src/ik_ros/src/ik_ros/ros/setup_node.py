@@ -1,0 +1,150 @@
+"""`ik_setup_node.py SOLVER`: TF, joint states, tolerances and goals in, problems of inverse kinematics out."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+
+import rospy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, Float64MultiArray, Header
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.on_off import OnOff
+from custom_ros_tools.ros.parameters import private_parameters
+from custom_ros_tools.ros.run_node import run_node
+from custom_ros_tools.ros.throttle import ThrottledWarning
+from custom_ros_tools.ros.toggle_service import ToggleService
+from custom_ros_tools.ros.wall_timer import WallTimer
+from ik_ros.msg import IKProblem as IKProblemMessage
+
+from ..problem import IKProblem, JointPositions
+from ..setup_parameters import SetupParameters
+from .fresh_tf import FreshTf
+from .messages import positions_in, problem_message
+from .robot_ik_setup import RobotIKSetup
+from .solver_argument import solver_argument
+
+QUEUE_SIZE = 10
+START_TOPICS = ("qinit", "start_state", "currentPosition")
+"""Names that the release's solvers have for the same."""
+PREVIOUS_TOPICS = ("previous_solutions", "previous_solution")
+TOLERANCES = ("bx", "by", "bz", "brx", "bry", "brz")
+
+
+class SetupNode:
+    """Publishes a problem at a rate, while it is switched on and there is a target.
+
+    Args:
+        name: Name of the solver; it is in the names of topics and services.
+
+    Raises:
+        ConfigError: If a parameter is wrong.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._config = config = private_parameters(SetupParameters)
+        self._topics = f"ik/setup/{name.replace(':', '/').replace('.', '/')}"
+        self._warn = ThrottledWarning()
+        self._lock = threading.Lock()
+        self._is_on = False
+        self._tf: FreshTf | None = None
+        if config.parent_frame_id is not None and config.child_frame_id is not None:
+            self._tf = FreshTf(config.parent_frame_id, config.child_frame_id, config.tf_timeout_s)
+        self._start: JointPositions = {}
+        self._previous: deque[JointPositions] = deque(maxlen=config.max_num_prev_solutions)
+        self._goals = dict(config.goals)
+        self._tolerances = {key: getattr(config, f"init_{key}") for key in TOLERANCES}
+        self._publisher = rospy.Publisher("ik", IKProblemMessage, queue_size=QUEUE_SIZE, tcp_nodelay=True)
+        rospy.set_param("ik_ros/interface", name)
+        self._subscribe()
+        setup = OnOff("setup", lambda: self._switch(True), lambda: self._switch(False))
+        if config.start_on_init:
+            setup.on()
+        ToggleService(f"{self._topics}/toggle", setup.on, setup.off)
+        WallTimer(config.hz, self._publish)
+
+    def _subscribe(self) -> None:
+        for topic in START_TOPICS:
+            self._listen(topic, JointState, lambda message, t=topic: self._take_start(t, message))
+        for topic in PREVIOUS_TOPICS:
+            self._listen(topic, JointState, lambda message, t=topic: self._take_previous(t, message))
+        for key in TOLERANCES:
+            self._listen(key, Float64, lambda message, k=key: self._take_tolerance(k, message.data))
+        for task in self._goals:
+            topic = f"task_map_goal/{task}"
+            self._listen(topic, Float64MultiArray, lambda message, t=task: self._take_goal(t, message))
+
+    def _listen(self, topic: str, message_type: type, take: Callable[[rospy.Message], None]) -> None:
+        full_name = f"{self._topics}/{topic}"
+
+        def checked(message: rospy.Message) -> None:
+            try:
+                with self._lock:
+                    take(message)
+            except ValueError as error:
+                self._warn(rospy.resolve_name(full_name), f"message refused: {error}")
+
+        rospy.Subscriber(full_name, message_type, checked, queue_size=1, tcp_nodelay=True)
+
+    def _switch(self, on: bool) -> None:
+        self._is_on = on
+
+    def _take_start(self, topic: str, message: JointState) -> None:
+        self._start = positions_in(topic, message)
+
+    def _take_previous(self, topic: str, message: JointState) -> None:
+        self._previous.append(positions_in(topic, message))
+
+    def _take_tolerance(self, key: str, value: float) -> None:
+        changed = {**self._tolerances, key: value}
+        _problem_with(tolerances=changed)
+        self._tolerances = changed
+
+    def _take_goal(self, task: str, message: Float64MultiArray) -> None:
+        expected = len(self._config.goals[task])
+        if len(message.data) != expected:
+            raise ValueError(f"expected {expected} values, as the first goal has, got {len(message.data)}")
+        IKProblem(goals={task: message.data})
+        self._goals[task] = tuple(message.data)
+
+    def _publish(self) -> None:
+        if not self._is_on:
+            return
+        try:
+            target = None if self._tf is None else self._tf.pose()
+        except InterfaceError as error:
+            self._warn("no problem is published", str(error))
+            return
+        with self._lock:
+            problem = IKProblem(
+                target=target,
+                **_fields(self._tolerances),
+                start=self._start,
+                previous=tuple(self._previous),
+                goals=self._goals,
+                seed=self._config.seed,
+            )
+        header = Header(stamp=rospy.Time.now(), frame_id=self._config.parent_frame_id or "")
+        self._publisher.publish(problem_message(problem, header))
+
+
+def _fields(tolerances: dict[str, float]) -> dict[str, tuple[float, ...]]:
+    values = tuple(tolerances[key] for key in TOLERANCES)
+    return {"position_tolerance": values[:3], "rotation_tolerance": values[3:]}
+
+
+def _problem_with(tolerances: dict[str, float]) -> IKProblem:
+    """Returns a problem, which checks the tolerances."""
+    return IKProblem(**_fields(tolerances))
+
+
+def main() -> None:
+    """Runs the node."""
+    name = solver_argument("ik_setup_node.py")
+
+    def start() -> object:
+        return RobotIKSetup() if name == "pybullet" and rospy.has_param("~config") else SetupNode(name)
+
+    run_node(f"ik_setup_{name.rpartition(':')[2]}", start, anonymous=True)

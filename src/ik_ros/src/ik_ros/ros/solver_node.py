@@ -1,0 +1,216 @@
+"""`ik_solver_node.py SOLVER`: problems of inverse kinematics in, joint targets out."""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+import time
+from collections.abc import Callable
+
+import genpy
+import rospy
+from pydantic import Field
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+from trajectory_msgs.msg import JointTrajectory
+
+from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
+from custom_ros_tools.node_parameters import StartParameters
+from custom_ros_tools.on_off import OnOff
+from custom_ros_tools.ros.run_node import run_node
+from custom_ros_tools.ros.throttle import ThrottledWarning
+from custom_ros_tools.ros.toggle_service import ToggleService
+from ik_ros.msg import IKProblem as IKProblemMessage
+from ik_ros.msg import IKSolution as IKSolutionMessage
+from ik_ros.msg import TracIKProblem
+from ik_ros.srv import (
+    JointNames,
+    JointNamesResponse,
+    SolveIK,
+    SolveIKRequest,
+    SolveIKResponse,
+    TracIK,
+    TracIKRequest,
+    TracIKResponse,
+)
+
+from ..continuity import Continuity, ContinuityConfig
+from ..lookup import make_solver
+from ..problem import IKProblem
+from ..solution import IKSolution
+from .base_frame import BaseFrame
+from .messages import problem_in, problem_in_trac_ik, solution_message, trajectory_message
+from .solver_argument import solver_argument
+
+QUEUE_SIZE = 10
+LONGEST_PERIOD_S = 0.1
+"""Targets that come after a longer pause go on as if it had been this long."""
+PROBLEMS: dict[str, tuple[type[genpy.Message], Callable[[genpy.Message], IKProblem]]] = {
+    IKProblemMessage._type: (IKProblemMessage, problem_in),
+    TracIKProblem._type: (TracIKProblem, problem_in_trac_ik),
+}
+"""What the topic `ik` may carry, and how it is read."""
+
+
+class SolverNodeParameters(StartParameters):
+    """Private parameters of the node itself; all others are the solver's."""
+
+    base_frame_id: str = Field("", description="TF frame of the solver's base; empty takes poses as they are.")
+    continuity: ContinuityConfig | None = Field(None, description="Keeps targets within the velocities of the joints.")
+
+
+class SolverNode:
+    """Solves problems while it is switched on, and whenever its service is called.
+
+    Args:
+        name: Name of the solver, or `module:Class`.
+
+    Raises:
+        ConfigError: If a parameter is wrong.
+        MissingDependency: If a library is not installed.
+    """
+
+    def __init__(self, name: str) -> None:
+        own, options = _parameters()
+        self._name, self._solver = name, make_solver(name, options, rospy.get_name())
+        self._continuity = self._make_continuity(own.continuity)
+        self._base = BaseFrame(own.base_frame_id)
+        self._warn = ThrottledWarning()
+        self._lock = threading.Lock()
+        self._last: IKSolution | None = None
+        self._last_s: float | None = None
+        self._target = rospy.Publisher("joint_states/target", JointState, queue_size=QUEUE_SIZE, tcp_nodelay=True)
+        self._solution = rospy.Publisher("ik/solution", IKSolutionMessage, queue_size=QUEUE_SIZE, tcp_nodelay=True)
+        self._trajectory = rospy.Publisher("ik/trajectory", JointTrajectory, queue_size=QUEUE_SIZE)
+        solving = OnOff("solving", self._listen, self._listen_no_more)
+        if own.start_on_init:
+            solving.on()
+        services = f"ik/solver/{name.replace(':', '/').replace('.', '/')}"
+        ToggleService(f"{services}/toggle", solving.on, solving.off)
+        rospy.Service(f"{services}/joint_names", JointNames, lambda _: JointNamesResponse(self._solver.joint_names))
+        rospy.Service(f"{services}/solve", SolveIK, self._serve)
+        rospy.Service(f"{services}/solve_trac_ik", TracIK, self._serve_trac_ik)
+
+    def _make_continuity(self, config: ContinuityConfig | None) -> Continuity | None:
+        if config is None:
+            return None
+        try:
+            return Continuity(config, self._solver.joint_names, self._solver.velocity_limits)
+        except ValueError as error:
+            raise ConfigError([Problem(rospy.get_name(), "", str(error))]) from None
+
+    def _listen(self) -> None:
+        with self._lock:
+            self._last = self._last_s = None
+            if self._continuity is not None:
+                self._continuity.restart()
+        # The newest problem is the one that counts
+        self._subscriber = rospy.Subscriber("ik", rospy.AnyMsg, self._take, queue_size=1, tcp_nodelay=True)
+
+    def _listen_no_more(self) -> None:
+        self._subscriber.unregister()
+
+    def _take(self, raw: rospy.AnyMsg) -> None:
+        type_name = raw._connection_header["type"]
+        if type_name not in PROBLEMS:
+            self._warn(self._subscriber.resolved_name, f"expected {' or '.join(PROBLEMS)}, got {type_name}; refused")
+            return
+        message_type, read = PROBLEMS[type_name]
+        message = message_type().deserialize(raw._buff)
+        try:
+            with self._lock:
+                solution = self._follow(read(message), message.header)
+        except (InterfaceError, ValueError) as error:
+            self._warn(self._subscriber.resolved_name, f"problem refused: {error}")
+            solution = IKSolution(False, str(error), self._solver.joint_names, ())
+        else:
+            if not solution.success:
+                self._warn("ik/solution", solution.message)
+        self._publish(solution, message.header)
+
+    def _follow(self, problem: IKProblem, header: Header) -> IKSolution:
+        """Solves a problem of a stream: from where the last one led, and no further than the joints are fast."""
+        continuity = self._continuity
+        if continuity is not None and continuity.last is None and problem.start:
+            continuity.restart([problem.start.get(name, 0.0) for name in self._solver.joint_names])
+        if continuity is not None and continuity.last is not None:
+            start = dict(zip(self._solver.joint_names, continuity.last.tolist()))
+            problem = dataclasses.replace(problem, start=start)
+        elif not problem.start and self._last is not None:
+            problem = dataclasses.replace(problem, start=dict(zip(self._last.joint_names, self._last.positions)))
+        solution = self._solver.solve(self._base.with_poses_in_it(problem, header.frame_id))
+        if not solution.success:
+            return solution
+        self._last = solution
+        if continuity is None:
+            return solution
+        target, share = continuity.next(solution.positions, self._period_s(header))
+        message = solution.message
+        if share < 1.0:
+            message = f"{message}; the joints are {share:.0%} of the way there"
+        return dataclasses.replace(solution, positions=tuple(target.tolist()), message=message)
+
+    def _period_s(self, header: Header) -> float:
+        """Returns the time since the last problem, by stamps if there are any [s]."""
+        now_s = header.stamp.to_sec() or time.monotonic()
+        period_s = 0.0 if self._last_s is None else now_s - self._last_s
+        self._last_s = now_s
+        return min(max(period_s, 0.0), LONGEST_PERIOD_S)
+
+    def _publish(self, solution: IKSolution, header: Header) -> None:
+        answer = IKSolutionMessage(
+            interface_name=self._name,
+            success=solution.success,
+            message=solution.message,
+            joint_names=solution.joint_names,
+            solution=solution.positions,
+        )
+        answer.header.stamp = header.stamp
+        if solution.success and solution.trajectory is None:
+            target = solution_message(solution)
+            target.header.stamp = header.stamp
+            self._target.publish(target)
+        elif solution.success:
+            self._trajectory.publish(trajectory_message(solution.joint_names, solution.trajectory))
+        self._solution.publish(answer)
+
+    def _serve(self, request: SolveIKRequest) -> SolveIKResponse:
+        try:
+            solution = self._solve_alone(problem_in(request.problem), request.problem.header)
+        except (InterfaceError, ValueError) as error:
+            return SolveIKResponse(success=False, message=str(error))
+        names = solution.joint_names
+        return SolveIKResponse(
+            success=solution.success,
+            message=solution.message,
+            solution=solution_message(solution),
+            position_error=solution.position_error_m,
+            orientation_error=solution.orientation_error_rad,
+            alternatives=[JointState(name=names, position=positions) for positions in solution.alternatives],
+            trajectory=trajectory_message(names, solution.trajectory),
+        )
+
+    def _serve_trac_ik(self, request: TracIKRequest) -> TracIKResponse:
+        try:
+            solution = self._solve_alone(problem_in_trac_ik(request.problem), request.problem.header)
+        except (InterfaceError, ValueError) as error:
+            return TracIKResponse(success=False, message=str(error))
+        return TracIKResponse(solution.success, solution.message, solution_message(solution))
+
+    def _solve_alone(self, problem: IKProblem, header: Header) -> IKSolution:
+        with self._lock:
+            return self._solver.solve(self._base.with_poses_in_it(problem, header.frame_id))
+
+
+def _parameters() -> tuple[SolverNodeParameters, dict[str, object]]:
+    """Returns the node's own private parameters, and all others."""
+    given = rospy.get_param("~", {})
+    own = {key: value for key, value in given.items() if key in SolverNodeParameters.model_fields}
+    options = {key: value for key, value in given.items() if key not in own}
+    return SolverNodeParameters.parse(own, rospy.get_name()), options
+
+
+def main() -> None:
+    """Runs the node."""
+    name = solver_argument("ik_solver_node.py")
+    run_node(f"ik_solver_{name.rpartition(':')[2]}", lambda: SolverNode(name), anonymous=True)

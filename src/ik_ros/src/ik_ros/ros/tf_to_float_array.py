@@ -1,0 +1,48 @@
+"""`tf_to_floatarray_node.py`: a transform as bare numbers, for instance as the goal of a task."""
+
+from __future__ import annotations
+
+import rospy
+from std_msgs.msg import Float64MultiArray
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.parameters import private_parameters
+from custom_ros_tools.ros.run_node import run_node
+from custom_ros_tools.ros.throttle import ThrottledWarning
+from custom_ros_tools.ros.wall_timer import WallTimer
+from custom_ros_tools.transforms import rpy_of
+
+from ..tf_to_float_array_config import TfToFloatArrayConfig
+from .fresh_tf import FreshTf
+
+QUEUE_SIZE = 10
+
+
+class TfToFloatArrayNode:
+    """Publishes a transform on the topic `transform` as long as TF has it.
+
+    Raises:
+        ConfigError: If a parameter is wrong.
+    """
+
+    def __init__(self) -> None:
+        config = private_parameters(TfToFloatArrayConfig)
+        self._mode = config.mode
+        self._tf = FreshTf(config.parent_frame_id, config.child_frame_id, config.tf_timeout_s)
+        self._warn = ThrottledWarning()
+        self._publisher = rospy.Publisher("transform", Float64MultiArray, queue_size=QUEUE_SIZE)
+        WallTimer(config.hz, self._publish)
+
+    def _publish(self) -> None:
+        try:
+            position, quat_xyzw = self._tf.pose()
+        except InterfaceError as error:
+            self._warn("nothing is published", str(error))
+            return
+        rotation = {"pos": (), "pos+quat": quat_xyzw, "pos+eul": tuple(rpy_of(quat_xyzw))}[self._mode]
+        self._publisher.publish(Float64MultiArray(data=[*position, *rotation]))
+
+
+def main() -> None:
+    """Runs the node."""
+    run_node("tf_to_floatarray", TfToFloatArrayNode, anonymous=True)

@@ -1,0 +1,75 @@
+"""Simple shapes that stand for links and obstacles."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from pydantic import model_validator
+
+from custom_ros_tools.schema import ConfigModel, KeyedError, ListOf, Position, PositiveMetres, Quat, Text
+from rpbi.pose import Pose
+
+
+class Core(NamedTuple):
+    """A shape as what is left when its roundness is taken off: a point, a line or a box, in the middle of it.
+
+    Attributes:
+        half: Half lengths along x, y, z [m].
+        radius: How far around this the surface is [m].
+    """
+
+    half: np.ndarray
+    radius: float
+
+    @property
+    def is_box(self) -> bool:
+        """Whether it is neither a point nor a line along z."""
+        return bool(self.half[:2].any())
+
+
+class ShapeConfig(ConfigModel):
+    """A shape; one of `sphere`, `box` and `capsule`.
+
+    Attributes:
+        name: What tasks and messages call it.
+        link: The link it belongs to; None: it stands in the base.
+        position: Where its middle is, in the link or base [m].
+        orientation: How it is turned there, quaternion x, y, z, w.
+        sphere: Its radius [m].
+        box: Its whole lengths along x, y, z [m].
+        capsule: Its radius, and its length along z between the centres of the round ends [m].
+    """
+
+    name: Text
+    link: Text | None = None
+    position: Position = (0.0, 0.0, 0.0)
+    orientation: Quat = (0.0, 0.0, 0.0, 1.0)
+    sphere: PositiveMetres | None = None
+    box: ListOf[PositiveMetres] | None = None
+    capsule: ListOf[PositiveMetres] | None = None
+
+    @model_validator(mode="after")
+    def _is_one_shape(self) -> ShapeConfig:
+        given = [kind for kind in ("sphere", "box", "capsule") if getattr(self, kind) is not None]
+        if len(given) != 1:
+            raise KeyedError("", f"expected one of sphere, box and capsule, got {' and '.join(given) or 'none'}")
+        for kind, count in (("box", 3), ("capsule", 2)):
+            values = getattr(self, kind)
+            if values is not None and len(values) != count:
+                raise KeyedError(kind, f"expected {count} numbers [m], got {len(values)}")
+        return self
+
+    @property
+    def pose(self) -> Pose:
+        """Where it is in the link or base."""
+        return Pose(self.position, self.orientation)
+
+    @property
+    def core(self) -> Core:
+        """What is left of it without its roundness."""
+        if self.sphere is not None:
+            return Core(np.zeros(3), self.sphere)
+        if self.capsule is not None:
+            return Core(np.array((0.0, 0.0, self.capsule[1] / 2.0)), self.capsule[0])
+        return Core(np.array(self.box) / 2.0, 0.0)

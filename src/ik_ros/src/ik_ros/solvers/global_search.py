@@ -1,0 +1,76 @@
+"""Not one solution but many: elbow up, elbow down, the wrist flipped; the best of them first."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from custom_ros_tools.schema import Count, Positive
+
+from ..goal import Goal
+from ..problem import IKProblem
+from .kdl import KdlConfig, KdlSolver
+
+
+class GlobalConfig(KdlConfig):
+    """Options of `global`.
+
+    Attributes:
+        restarts: How many random starts follow the one that was given; all are made.
+        rank_by: What makes a solution better: `distance_to_start`, the length of the way of all joints together
+            [rad or m, root of the sum of squares]; or `middle_of_limits`, how far the joint that is nearest to a
+            limit is from the middle, as a part of half its range.
+        distinct: Two solutions are distinct if a joint differs by more than this [rad or m].
+        most: How many solutions to tell at most, the best one included.
+    """
+
+    restarts: Count = 100
+    rank_by: Literal["distance_to_start", "middle_of_limits"] = "distance_to_start"
+    distinct: Positive = 0.5
+    most: Annotated[int, Field(ge=1)] = 16
+
+
+class GlobalSolver(KdlSolver):
+    """Random starts of `kdl`, and the distinct solutions that they lead to.
+
+    Where joints are to spare, solutions are not separate: then it takes samples that are `distinct`.
+
+    Args:
+        config: Its options.
+    """
+
+    Config = GlobalConfig
+
+    def __init__(self, config: GlobalConfig) -> None:
+        super().__init__(config)
+        self._distinct, self._most = config.distinct, config.most
+        self._cost: Callable[[Sequence[float], Sequence[float]], float] = {
+            "distance_to_start": math.dist,
+            "middle_of_limits": self._off_middle,
+        }[config.rank_by]
+
+    def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
+        """Returns distinct solutions, else the best that was found; see `ChainSolver`."""
+        found = [(self.residual(goal, q).size, q) for q in self.candidates(problem, goal, start, self._restarts)]
+        solutions = sorted((self._cost(q, start), q) for size, q in found if size <= 1.0)
+        if not solutions:
+            return [self.mended(goal, min(found)[1])]
+        kept: list[list[float]] = []
+        for _, q in solutions:
+            if len(kept) < self._most and all(_difference(q, other) > self._distinct for other in kept):
+                kept.append(q)
+        return kept
+
+    def _off_middle(self, q: Sequence[float], start: Sequence[float]) -> float:
+        """Returns how far the joint nearest to a limit is from the middle of its limits, 1 at a limit."""
+        return max(
+            2.0 * abs(position - middle) / (upper - lower) if upper > lower else 0.0
+            for position, middle, lower, upper in zip(q, self.limits.middle, self.lower, self.upper)
+        )
+
+
+def _difference(q: Sequence[float], other: Sequence[float]) -> float:
+    return max(abs(a - b) for a, b in zip(q, other))

@@ -1,0 +1,117 @@
+"""The default: the Orocos Kinematics and Dynamics Library, started again and again, within limits and tolerances."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Iterator, Sequence
+
+import PyKDL
+
+from custom_ros_tools.schema import Count
+
+from ..chain_solver import ChainConfig, ChainSolver
+from ..descent import descend
+from ..goal import Goal
+from ..problem import IKProblem
+
+ITERATIONS = 60
+"""Most iterations from one start; where a solution is, some 20 do."""
+THRESHOLD = 1e-5
+"""Residual at which KDL stops [m]; it counts a radian as 0.01 m."""
+RESTARTS_BEYOND_REACH = 3
+"""How often to start again if the chain is not long enough: only the best of what there is can be found."""
+GIVE_UP_AFTER = 10
+"""If so many starts do not even lead to the target outside limits, none will: of 100 starts for a target within reach,
+85 do for an arm of 6 joints, and 96 and more for one of 7."""
+MOST_DESCENTS = 15
+"""Most random starts of the own descent, which takes ten times longer and ends within limits half of the time."""
+NEAR_M, NEAR_RAD = 0.3, 0.8
+"""So near its target, the tip should not get there by way of another posture."""
+
+
+class KdlConfig(ChainConfig):
+    """Options of `kdl`.
+
+    Attributes:
+        restarts: How many random starts follow the one that was given.
+    """
+
+    restarts: Count = 50
+
+
+class KdlSolver(ChainSolver):
+    """KDL's Levenberg-Marquardt, which knows neither limits nor tolerances, and around it what does.
+
+    It goes from the start to the nearest solution. Where that is outside limits, random starts follow, after an own
+    descent within limits if the start is near the target. That descent does all where there are tolerances, or joints
+    that mimic others.
+
+    Args:
+        config: Its options.
+    """
+
+    Config = KdlConfig
+    deterministic = True
+
+    def __init__(self, config: KdlConfig) -> None:
+        super().__init__(config)
+        self._restarts = config.restarts
+        self._kdl = PyKDL.ChainIkSolverPos_LMA(self.chain.kdl, eps=THRESHOLD, maxiter=ITERATIONS)
+        self._from = PyKDL.JntArray(len(self.joint_names))
+        self._to = PyKDL.JntArray(len(self.joint_names))
+
+    def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
+        """Returns the first solution, else the best that was found; see `ChainSolver`."""
+        best, least = start, math.inf
+        for q in self.candidates(problem, goal, start, self._restarts):
+            size = self.residual(goal, q).size
+            if size < least:
+                best, least = q, size
+            if least <= 1.0:
+                return [best]
+        return [self.mended(goal, best)]
+
+    def candidates(self, problem: IKProblem, goal: Goal, start: list[float], restarts: int) -> Iterator[list[float]]:
+        """Tells where each start leads, within limits.
+
+        Args:
+            problem: The question.
+            goal: Its target with tolerances.
+            start: The first n positions to start from [rad or m].
+            restarts: How many random ones follow.
+        """
+        if not (goal.is_point and self.chain.is_plain):
+            for first in self._starts(problem, start, min(restarts, MOST_DESCENTS)):
+                yield descend(self.chain, goal, self.limits, first)
+            return
+        way = self.residual(goal, start)
+        is_near = way.position_m < NEAR_M and way.orientation_rad < NEAR_RAD
+        has_arrived = False
+        for count, first in enumerate(self._starts(problem, start, restarts), 1):
+            q, arrived = self._nearest(goal, first, start)
+            yield q
+            if first is start and is_near:
+                yield descend(self.chain, goal, self.limits, start)
+            has_arrived |= arrived
+            if count == GIVE_UP_AFTER and not has_arrived:
+                return
+
+    def mended(self, goal: Goal, q: list[float]) -> list[float]:
+        """Returns positions as near to the goal as a descent within limits gets from these [rad or m]."""
+        return descend(self.chain, goal, self.limits, q)
+
+    def _starts(self, problem: IKProblem, start: list[float], restarts: int) -> Iterator[list[float]]:
+        """Tells where to start: where it was asked for, and then at random."""
+        yield start
+        generator = random.Random(problem.seed)
+        for _ in range(RESTARTS_BEYOND_REACH if self.is_beyond_reach(problem) else restarts):
+            yield self.limits.random(generator, start)
+
+    def _nearest(self, goal: Goal, first: Sequence[float], near: Sequence[float]) -> tuple[list[float], bool]:
+        """Returns where KDL gets to from `first`, brought into limits, and whether it arrived but for the limits."""
+        for i, position in enumerate(first):
+            self._from[i] = position
+        status = self._kdl.CartToJnt(self._from, goal.frame, self._to)
+        q = [self._to[i] for i in range(len(first))]
+        return self.limits.bring_in(q if all(map(math.isfinite, q)) else first, near)[0], status == 0

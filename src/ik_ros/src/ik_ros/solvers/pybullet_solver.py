@@ -1,0 +1,89 @@
+"""PyBullet's inverse kinematics, as the robots of the simulator have it, with restarts, limits and a residual."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+from pydantic import model_validator
+
+from custom_ros_tools.schema import Count, KeyedError, ListOf, NonNegative
+from rpbi.kinematics import IKProblem as PybulletProblem
+from rpbi.kinematics import Kinematics
+from rpbi.urdf import write_description
+
+from ..chain_description import read_chain
+from ..chain_solver import ChainConfig, ChainSolver, refuse_mimics
+from ..goal import Goal, refuse_boxes
+from ..problem import IKProblem
+
+
+class PybulletConfig(ChainConfig):
+    """Options of `pybullet`; those with PyBullet's names mean what they do in `rpbi.kinematics.IKProblem`.
+
+    Lists have one value for each joint of the chain.
+    """
+
+    lowerLimits: ListOf[float] = ()
+    upperLimits: ListOf[float] = ()
+    jointRanges: ListOf[float] = ()
+    resetPoses: ListOf[float] = ()
+    jointDamping: ListOf[float] = ()
+    solver: Literal[0, 1] = 0
+    maxNumIterations: Count = 0
+    residualThreshold: NonNegative = 0.0
+
+    @model_validator(mode="after")
+    def _options_fit_the_chain(self) -> PybulletConfig:
+        description = read_chain(self.urdf_filename, self.base_link, self.tip_link)
+        try:
+            PybulletProblem(self.tip_link, (0.0, 0.0, 0.0), **self.options).check_lengths(description.joint_names)
+        except ValueError as error:
+            key, _, message = str(error).partition(": ")
+            raise KeyedError(key, message) from None
+        return self
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What is handed to PyBullet with each problem."""
+        return self.model_dump(exclude=set(ChainConfig.model_fields))
+
+
+class PybulletSolver(ChainSolver):
+    """The simulator's own solver, see docs/ik.md; for targets with or without an orientation.
+
+    Its random starts are the same for all seeds.
+
+    Args:
+        config: Its options.
+
+    Raises:
+        ConfigError: If a joint of the chain mimics another; it names the joint.
+        ValueError: If limits leave a joint no position.
+    """
+
+    Config = PybulletConfig
+    deterministic = True
+
+    def __init__(self, config: PybulletConfig) -> None:
+        super().__init__(config)
+        refuse_mimics(self.description, config, "pybullet")
+        self._options = config.options
+        self._kinematics = Kinematics(write_description(self.description.urdf))
+        limits = self._kinematics.limits.narrowed(PybulletProblem(config.tip_link, (0.0, 0.0, 0.0), **self._options))
+        self.use_limits(limits.lower.tolist(), limits.upper.tolist())
+
+    def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
+        """Returns the first solution, else the best that was found; see `ChainSolver`.
+
+        Raises:
+            ValueError: If the problem has larger tolerances than what counts as reached anyway, other than any
+                orientation.
+        """
+        refuse_boxes(problem, "pybullet", goal.any_orientation)
+        assert problem.target is not None
+        quat_xyzw = () if goal.any_orientation else problem.target.quat_xyzw
+        question = PybulletProblem(
+            self.description.tip, problem.target.position, quat_xyzw, currentPosition=start, **self._options
+        )
+        return [self._kinematics.solve(question).positions]

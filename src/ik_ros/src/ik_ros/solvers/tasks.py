@@ -1,0 +1,220 @@
+"""The user's own problem formulation: weighted costs and hard constraints, solved by quadratic programs in sequence."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from custom_ros_tools.errors import MissingDependency, UnknownNameError
+from rpbi.joint_model import LIMIT_ROUNDING
+from rpbi.kinematics.residual import Residual
+
+from ..problem import IKProblem
+from ..solution import IKSolution
+from ..solver import Solver
+
+try:
+    import daqp  # noqa: F401
+    import pinocchio  # noqa: F401
+except ImportError as error:
+    raise MissingDependency(error.name or "pinocchio", "./rpbi setup ik") from None
+
+from ..tasks.descent import Descent, Tried
+from ..tasks.formulation import Formulation, TaskSet
+from ..tasks.found import Found
+from ..tasks.frame_task import FrameTask
+from ..tasks.placement import from_base, to_se3
+
+_log = logging.getLogger(__name__)
+
+AIM = 0.1
+"""What is required is aimed at with a tenth of the tolerance, so that solutions lie well within."""
+PATIENCE, PATIENCE_OF_MANY = 5, 25
+"""Over so many iterations what is required has to get nearer by half, or the search starts elsewhere: for one task, and
+for several, which have to make way for each other."""
+SETTLED = 1e-2
+"""Costs are as low as they get here when in `PATIENCE` iterations they lose no more than this part."""
+STANDSTILL = 1e-6
+"""After a step this small, the search is at its end [rad or m]."""
+NEAR_RANGE = 0.5
+"""Standard deviation of random starts of a robot with a floating base, every other time [rad or m]."""
+
+
+class TasksSolver(Solver):
+    """Finds positions of joints that keep costs low and hold constraints, all chosen by the user.
+
+    Any thread may call it; a lock inside lets one in at a time.
+
+    Args:
+        config: The formulation.
+
+    Attributes:
+        tasks: The tasks, with their robot.
+    """
+
+    Config = Formulation
+    deterministic = True
+
+    def __init__(self, config: Formulation) -> None:
+        self._config = config
+        self.tasks = TaskSet(config)
+        robot = self.tasks.robot
+        self.joint_names = robot.joint_names
+        self.lower, self.upper = tuple(robot.lower.tolist()), tuple(robot.upper.tolist())
+        self.base_frame = self.tasks.base_frame
+        self._descent = Descent(robot, list(self.tasks.parts.values()))
+        self._names = list(self.tasks.parts)
+        self._required = [
+            (i, name, part.task) for i, (name, part) in enumerate(self.tasks.parts.items()) if part.is_required
+        ]
+        self._has_wishes = len(self._required) < len(self.tasks.parts)
+        self._patience = PATIENCE if len(self.tasks.parts) == 1 else PATIENCE_OF_MANY
+        self._lock = threading.Lock()
+        self._brought_in: set[str] = set()
+
+    def solve(self, problem: IKProblem) -> IKSolution:
+        """Looks for joint positions that fulfil the formulation.
+
+        Raises:
+            ValueError: If a goal is missing or makes no sense, or there is a target and no task that it is for.
+            UnknownNameError: If the problem names a joint or task that is not known.
+        """
+        with self._lock:
+            start = self._start(problem)
+            self._begin(problem, start)
+            found = self._search(problem, start)
+        robot = self.tasks.robot
+        return IKSolution(
+            success=found.size <= 1.0,
+            message=self._in_words(found),
+            joint_names=self.joint_names,
+            positions=tuple(robot.positions(found.q).tolist()),
+            position_error_m=max((residual.position_m for residual in found.residuals.values()), default=0.0),
+            orientation_error_rad=max((residual.orientation_rad for residual in found.residuals.values()), default=0.0),
+            base_pose=from_base(found.q) if robot.is_floating else None,
+        )
+
+    def _start(self, problem: IKProblem) -> np.ndarray:
+        """Returns the configuration where the search starts, within limits."""
+        robot = self.tasks.robot
+        q = robot.configuration({**self._config.start, **problem.start})
+        asked = robot.positions(q).tolist()
+        inside = robot.limits.bring_in(asked, asked)[0]
+        joints = zip(self.joint_names, asked, inside)
+        outside = {name: one for name, one, used in joints if abs(one - used) > LIMIT_ROUNDING}
+        if outside and outside.keys() != self._brought_in:  # told once, not at every problem of a stream
+            positions = ", ".join(f"'{name}' {one:g}" for name, one in outside.items())
+            _log.warning("the start is outside limits and is brought in: %s", positions)
+        self._brought_in = set(outside)
+        return robot.with_positions(q, inside)
+
+    def _begin(self, problem: IKProblem, start: np.ndarray) -> None:
+        """Tells all tasks what the problem wants of them."""
+        for name in problem.goals:
+            if name not in self.tasks.parts:
+                raise UnknownNameError("task", name, self._names)
+        main = self.tasks.main
+        if problem.target is not None and main is None:
+            raise ValueError("target: the formulation has no main task that it could be for")
+        for name, part in self.tasks.parts.items():
+            is_target = name == main and problem.target is not None
+            try:
+                if isinstance(part.task, FrameTask) and is_target:
+                    part.task.aim(problem)
+                else:
+                    part.task.begin(problem, problem.goals.get(name), start)
+            except ValueError as error:
+                key = "target" if name == main else f"goals: {name}"
+                raise ValueError(f"{key}: {error}") from None
+        self._descent.begin()
+
+    def _search(self, problem: IKProblem, start: np.ndarray) -> Found:
+        """Returns what was found from the first start that leads to a solution, else the best of all."""
+        best: Found | None = None
+        for first in self._starts(problem, start):
+            found = self._from(self._on_anchor(first))
+            if best is None or found.rank < best.rank:
+                best = found
+            if best.size <= 1.0:
+                break
+        assert best is not None
+        return best
+
+    def _starts(self, problem: IKProblem, start: np.ndarray) -> Iterator[np.ndarray]:
+        yield start
+        robot = self.tasks.robot
+        generator = np.random.default_rng(problem.seed)
+        reference = robot.positions(start)
+        half = np.where(robot.is_revolute, np.pi, 1.0)
+        lower = np.where(np.isfinite(robot.lower), robot.lower, np.minimum(reference, robot.upper) - half)
+        upper = np.where(np.isfinite(robot.upper), robot.upper, np.maximum(reference, robot.lower) + half)
+        for i in range(self._config.restarts):
+            positions = generator.uniform(lower, upper)
+            if robot.is_floating and i % 2 == 0:
+                positions = np.clip(generator.normal(reference, NEAR_RANGE), robot.lower, robot.upper)
+            yield robot.with_positions(start, positions)
+
+    def _on_anchor(self, q: np.ndarray) -> np.ndarray:
+        """Returns a configuration with the floating base where the first link that is held is where it shall be."""
+        robot, anchor = self.tasks.robot, self.tasks.anchor
+        if not robot.is_floating:
+            return q
+        q = robot.with_base(q, to_se3(self._config.base_start))
+        if anchor is None:
+            return q
+        robot.update(q)
+        return robot.with_base(q, anchor.goal * robot.frame(anchor.link_id).inverse() * to_se3(self._config.base_start))
+
+    def _from(self, first: np.ndarray) -> Found:
+        """Returns the best that is found from one start."""
+        best: Found | None = None
+        sizes: list[float] = []
+        merits: list[float] = []
+        for tried in self._descent(first):
+            found = self._judged(tried)
+            sizes.append(found.size)
+            merits.append(tried.merit)
+            if best is None or found.rank <= best.rank:
+                best = found
+            if self._is_at_its_end(sizes, merits, tried.step):
+                break
+        assert best is not None
+        return best
+
+    def _is_at_its_end(self, sizes: Sequence[float], merits: Sequence[float], step: float) -> bool:
+        """Tells whether there is nothing more to be had from one start."""
+        if step < STANDSTILL or len(sizes) > self._config.iterations:
+            return True
+        if not self._has_wishes and sizes[-1] <= AIM:
+            return True
+        if self._has_wishes and sizes[-1] <= 1.0:
+            return len(sizes) > PATIENCE and merits[-1] > (1.0 - SETTLED) * merits[-1 - PATIENCE]
+        return len(sizes) > self._patience and sizes[-1] > 0.5 * sizes[-1 - self._patience]
+
+    def _judged(self, tried: Tried) -> Found:
+        residuals = {name: task.residual(tried.beyond[i]) for i, name, task in self._required}
+        sizes = {name: task.size(residuals[name]) for _, name, task in self._required}
+        hard = (size for name, size in sizes.items() if self.tasks.parts[name].is_hard)
+        return Found(tried.q, residuals, max(sizes.values(), default=0.0), max(hard, default=0.0))
+
+    def _in_words(self, found: Found) -> str:
+        missed = [
+            f"'{name}' is off by {_amount(found.residuals[name])}"
+            for _, name, task in self._required
+            if task.size(found.residuals[name]) > 1.0
+        ]
+        if missed:
+            return "; ".join(missed)
+        if not self._required:
+            return "costs are as low as they get; none of them is required"
+        largest = max(self._required, key=lambda one: one[2].size(found.residuals[one[1]]))[1]
+        return f"all that is required is met, '{largest}' within {_amount(found.residuals[largest])}"
+
+
+def _amount(residual: Residual) -> str:
+    parts = [f"{residual.position_m * 1e3:.4g} mm"] if residual.position_m else []
+    parts += [f"{residual.orientation_rad:.3g} rad"] if residual.orientation_rad or not parts else []
+    return " and ".join(parts)

@@ -1,0 +1,83 @@
+"""TRAC-IK: two solvers race, one that knows limits from the start and one that gets unstuck (Beeson and Ames, 2015)."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from custom_ros_tools.errors import ConfigError, MissingDependency, Problem
+from custom_ros_tools.schema import Count, Positive, Unit
+
+from ..chain_solver import ChainConfig, ChainSolver, refuse_mimics
+from ..goal import Goal, refuse_boxes
+from ..problem import IKProblem
+
+try:
+    import pytracik
+except ImportError:
+    raise MissingDependency("pytracik", "./rpbi setup") from None
+
+
+class TracIkConfig(ChainConfig):
+    """Options of `trac_ik`.
+
+    Attributes:
+        timeout: How long to look for a solution from one start; other solve types than `Speed` always take it all.
+        epsilon: How exactly the target is to be met [m, rad].
+        solve_type: `Speed` takes the first solution, `Distance` the one nearest to the start, `Manip1` and `Manip2`
+            the one with the largest product and the best ratio of the Jacobian's singular values.
+        restarts: How many random starts follow the one that was given; each has the whole timeout.
+    """
+
+    timeout: Annotated[float, Field(gt=0, le=60), Unit("s")] = 0.005
+    epsilon: Positive = 1e-5
+    solve_type: Literal["Speed", "Distance", "Manip1", "Manip2"] = "Speed"
+    restarts: Count = 3
+
+
+class TracIkSolver(ChainSolver):
+    """The TRAC-IK library as the package `pytracik` has it, which leaves out Cartesian tolerances.
+
+    It is not deterministic: its two threads race, and where it ends depends on the clock.
+
+    Args:
+        config: Its options.
+
+    Raises:
+        ConfigError: If a joint of the chain mimics another, or slides without limits; it names the joint.
+    """
+
+    Config = TracIkConfig
+    deterministic = False
+
+    def __init__(self, config: TracIkConfig) -> None:
+        super().__init__(config)
+        refuse_mimics(self.description, config, "trac_ik")
+        for joint in self.description.joints:
+            if joint.type == "prismatic" and math.isinf(joint.upper):
+                message = f"joint '{joint.name}' slides without limits, which 'trac_ik' cannot solve for; 'kdl' can"
+                raise ConfigError([Problem(config.urdf_filename, "", message)])
+        self._restarts = config.restarts
+        solve_type = getattr(pytracik.SolveType, config.solve_type)
+        ends = self.description.base, self.description.tip
+        self._trac_ik = pytracik.TRAC_IK(*ends, self.description.urdf, config.timeout, config.epsilon, solve_type)
+
+    def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
+        """Returns TRAC-IK's solution, if it finds one; see `ChainSolver`.
+
+        Raises:
+            ValueError: If the problem has larger tolerances than what counts as reached anyway.
+        """
+        refuse_boxes(problem, "trac_ik")
+        target = (*goal.frame.p, *goal.frame.M.GetQuaternion())
+        generator = random.Random(problem.seed)
+        for attempt in range(1 if self.is_beyond_reach(problem) else 1 + self._restarts):
+            first = self.limits.random(generator, start) if attempt else start
+            status, *q = pytracik.ik(self._trac_ik, first, *target).tolist()
+            if status >= 0:
+                return [q]
+        return []

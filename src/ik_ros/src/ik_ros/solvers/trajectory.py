@@ -1,0 +1,230 @@
+"""A whole joint trajectory through waypoints: smooth, within limits, clear of obstacles."""
+
+from __future__ import annotations
+
+import math
+import random
+import threading
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from custom_ros_tools.errors import MissingDependency
+from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
+
+from ..goal import Goal
+from ..problem import IKProblem, Waypoint
+from ..solution import IKSolution, JointTrajectory
+from .kdl import KdlSolver
+
+try:
+    import casadi
+except ImportError:
+    raise MissingDependency("casadi", "./rpbi setup mpc") from None
+
+from ..trajectory.config import MOST_INTERVALS, TrajectoryConfig
+from ..trajectory.forward_kinematics import ForwardKinematics, rotation_matrix
+from ..trajectory.obstacles import Obstacles
+from ..trajectory.program import Program, Question
+from ..trajectory.rates import largest_rates
+from ..trajectory.spline import Spline
+
+MOST_SAMPLES = 100_000
+CHECKS = 10
+"""At so many places in each interval the result is checked."""
+AIM = 0.3
+"""Waypoints are aimed at with this part of the tolerance."""
+SPARE = 1e-6
+"""Speeds and accelerations are kept with this part to spare, for rounding."""
+
+
+class TrajectorySolver(KdlSolver):
+    """Finds the smoothest motion from rest to rest that passes waypoints in time.
+
+    KDL says which positions lead to the waypoints; from there on a nonlinear program shapes a spline for each joint.
+
+    Args:
+        config: Its options.
+    """
+
+    Config = TrajectoryConfig
+    deterministic = True
+
+    def __init__(self, config: TrajectoryConfig) -> None:
+        super().__init__(config)
+        self._config = config
+        self._kinematics = ForwardKinematics(self.description)
+        self._obstacles = Obstacles(config.shapes)
+        self._max_velocity, self._max_acceleration = largest_rates(config, self.joint_names)
+        self._programs: dict[tuple[int, int], Program] = {}
+        self._program_lock = threading.Lock()
+        q = casadi.SX.sym("q", len(self.joint_names))
+        distances = self._obstacles.distances(self._kinematics.frames(q)) or [casadi.inf]
+        self._distances = casadi.Function("distances", [q], [casadi.vertcat(*distances)])
+
+    def solve(self, problem: IKProblem) -> IKSolution:
+        """Looks for a trajectory through the waypoints; through the target alone, if there are none.
+
+        Raises:
+            ValueError: If there is neither, or the waypoints do not follow each other in time.
+            UnknownNameError: If the robot has no joint of a name in `start`.
+        """
+        waypoints = self._waypoints(problem)
+        with self._lock:
+            start = self._start(problem.start)
+        if (nearest := self._nearest_m(np.array([start]))) < self._config.clearance:
+            message = f"at the start, a sphere is as near as {nearest * 1e3:.4g} mm to an obstacle"
+            return IKSolution(False, message, self.joint_names, tuple(start))
+        goals = [Goal(replace(problem, target=waypoint.pose)) for waypoint in waypoints]
+        best: IKSolution | None = None
+        for attempt in range(self._config.attempts):
+            postures, failure = self._postures(problem, waypoints, start, attempt)
+            if failure is not None:
+                best = best or failure
+                break
+            solution = self._shaped(problem, waypoints, goals, start, postures)
+            if best is None or solution.success:
+                best = solution
+            if best.success:
+                break
+        assert best is not None
+        return best
+
+    def _waypoints(self, problem: IKProblem) -> tuple[Waypoint, ...]:
+        """Returns what is to be passed, checked."""
+        waypoints = problem.waypoints
+        if not waypoints:
+            if problem.target is None:
+                raise ValueError("waypoints: missing, and there is no target in their place")
+            waypoints = (Waypoint(self._config.duration_s, problem.target),)
+        last_s = 0.0
+        for i, waypoint in enumerate(waypoints):
+            if not waypoint.time_s > last_s:
+                message = f"must be after {last_s:g} s, got {waypoint.time_s:g}"
+                raise ValueError(f"waypoints[{i}].time_s: {message}")
+            last_s = waypoint.time_s
+        if last_s / self._config.sample_s > MOST_SAMPLES:
+            raise ValueError(f"waypoints: {last_s:g} s in steps of {self._config.sample_s:g} s (sample_s) are too many")
+        return waypoints
+
+    def _postures(
+        self, problem: IKProblem, waypoints: Sequence[Waypoint], start: Sequence[float], attempt: int
+    ) -> tuple[list[Sequence[float]], IKSolution | None]:
+        """Returns positions that lead to the waypoints, each near those before; or why there are none."""
+        postures: list[Sequence[float]] = [start]
+        if attempt:
+            generator = random.Random(f"{problem.seed} {attempt}")
+            postures[0] = self.limits.random(generator, start)
+        for waypoint in waypoints:
+            near = dict(zip(self.joint_names, postures[-1]))
+            found = super().solve(replace(problem, target=waypoint.pose, start=near, seed=problem.seed + attempt))
+            if not found.success:
+                message = f"waypoint at {waypoint.time_s:g} s: {found.message}"
+                return postures, replace(found, message=message, alternatives=())
+            postures.append(found.positions)
+        return [start, *postures[1:]], None
+
+    def _shaped(
+        self,
+        problem: IKProblem,
+        waypoints: Sequence[Waypoint],
+        goals: Sequence[Goal],
+        start: Sequence[float],
+        postures: Sequence[Sequence[float]],
+    ) -> IKSolution:
+        """Returns the trajectory that comes of positions at the waypoints, if it keeps all that was asked for."""
+        times_s = np.array([0.0, *(waypoint.time_s for waypoint in waypoints)])
+        duration_s = float(times_s[-1])
+        with self._program_lock:
+            spline, program = self._program(times_s)
+            guess = np.stack([np.interp(spline.times, times_s / duration_s, each) for each in zip(*postures)], axis=1)
+            tolerance = np.array((*problem.position_tolerance, *problem.rotation_tolerance))
+            aim = AIM * np.array((POSITION_TOLERANCE_M,) * 3 + (ORIENTATION_TOLERANCE_RAD,) * 3)
+            points, status = program.solve(
+                Question(
+                    start=np.array(start),
+                    poses=np.stack([_flat(waypoint) for waypoint in waypoints], axis=1),
+                    basis=spline.basis(times_s[1:] / duration_s),
+                    tolerance=np.where(np.array(goals[0].tolerance) < np.inf, tolerance + aim, np.inf),
+                    lower=np.array(self.lower),
+                    upper=np.array(self.upper),
+                    max_velocity=self._max_velocity * duration_s * (1.0 - SPARE),
+                    max_acceleration=self._max_acceleration * duration_s**2 * (1.0 - SPARE),
+                    clearance=self._config.clearance,
+                    guess=guess,
+                )
+            )
+            nearest = self._nearest_m(spline.basis(_checks(spline)) @ points)
+        passed = spline.basis(times_s[1:] / duration_s) @ points
+        residuals = [self.residual(goal, q.tolist()) for goal, q in zip(goals, passed)]
+        faults = [
+            f"the waypoint at {waypoint.time_s:g} s is missed by {_in_words(residual)}"
+            for waypoint, residual in zip(waypoints, residuals)
+            if residual.size > 1.0
+        ]
+        faults += self._too_fast(spline, points, duration_s)
+        if nearest < self._config.clearance:
+            faults.append(f"a sphere comes as near as {nearest * 1e3:.4g} mm to an obstacle")
+        worst = max(residuals, key=lambda residual: residual.size)
+        apart = f", {nearest * 1e3:.4g} mm at least from obstacles" if math.isfinite(nearest) else ""
+        passes = f"passes {len(waypoints)} waypoints within {_in_words(worst)}{apart}"
+        return IKSolution(
+            success=not faults,
+            message=f"{'; '.join(faults)} (Ipopt: {status})" if faults else passes,
+            joint_names=self.joint_names,
+            positions=tuple(points[-1].tolist()),
+            position_error_m=max(residual.position_m for residual in residuals),
+            orientation_error_rad=max(residual.orientation_rad for residual in residuals),
+            trajectory=None if faults else self._sampled(spline, points, duration_s),
+        )
+
+    def _program(self, times_s: np.ndarray) -> tuple[Spline, Program]:
+        """Returns splines that are fine enough for the waypoints, and their program."""
+        gap = float(np.diff(times_s).min() / times_s[-1])
+        intervals = self._config.intervals
+        while gap * intervals < 2.0 and intervals < MOST_INTERVALS:
+            intervals *= 2
+        key = intervals, len(times_s) - 1
+        if key not in self._programs:
+            program = Program(self._kinematics, self._obstacles, len(self.joint_names), Spline(intervals), key[1])
+            self._programs[key] = program
+        return Spline(intervals), self._programs[key]
+
+    def _nearest_m(self, q: np.ndarray) -> float:
+        """Returns the least distance of all pairs in k x n positions; inf without any [m]."""
+        if not self._obstacles.pairs:
+            return math.inf
+        return float(np.array(self._distances.map(len(q))(q.T)).min())
+
+    def _too_fast(self, spline: Spline, points: np.ndarray, duration_s: float) -> list[str]:
+        """Tells where speeds or accelerations are beyond their limits, checked closely."""
+        faults = []
+        for order, most, unit in ((1, self._max_velocity, "/s"), (2, self._max_acceleration, "/s^2")):
+            values = np.abs(spline.basis(_checks(spline), order) @ points).max(axis=0) / duration_s**order
+            i = int((values / most).argmax())
+            if values[i] > most[i]:
+                faults.append(f"'{self.joint_names[i]}' needs {values[i]:.4g} rad{unit}, its limit is {most[i]:.4g}")
+        return faults
+
+    def _sampled(self, spline: Spline, points: np.ndarray, duration_s: float) -> JointTrajectory:
+        times = np.linspace(0.0, 1.0, max(1, math.ceil(duration_s / self._config.sample_s)) + 1)
+        positions, velocities = spline.basis(times) @ points, spline.basis(times, 1) @ points / duration_s
+        return JointTrajectory(
+            times_s=tuple((times * duration_s).tolist()),
+            positions=tuple(map(tuple, np.clip(positions, self.lower, self.upper).tolist())),
+            velocities=tuple(map(tuple, velocities.tolist())),
+        )
+
+
+def _flat(waypoint: Waypoint) -> np.ndarray:
+    """Returns rotation by columns and position of a waypoint, 12 numbers."""
+    return np.concatenate((rotation_matrix(waypoint.pose).T.ravel(), waypoint.pose.position))
+
+
+def _checks(spline: Spline) -> np.ndarray:
+    return np.linspace(0.0, 1.0, CHECKS * spline.intervals + 1)
+
+
+def _in_words(residual: Residual) -> str:
+    return f"{residual.position_m * 1e3:.3g} mm and {residual.orientation_rad:.3g} rad"

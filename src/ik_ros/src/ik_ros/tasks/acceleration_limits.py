@@ -1,0 +1,59 @@
+"""How fast the speed of joints may change from one solution to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.schema import Positive, Seconds
+
+from ..problem import IKProblem
+from .joint_task import JointTask
+from .robot import Robot
+from .task import TaskConfig
+
+
+class AccelerationLimitsConfig(TaskConfig):
+    """What this task is told.
+
+    Attributes:
+        dt_s: Time between solutions [s].
+        limits: Largest acceleration of joints [rad/s^2 or m/s^2].
+    """
+
+    dt_s: Seconds
+    limits: dict[str, Positive] = Field(min_length=1)
+    tolerance_rad: Positive = 1e-6
+
+
+class AccelerationLimits(JointTask):
+    """Keeps joints near where the last two solutions lead; with one solution they start at rest, with none free.
+
+    Args:
+        config: Its options.
+        robot: The robot.
+    """
+
+    Config = AccelerationLimitsConfig
+
+    def __init__(self, config: AccelerationLimitsConfig, robot: Robot) -> None:
+        super().__init__(config, robot, list(config.limits), "limits")
+        self._way = np.array(list(config.limits.values())) * config.dt_s**2
+        self._ahead: np.ndarray | None = None
+
+    def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
+        """See `Task`."""
+        super().begin(problem, goal, q)
+        known = [self.positions(solution) for solution in problem.previous[-2:]]
+        newest = known[-1] if known else None
+        older = known[0] if known else None
+        self._ahead = None if newest is None else newest if older is None else 2.0 * newest - older
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `JointTask`."""
+        if self._ahead is None:
+            unlimited = np.full(len(self._way), np.inf)
+            return -unlimited, unlimited
+        return self._ahead - self._way, self._ahead + self._way

@@ -1,0 +1,35 @@
+"""Staying where the robot was."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..problem import IKProblem
+from .joint_task import JointTask
+from .robot import Robot
+from .task import TaskConfig
+
+
+class Closeness(JointTask):
+    """Keeps joints near the previous solution of the problem; if it has none, near its start.
+
+    Args:
+        config: Its options.
+        robot: The robot.
+    """
+
+    def __init__(self, config: TaskConfig, robot: Robot) -> None:
+        super().__init__(config, robot, robot.joint_names, "name")
+        self._goal = np.zeros(len(self.indices))
+
+    def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
+        """See `Task`."""
+        super().begin(problem, goal, q)
+        previous = self.positions(problem.previous[-1]) if problem.previous else None
+        self._goal = self.robot.positions(q) if previous is None else previous
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `JointTask`."""
+        return self._goal, self._goal

@@ -1,0 +1,90 @@
+"""Balance: the centre of mass stays over what the robot stands on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.errors import UnknownNameError
+from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Position
+
+from .robot import Robot
+from .task import Rows, Task, TaskConfig
+
+
+class ComInSupportConfig(TaskConfig):
+    """What this task is told.
+
+    Attributes:
+        support: Points of links that stand on the ground, in the link [m], such as the corners of both soles.
+        margin: How far inside the polygon around them the centre of mass stays [m].
+    """
+
+    support: dict[str, ListOf[Position]] = Field(min_length=1)
+    margin: NonNegative = 0.0
+
+
+class ComInSupport(Task):
+    """Keeps the centre of mass over the support polygon, seen along the z axis of the base, which is upright.
+
+    The polygon is the convex hull of the contact points where they are now; that it moves with them is left out of the
+    Jacobian, since feet that stand are held by constraints of their own.
+
+    Args:
+        config: Its options.
+        robot: The robot.
+    """
+
+    Config = ComInSupportConfig
+
+    def __init__(self, config: ComInSupportConfig, robot: Robot) -> None:
+        super().__init__(config, robot)
+        self._margin = config.margin
+        try:
+            self._contacts = [(robot.link_id(link), np.array(points)) for link, points in config.support.items()]
+        except UnknownNameError as error:
+            raise KeyedError("support", str(error)) from None
+        if sum(len(points) for _, points in self._contacts) < 3:
+            raise KeyedError("support", "expected 3 points at least")
+
+    def rows(self, q: np.ndarray) -> Rows:
+        """See `Task`: how far the centre of mass is outside of each edge; negative inside [m]."""
+        com, jacobian = self.robot.com(q)
+        corners = self.polygon()
+        edges = np.roll(corners, -1, axis=0) - corners
+        lengths = np.linalg.norm(edges, axis=1)
+        kept = lengths > 1e-9
+        outward = np.stack((edges[kept, 1], -edges[kept, 0]), axis=1) / lengths[kept, None]
+        values = np.einsum("ij,ij->i", outward, com[:2] - corners[kept])
+        upper = np.full(len(values), -self._margin)
+        return Rows(values, outward @ jacobian[:2], np.full(len(values), -np.inf), upper)
+
+    def polygon(self) -> np.ndarray:
+        """Returns the corners of the support polygon in the base, k x 2, counter-clockwise [m]."""
+        points = [self.robot.frame(link).act(point) for link, points in self._contacts for point in points]
+        return np.array(_hull((float(x), float(y)) for x, y, _ in points))
+
+
+def _hull(points: Iterable[tuple[float, float]]) -> Sequence[tuple[float, float]]:
+    """Returns the convex hull of points, counter-clockwise.
+
+    After Andrew, Another efficient algorithm for convex hulls in two dimensions, Information Processing Letters 9(5),
+    1979.
+    """
+    ordered = sorted(set(points))
+    lower, upper = _half_hull(ordered), _half_hull(ordered[::-1])
+    return lower[:-1] + upper[:-1]
+
+
+def _half_hull(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    kept: list[tuple[float, float]] = []
+    for x, y in points:
+        while len(kept) > 1:
+            (x0, y0), (x1, y1) = kept[-2:]
+            if (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0) > 0.0:
+                break
+            kept.pop()
+        kept.append((x, y))
+    return kept

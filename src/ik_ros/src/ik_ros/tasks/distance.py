@@ -1,0 +1,86 @@
+"""Distance between links, and between links and obstacles."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.errors import UnknownNameError
+from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Text
+
+from .clearance import Placed, clearance
+from .robot import Robot
+from .robot_shape import RobotShape
+from .task import Rows, Task, TaskConfig
+
+NEAR_M = 0.3
+"""What is farther apart than asked by more than this is not looked at in this step [m]."""
+
+
+class DistanceConfig(TaskConfig):
+    """What this task is told.
+
+    Attributes:
+        pairs: Names of two shapes each.
+        at_least: How far they stay apart [m].
+    """
+
+    pairs: ListOf[ListOf[Text]] = Field(min_length=1)
+    at_least: NonNegative = 0.0
+
+
+class Distance(Task):
+    """Keeps shapes of the formulation apart, in pairs; one of each pair at most is a box, and one at least moves.
+
+    Args:
+        config: Its options.
+        robot: The robot, which knows the shapes.
+    """
+
+    Config = DistanceConfig
+
+    def __init__(self, config: DistanceConfig, robot: Robot) -> None:
+        super().__init__(config, robot)
+        self._at_least = config.at_least
+        self._pairs: list[tuple[RobotShape, RobotShape]] = []
+        for i, pair in enumerate(config.pairs):
+            key = f"pairs[{i}]"
+            if len(pair) != 2:
+                raise KeyedError(key, f"expected two shapes, got {len(pair)}")
+            try:
+                first, second = (robot.shape(name) for name in pair)
+            except UnknownNameError as error:
+                raise KeyedError(key, str(error)) from None
+            if first.link_id == second.link_id:
+                raise KeyedError(key, f"'{pair[0]}' and '{pair[1]}' are at the same link, or both stand still")
+            if first.core.is_box and second.core.is_box:
+                raise KeyedError(key, "both are boxes; give one as a capsule or some spheres")
+            self._pairs.append((first, second))
+
+    def rows(self, q: np.ndarray) -> Rows:
+        """See `Task`: the distance of each pair that is near [m]."""
+        values, rows = [], []
+        for first, second in self._pairs:
+            found = clearance(self._placed(first), self._placed(second))
+            if found.distance < self._at_least + NEAR_M:
+                values.append(found.distance)
+                way = found.direction
+                rows.append(self._along(second, found.second, way) - self._along(first, found.first, way))
+        count = len(values)
+        jacobian = np.array(rows) if rows else np.zeros((0, len(self.robot.free)))
+        return Rows(np.array(values), jacobian, np.full(count, self._at_least), np.full(count, np.inf))
+
+    def _placed(self, shape: RobotShape) -> Placed:
+        placement = shape.placement
+        if shape.link_id is not None:
+            placement = self.robot.frame(shape.link_id) * placement
+        return Placed(shape.core, placement.rotation, placement.translation)
+
+    def _along(self, shape: RobotShape, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """Returns how a point of a shape moves along a direction, with what is free."""
+        if shape.link_id is None:
+            return np.zeros(len(self.robot.free))
+        frame = self.robot.frame(shape.link_id)
+        jacobian = self.robot.jacobian(shape.link_id)
+        along = frame.rotation.T @ direction
+        return along @ jacobian[:3] + np.cross(frame.actInv(point), along) @ jacobian[3:]

@@ -1,0 +1,22 @@
+"""The orientation of a link."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rpbi.pose import Pose
+
+from .frame_task import FrameTask
+
+
+class FrameOrientation(FrameTask):
+    """Turns a link to a quaternion x, y, z, w, of any length but 0; any position will do."""
+
+    available = ("rx", "ry", "rz")
+    goal_words = "a quaternion (x, y, z, w) that is not zero"
+
+    def pose_of(self, values: Sequence[float]) -> Pose:
+        """See `FrameTask`."""
+        if len(values) != 4:
+            raise ValueError(f"expected {self.goal_words}, got {list(values)}")
+        return super().pose_of((0.0, 0.0, 0.0, *values))

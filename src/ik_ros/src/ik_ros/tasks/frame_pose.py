@@ -1,0 +1,9 @@
+"""The pose of a link."""
+
+from __future__ import annotations
+
+from .frame_task import FrameTask
+
+
+class FramePose(FrameTask):
+    """Brings a link to a pose: position [m] and quaternion x, y, z, w."""

@@ -1,0 +1,23 @@
+"""The position of a link."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rpbi.pose import Pose
+
+from .frame_task import FrameTask
+
+
+class FramePosition(FrameTask):
+    """Brings the origin of a link to a position x, y, z [m]; any orientation will do."""
+
+    available = ("x", "y", "z")
+    goal_words = "a position (x, y, z)"
+
+    def pose_of(self, values: Sequence[float]) -> Pose:
+        """See `FrameTask`; the axes of the goal are those of the base."""
+        if len(values) != 3:
+            raise ValueError(f"expected {self.goal_words}, got {list(values)}")
+        x, y, z = values
+        return Pose((x, y, z))

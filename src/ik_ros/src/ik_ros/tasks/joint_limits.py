@@ -1,0 +1,56 @@
+"""Limits of joints, narrower than those of the URDF."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Positive
+
+from .joint_task import JointTask
+from .robot import Robot
+from .task import TaskConfig
+
+
+class JointLimitsConfig(TaskConfig):
+    """What this task is told.
+
+    Attributes:
+        limits: Lower and upper limit of joints [rad or m].
+        margin: How far to stay off the URDF's limits, for all joints [rad or m].
+    """
+
+    limits: dict[str, ListOf[float]] = Field(default_factory=dict)
+    margin: NonNegative = 0.0
+    tolerance_rad: Positive = 1e-6
+
+
+class JointLimits(JointTask):
+    """Keeps joints within limits; those of the URDF are kept anyway.
+
+    Args:
+        config: Its options.
+        robot: The robot.
+    """
+
+    Config = JointLimitsConfig
+
+    def __init__(self, config: JointLimitsConfig, robot: Robot) -> None:
+        super().__init__(config, robot, [*robot.joint_names], "limits")
+        lower, upper = robot.lower + config.margin, robot.upper - config.margin
+        for name, limits in config.limits.items():
+            if name not in robot.joint_names:
+                super().__init__(config, robot, [name], f"limits.{name}")
+            if len(limits) != 2 or limits[0] > limits[1]:
+                raise KeyedError(f"limits.{name}", f"expected a lower and an upper limit, got {list(limits)}")
+            i = robot.index(name)
+            lower[i], upper[i] = max(lower[i], limits[0]), min(upper[i], limits[1])
+        for name, low, high in zip(robot.joint_names, lower, upper):
+            if low > high:
+                key = f"limits.{name}" if name in config.limits else "margin"
+                raise KeyedError(key, f"leaves '{name}' no position: {low:g} to {high:g}")
+        self._bounds = lower, upper
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `JointTask`."""
+        return self._bounds

@@ -1,0 +1,52 @@
+"""Tasks about positions of joints."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from custom_ros_tools.errors import UnknownNameError
+from custom_ros_tools.schema import KeyedError
+from rpbi.kinematics.residual import Residual
+
+from .robot import Robot
+from .task import Rows, Task, TaskConfig
+
+
+class JointTask(Task):
+    """Wants positions of some joints within bounds.
+
+    Args:
+        config: Its options.
+        robot: The robot.
+        joints: Names of the k joints.
+        key: The option that names them, for messages.
+    """
+
+    def __init__(self, config: TaskConfig, robot: Robot, joints: Sequence[str], key: str) -> None:
+        super().__init__(config, robot)
+        try:
+            self.indices = [robot.index(name) for name in joints]
+        except UnknownNameError as error:
+            raise KeyedError(key, str(error)) from None
+        self._jacobian = robot.joint_rows(self.indices)
+
+    @abstractmethod
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Returns k lower and k upper bounds [rad or m]."""
+
+    def positions(self, named: Mapping[str, float]) -> np.ndarray | None:
+        """Returns the k positions of a problem's solution [rad or m], None if it lacks one of them."""
+        names = [self.robot.joint_names[i] for i in self.indices]
+        return np.array([named[name] for name in names]) if all(name in named for name in names) else None
+
+    def rows(self, q: np.ndarray) -> Rows:
+        """See `Task`."""
+        return Rows(self.robot.positions(q)[self.indices], self._jacobian, *self.bounds())
+
+    def residual(self, beyond: np.ndarray) -> Residual:
+        """See `Task`."""
+        return Residual(0.0, math.hypot(*beyond.tolist()))

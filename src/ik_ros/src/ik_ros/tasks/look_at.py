@@ -1,0 +1,99 @@
+"""Where a link looks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+
+from custom_ros_tools.errors import UnknownNameError
+from custom_ros_tools.schema import KeyedError, Position, Text, Vec3
+from rpbi.kinematics.residual import Residual
+
+from ..problem import IKProblem
+from .robot import Robot
+from .task import Rows, Task, TaskConfig
+
+NEAREST_M = 1e-6
+"""What is nearer has no direction [m]."""
+ZERO = np.zeros(2)
+
+
+class LookAtConfig(TaskConfig):
+    """What this task is told.
+
+    Attributes:
+        frame: The link.
+        axis: Its axis that is to point at something, in the link; any length but 0.
+        goal: The point, x, y, z in the base [m]; None: each problem says.
+    """
+
+    frame: Text
+    axis: Vec3 = (0.0, 0.0, 1.0)
+    goal: Position | None = None
+
+
+class LookAt(Task):
+    """Turns an axis through a link's origin towards a point, such as that of a camera.
+
+    Args:
+        config: Its options.
+        robot: The robot.
+    """
+
+    Config = LookAtConfig
+
+    def __init__(self, config: LookAtConfig, robot: Robot) -> None:
+        super().__init__(config, robot)
+        try:
+            self._link_id = robot.link_id(config.frame)
+        except UnknownNameError as error:
+            raise KeyedError("frame", str(error)) from None
+        length = math.hypot(*config.axis)
+        if length < 1e-6:
+            raise KeyedError("axis", "must not be zero")
+        self._axis = np.array(config.axis) / length
+        across = np.eye(3)[np.argmin(np.abs(self._axis))]
+        first = np.cross(self._axis, across)
+        first /= np.linalg.norm(first)
+        self._across = np.stack((first, np.cross(self._axis, first)))
+        self._default = config.goal
+        self._goal = np.zeros(3)
+
+    def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
+        """See `Task`."""
+        point = self._default if goal is None else goal
+        if point is None:
+            raise ValueError("missing, neither the problem nor the formulation has one")
+        if len(point) != 3:
+            raise ValueError(f"expected a point (x, y, z), got {list(point)}")
+        self._goal = np.array(point)
+
+    def rows(self, q: np.ndarray) -> Rows:
+        """See `Task`: the angle to the point, as two components across the axis [rad]."""
+        point = self.robot.frame(self._link_id).actInv(self._goal)  # in the link
+        jacobian = self.robot.jacobian(self._link_id)
+        change = pin.skew(point) @ jacobian[3:] - jacobian[:3]
+        across, ahead = self._across @ point, float(self._axis @ point)
+        distance2 = float(point @ point)
+        if distance2 < NEAREST_M**2:
+            return Rows(ZERO, np.zeros((2, jacobian.shape[1])), ZERO, ZERO)
+        aside = float(np.linalg.norm(across))
+        if aside < 1e-9:
+            across, aside = np.array((1e-9, 0.0)), 1e-9
+        angle = math.atan2(aside, ahead)
+        # v = (angle / aside) across, with angle = atan2(aside, ahead)
+        ratio = angle / aside
+        by_aside = (ahead / distance2 - ratio) / aside
+        by_ahead = -1.0 / distance2
+        change_across = self._across @ change
+        change_aside = across @ change_across / aside
+        change_ratio = by_aside * change_aside + by_ahead * (self._axis @ change)
+        rows = ratio * change_across + np.outer(across, change_ratio)
+        return Rows(ratio * across, rows, ZERO, ZERO)
+
+    def residual(self, beyond: np.ndarray) -> Residual:
+        """See `Task`."""
+        return Residual(0.0, math.hypot(*beyond.tolist()))

@@ -1,0 +1,49 @@
+"""A posture that is preferred."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydantic import Field
+
+from ..problem import IKProblem
+from .joint_task import JointTask
+from .robot import Robot
+from .task import TaskConfig
+
+
+class PostureConfig(TaskConfig):
+    """What this task is told.
+
+    Attributes:
+        goal: Position of each joint that counts [rad or m].
+    """
+
+    goal: dict[str, float] = Field(min_length=1)
+
+
+class Posture(JointTask):
+    """Brings joints to given positions; goals of problems have one for each, in the same order.
+
+    Args:
+        config: Its options.
+        robot: The robot.
+    """
+
+    Config = PostureConfig
+
+    def __init__(self, config: PostureConfig, robot: Robot) -> None:
+        super().__init__(config, robot, list(config.goal), "goal")
+        self._default = np.array(list(config.goal.values()))
+        self._goal = self._default
+
+    def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
+        """See `Task`."""
+        if goal is not None and len(goal) != len(self._default):
+            raise ValueError(f"expected {len(self._default)} positions, got {len(goal)}")
+        self._goal = self._default if goal is None else np.array(goal)
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `JointTask`."""
+        return self._goal, self._goal

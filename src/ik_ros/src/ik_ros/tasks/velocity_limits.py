@@ -1,0 +1,59 @@
+"""How fast joints may go from one solution to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.schema import Positive, Seconds
+
+from ..problem import IKProblem
+from .joint_task import JointTask
+from .robot import Robot
+from .task import TaskConfig
+
+
+class VelocityLimitsConfig(TaskConfig):
+    """What this task is told.
+
+    Attributes:
+        dt_s: Time from the previous solution to this one [s].
+        limits: Largest speed of joints [rad/s or m/s]; without any, all joints have those of the URDF.
+        factor: What the speeds are multiplied with.
+    """
+
+    dt_s: Seconds
+    limits: dict[str, Positive] = Field(default_factory=dict)
+    factor: Positive = 1.0
+    tolerance_rad: Positive = 1e-6
+
+
+class VelocityLimits(JointTask):
+    """Keeps joints as near to the previous solution as their speed allows; without one, they are free.
+
+    Args:
+        config: Its options.
+        robot: The robot.
+    """
+
+    Config = VelocityLimitsConfig
+
+    def __init__(self, config: VelocityLimitsConfig, robot: Robot) -> None:
+        super().__init__(config, robot, list(config.limits) or robot.joint_names, "limits")
+        speeds = np.array(list(config.limits.values())) if config.limits else robot.max_velocity
+        self._way = speeds * config.factor * config.dt_s
+        self._previous: np.ndarray | None = None
+
+    def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
+        """See `Task`."""
+        super().begin(problem, goal, q)
+        self._previous = self.positions(problem.previous[-1]) if problem.previous else None
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `JointTask`."""
+        if self._previous is None:
+            unlimited = np.full(len(self._way), np.inf)
+            return -unlimited, unlimited
+        return self._previous - self._way, self._previous + self._way

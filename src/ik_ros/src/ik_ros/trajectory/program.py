@@ -1,0 +1,132 @@
+"""The nonlinear program that shapes splines of joints."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import casadi
+import numpy as np
+
+from .forward_kinematics import ForwardKinematics, rotation_vector
+from .obstacles import Obstacles
+from .spline import Spline
+
+SAMPLES = 2
+"""At so many places in each interval of the spline, obstacles are looked at."""
+SAFETY_M = 5e-3
+"""Spheres stay this much farther away there, since between two places they may come nearer [m]."""
+ITERATIONS = 100
+OPTIONS: Any = {
+    "print_time": False,
+    "error_on_fail": False,
+    "ipopt": {
+        "print_level": 0,
+        "sb": "yes",
+        "max_iter": ITERATIONS,
+        "tol": 1e-5,
+        "constr_viol_tol": 1e-6,
+        "expect_infeasible_problem": "yes",
+        "bound_relax_factor": 0.0,
+    },
+}
+
+
+class Question(NamedTuple):
+    """What a program is asked, over the time from 0 to 1, for n joints, m control points and w waypoints.
+
+    Attributes:
+        start: n positions where it begins, at rest [rad or m].
+        poses: Rotation (9 numbers, by columns) and position (3) of each waypoint, 12 x w.
+        basis: What each control point counts at each waypoint, w x m.
+        tolerance: How far off a waypoint the tip may be, along and about its axes: 6 numbers [m, rad].
+        lower: n lower limits [rad or m].
+        upper: n upper limits.
+        max_velocity: n largest speeds, per unit of time.
+        max_acceleration: n largest accelerations, per unit of time squared.
+        clearance: How far spheres stay away from obstacles [m].
+        guess: m x n control points to start from.
+    """
+
+    start: np.ndarray
+    poses: np.ndarray
+    basis: np.ndarray
+    tolerance: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    max_velocity: np.ndarray
+    max_acceleration: np.ndarray
+    clearance: float
+    guess: np.ndarray
+
+
+class Program:
+    """Finds the smoothest splines that pass all waypoints within limits; Ipopt solves it.
+
+    Args:
+        kinematics: The chain.
+        obstacles: What it has to stay away from.
+        joints: Number of joints.
+        spline: The splines.
+        waypoints: Number of waypoints.
+    """
+
+    def __init__(
+        self, kinematics: ForwardKinematics, obstacles: Obstacles, joints: int, spline: Spline, waypoints: int
+    ) -> None:
+        self._spline, self._joints = spline, joints
+        points = casadi.MX.sym("points", spline.count, joints)
+        poses = casadi.MX.sym("poses", 12, waypoints)
+        basis = casadi.MX.sym("basis", waypoints, spline.count)
+        q = casadi.SX.sym("q", joints)
+        frames = kinematics.frames(q)
+        pose = casadi.SX.sym("pose", 12)
+        rotation, position = list(frames.values())[-1]
+        target = casadi.reshape(pose[:9], 3, 3)
+        off = casadi.vertcat(target.T @ (position - pose[9:]), rotation_vector(target.T @ rotation))
+        to_off = casadi.Function("off", [q, pose], [off])
+        passed = [to_off((basis[i, :] @ points).T, poses[:, i]) for i in range(waypoints)]
+        self._pairs = len(obstacles.pairs)
+        times = np.linspace(0.0, 1.0, SAMPLES * spline.intervals + 1)[1:]
+        self._samples = len(times) if self._pairs else 0
+        apart = []
+        if self._pairs:
+            to_distances = casadi.Function("distances", [q], [casadi.vertcat(*obstacles.distances(frames))])
+            sampled = casadi.DM(spline.basis(times)) @ points
+            apart = [to_distances(sampled[i, :].T) for i in range(len(times))]
+        constraints = casadi.vertcat(
+            casadi.vec(casadi.DM(spline.to_velocity) @ points),
+            casadi.vec(casadi.DM(spline.to_acceleration) @ points),
+            *passed,
+            *apart,
+        )
+        cost = casadi.sum1(casadi.sum2(points * (casadi.DM(spline.roughness) @ points)))
+        parameters = casadi.vertcat(casadi.vec(poses), casadi.vec(basis))
+        nlp: Any = {"x": casadi.vec(points), "p": parameters, "f": cost, "g": constraints}
+        self._solve: Any = casadi.nlpsol("trajectory", "ipopt", nlp, OPTIONS)
+        self._waypoints = waypoints
+
+    def solve(self, question: Question) -> tuple[np.ndarray, str]:
+        """Returns m x n control points within limits [rad or m], and how Ipopt says it went."""
+        count = self._spline.count
+        lower, upper = np.tile(question.lower, (count, 1)), np.tile(question.upper, (count, 1))
+        lower[:2] = upper[:2] = question.start  # two equal control points are an end at rest
+        speed = np.tile(question.max_velocity, (count - 1, 1))
+        speed[-1] = 0.0
+        change = np.tile(question.max_acceleration, (count - 2, 1))
+        tolerance = np.tile(question.tolerance, self._waypoints)
+        clearance = np.full(self._samples * self._pairs, question.clearance + SAFETY_M)
+        most = np.concatenate((speed.T.ravel(), change.T.ravel(), tolerance))
+        answer = self._solve(
+            x0=question.guess.T.ravel(),
+            p=np.concatenate((question.poses.T.ravel(), question.basis.T.ravel())),
+            lbx=lower.T.ravel(),
+            ubx=upper.T.ravel(),
+            lbg=np.concatenate((-most, clearance)),
+            ubg=np.concatenate((most, np.full(len(clearance), np.inf))),
+        )
+        points = np.array(answer["x"]).reshape(self._joints, count).T
+        status = str(self._solve.stats()["return_status"])
+        if not np.isfinite(points).all():
+            return np.tile(question.start, (count, 1)), status
+        points[-2] = points[-1]
+        return np.clip(points, question.lower, question.upper), status

@@ -1,0 +1,66 @@
+"""Splines for joints, whose control points bound them."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+DEGREE = 3
+
+
+class Spline:
+    """Cubic B-splines over the time from 0 to 1, for any number of joints.
+
+    Between its ends, a B-spline is a mean of its control points, and so are its derivatives of theirs: limits that
+    control points keep are kept everywhere (de Boor, A Practical Guide to Splines, 1978). Accelerations are piecewise
+    linear.
+
+    Args:
+        intervals: How many polynomials follow each other.
+
+    Attributes:
+        count: Number m of control points.
+        times: When each control point counts most, from 0 to 1: the means of their knots.
+        to_velocity: Control points of the velocity from those of the position, (m - 1) x m.
+        to_acceleration: The same of the acceleration, (m - 2) x m.
+    """
+
+    def __init__(self, intervals: int) -> None:
+        knots = np.linspace(0.0, 1.0, intervals + 1)
+        self.intervals = intervals
+        self.count = intervals + DEGREE
+        self._knots = np.concatenate((np.zeros(DEGREE), knots, np.ones(DEGREE)))
+        self.times = np.array([self._knots[i + 1 : i + 1 + DEGREE].mean() for i in range(self.count)])
+        self.to_velocity = _derivative(self._knots, DEGREE, self.count)
+        self.to_acceleration = _derivative(self._knots[1:-1], DEGREE - 1, self.count - 1) @ self.to_velocity
+
+    def basis(self, times: np.ndarray, order: int = 0) -> np.ndarray:
+        """Returns what each control point counts.
+
+        Args:
+            times: k times from 0 to 1.
+            order: 0 for positions, 1 for velocities, 2 for accelerations, per unit of time.
+
+        Returns:
+            k x m numbers; times the control points, they are the k values.
+        """
+        spline = BSpline(self._knots, np.eye(self.count), DEGREE)
+        return np.asarray((spline.derivative(order) if order else spline)(times))
+
+    @property
+    def roughness(self) -> np.ndarray:
+        """The matrix of the integral of the squared acceleration, m x m."""
+        pair = np.array(((2.0, 1.0), (1.0, 2.0))) / (6.0 * self.intervals)  # of a line's square, by its ends
+        weights = np.zeros((self.count - 2,) * 2)
+        for i in range(self.intervals):
+            weights[i : i + 2, i : i + 2] += pair
+        return np.asarray(self.to_acceleration.T @ weights @ self.to_acceleration)
+
+
+def _derivative(knots: np.ndarray, degree: int, count: int) -> np.ndarray:
+    """Returns control points of the derivative from those of a spline (de Boor, chapter X)."""
+    matrix = np.zeros((count - 1, count))
+    for i in range(count - 1):
+        slope = degree / (knots[i + degree + 1] - knots[i + 1])
+        matrix[i, i : i + 2] = -slope, slope
+    return matrix

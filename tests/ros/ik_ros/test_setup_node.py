@@ -1,0 +1,234 @@
+"""`ik_setup_node.py`: TF, joint states, tolerances and goals become problems; `tf_to_floatarray_node.py`."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import rospy
+import tf2_ros
+from geometry_msgs.msg import Point, Pose, Quaternion
+from ik_nodes import HOME, JOINTS, start_setup, transform
+from node_world import Rosout, publishing
+from ros_system import wait_until
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, Float64MultiArray
+from std_srvs.srv import SetBool
+from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit
+
+from ik_ros.msg import IKProblem
+
+TARGET = Pose(Point(0.3, -0.2, 0.5), Quaternion(0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5)))
+FRAMES = {"parent_frame_id": "foot", "child_frame_id": "target"}
+
+
+@pytest.fixture
+def target(ros):
+    """Broadcasts where the target is, as often as it is called."""
+    broadcaster = tf2_ros.TransformBroadcaster()
+
+    def send(pose: Pose = TARGET) -> None:
+        broadcaster.sendTransform(transform("foot", "target", pose, rospy.Time.from_sec(rospy.get_time())))
+
+    return send
+
+
+def hear(problems, target, condition, what):
+    """Keeps the target alive until the newest problem fulfils a condition, and returns it."""
+    wait_until(lambda: target() or (problems.messages and condition(problems.messages[-1])), what)
+    return problems.messages[-1]
+
+
+def test_target_start_tolerances_and_previous_solutions_come_together(ros, target):
+    start_setup(ros, **FRAMES, init_bx=0.01, max_num_prev_solutions=2, seed=7, hz=100.0)
+    problems = ros.listen("ik", IKProblem)
+    with (
+        publishing("ik/setup/kdl/qinit", JointState) as start,
+        publishing("ik/setup/kdl/brz", Float64) as turn,
+        publishing("ik/setup/kdl/previous_solutions", JointState) as previous,
+    ):
+        start.publish(JointState(name=JOINTS, position=HOME))
+        turn.publish(3.2)
+        for value in (0.1, 0.2, 0.3):
+            previous.publish(JointState(name=["a"], position=[value]))
+        problem = hear(
+            problems,
+            target,
+            lambda one: one.start.name and one.rotation_tolerance.z and len(one.previous_solutions) == 2
+            and one.previous_solutions[-1].position == (0.3,),
+            "a problem has all of it",
+        )
+    assert problem.has_target and problem.target == TARGET
+    assert problem.header.frame_id == "foot" and problem.header.stamp
+    assert dict(zip(problem.start.name, problem.start.position)) == pytest.approx(dict(zip(JOINTS, HOME)))
+    assert (problem.position_tolerance.x, problem.position_tolerance.y, problem.rotation_tolerance.z) == (0.01, 0, 3.2)
+    assert [one.position for one in problem.previous_solutions] == [(0.2,), (0.3,)]
+    assert problem.seed == 7
+    assert rospy.get_param("ik_ros/interface") == "kdl"
+
+
+def test_nothing_is_published_before_there_is_a_target_or_when_its_tf_stops(ros, target):
+    rosout = Rosout(ros)
+    start_setup(ros, **FRAMES, tf_timeout_s=0.2)
+    problems = ros.listen("ik", IKProblem)
+    wait_until(lambda: rosout.logs("there is no TF from 'foot' to 'target'"), "it says what it lacks")
+    assert problems.messages == []
+    hear(problems, target, lambda _: True, "problems come")
+    wait_until(lambda: rosout.logs("is stale: nothing new has come"), "it says that TF is stale", 20.0)
+    count = len(problems.messages)
+    wait_until(lambda: target() or len(problems.messages) > count, "problems come again when TF does")
+
+
+def test_static_target_never_gets_stale(ros):
+    tf2_ros.StaticTransformBroadcaster().sendTransform(transform("foot", "target", TARGET, rospy.Time(0)))
+    start_setup(ros, **FRAMES, tf_timeout_s=0.05, hz=100.0)
+    problems = ros.listen("ik", IKProblem)
+    problems.wait_for(50)
+
+
+def test_goals_of_tasks_change_by_topic_and_keep_their_length(ros):
+    rosout = Rosout(ros)
+    start_setup(ros, "tasks", goals={"hand": [0.1, 0.2, 0.3], "head": [1.0]})
+    problems = ros.listen("ik", IKProblem)
+
+    def goals():
+        return {goal.task: goal.values for goal in problems.messages[-1].goals} if problems.messages else {}
+
+    wait_until(lambda: goals() == {"hand": (0.1, 0.2, 0.3), "head": (1.0,)}, "the first goals come")
+    assert not problems.messages[-1].has_target
+    with publishing("ik/setup/tasks/task_map_goal/hand", Float64MultiArray) as hand:
+        hand.publish(Float64MultiArray(data=[0.1, 0.2]))
+        hand.publish(Float64MultiArray(data=[0.1, 0.2, math.nan]))
+        hand.publish(Float64MultiArray(data=[0.4, 0.5, 0.6]))
+        wait_until(lambda: goals() == {"hand": (0.4, 0.5, 0.6), "head": (1.0,)}, "a goal changes")
+    assert rosout.logs("task_map_goal/hand: message refused: expected 3 values")
+
+
+@pytest.mark.parametrize(
+    ("topic", "message", "told"),
+    [
+        ("qinit", JointState(name=["a"], position=[math.nan]), "values must be finite"),
+        ("currentPosition", JointState(position=[1.0]), "expected the names"),
+        ("bx", Float64(-0.1), "must not be negative"),
+        ("brx", Float64(math.inf), "expected finite numbers"),
+    ],
+)
+def test_bad_messages_are_refused_and_the_topic_named(ros, target, topic, message, told):
+    rosout = Rosout(ros)
+    start_setup(ros, **FRAMES)
+    problems = ros.listen("ik", IKProblem)
+    with publishing(f"ik/setup/kdl/{topic}", type(message)) as publisher:
+        wait_until(lambda: publisher.publish(message) or rosout.logs(told), "it is refused")
+    assert f"/ik/setup/kdl/{topic}" in rosout.logs(told)[0].msg
+    problem = hear(problems, target, lambda _: True, "problems go on")
+    assert problem.start.name == [] and problem.position_tolerance.x == problem.rotation_tolerance.x == 0.0
+
+
+def test_it_is_switched_by_service(ros, target):
+    start_setup(ros, start_on_init=False, **FRAMES)
+    problems = ros.listen("ik", IKProblem)
+    assert ros.call("ik/setup/kdl/toggle", SetBool, True).success
+    hear(problems, target, lambda _: True, "problems come")
+    assert ros.call("ik/setup/kdl/toggle", SetBool, False).success
+    rospy.rostime.wallsleep(0.2)  # those under way arrive
+    count = len(problems.messages)
+    for _ in range(20):
+        target()
+        rospy.rostime.wallsleep(0.02)
+    assert len(problems.messages) == count
+
+
+@pytest.mark.parametrize(
+    ("parameters", "told"),
+    [
+        ({"parent_frame_id": "foot"}, "child_frame_id: missing; parent_frame_id and child_frame_id go together"),
+        ({}, "child_frame_id: missing; a problem has a target frame, or goals of tasks"),
+        ({**FRAMES, "hz": 0.0}, "hz: must be > 0"),
+        ({**FRAMES, "init_brx": -1.0}, "init_brx: must be >= 0"),
+    ],
+)
+def test_wrong_parameters_end_it_with_1_and_their_names(ros, parameters, told):
+    rospy.set_param("/ik_setup_node", parameters)
+    process = ros.start(["rosrun", "ik_ros", "ik_setup_node.py", "kdl", "__name:=ik_setup_node"])
+    assert process.wait(20.0) == 1
+    assert told in ros.output(process), ros.output(process)
+
+
+@pytest.mark.parametrize(
+    ("mode", "rotation"),
+    [("pos", ()), ("pos+quat", (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))), ("pos+eul", (0.0, math.pi / 2, 0.0))],
+)
+def test_transform_as_numbers(ros, mode, rotation):
+    tf2_ros.StaticTransformBroadcaster().sendTransform(transform("foot", "target", TARGET, rospy.Time(0)))
+    rospy.set_param("/tf_to_floatarray_node", {**FRAMES, "mode": mode})
+    ros.start(["rosrun", "ik_ros", "tf_to_floatarray_node.py", "__name:=tf_to_floatarray_node"])
+    numbers = ros.listen("transform", Float64MultiArray).wait_for()[0].data
+    assert numbers == pytest.approx((0.3, -0.2, 0.5, *rotation), abs=1e-6)
+
+
+def test_simulated_robot_is_asked_itself(ros, target):
+    arm = {
+        "name": "arm",
+        "loadURDF": {"fileName": "kuka_iiwa/model.urdf", "useFixedBase": True},
+        "setJointMotorControlArray": {"controlMode": "POSITION_CONTROL"},
+        "start_ik_callback": True,
+        "broadcast_link_states": True,
+    }
+    ros.simulator(
+        {
+            "connect": {"connection_mode": "DIRECT"},
+            "setAdditionalSearchPath": "pybullet_data_path",
+            "robots": [ros.write_yaml("arm.yaml", arm)],
+        }
+    )
+    wanted = Pose(Point(0.5, 0.1, 0.6), Quaternion(0.0, 1.0, 0.0, 0.0))
+    tf2_ros.StaticTransformBroadcaster().sendTransform(transform("rpbi/world", "target", wanted, rospy.Time(0)))
+    config = {
+        "robot_name": "arm",
+        "link_name": "lbr_iiwa_link_7",
+        "parent_frame_id": "rpbi/world",
+        "child_frame_id": "target",
+    }
+    rospy.set_param("/ik_setup_node", {"config": config, "start_on_init": True})
+    ros.start(["rosrun", "ik_ros", "ik_setup_node.py", "pybullet", "__name:=ik_setup_node", "ik:=rpbi/arm/ik"])
+    buffer = tf2_ros.Buffer(debug=False)
+    tf2_ros.TransformListener(buffer)
+
+    def is_there():
+        try:
+            found = buffer.lookup_transform("rpbi/world", "rpbi/arm/lbr_iiwa_link_7", rospy.Time(0)).transform
+        except tf2_ros.TransformException:
+            return False
+        p = found.translation
+        return math.dist((p.x, p.y, p.z), (0.5, 0.1, 0.6)) < 5e-3
+
+    wait_until(is_there, "the arm goes to the target", 30.0)
+
+
+def test_frame_that_is_dragged_in_rviz_is_broadcast_where_the_handles_are(ros):
+    parameters = {"parent_frame_id": "foot", "child_frame_id": "dragged", "position": [0.1, 0.2, 0.3]}
+    rospy.set_param("/interactive_target_node", parameters)
+    ros.start(["rosrun", "ik_ros", "interactive_target_node.py", "__name:=interactive_target_node"])
+    shown = ros.listen("ik_target/update_full", InteractiveMarkerInit).wait_for()[-1].markers[0]
+    assert (shown.header.frame_id, shown.name, len(shown.controls)) == ("foot", "dragged", 6)
+    buffer = tf2_ros.Buffer(debug=False)
+    tf2_ros.TransformListener(buffer)
+
+    def position():
+        try:
+            p = buffer.lookup_transform("foot", "dragged", rospy.Time(0)).transform.translation
+        except tf2_ros.TransformException:
+            return None
+        return p.x, p.y, p.z
+
+    wait_until(lambda: position() == (0.1, 0.2, 0.3), "it is where the parameters say")
+    with publishing("ik_target/feedback", InteractiveMarkerFeedback) as mouse:
+        def drag(pose):
+            feedback = InteractiveMarkerFeedback(
+                client_id="test", marker_name="dragged", event_type=InteractiveMarkerFeedback.POSE_UPDATE, pose=pose
+            )
+            feedback.header.frame_id = "foot"
+            mouse.publish(feedback)
+
+        drag(Pose(Point(math.nan, 0, 0), Quaternion(0, 0, 0, 1)))
+        wait_until(lambda: drag(TARGET) or position() == (0.3, -0.2, 0.5), "it follows the mouse")

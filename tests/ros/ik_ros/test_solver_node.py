@@ -1,0 +1,273 @@
+"""`ik_solver_node.py`: problems in, joint targets out, and failures told with their reason."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import rospy
+import tf2_ros
+from geometry_msgs.msg import Point, Pose, Quaternion, Transform, Vector3
+from ik_nodes import HOME, JOINTS, TIP, forward, problem, start_at, start_node, start_solver, transform
+from node_world import Rosout, publishing
+from ros_system import wait_until
+from sensor_msgs.msg import JointState
+from std_srvs.srv import SetBool
+
+from ik_ros.msg import IKProblem, IKSolution, TracIKProblem
+from ik_ros.srv import JointNames, SolveIK, TracIK
+
+BENT = (0.3, 0.6, 0.2, -1.2, 0.1, 0.8, 0.4)
+FAR = Pose(Point(5.0, 0.0, 0.5), Quaternion(0.0, 0.0, 0.0, 1.0))
+
+
+def assert_there(positions, pose):
+    """Checks that the tip is at a pose."""
+    reached = forward(positions)
+    a, b = reached.position, pose.position
+    assert math.dist((a.x, a.y, a.z), (b.x, b.y, b.z)) < 1e-3
+    a, b = reached.orientation, pose.orientation
+    assert abs(a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w) > math.cos(0.005)
+
+
+def send_until(publisher, message, listener, count=1):
+    """Publishes a message until so many more messages have come."""
+    before = len(listener.messages)
+    wait_until(lambda: publisher.publish(message) or len(listener.messages) >= before + count, "an answer comes")
+    return listener.messages[before]
+
+
+@pytest.mark.parametrize("solver", ["kdl", "pybullet", "trac_ik", "global"])
+def test_problems_become_targets_that_reach(ros, solver):
+    start_solver(ros, solver)
+    targets, solutions = ros.listen("joint_states/target", JointState), ros.listen("ik/solution", IKSolution)
+    asked = problem(BENT, start=start_at(HOME))
+    asked.header.stamp = rospy.Time(12, 5)
+    with publishing("ik", IKProblem) as ik:
+        target = send_until(ik, asked, targets)
+        solution = solutions.wait_for()[0]
+    assert list(target.name) == JOINTS == list(solution.joint_names)
+    assert_there(target.position, asked.target)
+    assert (solution.success, solution.interface_name) == (True, solver)
+    assert solution.header.stamp == target.header.stamp == rospy.Time(12, 5)
+    assert TIP in solution.message
+
+
+def test_problem_without_a_solution_is_told_with_the_reason_and_moves_nothing(ros):
+    rosout = Rosout(ros)
+    start_solver(ros)
+    targets, solutions = ros.listen("joint_states/target", JointState), ros.listen("ik/solution", IKSolution)
+    with publishing("ik", IKProblem) as ik:
+        solution = send_until(ik, IKProblem(has_target=True, target=FAR), solutions, 3)
+        wait_until(lambda: rosout.logs("misses its target"), "it is warned of")
+    assert not solution.success and "misses its target" in solution.message
+    assert len(solution.solution) == 7, "the best that was found"
+    assert targets.messages == []
+    assert len(rosout.logs("misses its target")) == 1, "once, not each time"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        (IKProblem(), "target"),
+        (IKProblem(has_target=True, target=Pose(Point(math.nan, 0, 0), Quaternion(0, 0, 0, 1))), "finite"),
+        (IKProblem(has_target=True, target=Pose(Point(), Quaternion())), "quaternion: must not be zero"),
+        (problem(start=JointState(name=["elbow"], position=[0.1])), "unknown joint 'elbow'"),
+        (problem(start=JointState(name=JOINTS, position=[0.1])), "start: expected 7 values of position"),
+        (problem(start=JointState(position=[0.1])), "start: expected the names"),
+        (problem(position_tolerance=Vector3(-1.0, 0.0, 0.0)), "position_tolerance: must not be negative"),
+    ],
+    ids=["no target", "not a number", "no rotation", "unknown joint", "too few", "no names", "negative tolerance"],
+)
+def test_problem_that_makes_no_sense_is_refused_and_the_next_one_solved(ros, wrong, told):
+    start_solver(ros)
+    targets, solutions = ros.listen("joint_states/target", JointState), ros.listen("ik/solution", IKSolution)
+    with publishing("ik", IKProblem) as ik:
+        solution = send_until(ik, wrong, solutions)
+        assert not solution.success and told in solution.message, solution.message
+        assert targets.messages == []
+        send_until(ik, problem(BENT), targets)
+
+
+def test_problems_of_the_release_are_taken_on_the_same_topic_and_by_service(ros):
+    start_solver(ros, "trac_ik")
+    targets = ros.listen("joint_states/target", JointState)
+    pose = forward(BENT)
+    translation = Vector3(pose.position.x, pose.position.y, pose.position.z)
+    old = TracIKProblem(qinit=start_at(HOME), goal=Transform(translation, pose.orientation), bx=1e-5, brx=1e-3)
+    with publishing("ik", TracIKProblem) as ik:
+        assert_there(send_until(ik, old, targets).position, pose)
+    answer = ros.call("ik/solver/trac_ik/solve_trac_ik", TracIK, old)
+    assert answer.success, answer.message
+    assert_there(answer.solution.position, pose)
+
+
+def test_messages_of_another_type_are_refused_and_the_types_named(ros):
+    rosout = Rosout(ros)
+    start_solver(ros)
+    with publishing("ik", JointState) as ik:
+        wait_until(lambda: ik.publish(JointState()) or rosout.logs("ik_ros/IKProblem or"), "they are refused")
+    assert "sensor_msgs/JointState" in rosout.logs("ik_ros/IKProblem or")[0].msg
+
+
+def test_service_answers_whether_the_node_is_on_or_off(ros):
+    start_solver(ros, start_on_init=False)
+    answer = ros.call("ik/solver/kdl/solve", SolveIK, problem(BENT))
+    assert answer.success, answer.message
+    assert_there(answer.solution.position, forward(BENT))
+    assert answer.position_error < 1e-3 and answer.orientation_error < 0.01
+    failed = ros.call("ik/solver/kdl/solve", SolveIK, IKProblem(has_target=True, target=FAR))
+    assert not failed.success and failed.position_error > 1.0 and len(failed.solution.position) == 7
+    refused = ros.call("ik/solver/kdl/solve", SolveIK, IKProblem())
+    assert not refused.success and "target" in refused.message
+    assert list(ros.call("ik/solver/kdl/joint_names", JointNames).joint_names) == JOINTS
+
+
+def test_global_solver_tells_alternatives_that_reach_too(ros):
+    start_solver(ros, "global", start_on_init=False)
+    answer = ros.call("ik/solver/global/solve", SolveIK, problem(BENT))
+    assert answer.success and len(answer.alternatives) >= 1
+    for alternative in answer.alternatives:
+        assert_there(alternative.position, forward(BENT))
+        assert np.abs(np.subtract(alternative.position, answer.solution.position)).max() > 0.05
+
+
+def test_switched_off_it_does_not_listen(ros):
+    start_solver(ros, start_on_init=False)
+    solutions = ros.listen("ik/solution", IKSolution)
+    toggle = "ik/solver/kdl/toggle"
+    assert ros.call(toggle, SetBool, True).success
+    with publishing("ik", IKProblem) as ik:
+        send_until(ik, problem(BENT), solutions)
+        assert ros.call(toggle, SetBool, False).success
+        wait_until(lambda: not ik.get_num_connections(), "it listens no more")
+    assert not ros.call(toggle, SetBool, False).success, "it is off already"
+
+
+def test_poses_of_other_frames_are_turned_into_the_base(ros):
+    base_in_world = Pose(Point(1.0, 2.0, 0.0), Quaternion(0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)))
+    broadcaster = tf2_ros.StaticTransformBroadcaster()
+    broadcaster.sendTransform(transform("room", "foot", base_in_world, rospy.Time(0)))
+    start_solver(ros, base_frame_id="foot")
+    p = forward(BENT)
+    # A quarter turn about z takes x, y to -y, x
+    q, half = p.orientation, math.sqrt(0.5)
+    turned = Quaternion(half * (q.x - q.y), half * (q.y + q.x), half * (q.z + q.w), half * (q.w - q.z))
+    asked = IKProblem(has_target=True, target=Pose(Point(1 - p.position.y, 2 + p.position.x, p.position.z), turned))
+    asked.header.frame_id = "room"
+
+    def solution():
+        answer = ros.call("ik/solver/kdl/solve", SolveIK, asked)
+        return answer if answer.success else None
+
+    assert_there(wait_until(solution, "TF is known and it is solved").solution.position, p)
+    asked.header.frame_id = "nowhere"
+    refused = ros.call("ik/solver/kdl/solve", SolveIK, asked)
+    assert not refused.success and "'nowhere'" in refused.message and "'foot'" in refused.message
+
+
+def test_targets_go_on_from_the_last_one_when_problems_have_no_start(ros):
+    start_solver(ros)
+    targets = ros.listen("joint_states/target", JointState)
+    with publishing("ik", IKProblem) as ik:
+        send_until(ik, problem(BENT, start=start_at(BENT)), targets)
+        near = np.add(BENT, 0.01)
+        last = send_until(ik, problem(near), targets, 3)
+    assert np.abs(np.subtract(last.position, near)).max() < 0.1, "another posture would be further away"
+
+
+def test_continuity_holds_the_velocities_of_the_joints(ros):
+    start_solver(ros, continuity={"max_velocity": 0.5})
+    targets = ros.listen("joint_states/target", JointState)
+    solutions = ros.listen("ik/solution", IKSolution)
+    far_away = np.add(HOME, 0.4)
+    with publishing("ik", IKProblem) as ik:
+        wait_until(ik.get_num_connections, "it listens")
+        for number in range(200):
+            asked = problem_at(far_away)
+            asked.header.stamp = rospy.Time(100) + rospy.Duration.from_sec(0.01 * number)
+            ik.publish(asked)
+            targets.wait_for(number + 1)
+    positions = np.array([message.position for message in targets.messages])
+    assert np.abs(np.diff(positions, axis=0)).max() <= 0.5 * 0.01 + 1e-9
+    assert_there(positions[-1], forward(far_away))
+    assert any("of the way there" in solution.message for solution in solutions.messages)
+
+
+_POSES = {}
+
+
+def problem_at(positions):
+    """Returns a problem that starts at home, its pose computed once."""
+    key = tuple(positions)
+    _POSES.setdefault(key, forward(positions))
+    return IKProblem(has_target=True, target=_POSES[key], start=start_at(HOME))
+
+
+@pytest.mark.parametrize(
+    ("solver", "parameters", "told"),
+    [
+        ("kdk", {}, "did you mean 'kdl'?"),
+        ("kdl", {"tip_link": "finger"}, "tip_link: unknown link 'finger'"),
+        ("kdl", {"urdf_filename": "/nowhere.urdf"}, "urdf_filename"),
+        ("kdl", {"tip": "x"}, "tip: unknown key"),
+        ("kdl", {"continuity": {"max_velocity": -1.0}}, "continuity.max_velocity"),
+        ("kdl", {"continuity": {"max_velocity": {"elbow": 1.0}}}, "no joint is called elbow"),
+        ("nowhere.solvers:Best", {}, "nowhere"),
+    ],
+    ids=["solver", "link", "file", "key", "velocity", "joint", "module"],
+)
+def test_wrong_parameters_end_it_with_1_and_their_names(ros, solver, parameters, told):
+    rospy.set_param("/ik_solver_node", {**dict(CHAIN_OF_TEST), **parameters})
+    process = ros.start(["rosrun", "ik_ros", "ik_solver_node.py", solver, "__name:=ik_solver_node"])
+    assert process.wait(20.0) == 1
+    output = ros.output(process)
+    assert told in output, output
+    assert "Traceback" not in output
+
+
+def test_without_a_solver_it_tells_which_there_are(ros):
+    process = ros.start(["rosrun", "ik_ros", "ik_solver_node.py"])
+    assert process.wait(20.0) == 2
+    assert "kdl" in ros.output(process) and "trac_ik" in ros.output(process)
+
+
+CHAIN_OF_TEST = {
+    "urdf_filename": "{rpbi_examples}/robots/kuka_lwr.urdf",
+    "base_link": "lwr_arm_0_link",
+    "tip_link": TIP,
+}
+
+
+def test_users_own_solver_serves_by_module_and_class(ros, tmp_path, monkeypatch):
+    (tmp_path / "lazy_lab.py").write_text(OWN_SOLVER)
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{__import__('os').environ.get('PYTHONPATH', '')}")
+    start_node(
+        ros, "ik_solver_node.py", "lazy_lab:Stubborn", "ik/solver/lazy_lab/Stubborn/solve", position=0.25
+    )
+    answer = ros.call("ik/solver/lazy_lab/Stubborn/solve", SolveIK, IKProblem())
+    assert answer.success and answer.solution.name == ["joint"] and answer.solution.position == (0.25,)
+
+
+OWN_SOLVER = '''
+from custom_ros_tools.schema import ConfigModel
+from ik_ros.solution import IKSolution
+from ik_ros.solver import Solver
+
+
+class StubbornConfig(ConfigModel):
+    position: float
+
+
+class Stubborn(Solver):
+    Config = StubbornConfig
+    deterministic = True
+    joint_names, lower, upper, velocity_limits, base_frame = ("joint",), (-1.0,), (1.0,), (1.0,), "base"
+
+    def __init__(self, config):
+        self._position = config.position
+
+    def solve(self, problem):
+        return IKSolution(True, "as always", self.joint_names, (self._position,))
+'''
