@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import rospy
 
+from custom_ros_tools.ros.master_watch import MasterWatch
 from custom_ros_tools.ros.tf_interface import TfInterface
 
 HZ = 50.0
@@ -23,6 +24,7 @@ def move_frame(
         child: Its name.
         pose: Position [m] and orientation (x, y, z, w) at a time since the start [s] of ROS time.
     """
+    MasterWatch()
     tf = TfInterface()
     start = last = rospy.Time.now()
     rate = rospy.Rate(HZ)
