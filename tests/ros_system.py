@@ -31,6 +31,10 @@ def wait_until(condition: Callable[[], Any], what: str, timeout_s: float = 20.0)
         time.sleep(0.02)
 
 
+FOREIGN = ("rostopic",)
+"""Programs of rospy's that sometimes hang on Ctrl-C, and have nothing to finish."""
+
+
 def stop_group(process: subprocess.Popen, timeout_s: float = 15.0) -> int:
     """Ends a process and its children as Ctrl-C would; returns its exit code.
 
@@ -38,7 +42,8 @@ def stop_group(process: subprocess.Popen, timeout_s: float = 15.0) -> int:
         TimeoutError: If it did not end by itself.
     """
     if process.poll() is None:
-        os.killpg(process.pid, signal.SIGINT)
+        is_foreign = isinstance(process.args, list) and process.args[0] in FOREIGN
+        os.killpg(process.pid, signal.SIGKILL if is_foreign else signal.SIGINT)
     try:
         return process.wait(timeout_s)
     except subprocess.TimeoutExpired:

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import statistics
 import threading
 import time
-from pathlib import Path
-from xmlrpc.client import ServerProxy
 
-import rosgraph
 import rospy
 import tf2_ros
+from processes import handles, memory_mb, process_of
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
@@ -35,12 +32,12 @@ def main() -> None:
     threading.Thread(target=_control, daemon=True).start()
     reset = rospy.ServiceProxy("rpbi/reset", Trigger)
     reset.wait_for_service()
-    process_id = _process_of("/ros_pybullet_interface")
+    process_id = process_of("/ros_pybullet_interface")
     _reset(reset, WARM_UP)
     warnings.clear()
-    before = _held(process_id)
+    before = memory_mb(process_id), handles(process_id)
     times_s = _reset(reset, resets)
-    after = _held(process_id)
+    after = memory_mb(process_id), handles(process_id)
     assert buffer.can_transform("rpbi/world", "rpbi/box", rospy.Time(0)), "TF works"
     found = {
         "median_ms": 1e3 * statistics.median(times_s),
@@ -69,19 +66,6 @@ def _reset(reset: rospy.ServiceProxy, count: int) -> list[float]:
         assert answer.success, answer.message
         time.sleep(0.02)  # some ticks come in between
     return times_s
-
-
-def _process_of(node: str) -> int:
-    uri = rosgraph.Master("/reset_often").lookupNode(node)
-    _, _, process_id = ServerProxy(uri).getPid("/reset_often")
-    return int(process_id)  # type: ignore[call-overload]
-
-
-def _held(process_id: int) -> tuple[float, int]:
-    """Returns what a process holds: memory [MB], and threads and open files together."""
-    folder = Path(f"/proc/{process_id}")
-    pages = int((folder / "statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6, len(os.listdir(folder / "task")) + len(os.listdir(folder / "fd"))
 
 
 if __name__ == "__main__":

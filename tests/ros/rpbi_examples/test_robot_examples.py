@@ -121,3 +121,16 @@ def test_kuka_holds_still_until_it_is_told_to_move(ros):
     goal = JointState(name=["lwr_arm_0_joint"], position=[0.5])
     answer = ros.call("/rpbi/kuka_lwr/move_to_joint_state", ResetJointState, goal, 0.5)
     assert answer.success, answer.message
+
+
+def test_still_scene_stands_still_with_the_tool_at_the_whiteboard(ros, position):
+    launch(ros, "run_pose_kuka_lwr")
+    states = ros.listen("/rpbi/kuka_lwr/joint_states", JointState)
+    start = states.wait_for(1)[0].position
+    ball, cup = "rpbi/kuka_lwr/end_effector_ball", "rpbi/cup/base_link"
+    wait_until(lambda: position(ball) and position(cup), "their frames are on TF")
+    states.wait_for(200)
+    assert states.messages[-1].position == pytest.approx(start, abs=2e-3)
+    board_x, ball_radius = -0.187, 0.015
+    assert position(ball)[0] - board_x == pytest.approx(ball_radius, abs=5e-3)
+    assert position(cup) == pytest.approx((0.05, 0.70, 0.501), abs=2e-3)

@@ -14,7 +14,7 @@ from frame_sink import DEMAND_FILE
 from rpbi.camera import Intrinsics
 from rpbi.pose import Pose
 from rpbi.render.client import RenderClient
-from rpbi.render.frame import Camera
+from rpbi.render.frame import Camera, Demand
 from rpbi.samples import SceneSample
 from rpbi.world import World
 
@@ -53,7 +53,8 @@ class Rendering:
         unfinished = self.folder / "demand.part"
         unfinished.write_text(json.dumps({camera: [streams, seen]}))
         unfinished.rename(self.folder / DEMAND_FILE)
-        self.until(lambda: (camera in self.client.wanted) == bool(streams), "the demand is known")
+        wanted = Demand(frozenset(streams), seen)
+        self.until(lambda: self.client._demands.get(camera) == wanted, "the demand is known")
 
     def sample(self, pose: Pose = Pose(), camera: str = "eye") -> SceneSample:
         """Returns what a camera would see now."""

@@ -10,8 +10,9 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
-AROUND = 96
-"""Corners of a circle: the triangles of a sphere of radius 0.2 m are within 0.3 mm of it."""
+TOLERANCE_M = 2e-4
+"""How far the edges of a circle's polygon may be inside of it, where `MOST_CORNERS` are enough."""
+FEWEST_CORNERS, MOST_CORNERS = 24, 160
 PLANE_HALF_WIDTH_M = 100.0
 """Half the edge of the square that stands for a plane without end."""
 
@@ -54,12 +55,14 @@ def plane(normal: Sequence[float]) -> Surface:
 
 def capsule(radius: float, length: float) -> Surface:
     """Returns a capsule about the origin along z; `length` is that of its cylinder, 0 makes it a sphere."""
-    latitude = np.linspace(-np.pi / 2, np.pi / 2, AROUND // 2 + 1)
+    corners = _corners(radius)
+    equator = corners // 4
+    latitude = np.linspace(-np.pi / 2, np.pi / 2, corners // 2 + 1)
     if length > 0.0:
-        latitude = np.insert(latitude, AROUND // 4, 0.0)  # the equator twice, a length apart
+        latitude = np.insert(latitude, equator, 0.0)  # the equator twice, a length apart
     profile = np.stack([np.cos(latitude), np.sin(latitude)], axis=1)
-    shift = np.where(np.arange(len(latitude)) <= AROUND // 4, -length / 2, length / 2)
-    return _turned(radius * profile + np.stack([0.0 * shift, shift], axis=1), profile)
+    shift = np.where(np.arange(len(latitude)) <= equator, -length / 2, length / 2)
+    return _turned(radius * profile + np.stack([0.0 * shift, shift], axis=1), profile, corners)
 
 
 def cylinder(radius: float, length: float) -> Surface:
@@ -67,8 +70,8 @@ def cylinder(radius: float, length: float) -> Surface:
     half = length / 2
     outline = np.array([[0, -half], [radius, -half], [radius, -half], [radius, half], [radius, half], [0, half]])
     normals = np.array([[0, -1], [0, -1], [1, 0], [1, 0], [0, 1], [0, 1]], float)
-    parts = [_turned(outline[begin : begin + 2], normals[begin : begin + 2]) for begin in (0, 2, 4)]
-    return _joined(parts)
+    rows = (slice(begin, begin + 2) for begin in (0, 2, 4))
+    return _joined([_turned(outline[row], normals[row], _corners(radius)) for row in rows])
 
 
 def mesh(points: Array, triangles: npt.NDArray[Any], normals: Array | None = None) -> Surface:
@@ -93,14 +96,21 @@ def _square(axis: Array, sign: float) -> Surface:
     return Surface(points, np.tile(outward, (4, 1)), np.array([[0, 1, 2], [0, 2, 3]]))
 
 
-def _turned(profile: Array, normals: Array) -> Surface:
+def _corners(radius: float) -> int:
+    """Returns how many corners a circle needs to look round, a multiple of 4; small things are often many."""
+    needed = np.pi / np.arccos(1.0 - min(TOLERANCE_M / radius, 1.0))
+    return int(np.clip(4 * np.ceil(needed / 4), FEWEST_CORNERS, MOST_CORNERS))
+
+
+def _turned(profile: Array, normals: Array, corners: int) -> Surface:
     """Returns the surface that an outline makes when it turns about z.
 
     Args:
         profile: Distance from the axis and height of n points, upwards along the outside, shape (n, 2).
         normals: Their normals in the same plane, shape (n, 2).
+        corners: Corners of its circles.
     """
-    angle = np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
+    angle = np.linspace(0.0, 2.0 * np.pi, corners + 1)
     around = np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
     def turn(outline: Array) -> Array:
@@ -108,9 +118,9 @@ def _turned(profile: Array, normals: Array) -> Surface:
         height = np.broadcast_to(outline[:, None, 1:], (*flat.shape[:2], 1))
         return np.concatenate([flat, height], axis=2).reshape(-1, 3)
 
-    rows, columns = np.meshgrid(np.arange(len(profile) - 1), np.arange(AROUND), indexing="ij")
-    corner = (rows * (AROUND + 1) + columns).ravel()
-    right, up = corner + 1, corner + AROUND + 1
+    rows, columns = np.meshgrid(np.arange(len(profile) - 1), np.arange(corners), indexing="ij")
+    corner = (rows * (corners + 1) + columns).ravel()
+    right, up = corner + 1, corner + corners + 1
     triangles = np.concatenate([np.stack([corner, right, up + 1], 1), np.stack([corner, up + 1, up], 1)])
     points = turn(profile)
     a, b, c = (points[triangles[:, index]] for index in range(3))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import signal
 import sys
 
 import pybullet
@@ -21,6 +22,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="./rpbi check", description="Finds all problems of a world.")
     parser.add_argument("world", metavar="WORLD.yaml", help="main YAML file; {package}/path is resolved")
     path = parser.parse_args().world
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # so that it may be piped into `head`
     logging.basicConfig(format="warning: %(message)s", level=logging.WARNING)
     try:
         world = World(load_world(path, BODY_TYPES), connection_mode=pybullet.DIRECT)

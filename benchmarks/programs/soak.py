@@ -1,0 +1,96 @@
+"""Notes for a long time what a simulator sends and holds, while a controller commands it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import statistics
+import threading
+import time
+
+import rospy
+from processes import handles, memory_mb, process_of
+from sensor_msgs.msg import Image, JointState
+from std_msgs.msg import Int64
+
+NODES = {"simulator": "/ros_pybullet_interface", "camera": "/ros_pybullet_interface_camera"}
+TARGET_HZ = 50.0
+WARM_UP_SHARE = 0.1
+"""Share of the time after which memory counts; buffers fill and caches grow before."""
+
+
+class Count:
+    """How often something came, and the longest time in between [s]."""
+
+    def __init__(self, topic: str, message_type: type) -> None:
+        self.number, self.longest_gap_s = 0, 0.0
+        self._last_s = math.inf
+        rospy.Subscriber(topic, message_type, self._take, tcp_nodelay=True)
+
+    def _take(self, _: object) -> None:
+        now_s = time.monotonic()
+        self.longest_gap_s = max(self.longest_gap_s, now_s - self._last_s)
+        self._last_s = now_s
+        self.number += 1
+
+    def restart(self) -> None:
+        """Counts from now on."""
+        self.number, self.longest_gap_s, self._last_s = 0, 0.0, math.inf
+
+
+def main() -> None:
+    """Prints what it noted as JSON."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("seconds", type=float, help="how long")
+    parser.add_argument("robot")
+    parser.add_argument("joint", help="joint that is moved to and fro")
+    arguments = parser.parse_args()
+    rospy.init_node("soak", disable_rostime=True, disable_signals=True)
+    counts = {
+        "statuses": Count("rpbi/status", Int64),
+        "joint_states": Count(f"rpbi/{arguments.robot}/joint_states", JointState),
+        "images": Count("rpbi/camera/colour/image", Image),
+    }
+    threading.Thread(target=_control, args=(arguments.robot, arguments.joint), daemon=True).start()
+    while not all(count.number for count in counts.values()):
+        time.sleep(0.01)
+    processes = {name: process_of(node) for name, node in NODES.items()}
+    held: dict[str, list[float]] = {name: [] for name in processes}
+    time.sleep(WARM_UP_SHARE * arguments.seconds)
+    handles_before = sum(map(handles, processes.values()))
+    for count in counts.values():
+        count.restart()
+    start_s = time.monotonic()
+    while time.monotonic() - start_s < arguments.seconds:
+        for name, process_id in processes.items():
+            held[name].append(memory_mb(process_id))
+        time.sleep(min(1.0, arguments.seconds / 100))
+    wall_s = time.monotonic() - start_s
+    found = {
+        "wall_s": wall_s,
+        "memory_mb": {name: statistics.median(values) for name, values in held.items()},
+        "growth": {name: _growth(values) for name, values in held.items()},
+        "new_handles": sum(map(handles, processes.values())) - handles_before,
+        **{name: count.number for name, count in counts.items()},
+        "longest_gaps_s": {name: count.longest_gap_s for name, count in counts.items()},
+    }
+    print("result:", json.dumps(found))
+
+
+def _control(robot: str, joint: str) -> None:
+    target = rospy.Publisher(f"rpbi/{robot}/joint_states/target", JointState, queue_size=10)
+    while not rospy.is_shutdown():
+        target.publish(JointState(name=[joint], position=[0.3 * math.sin(time.monotonic())]))
+        time.sleep(1.0 / TARGET_HZ)
+
+
+def _growth(values: list[float]) -> float:
+    """Returns how much the last tenth is above the first, as a share of the first."""
+    tenth = max(1, len(values) // 10)
+    first, last = statistics.median(values[:tenth]), statistics.median(values[-tenth:])
+    return last / first - 1.0
+
+
+if __name__ == "__main__":
+    main()
