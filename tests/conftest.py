@@ -65,3 +65,11 @@ def ros(ros_master: str, tmp_path: Path) -> Iterator[RosSystem]:  # noqa: F821
         yield system
     finally:
         system.close()
+
+
+@pytest.fixture
+def second_master(ros: RosSystem) -> SecondMaster:  # noqa: F821
+    """A master that may be killed; the tests' own one goes on."""
+    from second_master import SecondMaster
+
+    return SecondMaster(ros)

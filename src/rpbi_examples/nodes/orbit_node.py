@@ -1,6 +1,9 @@
 #!/usr/bin/python3
 """Moves the camera's frame around the scene."""
 
-from rpbi_examples.ros.orbit import main
+import signal
+
+signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # before any thread starts
+from rpbi_examples.ros.orbit import main  # noqa: E402
 
 main()

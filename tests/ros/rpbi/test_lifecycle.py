@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -12,7 +11,6 @@ import time
 from pathlib import Path
 
 import pytest
-import rosgraph
 import rospy
 import yaml
 from node_world import Rosout, add, main_config, registrations, remove
@@ -103,6 +101,15 @@ def test_rosnode_kill_ends_it(ros, tmp_path):
     assert "Traceback" not in ros.output(process), ros.output(process)
 
 
+def test_a_camera_whose_node_is_killed_comes_back(ros, tmp_path):
+    process = ros.simulator(_config(tmp_path, rgbd_sensor=CAMERA))
+    published = ("publishes", "/rpbi/camera/colour/image")
+    wait_until(lambda: published in registrations(f"{NODE}_camera"), "the camera is up")
+    subprocess.run(["rosnode", "kill", f"{NODE}_camera"], check=True, capture_output=True, timeout=30)
+    wait_until(lambda: "it is started again" in ros.output(process), "the simulator sees that it has gone")
+    wait_until(lambda: published in registrations(f"{NODE}_camera"), "the camera is up again")
+
+
 def test_ctrl_c_with_a_subscriber_that_does_not_take_its_messages(ros, tmp_path):
     process = ros.simulator(_config(tmp_path), use_sim_time=True)
     holder = _holder(ros, "/clock", "/tf", "/rpbi/iiwa/joint_states")
@@ -174,26 +181,11 @@ def test_a_world_that_breaks_stands_still_and_says_so_once(ros, tmp_path):
     _interrupt(ros, process)
 
 
-@pytest.fixture
-def second_master(ros, tmp_path, monkeypatch):
-    """A master that may be killed; the tests' own one goes on."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    uri = f"http://127.0.0.1:{port}"
-    process = ros.start(["rosmaster", "--core", "-p", str(port)], log="master.log", ROS_MASTER_URI=uri)
-    master = rosgraph.Master("/tests", master_uri=uri)
-    wait_until(master.is_online, "the second master answers")
-    yield process, uri, master
-
-
 def test_it_survives_the_master_and_still_ends_on_ctrl_c(ros, tmp_path, second_master):
-    roscore, uri, master = second_master
-    master.setParam(f"{NODE}/config", _config(tmp_path))
-    process = ros.simulator({}, wait=False, ROS_MASTER_URI=uri)
-    wait_until(lambda: _is_served(master, "/rpbi/list_objects"), "the node is up")
-    os.killpg(roscore.pid, signal.SIGKILL)
-    roscore.wait()
+    second_master.api.setParam(f"{NODE}/config", _config(tmp_path))
+    process = ros.simulator({}, wait=False, **second_master.environment)
+    wait_until(lambda: second_master.has("/rpbi/list_objects"), "the node is up")
+    second_master.kill()
     printed = len(ros.output(process))
     time.sleep(3.0)
     assert process.poll() is None
@@ -205,19 +197,9 @@ def test_it_survives_the_master_and_still_ends_on_ctrl_c(ros, tmp_path, second_m
 
 
 def test_ctrl_c_while_it_waits_for_a_master(ros, tmp_path, second_master):
-    roscore, uri, _ = second_master
-    os.killpg(roscore.pid, signal.SIGKILL)
-    roscore.wait()
-    process = ros.simulator({}, wait=False, ROS_MASTER_URI=uri)
-    time.sleep(2.0)
-    assert process.poll() is None
+    second_master.kill()
+    process = ros.simulator({}, wait=False, **second_master.environment)
+    wait_until(lambda: "is roscore running?" in ros.output(process), "it waits")
     os.killpg(process.pid, signal.SIGINT)
     assert process.wait(ENDS_WITHIN_S) == 0, ros.output(process)
     assert "Traceback" not in ros.output(process)
-
-
-def _is_served(master, name):
-    try:
-        return master.lookupService(name)
-    except rosgraph.MasterError:
-        return None

@@ -67,6 +67,24 @@ def test_a_recording_that_lacks_a_command_says_so_and_goes_no_further(session):
     assert f"command {lost}" in result.left_out[0]
 
 
+@pytest.mark.parametrize(
+    "senseless",
+    [
+        {"what": "explode"},
+        {"name": "mobile/nothing", "what": "input"},
+        {"name": "mobile/cmd_vel", "what": "input", "data": "1.0"},
+        {"name": "nobody"},
+        {"data": "{{"},
+    ],
+)
+def test_a_command_that_makes_no_sense_ends_the_replay_with_its_tick(session, senseless):
+    index, command = session["commands"][0]
+    commands = {**dict(session["commands"]), index: command._replace(**senseless)}
+    result = Replay(script.read({**session, "commands": list(commands.items())})).run()
+    assert result.agreed == 1 and result.difference is None  # the start
+    assert f"from tick {command.tick} on" in result.left_out[0]
+
+
 def test_a_reset_is_a_new_start_and_can_be_replayed_alone(folder):
     world = script.build(folder)
     description = script.describe(world)

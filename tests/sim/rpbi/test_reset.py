@@ -155,3 +155,11 @@ def test_a_file_that_has_gone_is_told_and_a_later_reset_finds_it_again(tmp_path)
     world.reset()
     assert world.state_hash() == start
     world.close()
+
+
+def test_a_rate_that_is_too_high_is_warned_of_once(tmp_path, caplog):
+    world = World.from_file(write_world(tmp_path, dynamic=(ball(broadcast_hz=1e6),)))
+    for _ in range(3):
+        world.reset()
+    world.close()
+    assert caplog.text.count("more than a sample a tick") == 1

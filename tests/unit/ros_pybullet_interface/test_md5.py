@@ -9,6 +9,8 @@ import pytest
 SOURCES = Path(__file__).resolve().parents[3] / "src"
 
 MESSAGES = {
+    "ik_ros/IKSolution": "9d9d20f46e8e2af539dbff8d238f2338",
+    "ik_ros/TracIKProblem": "7be0c51f9022071f61a2d5e730a6ea2b",
     "ros_pybullet_interface/CalculateInverseKinematicsProblem": "66ba1e46809f0e71459d2d82a47754bf",
     "ros_pybullet_interface/JointInfo": "a9c7515fded04226244ad03a018364a8",
     "ros_pybullet_interface/KeyboardEvent": "70fe1577726387662ed067d7c32e2647",
@@ -19,6 +21,8 @@ MESSAGES = {
 SERVICES = {
     "custom_ros_tools/SetString": "546971982e3fbbd5a41e60fb6432e357",
     "custom_ros_tools/SetTransform": "18a9eea4bf7301361f824b9b6abce083",
+    "ik_ros/JointNames": "587f4b1b8847cbdf153605e9cf8ebaed",
+    "ik_ros/TracIK": "8a445ecb230fa39cf7d2ac5953bef6a0",
     "ros_pybullet_interface/AddPybulletObject": "21feca091ba47662b9b8306046dd6d18",
     "ros_pybullet_interface/CalculateInverseKinematics": "4ae03ea1c2add4477faaf6439751820f",
     "ros_pybullet_interface/GetDebugVisualizerCamera": "f54fde95a74416d547ed75f41181d84a",

@@ -74,6 +74,10 @@ def test_a_rate_above_one_a_tick_is_clamped():
     assert not Schedule(1000, 1_000_000).clamped
 
 
+def test_a_rate_that_is_next_to_nothing_is_due_some_day():
+    assert Schedule(1e-300, 1_000_000).next_due(0) == 10**9
+
+
 def test_the_initial_state_is_due():
     assert Schedule(0.1, 1_000_000).is_due(0)
 

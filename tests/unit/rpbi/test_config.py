@@ -14,7 +14,7 @@ import pytest
 import yaml
 from pydantic import Field
 
-from custom_ros_tools.errors import ConfigError, UnknownNameError
+from custom_ros_tools.errors import ConfigError
 from custom_ros_tools.schema import ConfigModel, Hz, Name
 from rpbi.config import LoadedWorld, WorldConfig, load_object, load_world, load_world_dict
 from rpbi.pybullet_models import ChangeDynamics, CreateVisualShape, LoadURDF
@@ -42,6 +42,7 @@ class Ball:
 
     Config: type[ConfigModel] = BallConfig
     section = "visual_objects"
+    is_soft = False
 
     def claims(self, data: Any) -> bool:
         return True
@@ -52,6 +53,7 @@ class Arm:
 
     Config: type[ConfigModel] = ArmConfig
     section = "robots"
+    is_soft = False
 
     def claims(self, data: Any) -> bool:
         return True
@@ -188,6 +190,8 @@ def test_all_faults_of_all_files_are_told_at_once(folder: Path) -> None:
     [
         ({"timeStep": 0}, "timeStep: must be > 0 [s], got 0"),
         ({"timeStep": 1e-12}, "timeStep: must be at least 1.0e-9 [s], got 1e-12"),
+        ({"timeStep": 1e300}, "timeStep: must be at most 10 [s], got 1e+300"),
+        ({"visualizer_image_width": 10**12}, "visualizer_image_width: must be <= 8192 [px], got 1000000000000"),
         ({"real_time_factor": -1}, "real_time_factor: must be >= 0, got -1"),
         ({"robots": "arm.yaml"}, "robots: expected a list of files, got text 'arm.yaml'"),
         ({"robots": None}, "robots: expected a list of files, got nothing"),
@@ -288,9 +292,7 @@ def test_single_object_is_checked_like_one_of_the_world(tmp_path: Path) -> None:
 
 
 def test_unknown_type_of_object_is_named() -> None:
-    with pytest.raises(
-        UnknownNameError, match="unknown object type 'robt': known are visual, robot; did you mean"
-    ):
+    with pytest.raises(ConfigError, match="config: type: unknown object type 'robt'; did you mean 'robot'?"):
         load_object("robt", ARM, "config", BODY_TYPES)
 
 

@@ -103,6 +103,25 @@ class MissingDependency(InterfaceError):  # noqa: N818 (the name says what is th
         return f"'{self.package}' is not installed: {self.how}"
 
 
+class PluginError(InterfaceError):
+    """A class or function of another package failed.
+
+    Args:
+        plugin: Its name, as `module:Class`.
+        doing: What it was about to do, such as `before_step`, and where it says so itself, for what.
+        cause: What happened, with file and line.
+    """
+
+    def __init__(self, plugin: str, doing: str, cause: str) -> None:
+        self.plugin = plugin
+        self.doing = doing
+        self.cause = cause
+        super().__init__(plugin, doing, cause)
+
+    def __str__(self) -> str:
+        return f"{self.plugin} failed in {self.doing}: {self.cause}"
+
+
 class PhysicsError(InterfaceError):
     """PyBullet refused a call that the configuration allows.
 

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from typing import Literal
 
+from pydantic import Field
+
 from .schema import ConfigModel, ListOf, Text
 
 
 class FloatArrayConfig(ConfigModel):
     """Which numbers of a joint state, in which order."""
 
-    joint_names: ListOf[Text] | None = None
-    field: Literal["position", "velocity", "effort"] = "position"
+    joint_names: ListOf[Text] | None = Field(
+        None, description="Joints in the order of the numbers; without it, all as they come."
+    )
+    field: Literal["position", "velocity", "effort"] = Field("position", description="Which numbers of the joints.")

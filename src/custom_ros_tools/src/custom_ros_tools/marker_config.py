@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 
 from .errors import hint
 from .schema import (
@@ -43,6 +44,12 @@ SHAPES = ("ARROW", "CUBE", "SPHERE", "CYLINDER", "MESH_RESOURCE")
 """Types that are drawn from what this configuration holds; the others need points or a text."""
 
 
+def _in_any_case(names: Iterable[str]) -> WithJsonSchema:
+    """Returns the JSON Schema of constants, of which editors propose the usual spelling."""
+    usual = {"type": "string", "enum": [name.lower() for name in names]}
+    return WithJsonSchema({"anyOf": [usual, {"type": "string", "pattern": "^[A-Za-z_]+$"}]})
+
+
 def _known_type(name: str) -> str:
     return _known(name, "marker type", MARKER_TYPES)
 
@@ -60,10 +67,14 @@ def _known(name: str, kind: str, constants: dict[str, int]) -> str:
 class MarkerNodeConfig(ConfigModel):
     """How the marker is published."""
 
-    topic_name: Annotated[str, Field(pattern=r"^[~/A-Za-z][A-Za-z0-9_/]*$"), Expects("the name of a topic")]
-    hz: Hz = 50.0
-    broadcast_offset: Switch = False
-    child_frame_id: FrameId | None = None
+    topic_name: Annotated[str, Field(pattern=r"^[~/A-Za-z][A-Za-z0-9_/]*$"), Expects("the name of a topic")] = Field(
+        description="Topic of the visualization_msgs/Marker."
+    )
+    hz: Hz = Field(50.0, description="How often it is sent, in wall time.")
+    broadcast_offset: Switch = Field(False, description="Whether the marker's pose is on TF too.")
+    child_frame_id: FrameId | None = Field(
+        None, description="TF frame at the marker; required with `broadcast_offset`."
+    )
 
     @model_validator(mode="after")
     def _names_the_frame_that_it_broadcasts(self) -> MarkerNodeConfig:
@@ -75,16 +86,32 @@ class MarkerNodeConfig(ConfigModel):
 class MarkerConfig(ConfigModel):
     """A marker at a fixed pose in a TF frame."""
 
-    node: MarkerNodeConfig
-    frame_id: FrameId = "map"
-    type: Annotated[str, AfterValidator(_known_type), Expects("the name of a marker type")]
-    action: Annotated[str, AfterValidator(_known_action), Expects("the name of a marker action")] = "ADD"
-    position: Position = (0.0, 0.0, 0.0)
-    orientation: Annotated[ListOf[float], Expects("roll, pitch, yaw or a quaternion x, y, z, w")] = (0.0, 0.0, 0.0)
-    ori_in_deg: Switch = False
-    rgba: Rgba = (0.0, 0.0, 1.0, 0.9)
-    scale: Annotated[tuple[NonNegative, NonNegative, NonNegative], Field(strict=False)]
-    mesh_resource: Text | None = None
+    node: MarkerNodeConfig = Field(description="How it is published.")
+    frame_id: FrameId = Field("map", description="TF frame that it is attached to.")
+    type: Annotated[
+        str, AfterValidator(_known_type), _in_any_case(MARKER_TYPES), Expects("the name of a marker type")
+    ] = Field(
+        description="Constant of the message in any case: `cube`, `sphere`, `cylinder`, `arrow`, `mesh_resource`, ..."
+    )
+    action: Annotated[
+        str, AfterValidator(_known_action), _in_any_case(MARKER_ACTIONS), Expects("the name of a marker action")
+    ] = Field(
+        "ADD", description="Constant of the message in any case: `add`, `modify`, `delete` or `deleteall`."
+    )
+    position: Position = Field((0.0, 0.0, 0.0), description="Where it is in that frame.")
+    orientation: Annotated[ListOf[float], Expects("roll, pitch, yaw or a quaternion x, y, z, w")] = Field(
+        (0.0, 0.0, 0.0),
+        description="Roll, pitch, yaw or a quaternion x, y, z, w in that frame.",
+    )
+    ori_in_deg: Switch = Field(False, description="Whether roll, pitch and yaw are in degrees, else in radians.")
+    rgba: Rgba = Field((0.0, 0.0, 1.0, 0.9), description="Colour and opacity, each from 0 to 1.")
+    scale: Annotated[tuple[NonNegative, NonNegative, NonNegative], Field(strict=False)] = Field(
+        description="Size along x, y and z in m, or factors on a mesh."
+    )
+    mesh_resource: Text | None = Field(
+        None,
+        description="Mesh as `package://`, `{package}/`, `file://`, `http://` or absolute path; required for a mesh.",
+    )
 
     @model_validator(mode="after")
     def _can_be_drawn(self) -> MarkerConfig:

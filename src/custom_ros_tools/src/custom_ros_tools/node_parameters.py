@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from pydantic import Field
+
 from .schema import ConfigModel, Hz, Switch
 
 
 class StartParameters(ConfigModel):
     """Of a node that is switched on and off."""
 
-    start_on_init: Switch = False
+    start_on_init: Switch = Field(False, description="Whether it is on from the start.")
 
 
 class RateParameters(ConfigModel):
     """Of a node that repeats what it says."""
 
-    hz: Hz = 100.0
+    hz: Hz = Field(100.0, description="How often it is said, in wall time.")

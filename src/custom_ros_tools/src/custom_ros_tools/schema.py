@@ -18,16 +18,22 @@ from pydantic import (
     ConfigDict,
     Field,
     ValidationError,
+    WithJsonSchema,
 )
 
 from .errors import ConfigError, Problem
+from .schema_annotations import AlsoTakes as AlsoTakes
 from .schema_annotations import Expects as Expects
+from .schema_annotations import InnerProblemsError as InnerProblemsError
 from .schema_annotations import KeyedError as KeyedError
 from .schema_annotations import Unit as Unit
 from .schema_errors import problems_of
 
 Model = TypeVar("Model", bound="ConfigModel")
 Item = TypeVar("Item")
+
+_NAME = r"[A-Za-z0-9_]+"
+_FRAME_ID = r"[^\s/](\S*[^\s/])?"
 
 
 class ConfigModel(BaseModel):
@@ -78,7 +84,7 @@ def _switch(value: Any) -> Any:
 
 
 def _name(value: str) -> str:
-    if not re.fullmatch(r"[A-Za-z0-9_]+", value):
+    if not re.fullmatch(_NAME, value):
         raise ValueError(
             f"use letters, digits and '_' only (topics and frames are named after it), got {value!r}"
         )
@@ -86,7 +92,7 @@ def _name(value: str) -> str:
 
 
 def _frame_id(value: str) -> str:
-    if not re.fullmatch(r"[^\s/](\S*[^\s/])?", value):
+    if not re.fullmatch(_FRAME_ID, value):
         raise ValueError(f"a TF frame has no spaces and neither starts nor ends with '/', got {value!r}")
     return value
 
@@ -99,7 +105,7 @@ Hz = Annotated[float, Field(gt=0), Unit("Hz")]
 HzOrOff = Annotated[float, Field(ge=0), Unit("Hz")]
 """A rate, where 0 switches off."""
 Seconds = Annotated[float, Field(gt=0), Unit("s")]
-Pixels = Annotated[int, Field(gt=0), Unit("px")]
+Pixels = Annotated[int, Field(gt=0, le=8192), Unit("px")]
 Metres = Annotated[float, Unit("m")]
 PositiveMetres = Annotated[float, Field(gt=0), Unit("m")]
 Kilograms = Annotated[float, Field(ge=0), Unit("kg")]
@@ -114,9 +120,16 @@ Rgb = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False)]
 ListOf = Annotated[tuple[Item, ...], Field(strict=False)]
 """A list of any length, kept as a tuple: `ListOf[float]`."""
 
-Switch = Annotated[bool, BeforeValidator(_switch)]
+Switch = Annotated[bool, BeforeValidator(_switch), AlsoTakes({"type": "integer", "minimum": 0, "maximum": 1})]
 """True or false, which may be written 1 and 0 as PyBullet's users do."""
 Text = Annotated[str, Field(min_length=1)]
-Name = Annotated[str, AfterValidator(_name), Expects("a name")]
+Name = Annotated[
+    str, AfterValidator(_name), WithJsonSchema({"type": "string", "pattern": f"^{_NAME}$"}), Expects("a name")
+]
 """Name of an object: letters, digits and '_'."""
-FrameId = Annotated[str, AfterValidator(_frame_id), Expects("a TF frame")]
+FrameId = Annotated[
+    str,
+    AfterValidator(_frame_id),
+    WithJsonSchema({"type": "string", "pattern": f"^{_FRAME_ID}$"}),
+    Expects("a TF frame"),
+]

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 from pydantic import GetJsonSchemaHandler
 from pydantic_core import CoreSchema
+
+from .errors import Problem
 
 
 @dataclass(frozen=True)
@@ -24,6 +27,20 @@ class Unit:
         return schema
 
 
+@dataclass(frozen=True, eq=False)  # typing wants a hash, which a mapping has not
+class AlsoTakes:
+    """Annotation that states what a validator accepts beside the type itself.
+
+    Attributes:
+        schema: The JSON Schema of it.
+    """
+
+    schema: Mapping[str, Any]
+
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        return {"anyOf": [handler(core), dict(self.schema)]}
+
+
 @runtime_checkable
 class SaysWhatItWants(Protocol):
     """Annotation that knows the words for "expected ..."; they go before those for the Python type."""
@@ -34,13 +51,33 @@ class SaysWhatItWants(Protocol):
 
 @dataclass(frozen=True)
 class Expects:
-    """Annotation that says in words what a value has to be, where the Python type does not tell it."""
+    """Annotation that says in words what a value has to be, where the Python type does not tell it.
+
+    The JSON Schema carries it under `expects`.
+    """
 
     text: str
+
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        schema = handler(core)
+        schema["expects"] = self.text
+        return schema
 
     def in_words(self) -> str:
         """Return the text."""
         return self.text
+
+
+class InnerProblemsError(ValueError):
+    """What a validator raises for a value that has a model of its own.
+
+    Args:
+        problems: All that is wrong with the value, with keys inside of it.
+    """
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__(self.problems)
 
 
 class KeyedError(ValueError):

@@ -10,7 +10,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from .errors import Problem, hint
-from .schema_annotations import KeyedError
+from .schema_annotations import InnerProblemsError, KeyedError
 from .schema_words import TYPE_WORDS, expected, is_model, number_advice, parts_of, shown, unit_of
 
 _BOUNDS = {
@@ -47,9 +47,13 @@ def problems_of(
     found: dict[tuple[str, str], Problem] = {}
     for details in error.errors(include_url=False):
         loc = _real_location(details, data)
-        field = _field_at(model, loc)
-        key, message = _explain(details, loc, field, model)
-        found.setdefault((key, message), Problem(file, key, message))
+        error_raised = details.get("ctx", {}).get("error")
+        if isinstance(error_raised, InnerProblemsError):
+            inner = [(_joined(key_path(loc), each.key), each.message) for each in error_raised.problems]
+        else:
+            inner = [_explain(details, loc, _field_at(model, loc), model)]
+        for key, message in inner:
+            found.setdefault((key, message), Problem(file, key, message))
     return list(found.values())
 
 
@@ -59,6 +63,10 @@ def key_path(loc: Sequence[str | int]) -> str:
     for part in loc:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
     return text
+
+
+def _joined(outer: str, inner: str) -> str:
+    return ".".join(filter(None, (outer, inner)))
 
 
 def _real_location(details: ErrorDetails, data: Any) -> tuple[str | int, ...]:
@@ -97,7 +105,7 @@ def _explain(
     unit = unit_of(field)
     error = context.get("error")
     if isinstance(error, KeyedError):
-        return ".".join(filter(None, (key_path(loc), error.key))), error.message
+        return _joined(key_path(loc), error.key), error.message
     if kind in _LENGTH_ERRORS and isinstance(value, (list, tuple)):
         where = loc[:-1] if kind == "missing" else loc
         depth = len(where) - max((i + 1 for i, part in enumerate(where) if isinstance(part, str)), default=0)

@@ -6,6 +6,7 @@ import time
 from fractions import Fraction
 
 NS_PER_S = 1_000_000_000
+SLOWEST_HZ = Fraction(1, 1_000_000)
 
 
 class Clock:
@@ -67,12 +68,12 @@ class Schedule:
     jitter at most one tick. All in integers, so nothing drifts.
 
     Args:
-        hz: Rate [Hz]; at most `1 / dt` has an effect (see `clamped`).
+        hz: Rate [Hz]; at least SLOWEST_HZ and at most `1 / dt` (see `clamped`).
         dt_ns: Length of a tick [ns].
     """
 
     def __init__(self, hz: float, dt_ns: int) -> None:
-        wanted = Fraction(hz).limit_denominator(1_000_000) * dt_ns / NS_PER_S
+        wanted = max(Fraction(hz).limit_denominator(1_000_000), SLOWEST_HZ) * dt_ns / NS_PER_S
         self.clamped = wanted > 1
         self._per_tick = min(wanted, Fraction(1))
 

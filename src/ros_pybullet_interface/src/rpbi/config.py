@@ -14,7 +14,7 @@ from custom_ros_tools.errors import ConfigError, Problem
 from .asset_files import ROBOT_DESCRIPTION, find_file, find_folder
 from .instance import Instance, parse_instance
 from .legacy import MAIN
-from .object_config import BodyType, ObjectConfig, load_object, name_in, parse_section, type_of
+from .object_config import BodyType, ObjectConfig, load_object, name_in, parse_section, sections_of, type_of
 from .rgbd_config import FIRST_TOPIC_NAME, RgbdSensorConfig
 from .world_config import WorldConfig
 
@@ -134,7 +134,7 @@ class _Reader:
         return LoadedWorld(config, objects, self._file, first + further)
 
     def _objects(self) -> Iterator[ObjectConfig]:
-        for section in dict.fromkeys(body_type.section for body_type in self._body_types.values()):
+        for section in sections_of(self._body_types):
             for data, file, context in self._files(section):
                 with self._noting_problems(file):
                     kind = type_of(section, data, self._body_types)

@@ -66,7 +66,6 @@ def _check(entry: Any) -> Any:
 ObjectEntry = Annotated[
     Any,
     AfterValidator(_check),
-    Expects("a list of files"),  # said of the list; what is wrong with an entry, the validator says
     WithJsonSchema(
         {
             "anyOf": [
@@ -75,5 +74,6 @@ ObjectEntry = Annotated[
             ]
         }
     ),
+    Expects("a list of files"),  # said of the list; what is wrong with an entry, the validator says
 ]
 """A file of an object, or `{file: FILE, KEY: VALUE, ...}`."""

@@ -9,9 +9,11 @@ import pybullet
 
 from custom_ros_tools.errors import PhysicsError, UnknownNameError
 
-from .bodies import BODY_TYPES, Body
+from .bodies import Body, body_class
 from .client import Client
 from .dynamics import change_dynamics
+from .finite_body import refuse_non_finite
+from .plugin_faults import blame, blaming
 from .world_config import WorldConfig
 
 _SAME_EVERY_TIME = {
@@ -46,6 +48,7 @@ def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:
     Raises:
         ConfigError: If a configuration does not fit.
         PhysicsError: If PyBullet refuses.
+        PluginError: If a class of another package fails.
         UnknownNameError: If there is no body or link of that name.
         ValueError: If a change of dynamics makes no sense.
     """
@@ -57,20 +60,25 @@ def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:
         body = bodies.pop(entry.name)
         for other in bodies.values():
             other.untie(entry.name)
-        body.remove()
+        with blaming(body, f"remove of '{entry.name}'"):
+            body.remove()
     elif entry.what == "dynamics":
         change_dynamics(bodies[entry.name], *entry.arguments)
     else:
         kind, config = entry.arguments
         before = _body_ids(pb)
         try:
-            make: Any = BODY_TYPES[kind]  # each with a constructor of its own
+            make: Any = body_class(kind)  # each with a constructor of its own
             body = make(pb, config)
+            if not body.is_soft:
+                refuse_non_finite(body)
             body.tie(bodies)
             bodies[entry.name] = body
         except BaseException as error:
             for body_id in _body_ids(pb) - before:
                 pb.removeBody(body_id)
+            if isinstance(error, Exception):
+                blame(body_class(kind), f"making '{entry.name}'", error)
             if isinstance(error, pybullet.error):
                 raise PhysicsError(f"{entry.name}: {error}") from error
             raise

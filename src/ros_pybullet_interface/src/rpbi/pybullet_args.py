@@ -56,7 +56,18 @@ class Constants:
         return core_schema.no_info_before_validator_function(self.parse, handler(source))
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"anyOf": [{"type": "string", "enum": list(self.names)}, {"type": "integer"}]}
+        return {"kind": self.kind, "anyOf": [self._name_schema(), self._number_schema()]}
+
+    def one_or_several_schema(self) -> dict[str, Any]:
+        """Returns the JSON Schema of one name, of names as `A|B`, or of one number."""
+        several = {"type": "string", "pattern": r"^\s*[A-Z]\w*\s*(\|\s*[A-Z]\w*\s*)+$"}
+        return {"kind": self.kind, "anyOf": [self._name_schema(), several, self._number_schema()]}
+
+    def _name_schema(self) -> dict[str, Any]:
+        return {"type": "string", "enum": list(self.names)}
+
+    def _number_schema(self) -> dict[str, Any]:
+        return {"type": "integer", "enum": sorted(set(map(self._named, self.names)))}
 
 
 @dataclass(frozen=True)
@@ -92,8 +103,11 @@ class Flags(Constants):
         return result
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        one = {"type": ["string", "integer"]}
-        return {"anyOf": [*({"type": t} for t in ("string", "integer")), {"type": "array", "items": one}]}
+        one = self.one_or_several_schema()
+        return {"kind": self.kind, "anyOf": [*one["anyOf"], {"type": "array", "items": one}]}
+
+    def _number_schema(self) -> dict[str, Any]:
+        return {"type": "integer", "minimum": 0}
 
 
 def _starting_with(prefix: str) -> tuple[str, ...]:

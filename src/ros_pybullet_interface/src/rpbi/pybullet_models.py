@@ -12,6 +12,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from custom_ros_tools.schema import (
+    AlsoTakes,
     ConfigModel,
     Count,
     Expects,
@@ -54,6 +55,7 @@ Gains = Annotated[
     Annotated[ListOf[NonNegative], Tag("list")] | Annotated[dict[str, NonNegative], Tag("mapping")],
     Discriminator(lambda given: "mapping" if isinstance(given, Mapping) else "list"),
     BeforeValidator(_one_as_list),
+    AlsoTakes({"type": "number", "minimum": 0}),
     Expects("a number, a list of numbers or a mapping of joints to numbers"),
 ]
 """One gain for all joints, one for each, or some by joint."""
@@ -179,15 +181,21 @@ class ChangeDynamics(PybulletModel):
     activationState: Annotated[int, ACTIVATION_STATES] | None = Field(
         None, description="ACTIVATION_STATE_... flags."
     )
-    jointDamping: NonNegative | None = Field(None, description="Damping of the joint.")
+    jointDamping: Annotated[NonNegative, Unit("N m s/rad or N s/m")] | None = Field(
+        None, description="Damping of the joint."
+    )
     anisotropicFriction: Vec3 | None = Field(None, description="Factors on friction along x, y and z.")
-    maxJointVelocity: Positive | None = Field(None, description="Largest velocity of the joint.")
+    maxJointVelocity: Annotated[Positive, Unit("rad/s or m/s")] | None = Field(
+        None, description="Largest velocity of the joint."
+    )
     collisionMargin: Annotated[NonNegative, Unit("m")] | None = Field(
         None, description="Margin around the shape."
     )
-    jointLowerLimit: float | None = Field(None, description="Lower limit of the joint.")
-    jointUpperLimit: float | None = Field(None, description="Upper limit of the joint.")
-    jointLimitForce: NonNegative | None = Field(None, description="Largest force at the joint's limits.")
+    jointLowerLimit: Annotated[float, Unit("rad or m")] | None = Field(None, description="Lower limit of the joint.")
+    jointUpperLimit: Annotated[float, Unit("rad or m")] | None = Field(None, description="Upper limit of the joint.")
+    jointLimitForce: Annotated[NonNegative, Unit("N m or N")] | None = Field(
+        None, description="Largest effort at the joint's limits."
+    )
     sleepThreshold: NonNegative | None = Field(None, description="Motion below which the body may sleep.")
 
     @model_validator(mode="after")

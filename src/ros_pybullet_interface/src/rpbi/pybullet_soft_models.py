@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
-from pydantic import Field, WithJsonSchema, model_validator
+from pydantic import Field, model_validator
 
 from custom_ros_tools.schema import (
+    AlsoTakes,
     Count,
     KeyedError,
     Kilograms,
@@ -104,7 +105,10 @@ class CreateSoftBodyAnchor(PybulletModel):
         return named
 
 
-AnchorEntry = Annotated[CreateSoftBodyAnchor, WithJsonSchema({"type": "array", "minItems": 1, "maxItems": 5})]
+_ARGUMENT = {"type": ["string", "integer", "null", "array"], "items": {"type": "number"}}
+AnchorEntry = Annotated[
+    CreateSoftBodyAnchor, AlsoTakes({"type": "array", "minItems": 1, "maxItems": 5, "items": _ARGUMENT})
+]
 
 
 def _has_own_id(arguments: list[Any]) -> bool:

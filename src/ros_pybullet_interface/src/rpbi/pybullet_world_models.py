@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import pybullet
-from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from custom_ros_tools.schema import (
+    AlsoTakes,
     Count,
     Degrees,
     KeyedError,
@@ -38,7 +39,9 @@ class Connect(PybulletModel):
     """How to reach PyBullet."""
 
     connection_mode: Annotated[int, CONNECTION_MODES] = Field(
-        pybullet.GUI, description="GUI opens PyBullet's window, DIRECT needs no screen."
+        pybullet.GUI,
+        description="GUI opens PyBullet's window, DIRECT needs no screen.",
+        json_schema_extra={"default": "GUI"},
     )
     options: Text | None = Field(
         None, description="Further options, such as `--mp4=FILE` to record the window."
@@ -88,7 +91,9 @@ class SetPhysicsEngineParameter(PybulletModel):
     )
     numSubSteps: Count | None = Field(None, description="Parts that each step is divided into.")
     collisionFilterMode: Count | None = Field(None, description="0: both masks must match, 1: one of them.")
-    contactBreakingThreshold: NonNegative | None = Field(None, description="Distance at which contacts end.")
+    contactBreakingThreshold: Annotated[NonNegative, Unit("m")] | None = Field(
+        None, description="Distance at which contacts end."
+    )
     maxNumCmdPer1ms: int | None = Field(None, description="Most commands in a millisecond.")
     enableFileCaching: Switch | None = Field(None, description="Whether files are read once only.")
     restitutionVelocityThreshold: Annotated[NonNegative, Unit("m/s")] | None = Field(
@@ -138,8 +143,12 @@ class ConfigureDebugVisualizer(PybulletModel):
     flag: Annotated[
         ListOf[Annotated[int, VISUALIZER_FLAGS]],
         BeforeValidator(_as_list),
-        WithJsonSchema({"type": ["string", "integer", "array"]}),
-    ] = Field((pybullet.COV_ENABLE_GUI,), description="COV_... constants to switch.")
+        AlsoTakes(VISUALIZER_FLAGS.one_or_several_schema()),
+    ] = Field(
+        (pybullet.COV_ENABLE_GUI,),
+        description="COV_... constants to switch.",
+        json_schema_extra={"default": "COV_ENABLE_GUI"},
+    )
     enable: Switch = Field(False, description="Whether they are switched on.")
     lightPosition: Position | None = Field(None, description="Where the light is.")
     shadowMapResolution: Count | None = Field(

@@ -166,9 +166,16 @@ def apply_command(world: World, command: RecordedCommand) -> None:
 
     Raises:
         InterfaceError: If the world refuses.
-        ValueError: If the command cannot be read.
+        ValueError: If the command cannot be read, or is none that this world knows.
     """
-    name, what, value = command.name, command.what, from_text(command.data)
+    value = from_text(command.data)
+    try:
+        _apply(world, command.name, command.what, value)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ValueError(f"'{command.what}' of '{command.name}' makes no sense in this world: {error!r}") from error
+
+
+def _apply(world: World, name: str, what: str, value: Any) -> None:
     if what == "input":
         world.take_input(name, value)
     elif what == "add":

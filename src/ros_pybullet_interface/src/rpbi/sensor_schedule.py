@@ -8,6 +8,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from .clock import Clock, Schedule
+from .plugin_faults import blame, check_sample
+from .plugins import is_foreign
 from .sensors.sensor import Sensor
 
 log = logging.getLogger(__name__)
@@ -18,18 +20,24 @@ class _Scheduled:
 
     def __init__(self, sensor: Sensor, dt_ns: int, tick: int, order: int) -> None:
         self.sensor = sensor
+        self._is_foreign = is_foreign(sensor)
         self.order = order
         self.schedule = Schedule(sensor.hz, dt_ns)
-        if self.schedule.clamped:
-            log.warning("%s: %s Hz is more than a sample a tick; it gets one a tick", sensor.name, sensor.hz)
         self.next_tick = self.schedule.next_due(tick)
         self.read_tick = -1
         """Tick of the last sample, -1 before the first."""
 
     def read(self, tick: int) -> Any:
-        sample = self.sensor.read(tick)
-        if sample is not None:
-            self.read_tick = tick
+        try:
+            sample = self.sensor.read(tick)
+            if sample is None:
+                return None
+            if self._is_foreign:
+                check_sample(sample, self.sensor.sample_type, self.sensor.name)
+        except Exception as error:
+            blame(self.sensor, f"read of '{self.sensor.name}' at tick {tick}", error)
+            raise
+        self.read_tick = tick
         return sample
 
 
@@ -48,6 +56,8 @@ class SensorSchedule:
         self._queue: list[tuple[int, int, _Scheduled]] = []
         """A heap of when each sensor is due, in which order it came, and the sensor."""
         self._count = 0
+        self._warned: set[tuple[str, float]] = set()
+        """Names and rates of sensors that were warned of; a reset is no reason to do so again."""
 
     def __contains__(self, name: str) -> bool:
         """Whether it knows a body or camera of that name, with sensors or without."""
@@ -62,6 +72,9 @@ class SensorSchedule:
         dt_ns, tick = self._clock.dt_ns, self._clock.tick
         self._scheduled[name] = [_Scheduled(one, dt_ns, tick, order) for order, one in enumerate(sensors, self._count)]
         self._count += len(sensors)
+        for each in self._scheduled[name]:
+            if each.schedule.clamped:
+                self._warn(each.sensor)
         self._take_stock()
 
     def remove(self, name: str) -> None:
@@ -74,15 +87,28 @@ class SensorSchedule:
         self._scheduled.clear()
         self._take_stock()
 
+    def _warn(self, sensor: Sensor) -> None:
+        if (sensor.name, sensor.hz) not in self._warned:
+            self._warned.add((sensor.name, sensor.hz))
+            log.warning("%s: %s Hz is more than a sample a tick; it gets one a tick", sensor.name, sensor.hz)
+
     def before_step(self) -> None:
         """Lets sensors act that do so before the physics of each tick."""
         for sensor in self._watching:
-            sensor.before_step(self._clock.tick)
+            try:
+                sensor.before_step(self._clock.tick)
+            except Exception as error:
+                blame(sensor, f"before_step of '{sensor.name}' at tick {self._clock.tick}", error)
+                raise
 
     def after_step(self) -> None:
         """Lets the same sensors act after it."""
         for sensor in self._watching:
-            sensor.after_step(self._clock.tick)
+            try:
+                sensor.after_step(self._clock.tick)
+            except Exception as error:
+                blame(sensor, f"after_step of '{sensor.name}' at tick {self._clock.tick}", error)
+                raise
 
     def read_due(self) -> list[Any]:
         """Returns samples of the sensors that are due at this tick."""

@@ -8,21 +8,22 @@ from typing import Any
 
 import pybullet
 
-from custom_ros_tools.errors import ConfigError, PhysicsError, Problem, UnknownNameError
-from custom_ros_tools.schema import ConfigModel
+from custom_ros_tools.errors import ConfigError, PhysicsError, PluginError, Problem, UnknownNameError
 
 from .actions import ACTIONS
-from .bodies import BODY_TYPES, Body
+from .bodies import BODY_TYPES, Body, BodyConfig
 from .client import Client
 from .clock import Clock
 from .command_log import CommandLog, WorldCommand
 from .config import LoadedWorld, load_world
 from .contact_reader import ContactReader
 from .dynamics import read_dynamics
+from .equipment import equipment
 from .inputs import Input
 from .link_dynamics import LinkDynamics
 from .load_log import LogEntry, apply
 from .mailbox import Mailbox
+from .plugin_faults import blame, blaming
 from .pybullet_models import ChangeDynamics
 from .rgbd_config import FIRST_TOPIC_NAME, RgbdSensorConfig
 from .sensor_schedule import SensorSchedule
@@ -100,27 +101,32 @@ class World:
         """
         return cls(load_world(path, BODY_TYPES), **options)
 
-    def add(self, kind: str, config: ConfigModel, file: str | None = None) -> Body:
+    def add(self, kind: str, config: BodyConfig, file: str | None = None) -> Body:
         """Adds a body; when it raises, the world is as it was.
 
         Args:
-            kind: A key of BODY_TYPES.
+            kind: A key of BODY_TYPES, or `module:Class`.
             config: Configuration of that type.
             file: Where it came from, for messages; without it, they have the body's name.
 
         Raises:
             ConfigError: If the name is taken or the configuration does not fit.
             PhysicsError: If PyBullet refuses.
+            PluginError: If a class of another package fails.
         """
-        name: str = config.name  # type: ignore[attr-defined]
+        name = config.name
         self._require_new(name, file)
         try:
             self._append(LogEntry(name, "add", (kind, config)))
+            body = self.bodies[name]
+            try:
+                self._register(name, *equipment(body, config))
+            except Exception:
+                self._append(LogEntry(name, "remove"))
+                raise
         except ConfigError as error:
             raise ConfigError([Problem(file or name, each.key, each.message) for each in error.problems]) from None
-        body = self.bodies[name]
         self._note(name, "add", (kind, config))
-        self._register(name, body.sensors(), body.inputs())
         if type(body).before_step is not Body.before_step:
             self._stepping.append(body)
         return body
@@ -261,8 +267,10 @@ class World:
 
     def take_input(self, slot: str, value: Any) -> None:
         """Acts on a value that was checked, and notes it if it is for a body."""
-        self._inputs[slot].apply(value)
-        if slot.split("/")[0] in self.bodies:
+        body = self.bodies.get(slot.split("/")[0])
+        with blaming(body or self, f"taking '{slot}' at tick {self.clock.tick}"):
+            self._inputs[slot].apply(value)
+        if body is not None:
             self._note(slot, "input", value)
 
     def step(self) -> list[Any]:
@@ -273,10 +281,15 @@ class World:
 
         Raises:
             PhysicsError: If something in the world is not finite any more.
+            PluginError: If a class of another package fails.
         """
         self.take_inputs()
         for body in self._stepping:
-            body.before_step(self.clock.tick)
+            try:
+                body.before_step(self.clock.tick)
+            except Exception as error:
+                blame(body, f"before_step of '{body.name}' at tick {self.clock.tick}", error)
+                raise
         self._sensors.before_step()
         self.pb.stepSimulation()
         self.contacts.outdate()
@@ -364,7 +377,7 @@ class World:
                 self.add(item.type, item.config, item.file)
             except ConfigError as error:
                 problems += error.problems
-            except PhysicsError as error:
+            except (PhysicsError, PluginError) as error:
                 problems.append(Problem(item.file, "", str(error)))
         if problems:
             raise ConfigError(problems)
@@ -401,6 +414,7 @@ class World:
 
     def _register(self, name: str, sensors: tuple[Sensor, ...], inputs: Any) -> None:
         for sensor in sensors:
-            sensor.enter(self)
+            with blaming(sensor, f"enter of '{sensor.name}'"):
+                sensor.enter(self)
         self._sensors.add(name, sensors)
         self._inputs = {**self._inputs, **{f"{name}/{key}": value for key, value in inputs.items()}}

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
 from custom_ros_tools.schema import (
+    AlsoTakes,
     ConfigModel,
     FrameId,
     Hz,
@@ -41,7 +42,12 @@ def _as_list(given: Any) -> Any:
     return [given] if isinstance(given, str) else given
 
 
+LONGEST_STEP_S = 10.0
+
+
 def _whole_nanoseconds(seconds: float) -> float:
+    if seconds > LONGEST_STEP_S:
+        raise ValueError(f"must be at most {LONGEST_STEP_S:g} [s], got {seconds:g}")
     if round(seconds * 1e9) < 1:
         raise ValueError(f"must be at least 1.0e-9 [s], got {seconds:g}")
     return seconds
@@ -50,7 +56,7 @@ def _whole_nanoseconds(seconds: float) -> float:
 Folders = Annotated[
     ListOf[Annotated[Text, AfterValidator(_existing_folder)]],
     BeforeValidator(_as_list),
-    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
+    AlsoTakes({"type": "string", "minLength": 1}),
 ]
 
 
@@ -119,6 +125,7 @@ class WorldConfig(ConfigModel):
     robots: ListOf[ObjectEntry] = Field((), description="Files of robots.")
     soft_objects: ListOf[ObjectEntry] = Field((), description="Files of soft bodies.")
     urdfs: ListOf[ObjectEntry] = Field((), description="Files of objects that come from a URDF and have no motors.")
+    objects: ListOf[ObjectEntry] = Field((), description="Files of objects of your own types, see docs/extending.md.")
     rgbd_sensor: RgbdSensorConfig | None = Field(
         None, description="Camera of colour, depth and segmentation; the first one if there are several."
     )

@@ -34,6 +34,15 @@ def log_last_words(lines: Iterable[str]) -> None:
     time.sleep(SENDING_S)
 
 
+def log_loss_of_master(error: ConnectionError) -> None:
+    """Logs that the ROS master has gone while it was needed.
+
+    Args:
+        error: What the call to it raised.
+    """
+    log_last_words([f"the ROS master at {rosgraph.get_master_uri()} has gone while the node was starting: {error}"])
+
+
 def _listeners() -> int:
     """Returns how many nodes listen to /rosout."""
     with contextlib.suppress(OSError, rosgraph.MasterException):

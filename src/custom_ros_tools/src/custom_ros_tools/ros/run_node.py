@@ -10,8 +10,9 @@ import rospy
 
 from ..errors import InterfaceError
 from .interrupts import leaving_ros_on_interrupt, wait_for_master
-from .last_words import log_last_words
+from .last_words import log_last_words, log_loss_of_master
 from .logging_bridge import attach_logging
+from .master_watch import MasterWatch
 
 
 def run_node(name: str, start: Callable[[], object], anonymous: bool = False) -> None:
@@ -29,6 +30,7 @@ def run_node(name: str, start: Callable[[], object], anonymous: bool = False) ->
         return
     rospy.init_node(name, anonymous=anonymous, disable_signals=True)
     attach_logging("custom_ros_tools")
+    MasterWatch()
     ended = threading.Event()
     rospy.on_shutdown(ended.set)
     with leaving_ros_on_interrupt():
@@ -36,6 +38,9 @@ def run_node(name: str, start: Callable[[], object], anonymous: bool = False) ->
             _node = start()
         except InterfaceError as error:
             log_last_words(str(error).splitlines())
+            sys.exit(1)
+        except ConnectionError as error:
+            log_loss_of_master(error)
             sys.exit(1)
         except rospy.ROSInterruptException:
             return

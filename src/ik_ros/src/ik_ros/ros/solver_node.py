@@ -9,13 +9,12 @@ from collections.abc import Callable
 
 import genpy
 import rospy
-from pydantic import Field
+from geometry_msgs.msg import Pose
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
-from custom_ros_tools.node_parameters import StartParameters
 from custom_ros_tools.on_off import OnOff
 from custom_ros_tools.ros.run_node import run_node
 from custom_ros_tools.ros.throttle import ThrottledWarning
@@ -38,8 +37,9 @@ from ..continuity import Continuity, ContinuityConfig
 from ..lookup import make_solver
 from ..problem import IKProblem
 from ..solution import IKSolution
+from ..solver_node_parameters import SolverNodeParameters
 from .base_frame import BaseFrame
-from .messages import problem_in, problem_in_trac_ik, solution_message, trajectory_message
+from .messages import pose_message, problem_in, problem_in_trac_ik, solution_message, trajectory_message
 from .solver_argument import solver_argument
 
 QUEUE_SIZE = 10
@@ -50,13 +50,6 @@ PROBLEMS: dict[str, tuple[type[genpy.Message], Callable[[genpy.Message], IKProbl
     TracIKProblem._type: (TracIKProblem, problem_in_trac_ik),
 }
 """What the topic `ik` may carry, and how it is read."""
-
-
-class SolverNodeParameters(StartParameters):
-    """Private parameters of the node itself; all others are the solver's."""
-
-    base_frame_id: str = Field("", description="TF frame of the solver's base; empty takes poses as they are.")
-    continuity: ContinuityConfig | None = Field(None, description="Keeps targets within the velocities of the joints.")
 
 
 class SolverNode:
@@ -181,6 +174,7 @@ class SolverNode:
             return SolveIKResponse(success=False, message=str(error))
         names = solution.joint_names
         return SolveIKResponse(
+            base_pose=Pose() if solution.base_pose is None else pose_message(solution.base_pose),
             success=solution.success,
             message=solution.message,
             solution=solution_message(solution),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from ..plugins import find_class, full_name
 from .body import Body
+from .body_config import BodyConfig
 from .collision import CollisionObject
 from .dynamic import DynamicObject
 from .mobile_robot import MobileRobot
@@ -24,9 +26,28 @@ BODY_TYPES: dict[str, type[Body]] = {
 }
 """In the order in which a world loads them; soft bodies may be tied to any of the others."""
 
+
+def body_class(kind: str) -> type[Body]:
+    """Returns the class of bodies of a type.
+
+    Args:
+        kind: A key of BODY_TYPES, or `module:Class` of another package.
+
+    Raises:
+        ValueError: If there is none.
+    """
+    return BODY_TYPES[kind] if kind in BODY_TYPES else find_class(kind, Body)
+
+
+def kind_of(body: Body) -> str:
+    """Returns the type of a body, by which `body_class` finds its class."""
+    return next((kind for kind, each in BODY_TYPES.items() if each is type(body)), full_name(body))
+
+
 __all__ = [
     "BODY_TYPES",
     "Body",
+    "BodyConfig",
     "CollisionObject",
     "DynamicObject",
     "MobileRobot",
@@ -35,4 +56,6 @@ __all__ = [
     "UrdfObject",
     "VisualObject",
     "VisualRobot",
+    "body_class",
+    "kind_of",
 ]

@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 import pybullet
 
 from custom_ros_tools.errors import PhysicsError
-from custom_ros_tools.schema import ConfigModel
 
 from ..client import Client
 from ..inputs import Input
@@ -18,6 +17,7 @@ from ..samples import BodyState
 from ..sensors.sensor import Sensor
 from ..twist import Twist
 from ..vectors import cross, minus, plus
+from .body_config import BodyConfig
 
 
 class Body:
@@ -32,11 +32,11 @@ class Body:
         body_id: PyBullet's id of it, valid as long as it exists.
     """
 
-    Config: ClassVar[type[ConfigModel]]
+    Config: ClassVar[type[BodyConfig]]
     is_soft: ClassVar[bool] = False
     """Whether it has neither links nor a fixed shape."""
-    section: ClassVar[str]
-    """The list of the main YAML file that names objects of this type."""
+    section: ClassVar[str] = "objects"
+    """The list of the main YAML file that names objects of this type; that of types from other packages, as a rule."""
 
     def __init__(self, pb: Client, name: str, body_id: int) -> None:
         if body_id < 0:

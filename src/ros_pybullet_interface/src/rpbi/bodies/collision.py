@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from custom_ros_tools.schema import ConfigModel, Name
-
 from ..client import Client
 from ..pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ObjectTf
 from ..sensors.contacts_config import ContactsConfig, contact_sensors
 from ..sensors.sensor import Sensor
+from .body_config import BodyConfig
 from .shape_object import ShapeObject
 
 
-class CollisionObjectConfig(ConfigModel):
-    """YAML of a collision object."""
+class CollisionObjectConfig(BodyConfig):
+    """A collision object: it is felt, and nothing but TF moves it."""
 
-    name: Name = Field(description="Unique name; topics and TF frames are named after it.")
     createVisualShape: CreateVisualShape = Field(description="What it looks like.")
     createCollisionShape: CreateCollisionShape = Field(description="What it feels like.")
     changeDynamics: ChangeDynamics | None = Field(None, description="Friction, restitution and the like.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from custom_ros_tools.schema import ConfigModel, HzOrOff, Name, Position, Positive, Quat
+from custom_ros_tools.schema import HzOrOff, Position, Positive, Quat
 
 from ..client import Client
 from ..pose import Pose
@@ -12,13 +12,13 @@ from ..pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisual
 from ..sensors.contacts_config import ContactsConfig, contact_sensors
 from ..sensors.link_pose import LinkPoseSensor
 from ..sensors.sensor import Sensor
+from .body_config import BodyConfig
 from .shape_object import ShapeObject
 
 
-class DynamicObjectConfig(ConfigModel):
-    """YAML of a dynamic object."""
+class DynamicObjectConfig(BodyConfig):
+    """A dynamic object: physics moves it."""
 
-    name: Name = Field(description="Unique name; topics and TF frames are named after it.")
     createVisualShape: CreateVisualShape = Field(description="What it looks like.")
     createCollisionShape: CreateCollisionShape = Field(description="What it feels like.")
     changeDynamics: ChangeDynamics = Field(description="Friction, restitution and the like.")

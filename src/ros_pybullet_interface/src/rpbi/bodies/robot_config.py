@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from custom_ros_tools.schema import ConfigModel, Hz, HzOrOff, KeyedError, ListOf, Name, Seconds, Switch
+from custom_ros_tools.schema import Hz, HzOrOff, KeyedError, ListOf, Seconds, Switch
 
 from ..control.planar_base_config import PlanarBaseConfig
 from ..control.trajectory_config import JointTrajectoryControllerConfig
 from ..pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity, SetJointMotorControlArray
 from ..sensors.contacts_config import ContactsConfig
 from ..sensors.force_torque_config import ForceTorqueEntry
+from .body_config import BodyConfig
 
 
-class RobotConfig(ConfigModel):
-    """YAML of a robot, simulated or only shown."""
+class RobotConfig(BodyConfig):
+    """A robot, simulated or only shown."""
 
-    name: Name = Field(description="Unique name; topics and TF frames are named after it.")
     loadURDF: LoadURDF = Field(description="Its description and where its base is.")
     is_visual_robot: Switch = Field(
         False, description="Whether it is only shown: it follows joint targets and TF, and nothing can touch it."

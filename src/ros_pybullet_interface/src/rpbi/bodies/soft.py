@@ -9,7 +9,7 @@ import pybullet
 from pydantic import Field, model_validator
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, Problem
-from custom_ros_tools.schema import ConfigModel, HzOrOff, KeyedError, ListOf, Name
+from custom_ros_tools.schema import HzOrOff, KeyedError, ListOf
 
 from ..client import Client
 from ..dynamics import link_index
@@ -23,16 +23,16 @@ from ..sensors.surface import SurfaceSensor
 from ..twist import Twist
 from ..urdf import deformable_meshes
 from .body import Body
+from .body_config import BodyConfig
 from .soft_mesh_faults import soft_mesh_faults
 from .urdf_loading import load_urdf
 
 
-class SoftObjectConfig(ConfigModel):
-    """YAML of a soft body."""
+class SoftObjectConfig(BodyConfig):
+    """A soft body: it has no fixed shape."""
 
-    name: Name = Field(description="Unique name; topics are named after it.")
     loadSoftBody: LoadSoftBody | None = Field(None, description="Its mesh and what it is made of; this or loadURDF.")
-    loadURDF: LoadURDF | None = Field(None, description="A URDF with a <deformable>; this or loadSoftBody.")
+    loadURDF: LoadURDF | None = Field(None, description="A URDF with a `<deformable>`; this or loadSoftBody.")
     createSoftBodyAnchor: ListOf[AnchorEntry] = Field(
         (), description="Corners tied to bodies or the world, each [node, body, link, position]."
     )

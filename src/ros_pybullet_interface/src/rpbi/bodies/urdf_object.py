@@ -9,7 +9,7 @@ import pybullet
 from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem
-from custom_ros_tools.schema import ConfigModel, HzOrOff, Name
+from custom_ros_tools.schema import HzOrOff
 
 from ..client import Client
 from ..inputs import Input, PoseInput
@@ -19,15 +19,15 @@ from ..sensors.link_pose import LinkPoseSensor
 from ..sensors.sensor import Sensor
 from ..urdf import deformable_meshes
 from .body import Body
+from .body_config import BodyConfig
 from .urdf_loading import load_urdf
 
 log = logging.getLogger(__name__)
 
 
-class UrdfObjectConfig(ConfigModel):
-    """YAML of a URDF object."""
+class UrdfObjectConfig(BodyConfig):
+    """An object that comes from a URDF and has no motors."""
 
-    name: Name = Field(description="Unique name; topics and TF frames are named after it.")
     loadURDF: LoadURDF = Field(description="Its description and where its base is.")
     object_tf: ObjectTf | None = Field(None, description="TF frame that a fixed base follows.")
     resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity of a floating base.")

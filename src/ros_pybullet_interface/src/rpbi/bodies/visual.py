@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from custom_ros_tools.schema import ConfigModel, Name
-
 from ..client import Client
 from ..pybullet_models import CreateCollisionShape, CreateVisualShape, ObjectTf
+from .body_config import BodyConfig
 from .shape_object import ShapeObject
 
 
-class VisualObjectConfig(ConfigModel):
-    """YAML of a visual object."""
+class VisualObjectConfig(BodyConfig):
+    """A visual object: it is seen and never felt."""
 
-    name: Name = Field(description="Unique name; topics and TF frames are named after it.")
     createVisualShape: CreateVisualShape = Field(description="What it looks like.")
     createCollisionShape: CreateCollisionShape | None = Field(
         None, description="Accepted and ignored, so that a collision object can be turned into a visual one."

@@ -39,11 +39,13 @@ class BodyService(NamedTuple):
         answer: Returns the response to a request. What it raises for a request that must be refused (InterfaceError or
             ValueError) becomes `success=False` and its message, or an error of the call where the response has none.
         suffixes: What follows `rpbi/NAME/` in its names, for a body; nothing if the body does not have it.
+        meaning: What it does, in a sentence.
     """
 
     service_type: type
     answer: Callable[[BodyContext, Any], Any]
     suffixes: Callable[[Body], Sequence[str]]
+    meaning: str
 
 
 def of(body_type: type[Body], suffix: str) -> Callable[[Body], Sequence[str]]:
@@ -52,17 +54,62 @@ def of(body_type: type[Body], suffix: str) -> Callable[[Body], Sequence[str]]:
 
 
 BODY_SERVICES: tuple[BodyService, ...] = (
-    BodyService(SetTransform, set_pose, of(Body, "set_pose")),
-    BodyService(RobotInfo, robot_info, of(JointedBody, "robot_info")),
-    BodyService(CalculateInverseKinematics, inverse_kinematics, of(JointedBody, "ik")),
-    BodyService(SetJointState, set_joint_state, of(JointedBody, "set_joint_state")),
-    BodyService(Empty, zero_force_torque, force_torque_suffixes),
-    BodyService(SetString, set_control_mode, of(Robot, "set_control_mode")),
-    BodyService(Trigger, stop_motion, of(Robot, "stop_motion")),
-    BodyService(ResetJointState, move_to_joint_state, of(Robot, "move_to_joint_state")),
-    BodyService(ResetJointState, move_to_initial_joint_state, of(Robot, "move_to_initial_joint_state")),
-    BodyService(ResetEffState, move_to_eff_state, of(Robot, "move_to_eff_state")),
-    BodyService(QueryTrajectoryState, query_state, query_suffixes),
+    BodyService(SetTransform, set_pose, of(Body, "set_pose"), "Puts the base link at a pose in the world, at rest."),
+    BodyService(
+        RobotInfo,
+        robot_info,
+        of(JointedBody, "robot_info"),
+        "Tells joints, limits, force-torque sensors and the present joint state.",
+    ),
+    BodyService(
+        CalculateInverseKinematics,
+        inverse_kinematics,
+        of(JointedBody, "ik"),
+        "Tells joint positions that bring a link to a pose; moves nothing.",
+    ),
+    BodyService(
+        SetJointState,
+        set_joint_state,
+        of(JointedBody, "set_joint_state"),
+        "Puts the joints that are named somewhere at once, within their limits.",
+    ),
+    BodyService(
+        Empty,
+        zero_force_torque,
+        force_torque_suffixes,
+        "Takes the mean of the next 100 samples of that force-torque sensor for zero.",
+    ),
+    BodyService(
+        SetString,
+        set_control_mode,
+        of(Robot, "set_control_mode"),
+        "Switches to `POSITION_CONTROL`, `VELOCITY_CONTROL` or `TORQUE_CONTROL`.",
+    ),
+    BodyService(Trigger, stop_motion, of(Robot, "stop_motion"), "Ends a timed motion."),
+    BodyService(
+        ResetJointState,
+        move_to_joint_state,
+        of(Robot, "move_to_joint_state"),
+        "Moves the joints that are named, in `duration` [s]; answers at the end.",
+    ),
+    BodyService(
+        ResetJointState,
+        move_to_initial_joint_state,
+        of(Robot, "move_to_initial_joint_state"),
+        "Moves all joints to where they started, in `duration` [s]; answers at the end.",
+    ),
+    BodyService(
+        ResetEffState,
+        move_to_eff_state,
+        of(Robot, "move_to_eff_state"),
+        "Moves a link to a pose by inverse kinematics, in `duration` [s]; answers at the end.",
+    ),
+    BodyService(
+        QueryTrajectoryState,
+        query_state,
+        query_suffixes,
+        "Tells where joints will be at a time; only with control_msgs.",
+    ),
 )
 
 

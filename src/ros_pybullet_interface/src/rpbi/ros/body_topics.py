@@ -25,16 +25,28 @@ class BodyTopic(NamedTuple):
         message_type: Its ROS type.
         take: Acts on a message; it raises InterfaceError or ValueError for one that must be refused.
         suffixes: What follows `rpbi/NAME/` in its names, for a body; nothing if the body does not have it.
+        meaning: What a message does, in a sentence.
     """
 
     message_type: type
     take: Callable[[BodyContext, Any], None]
     suffixes: Callable[[Body], Sequence[str]]
+    meaning: str
 
 
 BODY_TOPICS: tuple[BodyTopic, ...] = (
-    BodyTopic(CalculateInverseKinematicsProblem, move_by_ik, ik_topic_suffixes),
-    BodyTopic(JointTrajectory, follow_command, of_followers("command")),
+    BodyTopic(
+        CalculateInverseKinematicsProblem,
+        move_by_ik,
+        ik_topic_suffixes,
+        "The robot goes to the solution of the problem; with `start_ik_callback`.",
+    ),
+    BodyTopic(
+        JointTrajectory,
+        follow_command,
+        of_followers("command"),
+        "The robot follows the trajectory, without looking at how well.",
+    ),
 )
 
 _warn = ThrottledWarning()

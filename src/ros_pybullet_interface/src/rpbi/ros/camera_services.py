@@ -14,9 +14,14 @@ from custom_ros_tools.srv import SetString, SetStringRequest, SetStringResponse
 from ..asset_files import find_file
 from ..instance import FILE, parse_instance
 from ..rgbd_config import RgbdSensorConfig
+from .node_service import NodeService
 from .services import NO_FOLDER
 
-CAMERA_SERVICES: dict[str, type] = {"rpbi/add_rgbd_sensor": SetString}
+CAMERA_SERVICES: dict[str, NodeService] = {
+    "rpbi/add_rgbd_sensor": NodeService(
+        SetString, "Adds a camera: the keys of `rgbd_sensor` as YAML text, or `file` and the keys that differ."
+    )
+}
 """What is served for cameras; `rpbi/remove_pybullet_object` removes them too."""
 
 

@@ -14,22 +14,37 @@ class CameraTopic(NamedTuple):
         stream: What of the frame it tells, as in `render.frame.Demand`.
         suffix: Its name after the camera's prefix.
         message_type: Its ROS type.
+        meaning: What it tells, in a sentence.
     """
 
     stream: str
     suffix: str
     message_type: type
+    meaning: str
 
 
 IMAGE_TOPICS = (
-    CameraTopic("colour", "colour/image", Image),
-    CameraTopic("depth", "depth/image", Image),
-    CameraTopic("segmentation", "segmentation", Image),
-    CameraTopic("info", "colour/camera_info", CameraInfo),
-    CameraTopic("info", "depth/camera_info", CameraInfo),
-    CameraTopic("info", "camera_info", CameraInfo),  # that of `segmentation`, by the rule of image_transport
+    CameraTopic("colour", "colour/image", Image, "Colour, `rgb8`."),
+    CameraTopic(
+        "depth",
+        "depth/image",
+        Image,
+        "Distance along the optical axis, `32FC1` [m]; the far end of `range` where nothing is.",
+    ),
+    CameraTopic(
+        "segmentation", "segmentation", Image, "PyBullet's ids of the bodies, `mono16`; 65535 where nothing is."
+    ),
+    CameraTopic("info", "colour/camera_info", CameraInfo, "Intrinsics of the colour image."),
+    CameraTopic("info", "depth/camera_info", CameraInfo, "Intrinsics of the depth image."),
+    # By the rule of image_transport
+    CameraTopic("info", "camera_info", CameraInfo, "Intrinsics of the segmentation."),
 )
-CLOUD_TOPIC = CameraTopic("points", "pointcloud", PointCloud2)
+CLOUD_TOPIC = CameraTopic(
+    "points",
+    "pointcloud",
+    PointCloud2,
+    "Points `x`, `y`, `z` [m] in the optical frame and `rgb`, one a pixel, NaN where nothing is; with `pointcloud`.",
+)
 
 
 def camera_topics(topic_name: str, pointcloud: bool) -> dict[str, CameraTopic]:

@@ -11,10 +11,10 @@ import pybullet
 
 from custom_ros_tools.errors import InterfaceError
 
-from ..bodies import BODY_TYPES
+from ..bodies import BODY_TYPES, kind_of
 from ..config import load_world
 from ..world import World
-from .interface_table import endpoints
+from .interface_table import Endpoint, endpoints
 
 
 def main() -> None:
@@ -26,24 +26,23 @@ def main() -> None:
     logging.basicConfig(format="warning: %(message)s", level=logging.WARNING)
     try:
         world = World(load_world(path, BODY_TYPES), connection_mode=pybullet.DIRECT)
+        listed = endpoints(world)
     except InterfaceError as error:
         problems = str(error).splitlines()
         print("\n".join(problems), file=sys.stderr)
         print(f"{path}: {len(problems)} problem{'s' if len(problems) > 1 else ''}", file=sys.stderr)
         sys.exit(1)
-    _print(path, world)
+    _print(path, world, listed)
     world.close()
 
 
-def _print(path: str, world: World) -> None:
-    kinds = {body_type: kind for kind, body_type in BODY_TYPES.items()}
+def _print(path: str, world: World, listed: list[Endpoint]) -> None:
     print(f"{path}: fine; {1.0 / world.clock.dt_s:g} ticks a second")
     for name, body in world.bodies.items():
         joints = f", {len(body.link_indices)} joints" if body.link_indices else ""
-        print(f"  {kinds[type(body)]:<12} {name}{joints}")
+        print(f"  {kind_of(body):<12} {name}{joints}")
     for name in world.cameras:
         print(f"  {'camera':<12} {name}")
-    rows = endpoints(world)
-    kind_width, name_width, type_width = (max(map(len, column)) for column in list(zip(*rows))[:3])
-    for kind, name, type_name, note in rows:
-        print(f"  {kind:<{kind_width}}  {name:<{name_width}}  {type_name:<{type_width}}  {note}".rstrip())
+    kind_width, name_width, type_width = (max(map(len, column)) for column in list(zip(*listed))[:3])
+    for kind, name, type_name, note, meaning in listed:
+        print(f"  {kind:<{kind_width}}  {name:<{name_width}}  {type_name:<{type_width}}  {note or meaning}".rstrip())

@@ -25,12 +25,19 @@ from ros_pybullet_interface.srv import (
 from ..link_dynamics import LinkDynamics, difference
 from ..pybullet_models import ChangeDynamics
 from ..world import World
+from .node_service import NodeService
 from .requests import Requests
 
-DYNAMICS_SERVICES: dict[str, type] = {
-    "rpbi/get_pybullet_object_dynamics": GetObjectDynamics,
-    "rpbi/change_pybullet_object_dynamics": ChangeObjectDynamics,
-    "rpbi/change_dynamics": ChangeDynamicsService,
+DYNAMICS_SERVICES: dict[str, NodeService] = {
+    "rpbi/get_pybullet_object_dynamics": NodeService(
+        GetObjectDynamics, "Tells mass, friction and the like of an object or a link."
+    ),
+    "rpbi/change_pybullet_object_dynamics": NodeService(
+        ChangeObjectDynamics, "Changes what differs from what the service before tells."
+    ),
+    "rpbi/change_dynamics": NodeService(
+        ChangeDynamicsService, "Changes the keys of `changeDynamics` that the YAML text in it has."
+    ),
 }
 """What is served, in the order of the handlers."""
 
@@ -46,7 +53,8 @@ class DynamicsServices:
     def __init__(self, world: World, ask: Requests) -> None:
         self._world, self._ask = world, ask
         handlers = (self._get, self._change_object, self._change)
-        for (name, service_type), handler in zip(DYNAMICS_SERVICES.items(), handlers, strict=True):
+        for (name, service), handler in zip(DYNAMICS_SERVICES.items(), handlers, strict=True):
+            service_type: Any = service.service_type
             rospy.Service(name, service_type, _refusing(handler, service_type._response_class))
 
     def _get(self, request: GetObjectDynamicsRequest) -> GetObjectDynamicsResponse:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,6 +11,9 @@ import rosgraph
 import rospy
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
+
+from custom_ros_tools.ros.logging_bridge import attach_logging
+from custom_ros_tools.ros.master_watch import MasterWatch
 
 from ..point_cloud import PointCloud
 from ..render.frame import Camera, Demand, Frame
@@ -32,6 +36,8 @@ class ImageSink:
     def __init__(self) -> None:
         # Without ROS time, since it must never wait for the clock: stamps come with the frames.
         rospy.init_node("rpbi_camera", disable_rostime=True, disable_signals=True)
+        attach_logging("custom_ros_tools")
+        MasterWatch()
         self._cameras: dict[str, _CameraTopics] = {}
 
     def add(self, camera: Camera) -> None:
@@ -45,7 +51,13 @@ class ImageSink:
         self._cameras.pop(name).close()
 
     def demands(self) -> Mapping[str, Demand]:
-        """Returns what is subscribed to, by camera."""
+        """Returns what is subscribed to, by camera.
+
+        Raises:
+            SystemExit: If somebody has shut down the node: without it the process is of no use.
+        """
+        if rospy.is_shutdown():
+            sys.exit(f"{rospy.get_name()} was shut down")
         return {name: topics.demand() for name, topics in self._cameras.items()}
 
     def write(self, frame: Frame) -> None:

@@ -13,15 +13,17 @@ import geometry_msgs.msg
 import rospy
 from sensor_msgs.msg import JointState
 
-from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
 from custom_ros_tools.ros.throttle import ThrottledWarning
 
 from ..inputs import Input, PoseInput
 from ..joint_model import JointTarget, WrongQuantityError
+from ..plugins import full_name
 from ..pose import Pose
 from ..twist import Twist
 from ..world import World
 from .frames import world_frame
+from .plugin_topics import find_topic
 from .tf_listener import TfListener
 
 log = logging.getLogger(__name__)
@@ -39,11 +41,13 @@ class TopicInput(NamedTuple):
         topic: Name, with `{name}` for the body.
         message_type: ROS type.
         value: Turns a message into what the input takes.
+        meaning: What a message does, in a sentence.
     """
 
     topic: str
     message_type: type
     value: Callable[[Any], Any]
+    meaning: str = ""
 
 
 def _joint_target(message: JointState) -> JointTarget:
@@ -57,10 +61,38 @@ def _twist(message: geometry_msgs.msg.Twist) -> Twist:
 
 
 TOPIC_INPUTS: dict[str, TopicInput] = {
-    "target": TopicInput("rpbi/{name}/joint_states/target", JointState, _joint_target),
-    "cmd_vel": TopicInput("rpbi/{name}/cmd_vel", geometry_msgs.msg.Twist, _twist),
+    "target": TopicInput(
+        "rpbi/{name}/joint_states/target",
+        JointState,
+        _joint_target,
+        "Targets: positions [rad or m], velocities or efforts by the control mode; joints not named keep theirs.",
+    ),
+    "cmd_vel": TopicInput(
+        "rpbi/{name}/cmd_vel",
+        geometry_msgs.msg.Twist,
+        _twist,
+        "Velocity of a planar base in its own frame [m/s, rad/s], for `cmd_vel_timeout_s`.",
+    ),
 }
 """The topic of each kind of input that comes by topic."""
+
+
+def topic_input(key: str, taken: Input) -> TopicInput:
+    """Returns the topic of an input.
+
+    Args:
+        key: Its name on its body.
+        taken: The input.
+
+    Raises:
+        ConfigError: If it comes from another package and has no topic that can be found.
+    """
+    if taken.ros_topic:
+        return find_topic(taken.ros_topic, TopicInput, taken.apply)
+    if key not in TOPIC_INPUTS:
+        message = f"missing, expected 'module:NAME' of the TopicInput for its input '{key}'"
+        raise ConfigError([Problem(full_name(taken.apply), "ros_topic", message)])
+    return TOPIC_INPUTS[key]
 
 
 class Inputs:
@@ -84,7 +116,7 @@ class Inputs:
             if isinstance(taken, PoseInput):
                 self._tf.follow(name, f"{name}/{key}", taken)
             else:
-                subscribers.append(self._subscribe(name, key, TOPIC_INPUTS[key]))
+                subscribers.append(self._subscribe(name, key, topic_input(key, taken)))
 
     def close(self, name: str) -> None:
         """Disconnects the inputs of a body or sensor."""

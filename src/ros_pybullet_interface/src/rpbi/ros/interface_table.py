@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from tf2_msgs.msg import TFMessage
 
 from ros_pybullet_interface.msg import ResetDebugVisualizerCamera
 from ros_pybullet_interface.srv import GetDebugVisualizerCamera
 
+from ..bodies import Body
 from ..inputs import PoseInput
 from ..sensors import LinkPoseSensor
 from ..world import World
@@ -16,14 +20,22 @@ from .camera_services import CAMERA_SERVICES
 from .camera_topics import camera_topics
 from .debug_camera import GET_SERVICE, RESET_TOPIC
 from .dynamics_services import DYNAMICS_SERVICES
-from .inputs import TOPIC_INPUTS
-from .outlets import TOPICS
+from .inputs import topic_input
+from .node_topics import NODE_TOPICS
+from .outlets import sample_topic
 from .services import NODE_SERVICES
 from .time_services import TIME_SERVICES
 from .trajectory_commands import action_suffixes
 from .trajectory_messages import FollowJointTrajectoryAction
 from .window_topics import published_topics
 from .world_markers import MARKERS_TOPIC
+
+PUBLISHES = "publishes"
+SUBSCRIBES = "subscribes"
+SERVES = "serves"
+FOLLOWS = "listens to TF"
+OF_WINDOW = "PyBullet's window"
+"""Note of what belongs to it."""
 
 
 class Endpoint(NamedTuple):
@@ -33,60 +45,87 @@ class Endpoint(NamedTuple):
         kind: `publishes`, `subscribes`, `serves` or `listens to TF`.
         name: Its relative name, or the TF frame.
         type: Its ROS type.
-        note: Rate or purpose.
+        note: Its rate in this world, or what it belongs to.
+        meaning: What it tells or does, in a sentence.
     """
 
     kind: str
     name: str
     type: str
     note: str = ""
+    meaning: str = ""
 
 
 def endpoints(world: World) -> list[Endpoint]:
-    """Lists what the node opens for a world."""
-    config = world.config
-    listed = [
-        Endpoint("publishes", "rpbi/status", "std_msgs/Int64", f"{config.status_hz:g} Hz; 1 running, 0 stopped"),
-        Endpoint("publishes", "rpbi/state", "ros_pybullet_interface/SimulationState", f"{config.state_hz:g} Hz"),
-        Endpoint("publishes", "rpbi/commands", "ros_pybullet_interface/WorldCommands", "what enters, by tick"),
-        Endpoint("publishes", "rpbi/world_description", "std_msgs/String", "latched; for replays"),
-        Endpoint("publishes", "/diagnostics", "diagnostic_msgs/DiagnosticArray", "1 Hz"),
-    ]
-    listed.append(Endpoint("publishes", "/clock", "rosgraph_msgs/Clock", "if use_sim_time"))
-    if config.markers_hz:
-        listed.append(Endpoint("publishes", MARKERS_TOPIC, "visualization_msgs/MarkerArray", "latched; for RViz"))
-    for topic_name, message_type in published_topics(config).items():
-        listed.append(Endpoint("publishes", topic_name, message_type._type, "PyBullet's window"))
-    for name in world.bodies:
-        for sensor in world.sensors_of(name):
-            sample_topic = TOPICS.get(sensor.sample_type)
-            if sample_topic is not None:
-                topic_name = sample_topic.topic.format(name=sensor.name)
-                listed.append(Endpoint("publishes", topic_name, sample_topic.message_type._type, f"{sensor.hz:g} Hz"))
-            elif isinstance(sensor, LinkPoseSensor):
-                listed.append(Endpoint("publishes", "/tf", "tf2_msgs/TFMessage", f"{sensor.hz:g} Hz; {name}"))
-    for camera in world.cameras.values():
-        for full_name, topic in camera_topics(camera.topic_name, camera.config.pointcloud).items():
-            listed.append(Endpoint("publishes", full_name, topic.message_type._type, f"{camera.hz:g} Hz"))
-    for slot, taken in world.inputs.items():
-        name, key = slot.split("/")
-        if isinstance(taken, PoseInput):
-            listed.append(Endpoint("listens to TF", taken.tf_id, "", f"{taken.hz:g} Hz; {name}"))
-        else:
-            topic_input = TOPIC_INPUTS[key]
-            type_name = topic_input.message_type._type
-            listed.append(Endpoint("subscribes", topic_input.topic.format(name=name), type_name))
-    listed.append(Endpoint("subscribes", RESET_TOPIC, ResetDebugVisualizerCamera._type, "PyBullet's window"))
-    listed.append(Endpoint("serves", GET_SERVICE, GetDebugVisualizerCamera._type, "PyBullet's window"))
-    for name, service_type in {**NODE_SERVICES, **CAMERA_SERVICES, **DYNAMICS_SERVICES, **TIME_SERVICES}.items():
-        listed.append(Endpoint("serves", name, service_type._type))
+    """Lists what the node opens for a world.
+
+    Raises:
+        ConfigError: If a class of another package has no topic that can be found.
+    """
+    listed = [*_node_topics(world), *_window(world)]
     for name, body in world.bodies.items():
-        for topic in BODY_TOPICS:
-            for suffix in topic.suffixes(body):
-                listed.append(Endpoint("subscribes", f"rpbi/{name}/{suffix}", topic.message_type._type))
-        for suffix in action_suffixes(body):
-            listed.append(Endpoint("serves", f"rpbi/{name}/{suffix}", FollowJointTrajectoryAction._type, "action"))
-        for service in BODY_SERVICES:
-            for suffix in service.suffixes(body):
-                listed.append(Endpoint("serves", f"rpbi/{name}/{suffix}", service.service_type._type))
-    return listed
+        listed += of_body(world, name, body)
+    for name in world.cameras:
+        listed += of_camera(world, name)
+    services = {**NODE_SERVICES, **CAMERA_SERVICES, **DYNAMICS_SERVICES, **TIME_SERVICES}
+    return listed + [_endpoint(SERVES, name, each.service_type, "", each.meaning) for name, each in services.items()]
+
+
+def of_body(world: World, name: str, body: Body) -> Iterator[Endpoint]:
+    """Yields what belongs to a body."""
+    for sensor in world.sensors_of(name):
+        published = sample_topic(sensor)
+        rate = f"{sensor.hz:g} Hz"
+        if published is not None:
+            topic_name = published.topic.format(name=sensor.name)
+            yield _endpoint(PUBLISHES, topic_name, published.message_type, rate, published.meaning)
+        elif isinstance(sensor, LinkPoseSensor):
+            yield _endpoint(PUBLISHES, "/tf", TFMessage, f"{rate}; {name}", "Where it is, see [frames](#frames).")
+    yield from _inputs(world, name)
+    for topic in BODY_TOPICS:
+        for suffix in topic.suffixes(body):
+            yield _endpoint(SUBSCRIBES, f"rpbi/{name}/{suffix}", topic.message_type, "", topic.meaning)
+    for suffix in action_suffixes(body):
+        yield _endpoint(SERVES, f"rpbi/{name}/{suffix}", FollowJointTrajectoryAction, "action")
+    for service in BODY_SERVICES:
+        for suffix in service.suffixes(body):
+            yield _endpoint(SERVES, f"rpbi/{name}/{suffix}", service.service_type, "", service.meaning)
+
+
+def of_camera(world: World, name: str) -> Iterator[Endpoint]:
+    """Yields what belongs to a camera."""
+    camera = world.cameras[name]
+    for full_name, topic in camera_topics(camera.topic_name, camera.config.pointcloud).items():
+        yield _endpoint(PUBLISHES, full_name, topic.message_type, f"{camera.hz:g} Hz", topic.meaning)
+    yield from _inputs(world, name)
+
+
+def _node_topics(world: World) -> Iterator[Endpoint]:
+    for topic in NODE_TOPICS:
+        rate = getattr(world.config, topic.key) if topic.key else None
+        if topic.name != MARKERS_TOPIC or rate:
+            note = f"{rate:g} Hz" if rate else ""
+            yield _endpoint(PUBLISHES, topic.name, topic.message_type, note, topic.meaning)
+
+
+def _window(world: World) -> Iterator[Endpoint]:
+    for topic in published_topics(world.config):
+        yield _endpoint(PUBLISHES, topic.name, topic.message_type, OF_WINDOW, topic.meaning)
+    yield _endpoint(SUBSCRIBES, RESET_TOPIC, ResetDebugVisualizerCamera, OF_WINDOW, "Where the window shall look from.")
+    yield _endpoint(SERVES, GET_SERVICE, GetDebugVisualizerCamera, OF_WINDOW, "Tells where the window looks from.")
+
+
+def _inputs(world: World, name: str) -> Iterator[Endpoint]:
+    for slot, taken in world.inputs.items():
+        owner, key = slot.split("/")
+        if owner != name:
+            continue
+        if isinstance(taken, PoseInput):
+            yield Endpoint(FOLLOWS, taken.tf_id, "", f"{taken.hz:g} Hz; {name}")
+        else:
+            topic = topic_input(key, taken)
+            yield _endpoint(SUBSCRIBES, topic.topic.format(name=name), topic.message_type, "", topic.meaning)
+
+
+def _endpoint(kind: str, name: str, ros_type: Any, note: str, meaning: str = "") -> Endpoint:
+    return Endpoint(kind, name, ros_type._type, note, meaning)

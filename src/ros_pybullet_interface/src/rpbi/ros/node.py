@@ -13,12 +13,15 @@ import rospy
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, Problem, UnknownNameError
 from custom_ros_tools.ros.interrupts import leaving_ros_on_interrupt, wait_for_master
-from custom_ros_tools.ros.last_words import log_last_words
+from custom_ros_tools.ros.kept_parameters import kept_parameters
+from custom_ros_tools.ros.last_words import log_last_words, log_loss_of_master
 from custom_ros_tools.ros.logging_bridge import attach_logging
+from custom_ros_tools.ros.master_watch import MasterWatch
 
 from ..asset_files import ROBOT_DESCRIPTION
 from ..bodies import BODY_TYPES
 from ..config import load_world_dict
+from ..inputs import PoseInput
 from ..rgbd_config import RgbdSensorConfig
 from ..samples import LinkPoseSample, SceneSample
 from ..sensors import RgbdSensor
@@ -30,14 +33,15 @@ from .camera_services import CameraServices
 from .dynamics_services import DynamicsServices
 from .frames import use_prefix
 from .initial_state import start_where_robots_are, with_initial_state
-from .inputs import Inputs
-from .outlets import TOPICS, Outlet, SampleOutlet, TransformOutlet
+from .inputs import Inputs, topic_input
+from .outlets import TOPICS, Outlet, SampleOutlet, sample_topic
 from .requests import Requests
 from .services import NodeServices
 from .simulation import Simulation
 from .status import FREE_RUNNING_CLOCK_HZ, ClockOutlet
 from .time_services import TimeServices
 from .topics import FastTopic
+from .transform_outlet import TransformOutlet
 from .window_topics import WindowTopics
 from .world_markers import WorldMarkers
 
@@ -60,6 +64,7 @@ class SimulatorNode:
     """
 
     def __init__(self) -> None:
+        MasterWatch()
         description = _robot_description()
         loaded = load_world_dict(_config_parameter(), "~config", BODY_TYPES, description)
         loaded = start_where_robots_are(loaded)
@@ -72,10 +77,12 @@ class SimulatorNode:
                 config.real_time_factor,
             )
         self._world = World(loaded, simulated)
-        self._topics = {sample_type: SampleOutlet(topic) for sample_type, topic in TOPICS.items()}
+        self._topics = {sample_type: SampleOutlet() for sample_type in TOPICS}
         self._transforms = TransformOutlet()
-        outlets: dict[type, Outlet] = {**self._topics, LinkPoseSample: self._transforms}
-        self._cameras = outlets[SceneSample] = CameraOutlet(self._world)
+        self._outlets: dict[type, Outlet] = {**self._topics, LinkPoseSample: self._transforms}
+        self._cameras = self._outlets[SceneSample] = CameraOutlet(self._world)
+        for name in self._world.bodies:
+            self._find_topics(name)
         clock = ClockOutlet(self._world.clock, _clock_hz(config)) if simulated else None
         helpers: list[Callable[[], None]] = []
         if config.markers_hz:
@@ -84,7 +91,7 @@ class SimulatorNode:
         helpers += (self._cameras.poll, *window.polls)
         self._simulation = Simulation(
             self._world,
-            outlets,
+            self._outlets,
             config.real_time_factor,
             config.status_hz,
             clock,
@@ -137,12 +144,30 @@ class SimulatorNode:
     def _add(self, kind: str, config: Any, file: str) -> None:
         with self._objects_lock:
             config = with_initial_state(config, file)
-            self._ask(lambda: self._world.add(kind, config, file))
+            self._ask(lambda: self._take_in(kind, config, file))
             try:
                 self._open(config.name)
             except Exception as error:
                 self._withdraw(config.name)
                 raise InterfaceError(f"{config.name}: its topics could not be opened: {error}") from error
+
+    def _take_in(self, kind: str, config: Any, file: str) -> None:
+        """Does the simulation thread's part of it."""
+        self._world.add(kind, config, file)
+        try:
+            self._find_topics(config.name)
+        except InterfaceError:
+            self._world.remove(config.name)
+            raise
+
+    def _find_topics(self, name: str) -> None:
+        """Finds the topics of a body before its first sample, those that other packages name too."""
+        for sensor in self._world.sensors_of(name):
+            if sample_topic(sensor) is not None and sensor.sample_type not in self._topics:
+                self._topics[sensor.sample_type] = self._outlets[sensor.sample_type] = SampleOutlet()
+        for key, taken in self._world.bodies[name].inputs().items():
+            if not isinstance(taken, PoseInput):
+                topic_input(key, taken)
 
     def _add_camera(self, config: RgbdSensorConfig, file: str) -> None:
         with self._objects_lock:
@@ -202,8 +227,9 @@ class SimulatorNode:
         body = self._world.bodies[name]
         self._inputs.open(name, body.inputs())
         for sensor in self._world.sensors_of(name):
-            if sensor.sample_type in self._topics:
-                self._topics[sensor.sample_type].open(sensor.name)
+            topic = sample_topic(sensor)
+            if topic is not None:
+                self._topics[sensor.sample_type].open(sensor.name, topic)
         self._endpoints.open(body)
 
     def _withdraw(self, name: str) -> None:
@@ -235,6 +261,9 @@ def main() -> None:
     except InterfaceError as error:
         log_last_words(str(error).splitlines())
         sys.exit(1)
+    except ConnectionError as error:
+        log_loss_of_master(error)
+        sys.exit(1)
     with leaving_ros_on_interrupt():
         try:
             node.run()
@@ -260,7 +289,10 @@ def _robot_description() -> str | None:
 def _parameter_above(name: str, default: Any) -> Any:
     """Returns a parameter of this namespace or, failing that, of the nearest one around it."""
     found = rospy.search_param(name)
-    return default if found is None else rospy.get_param(found)
+    if found is None:
+        return default
+    kept_parameters.keep(found)
+    return rospy.get_param(found)
 
 
 def _clock_hz(config: Any) -> float:

@@ -5,27 +5,32 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
-from geometry_msgs.msg import TransformStamped, Vector3, Wrench, WrenchStamped
+from geometry_msgs.msg import Vector3, Wrench, WrenchStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
-from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
+from custom_ros_tools.errors import ConfigError, Problem
 from ros_pybullet_interface.msg import Contacts
 
 from ..control.controller_state import ControllerState
+from ..plugin_faults import blame, blaming
+from ..plugins import full_name
 from ..samples import (
     BaseStateSample,
     ContactArrowsSample,
     ContactsSample,
     JointStateSample,
     LinkPoseSample,
+    SceneSample,
     SurfaceSample,
     WrenchSample,
 )
+from ..sensors.sensor import Sensor
 from .contacts_messages import contact_arrows_message, contacts_message
-from .frames import prefixed, world_frame
+from .frames import prefixed
 from .odometry import odometry_message
+from .plugin_topics import find_topic
 from .stamps import to_ros_time
 from .surface_message import surface_message
 from .topics import FastTopic
@@ -39,11 +44,13 @@ class SampleTopic(NamedTuple):
         topic: Its name, with `{name}` for the sensor.
         message_type: ROS type.
         to_message: Makes the message of a sample and its stamp [ns].
+        meaning: What it tells and which key sets its rate, in a sentence.
     """
 
     topic: str
     message_type: type
     to_message: Callable[[Any, int], Any]
+    meaning: str = ""
 
 
 class Outlet(Protocol):
@@ -65,38 +72,49 @@ class Outlet(Protocol):
         """Drops what it keeps of all samples: the world was reset."""
 
 
+class _Route(NamedTuple):
+    """Where the samples of one sensor go."""
+
+    topic: FastTopic
+    to_message: Callable[[Any, int], Any]
+
+
 class SampleOutlet:
-    """Samples of one type, each sensor on a topic of its own.
+    """Samples of one type, each sensor on a topic of its own."""
 
-    Args:
-        sample_topic: The topics and what is sent on them.
-    """
-
-    def __init__(self, sample_topic: SampleTopic) -> None:
-        self._pattern, self._message_type, self._to_message = sample_topic
-        self._topics: dict[str, FastTopic] = {}
+    def __init__(self) -> None:
+        self._routes: dict[str, _Route] = {}
         self._last: dict[str, tuple[Any, int]] = {}
 
-    def open(self, name: str) -> None:
+    def open(self, name: str, sample_topic: SampleTopic) -> None:
         """Advertises the topic of a sensor; any thread may call it."""
-        topic = FastTopic(self._pattern.format(name=name), self._message_type)
-        self._topics = {**self._topics, name: topic}
+        topic = FastTopic(sample_topic.topic.format(name=name), sample_topic.message_type)
+        self._routes = {**self._routes, name: _Route(topic, sample_topic.to_message)}
 
     def publish(self, sample: Any, stamp_ns: int) -> None:
-        """Sends a sample."""
+        """Sends a sample.
+
+        Raises:
+            PluginError: If another package makes no message of it that can be sent.
+        """
         self._last[sample.name] = sample, stamp_ns
-        topic = self._topics.get(sample.name)  # there is none as long as the body is new
-        if topic is not None and topic.has_subscribers:
-            topic.publish(self._to_message(sample, stamp_ns))
+        route = self._routes.get(sample.name)  # there is none as long as the body is new
+        if route is not None and route.topic.has_subscribers:
+            try:
+                route.topic.publish(route.to_message(sample, stamp_ns))
+            except Exception as error:
+                blame(route.to_message, f"the message of '{sample.name}'", error)
+                raise
 
     def flush(self) -> None:
         """Has nothing to send: each sensor has a topic of its own."""
 
     def serve_late(self) -> None:
         """Gives the last samples to who has come since."""
-        for name, topic in self._topics.items():
+        for name, (topic, to_message) in self._routes.items():
             if name in self._last:
-                topic.serve_late(lambda last=self._last[name]: self._to_message(*last))
+                with blaming(to_message, f"the message of '{name}'"):
+                    topic.serve_late(lambda last=self._last[name], make=to_message: make(*last))
 
     def restart(self) -> None:
         """Drops what it keeps of all samples; the topics stay."""
@@ -109,51 +127,10 @@ class SampleOutlet:
             Its topic. Closing it is left to another thread, since the ROS master may be slow to answer.
         """
         self._last.pop(name, None)
-        topics = dict(self._topics)
-        topic = topics.pop(name, None)
-        self._topics = topics
-        return topic
-
-
-class TransformOutlet:
-    """Link poses on TF, all that a tick has in one message."""
-
-    def __init__(self) -> None:
-        self._topic = FastTopic("/tf", TFMessage)
-        self._last: dict[str, list[TransformStamped]] = {}
-        self._collected: list[TransformStamped] = []
-
-    def publish(self, sample: LinkPoseSample, stamp_ns: int) -> None:
-        """Collects the transforms of a body."""
-        transforms = self._last.get(sample.name)
-        if transforms is None or len(transforms) != len(sample.frames):
-            transforms = self._last[sample.name] = [_transform(frame) for frame in sample.frames]
-        stamp = to_ros_time(stamp_ns)
-        for message, (position, quat) in zip(transforms, sample.poses, strict=True):
-            message.header.stamp = stamp
-            translation, rotation = message.transform.translation, message.transform.rotation
-            translation.x, translation.y, translation.z = position
-            rotation.x, rotation.y, rotation.z, rotation.w = quat
-        self._collected += transforms
-
-    def flush(self) -> None:
-        """Sends what was collected."""
-        if self._collected:
-            if self._topic.has_subscribers:
-                self._topic.publish(TFMessage(self._collected))
-            self._collected = []
-
-    def serve_late(self) -> None:
-        """Gives all last poses to who has come since."""
-        self._topic.serve_late(lambda: TFMessage([one for body in self._last.values() for one in body]))
-
-    def restart(self) -> None:
-        """Drops all poses."""
-        self._last.clear()
-
-    def forget(self, name: str) -> None:
-        """Leaves a body out from now on."""
-        self._last.pop(name, None)
+        routes = dict(self._routes)
+        route = routes.pop(name, None)
+        self._routes = routes
+        return None if route is None else route.topic
 
 
 def joint_state_message(sample: JointStateSample, stamp_ns: int) -> JointState:
@@ -172,19 +149,66 @@ def wrench_message(sample: WrenchSample, stamp_ns: int) -> WrenchStamped:
     return message
 
 
-def _transform(frame: str) -> TransformStamped:
-    message = TransformStamped(child_frame_id=prefixed(frame))
-    message.header.frame_id = world_frame()
-    return message
-
-
 TOPICS: dict[type, SampleTopic] = {
-    WrenchSample: SampleTopic("rpbi/{name}/ft_sensor", WrenchStamped, wrench_message),
-    JointStateSample: SampleTopic("rpbi/{name}/joint_states", JointState, joint_state_message),
-    BaseStateSample: SampleTopic("rpbi/{name}/base_state", Odometry, odometry_message),
-    ContactsSample: SampleTopic("rpbi/{name}/contacts", Contacts, contacts_message),
-    SurfaceSample: SampleTopic("rpbi/{name}/surface", Marker, surface_message),
-    ContactArrowsSample: SampleTopic("rpbi/{name}/contacts/arrows", MarkerArray, contact_arrows_message),
-    ControllerState: SampleTopic(f"rpbi/{{name}}/{CONTROLLER}/state", JointTrajectoryControllerState, state_message),
+    WrenchSample: SampleTopic(
+        "rpbi/{name}/ft_sensor",
+        WrenchStamped,
+        wrench_message,
+        "Force [N] and moment [N m] in the joint, in the frame of its child link; "
+        "`hz` of `enabled_joint_force_torque_sensors`.",
+    ),
+    JointStateSample: SampleTopic(
+        "rpbi/{name}/joint_states",
+        JointState,
+        joint_state_message,
+        "Position [rad or m], velocity and the motor's effort [N m or N] of all joints, fixed ones too, in the URDF's "
+        "order; `joint_state_publisher_hz`.",
+    ),
+    BaseStateSample: SampleTopic(
+        "rpbi/{name}/base_state",
+        Odometry,
+        odometry_message,
+        "Pose of the root link in the world [m], its velocity in its own axes [m/s, rad/s]; `base_state_hz`.",
+    ),
+    ContactsSample: SampleTopic(
+        "rpbi/{name}/contacts",
+        Contacts,
+        contacts_message,
+        "Where others touch the body, and their forces on it [N]; `contacts.hz`.",
+    ),
+    SurfaceSample: SampleTopic(
+        "rpbi/{name}/surface", Marker, surface_message, "The surface as triangles, for RViz; `surface_hz`."
+    ),
+    ContactArrowsSample: SampleTopic(
+        "rpbi/{name}/contacts/arrows",
+        MarkerArray,
+        contact_arrows_message,
+        "The forces as arrows, for RViz; `contacts.arrows_hz`.",
+    ),
+    ControllerState: SampleTopic(
+        f"rpbi/{{name}}/{CONTROLLER}/state",
+        JointTrajectoryControllerState,
+        state_message,
+        "Where joints are to be on the trajectory, and where they are; `state_publish_rate`.",
+    ),
 }
 """The topic of each type of samples that has topics of its own."""
+
+_ELSEWHERE = (LinkPoseSample, SceneSample)
+"""Samples that go to TF and to the renderer."""
+
+
+def sample_topic(sensor: Sensor) -> SampleTopic | None:
+    """Returns the topic of a sensor, None if its samples go elsewhere.
+
+    Raises:
+        ConfigError: If it comes from another package and has no topic that can be found.
+    """
+    if sensor.sample_type in _ELSEWHERE:
+        return None
+    if sensor.ros_topic:
+        return find_topic(sensor.ros_topic, SampleTopic, sensor)
+    if sensor.sample_type not in TOPICS:
+        message = f"missing, expected 'module:NAME' of the SampleTopic for its {sensor.sample_type.__qualname__}"
+        raise ConfigError([Problem(full_name(sensor), "ros_topic", message)])
+    return TOPICS[sensor.sample_type]

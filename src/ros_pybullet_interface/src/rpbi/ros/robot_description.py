@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import sys
 from collections.abc import Callable
 
@@ -11,6 +10,7 @@ import pybullet_data
 import rospy
 
 from custom_ros_tools.errors import ConfigError
+from custom_ros_tools.ros.kept_parameters import kept_parameters
 
 from ..asset_files import find_file
 from ..bodies.jointed import JointedBody
@@ -24,13 +24,8 @@ def publish_description(context: BodyContext) -> Callable[[], None] | None:
     if not isinstance(body, JointedBody):
         return None
     name = rospy.resolve_name(f"rpbi/{body.name}/robot_description")
-    rospy.set_param(name, description_for_ros(body.config.loadURDF.fileName))
-
-    def withdraw() -> None:
-        with contextlib.suppress(KeyError):  # somebody was quicker
-            rospy.delete_param(name)
-
-    return withdraw
+    kept_parameters.set(name, description_for_ros(body.config.loadURDF.fileName))
+    return lambda: kept_parameters.delete(name)
 
 
 def main() -> None:

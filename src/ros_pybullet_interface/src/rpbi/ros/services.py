@@ -23,9 +23,10 @@ from ros_pybullet_interface.srv import (
 )
 
 from ..asset_files import find_file
-from ..bodies import BODY_TYPES, CollisionObject, DynamicObject, Robot, SoftObject, UrdfObject, VisualObject
+from ..bodies import BODY_TYPES, CollisionObject, DynamicObject, Robot, SoftObject, UrdfObject, VisualObject, kind_of
 from ..clock import NS_PER_S
 from ..config import load_object, type_of
+from .node_service import NodeService
 from .requests import Requests
 from .simulation import Simulation
 
@@ -44,13 +45,17 @@ OBJECT_TYPES = {
 """List of the main file for each number in PybulletObject."""
 
 
-NODE_SERVICES: dict[str, type] = {
-    "rpbi/start": Trigger,
-    "rpbi/stop": Trigger,
-    "rpbi/step": Trigger,
-    "rpbi/add_pybullet_object": AddPybulletObject,
-    "rpbi/remove_pybullet_object": SetString,
-    "rpbi/list_objects": ListObjects,
+NODE_SERVICES: dict[str, NodeService] = {
+    "rpbi/start": NodeService(Trigger, "Lets the world run; `success` is false if it does so already."),
+    "rpbi/stop": NodeService(Trigger, "Lets the world stand still; `success` is false if it does so already."),
+    "rpbi/step": NodeService(
+        Trigger, "Goes one tick on, if the world stands still; the message is `tick N, stamp S` [s]."
+    ),
+    "rpbi/add_pybullet_object": NodeService(
+        AddPybulletObject, "Adds an object from a YAML file or text; the message has all problems of it."
+    ),
+    "rpbi/remove_pybullet_object": NodeService(SetString, "Removes the object or camera of that name."),
+    "rpbi/list_objects": NodeService(ListObjects, "Tells names and types of all objects and cameras."),
 }
 """What the node serves, in the order of its handlers."""
 
@@ -77,8 +82,8 @@ class NodeServices:
         self._simulation, self._ask, self._add, self._remove = simulation, ask, add, remove
         self._context = context
         handlers = (self._start, self._stop, self._step, self._add_object, self._remove_object, self._list_objects)
-        for (name, service_type), handler in zip(NODE_SERVICES.items(), handlers, strict=True):
-            rospy.Service(name, service_type, handler)
+        for (name, service), handler in zip(NODE_SERVICES.items(), handlers, strict=True):
+            rospy.Service(name, service.service_type, handler)
 
     def _start(self, _: TriggerRequest) -> TriggerResponse:
         return self._switch(self._simulation.start, "started", "already running")
@@ -143,8 +148,7 @@ class NodeServices:
         return SetStringResponse(success=True, message=f"removed '{request.data}'")
 
     def _list_objects(self, _: ListObjectsRequest) -> ListObjectsResponse:
-        kinds = {body_type: kind for kind, body_type in BODY_TYPES.items()}
         world = self._simulation.world
         bodies, cameras = self._ask.or_service_error(lambda: (dict(world.bodies), list(world.cameras)))
-        types = [kinds[type(body)] for body in bodies.values()] + ["rgbd_sensor"] * len(cameras)
+        types = [kind_of(body) for body in bodies.values()] + ["rgbd_sensor"] * len(cameras)
         return ListObjectsResponse(names=[*bodies, *cameras], types=types)

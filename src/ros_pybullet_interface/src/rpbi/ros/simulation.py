@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from typing import Any
 
-from custom_ros_tools.errors import InterfaceError, PhysicsError
+from custom_ros_tools.errors import InterfaceError
 
 from ..pacer import Pacer
 from ..world import World
@@ -33,7 +33,7 @@ class Simulation:
 
     Args:
         world: The world.
-        outlets: Where samples go, by type of sample.
+        outlets: Where samples go, one for each type of sample; there may be more later.
         real_time_factor: Simulated seconds per wall second; 0 is as fast as it goes.
         status_hz: Rate of the status [Hz].
         clock: Publishes /clock if stamps are simulated time.
@@ -60,7 +60,6 @@ class Simulation:
         self.passes = 0
         """Grows as long as the loop is alive."""
         self._outlets = outlets
-        self._distinct_outlets = list(dict.fromkeys(outlets.values()))
         self._clock = clock
         self._helpers = helpers
         self._before_tick = before_tick
@@ -164,7 +163,7 @@ class Simulation:
         self.world.take_inputs()
         self._pacer.restart()
         self._idle_tick = 0
-        for outlet in self._distinct_outlets:
+        for outlet in self._outlets.values():
             outlet.restart()
         if self._clock is not None:
             self._clock.publish_now()
@@ -183,8 +182,9 @@ class Simulation:
                     self._advance()
                 else:
                     self._idle()
-            except PhysicsError as error:
-                self._break_off(error)
+            except InterfaceError as error:
+                if self.world.is_connected:  # else the loop is over, and that is why
+                    self._break_off(error)
             for help_out in self._helpers:
                 help_out()
             self._status.spin(self.running, self._burst is not None)
@@ -279,7 +279,7 @@ class Simulation:
         self.world.take_inputs()
         if self._clock is not None:
             self._publish(self.world.read_rest())
-            for outlet in self._distinct_outlets:
+            for outlet in self._outlets.values():
                 outlet.serve_late()
         else:
             since, self._idle_tick = self._idle_tick, self._idle_tick + self._idle_ticks_a_pass
@@ -290,5 +290,5 @@ class Simulation:
         stamp_ns = self.world.clock.stamp_ns
         for sample in samples:
             self._outlets[type(sample)].publish(sample, stamp_ns)
-        for outlet in self._distinct_outlets:
+        for outlet in self._outlets.values():
             outlet.flush()

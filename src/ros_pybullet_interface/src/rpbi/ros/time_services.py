@@ -17,14 +17,15 @@ from ros_pybullet_interface.srv import (
     StepNResponse,
 )
 
+from .node_service import NodeService
 from .requests import Requests
 from .simulation import Simulation
 from .stamps import to_ros_time
 
-TIME_SERVICES: dict[str, type] = {
-    "rpbi/step_n": StepN,
-    "rpbi/reset": Trigger,
-    "rpbi/get_state_hash": GetStateHash,
+TIME_SERVICES: dict[str, NodeService] = {
+    "rpbi/step_n": NodeService(StepN, "Goes many ticks on, as fast as it goes, if the world stands still."),
+    "rpbi/reset": NodeService(Trigger, "Makes the world what it was at its start, to the last bit; stamps go on."),
+    "rpbi/get_state_hash": NodeService(GetStateHash, "Tells a text that is the same for worlds in the same state."),
 }
 """What is served, in the order of the handlers."""
 
@@ -41,8 +42,8 @@ class TimeServices:
     def __init__(self, simulation: Simulation, ask: Requests, reset: Callable[[], None]) -> None:
         self._simulation, self._ask, self._do_reset = simulation, ask, reset
         handlers = (self._step_n, self._reset, self._state_hash)
-        for (name, service_type), handler in zip(TIME_SERVICES.items(), handlers, strict=True):
-            rospy.Service(name, service_type, handler)
+        for (name, service), handler in zip(TIME_SERVICES.items(), handlers, strict=True):
+            rospy.Service(name, service.service_type, handler)
 
     def _step_n(self, request: StepNRequest) -> StepNResponse:
         try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import pybullet
 from sensor_msgs.msg import Image
@@ -22,12 +23,40 @@ from .visualizer_image import IMAGE_TOPIC, NUMBERS_TOPIC, VisualizerImage
 
 log = logging.getLogger(__name__)
 
-OPTIONAL_TOPICS: dict[str, dict[str, type]] = {
-    "enable_keyboard_publisher": {KEYBOARD_TOPIC: KeyboardEvent},
-    "enable_mouse_publisher": {MOUSE_TOPIC: MouseEvent},
-    "publish_visualizer_image_hz": {IMAGE_TOPIC: Image, NUMBERS_TOPIC: Int64MultiArray},
-}
-"""By key of the main file: the topics that it opens, and their types."""
+
+class WindowTopic(NamedTuple):
+    """A topic that the window publishes.
+
+    Attributes:
+        key: The key of the main file that opens it, empty if none is needed.
+        name: Its relative name.
+        message_type: Its ROS type.
+        meaning: What it tells, in a sentence.
+    """
+
+    key: str
+    name: str
+    message_type: type
+    meaning: str
+
+
+WINDOW_TOPICS = (
+    WindowTopic("", CAMERA_TOPIC, ResetDebugVisualizerCamera, "Where the window looks from now; 30 Hz."),
+    WindowTopic("enable_keyboard_publisher", KEYBOARD_TOPIC, KeyboardEvent, "Keys; with `enable_keyboard_publisher`."),
+    WindowTopic("enable_mouse_publisher", MOUSE_TOPIC, MouseEvent, "The mouse; with `enable_mouse_publisher`."),
+    WindowTopic(
+        "publish_visualizer_image_hz",
+        IMAGE_TOPIC,
+        Image,
+        "What the window shows, `rgb8`; at most `publish_visualizer_image_hz`.",
+    ),
+    WindowTopic(
+        "publish_visualizer_image_hz",
+        NUMBERS_TOPIC,
+        Int64MultiArray,
+        "The same as red, green, blue, alpha of each pixel, row by row.",
+    ),
+)
 
 
 class WindowTopics:
@@ -66,19 +95,15 @@ def _open(window: Window, config: WorldConfig, clock: Clock) -> Iterator[Callabl
         yield VisualizerImage(window, clock, config.publish_visualizer_image_hz, *size).poll
 
 
-def published_topics(config: WorldConfig) -> dict[str, type]:
-    """Returns the topics of the window that a world with this configuration publishes, and their types."""
+def published_topics(config: WorldConfig) -> list[WindowTopic]:
+    """Returns the topics of the window that a world with this configuration publishes."""
     if config.connect.connection_mode == pybullet.DIRECT:
-        return {}
-    topics: dict[str, type] = {CAMERA_TOPIC: ResetDebugVisualizerCamera}
-    for key, opened in OPTIONAL_TOPICS.items():
-        if getattr(config, key):
-            topics |= opened
-    return topics
+        return []
+    return [topic for topic in WINDOW_TOPICS if not topic.key or getattr(config, topic.key)]
 
 
 def _warn_of_idle_keys(config: WorldConfig) -> None:
-    keys = [key for key in OPTIONAL_TOPICS if getattr(config, key)]
+    keys = [key for key in dict.fromkeys(topic.key for topic in WINDOW_TOPICS) if key and getattr(config, key)]
     if RECORD in (config.connect.options or ""):
         keys.append(f"connect.options {RECORD}")
     if keys:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .base_state import BaseStateSensor
+from .body_sensor import BodySensor
 from .contact_arrows import ContactArrowsSensor
 from .contacts import ContactsSensor
 from .force_torque import ForceTorqueSensor
@@ -10,6 +11,7 @@ from .joint_state import JointStateSensor
 from .link_pose import LinkPoseSensor
 from .rgbd import RgbdSensor
 from .sensor import Sensor
+from .sensor_config import SensorConfig
 from .surface import SurfaceSensor
 from .trajectory_state import TrajectoryStateSensor
 
@@ -28,6 +30,7 @@ SENSOR_TYPES: dict[str, type[Sensor]] = {
 __all__ = [
     "SENSOR_TYPES",
     "BaseStateSensor",
+    "BodySensor",
     "ContactArrowsSensor",
     "ContactsSensor",
     "ForceTorqueSensor",
@@ -35,6 +38,7 @@ __all__ = [
     "LinkPoseSensor",
     "RgbdSensor",
     "Sensor",
+    "SensorConfig",
     "SurfaceSensor",
     "TrajectoryStateSensor",
 ]

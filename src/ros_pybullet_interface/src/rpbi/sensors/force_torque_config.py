@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic import BeforeValidator, Field
 
-from custom_ros_tools.schema import ConfigModel, Count, FrameId, Hz, NonNegative, Text, Unit, Vec3
+from custom_ros_tools.schema import AlsoTakes, ConfigModel, Count, FrameId, Hz, NonNegative, Text, Unit, Vec3
 
 
 def _one_for_each_axis(given: Any) -> Any:
@@ -17,7 +17,7 @@ Deviation = Annotated[
     tuple[NonNegative, NonNegative, NonNegative],
     Field(strict=False),
     BeforeValidator(_one_for_each_axis),
-    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "array", "items": {"type": "number"}}]}),
+    AlsoTakes({"type": "number", "minimum": 0}),
 ]
 """A standard deviation: one number, or one of each axis."""
 
@@ -49,5 +49,7 @@ def _from_name(given: Any) -> Any:
     return {"joint": given} if isinstance(given, str) else given
 
 
-ForceTorqueEntry = Annotated[ForceTorqueConfig, BeforeValidator(_from_name)]
+ForceTorqueEntry = Annotated[
+    ForceTorqueConfig, BeforeValidator(_from_name), AlsoTakes({"type": "string", "minLength": 1})
+]
 """A sensor with all of its keys, or only the name of its joint."""

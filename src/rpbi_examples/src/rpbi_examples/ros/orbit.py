@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import rospy
 
+from custom_ros_tools.ros.run_node import run_node
+
 from ..orbit import camera_pose
 from .moving_frame import move_frame
 
 
 def main() -> None:
     """Runs the node; the frame is `~child_frame_id`, by default `rpbi/camera`."""
-    rospy.init_node("orbit")
-    move_frame("rpbi/world", rospy.get_param("~child_frame_id", "rpbi/camera"), camera_pose)
+    run_node("orbit", lambda: move_frame("rpbi/world", rospy.get_param("~child_frame_id", "rpbi/camera"), camera_pose))

@@ -5,9 +5,11 @@ from __future__ import annotations
 import http.client
 from collections.abc import Collection
 from typing import Any
-from xmlrpc.client import Error, ServerProxy, Transport
+from xmlrpc.client import Error, ServerProxy
 
 import rosgraph
+
+from custom_ros_tools.ros.timed_transport import TimedTransport
 
 _CALLER = "/rpbi_utils"
 _TIMEOUT_S = 1.0
@@ -53,7 +55,7 @@ def unconnected(node: str, topics: Collection[str]) -> list[str]:
 
 def _receivers(uri: str, node: str) -> set[str]:
     """Returns the topics that the node at `uri` sends to `node`; none if it does not answer."""
-    proxy: Any = ServerProxy(uri, _PatientTransport())
+    proxy: Any = ServerProxy(uri, TimedTransport(_TIMEOUT_S))
     try:
         _, _, connections = proxy.getBusInfo(_CALLER)
     except ConnectionRefusedError:
@@ -62,12 +64,3 @@ def _receivers(uri: str, node: str) -> set[str]:
         return set()
     # id, other end, direction, transport, topic, whether connected
     return {topic for _, other, way, _, topic, *_ in connections if other == node and way == _OUTBOUND}
-
-
-class _PatientTransport(Transport):
-    """Waits for an answer for a limited time: a stopped node accepts connections but never answers."""
-
-    def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        connection = super().make_connection(host)
-        connection.timeout = _TIMEOUT_S
-        return connection

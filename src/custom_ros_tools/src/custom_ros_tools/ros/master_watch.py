@@ -1,0 +1,100 @@
+"""Keeps a node known to a ROS master that goes away and comes back with an empty memory."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from typing import Any
+from xmlrpc.client import MultiCall
+
+import rosgraph
+import rospy
+from rospy.impl.paramserver import get_param_server_cache
+
+from .kept_parameters import kept_parameters
+from .registrations import Registrations
+from .timed_master import MASTER_FAILURES, timed_master
+from .wall_timer import WallTimer
+
+LOOK_HZ = 1.0
+_ASKED_BY_LOGGING = "/rosout_disable_topics_generation"
+
+
+class MasterWatch:
+    """Looks after the ROS master once a second, until the node shuts down.
+
+    When the master cannot be reached, it says so; connections that exist do not need it. When the master is back, all
+    topics, services and parameters of the node are registered again, since rospy does that at the start only. If
+    another node has taken the name meanwhile, this one ends, as ROS has it when a master sees both.
+
+    Make it once, after `rospy.init_node`.
+    """
+
+    def __init__(self) -> None:
+        self._name, self._uri = rospy.get_name(), rosgraph.get_master_uri()
+        self._registrations = Registrations()
+        self._process: int | None = None
+        self._is_gone = self._is_over = False
+        self._registering = threading.Lock()
+        with contextlib.suppress(*MASTER_FAILURES), timed_master() as master:
+            self._process = master.getPid(self._name)[2]
+            kept_parameters.keep("/use_sim_time")
+            kept_parameters.keep(self._name)
+            _log_without_master()
+        rospy.on_shutdown(self._end)
+        WallTimer(LOOK_HZ, self._look)
+
+    def _look(self) -> None:
+        try:
+            with timed_master() as master:
+                self._compare(master)
+        except MASTER_FAILURES as error:
+            if not self._is_gone and not rospy.core.is_shutdown_requested():
+                rospy.logwarn(
+                    "the ROS master at %s cannot be reached (%s): %s goes on with the connections that it has",
+                    self._uri,
+                    error,
+                    self._name,
+                )
+            self._is_gone, self._registrations.are_complete = True, False
+
+    def _compare(self, master: Any) -> None:
+        """Compares what the master knows of us with what is."""
+        calls = MultiCall(master)
+        calls.getPid(self._name)
+        calls.lookupNode(self._name, self._name)
+        (_, _, process), (_, _, node_uri) = calls()
+        if node_uri and node_uri != rospy.get_node_uri():
+            self._give_way(node_uri)
+        elif process != self._process or not node_uri or not self._registrations.are_complete:
+            self._register(master)
+            self._process, self._is_gone = process, False
+
+    def _give_way(self, node_uri: str) -> None:
+        if not rospy.core.is_shutdown_requested():
+            rospy.logfatal("another node is called %s by now (at %s): this one ends", self._name, node_uri)
+            rospy.signal_shutdown("another node has its name")
+
+    def _register(self, master: Any) -> None:
+        with self._registering:
+            if self._is_over:
+                return
+            topics, services = self._registrations.repeat(master)
+        rospy.loginfo(
+            "the ROS master at %s is back: %s has registered its %d topics and %d services again",
+            self._uri,
+            self._name,
+            topics,
+            services,
+        )
+
+    def _end(self) -> None:
+        """Sees to it that nothing is registered after the node has taken its leave."""
+        with self._registering:
+            self._is_over = True
+
+
+def _log_without_master() -> None:
+    """Answers what rospy asks the master for each line that it logs: one that hangs would hold up who says anything."""
+    answer = rospy.get_param_cached(_ASKED_BY_LOGGING, False)
+    get_param_server_cache().set(_ASKED_BY_LOGGING, answer)

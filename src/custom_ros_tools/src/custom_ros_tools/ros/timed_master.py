@@ -1,0 +1,25 @@
+"""The ROS master, asked without waiting for ever."""
+
+from __future__ import annotations
+
+import http.client
+from typing import Any
+from xml.parsers.expat import ExpatError
+from xmlrpc.client import Error, ServerProxy
+
+import rosgraph
+
+from .timed_transport import TimedTransport
+
+TIMEOUT_S = 2.0
+"""How long the master may take to answer [s]; a healthy one takes milliseconds."""
+MASTER_FAILURES = (OSError, Error, http.client.HTTPException, ExpatError)
+"""What its calls raise if it has gone, hangs or is something else."""
+
+
+def timed_master() -> Any:
+    """Returns the master's XML-RPC interface, a context whose end closes the connection.
+
+    Its calls return (code, message, value) and raise one of MASTER_FAILURES if the master does not answer.
+    """
+    return ServerProxy(rosgraph.get_master_uri(), TimedTransport(TIMEOUT_S))

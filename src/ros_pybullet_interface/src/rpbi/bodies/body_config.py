@@ -1,0 +1,64 @@
+"""What YAML says of every body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Self
+
+from pydantic import AfterValidator, Field, ValidationInfo, WithJsonSchema, model_validator
+
+from custom_ros_tools.errors import ConfigError
+from custom_ros_tools.schema import ConfigModel, Expects, InnerProblemsError, KeyedError, ListOf, Name
+from custom_ros_tools.schema_words import shown
+
+from ..plugins import config_of, find_class
+from ..sensors.body_sensor import BodySensor
+from ..sensors.sensor_config import SensorConfig
+
+
+def _sensor_config(entry: Any, info: ValidationInfo) -> SensorConfig:
+    """Returns the configuration of a sensor, by the model of its class."""
+    if isinstance(entry, SensorConfig):
+        return entry
+    kind = entry.get("type") if isinstance(entry, Mapping) else None
+    if not isinstance(kind, str):
+        raise ValueError(f"expected a mapping with 'type: module:Class', 'name' and 'hz'; got {shown(entry)}")
+    try:
+        model = config_of(find_class(kind, BodySensor), SensorConfig)
+    except ValueError as error:
+        raise KeyedError("type", str(error)) from None
+    context = info.context or {}
+    try:
+        return model.parse(entry, context.get("file", ""), context)
+    except ConfigError as error:
+        raise InnerProblemsError(error.problems) from None
+
+
+SensorEntry = Annotated[
+    Any,
+    AfterValidator(_sensor_config),
+    Expects("a list of sensors"),  # said of the list; what is wrong with an entry, the validator says
+    WithJsonSchema(
+        {
+            "type": "object",
+            "properties": SensorConfig.model_json_schema()["properties"],
+            "required": ["type", "name", "hz"],
+        }
+    ),
+]
+"""A sensor of another package: `{type: module:Class, name: NAME, hz: RATE, KEY: VALUE, ...}`."""
+
+
+class BodyConfig(ConfigModel):
+    """Keys of all objects."""
+
+    name: Name = Field(description="Unique name; topics and TF frames are named after it.")
+    sensors: ListOf[SensorEntry] = Field((), description="Sensors of your own that it carries.")
+
+    @model_validator(mode="after")
+    def _sensors_differ_in_name(self) -> Self:
+        names = [sensor.name for sensor in self.sensors]
+        for index, name in enumerate(names):
+            if name in names[:index]:
+                raise KeyedError(f"sensors[{index}].name", f"'{name}' is the name of another sensor of this body")
+        return self

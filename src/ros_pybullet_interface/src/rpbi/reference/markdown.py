@@ -1,0 +1,40 @@
+"""Pieces of Markdown, as GitHub shows it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+WRITTEN_BY = "<!-- Written by `./rpbi docs` from the code: change it there, not here. -->"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Returns a table; cells may have line breaks and `|`."""
+    lines = [_row(head), "|" + "---|" * len(head)]
+    return "\n".join([*lines, *map(_row, rows)])
+
+
+def link(title: str, page: str = "") -> str:
+    """Returns a link to a heading, of this page if none is named."""
+    anchor = re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
+    return f"[{title}]({page}#{anchor})"
+
+
+def code(text: str) -> str:
+    """Returns a piece of code in a line."""
+    return f"`{text}`"
+
+
+def block(language: str, text: str) -> str:
+    """Returns lines of code."""
+    return f"```{language}\n{text.strip()}\n```"
+
+
+def page(parts: Iterable[str]) -> str:
+    """Returns a page of its paragraphs, tables and headings; empty ones are left out."""
+    return "\n\n".join(filter(None, parts)) + "\n"
+
+
+def _row(cells: Sequence[str]) -> str:
+    texts = (re.sub(r"(?<!\\)\|", r"\\|", " ".join(cell.split())) for cell in cells)
+    return "| " + " | ".join(texts) + " |"

@@ -1,0 +1,29 @@
+"""Sensors that a body's YAML asks for by `module:Class`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from .sensor import Sensor
+from .sensor_config import SensorConfig
+
+if TYPE_CHECKING:
+    from ..bodies.body import Body
+
+
+class BodySensor(Sensor):
+    """A sensor of another package, on a body.
+
+    A new one is a subclass with a `Config`, a `sample_type` and `read`; see docs/extending.md.
+
+    Args:
+        body: The body.
+        config: What the body's YAML says of it.
+    """
+
+    Config: ClassVar[type[SensorConfig]] = SensorConfig
+
+    def __init__(self, body: Body, config: Any) -> None:
+        super().__init__(f"{body.name}/{config.name}", config.hz)
+        self.body = body
+        self.config = config
