@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -20,7 +19,6 @@ def test_memory_and_handles_stay_flat_while_it_runs_with_a_camera():
         capture_output=True,
         text=True,
         timeout=180.0,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         start_new_session=True,
     )
     assert done.returncode == 0, done.stdout + done.stderr

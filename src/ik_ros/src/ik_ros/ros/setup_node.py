@@ -86,7 +86,7 @@ class SetupNode:
             except ValueError as error:
                 self._warn(rospy.resolve_name(full_name), f"message refused: {error}")
 
-        rospy.Subscriber(full_name, message_type, checked, queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber(full_name, message_type, checked, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
     def _switch(self, on: bool) -> None:
         self._is_on = on
