@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped
 from sensor_msgs.msg import JointState
+from tf2_msgs.msg import TFMessage
 
 from ik_ros.msg import IKProblem
 from rpbi.kinematics import Kinematics
@@ -56,6 +59,17 @@ def problem(positions: Any = HOME, **fields: Any) -> IKProblem:
 def start_at(positions: Any) -> JointState:
     """Returns where a search starts."""
     return JointState(name=JOINTS, position=positions)
+
+
+@contextlib.contextmanager
+def static_transform(parent: str, child: str, pose: Pose) -> Iterator[None]:
+    """Broadcasts a fixed transform, and takes it back at the end: it would stay for all later tests."""
+    publisher = rospy.Publisher("/tf_static", TFMessage, latch=True, queue_size=1)
+    publisher.publish(TFMessage([transform(parent, child, pose, rospy.Time(0))]))
+    try:
+        yield
+    finally:
+        publisher.unregister()
 
 
 def transform(parent: str, child: str, pose: Pose, stamp: rospy.Time) -> TransformStamped:

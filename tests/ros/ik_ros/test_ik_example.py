@@ -11,7 +11,7 @@ import tf2_ros
 from ros_system import wait_until
 
 TIP, TARGET = "rpbi/kuka_lwr/end_effector_ball", "rpbi/figure_eight"
-SOLVERS = ("kdl", "pybullet", "trac_ik")
+SOLVERS = ("kdl", "pybullet", "trac_ik", "tasks")
 SLOWLY = "real_time_factor:=0.3"  # so that a busy machine does not count
 NEAR_M = 0.03
 """How far the tip may lag behind [m]."""

@@ -8,7 +8,7 @@ import pytest
 import rospy
 import tf2_ros
 from geometry_msgs.msg import Point, Pose, Quaternion
-from ik_nodes import HOME, JOINTS, start_setup, transform
+from ik_nodes import HOME, JOINTS, start_setup, static_transform, transform
 from node_world import Rosout, publishing
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
@@ -80,10 +80,10 @@ def test_nothing_is_published_before_there_is_a_target_or_when_its_tf_stops(ros,
 
 
 def test_static_target_never_gets_stale(ros):
-    tf2_ros.StaticTransformBroadcaster().sendTransform(transform("foot", "target", TARGET, rospy.Time(0)))
-    start_setup(ros, **FRAMES, tf_timeout_s=0.05, hz=100.0)
-    problems = ros.listen("ik", IKProblem)
-    problems.wait_for(50)
+    with static_transform("foot", "target", TARGET):
+        start_setup(ros, **FRAMES, tf_timeout_s=0.05, hz=100.0)
+        problems = ros.listen("ik", IKProblem)
+        problems.wait_for(50)
 
 
 def test_goals_of_tasks_change_by_topic_and_keep_their_length(ros):
@@ -159,11 +159,11 @@ def test_wrong_parameters_end_it_with_1_and_their_names(ros, parameters, told):
     [("pos", ()), ("pos+quat", (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))), ("pos+eul", (0.0, math.pi / 2, 0.0))],
 )
 def test_transform_as_numbers(ros, mode, rotation):
-    tf2_ros.StaticTransformBroadcaster().sendTransform(transform("foot", "target", TARGET, rospy.Time(0)))
-    rospy.set_param("/tf_to_floatarray_node", {**FRAMES, "mode": mode})
-    ros.start(["rosrun", "ik_ros", "tf_to_floatarray_node.py", "__name:=tf_to_floatarray_node"])
-    numbers = ros.listen("transform", Float64MultiArray).wait_for()[0].data
-    assert numbers == pytest.approx((0.3, -0.2, 0.5, *rotation), abs=1e-6)
+    with static_transform("foot", "target", TARGET):
+        rospy.set_param("/tf_to_floatarray_node", {**FRAMES, "mode": mode})
+        ros.start(["rosrun", "ik_ros", "tf_to_floatarray_node.py", "__name:=tf_to_floatarray_node"])
+        numbers = ros.listen("transform", Float64MultiArray).wait_for()[0].data
+        assert numbers == pytest.approx((0.3, -0.2, 0.5, *rotation), abs=1e-6)
 
 
 def test_simulated_robot_is_asked_itself(ros, target):
@@ -182,27 +182,27 @@ def test_simulated_robot_is_asked_itself(ros, target):
         }
     )
     wanted = Pose(Point(0.5, 0.1, 0.6), Quaternion(0.0, 1.0, 0.0, 0.0))
-    tf2_ros.StaticTransformBroadcaster().sendTransform(transform("rpbi/world", "target", wanted, rospy.Time(0)))
-    config = {
-        "robot_name": "arm",
-        "link_name": "lbr_iiwa_link_7",
-        "parent_frame_id": "rpbi/world",
-        "child_frame_id": "target",
-    }
-    rospy.set_param("/ik_setup_node", {"config": config, "start_on_init": True})
-    ros.start(["rosrun", "ik_ros", "ik_setup_node.py", "pybullet", "__name:=ik_setup_node", "ik:=rpbi/arm/ik"])
-    buffer = tf2_ros.Buffer(debug=False)
-    tf2_ros.TransformListener(buffer)
+    with static_transform("rpbi/world", "target", wanted):
+        config = {
+            "robot_name": "arm",
+            "link_name": "lbr_iiwa_link_7",
+            "parent_frame_id": "rpbi/world",
+            "child_frame_id": "target",
+        }
+        rospy.set_param("/ik_setup_node", {"config": config, "start_on_init": True})
+        ros.start(["rosrun", "ik_ros", "ik_setup_node.py", "pybullet", "__name:=ik_setup_node", "ik:=rpbi/arm/ik"])
+        buffer = tf2_ros.Buffer(debug=False)
+        tf2_ros.TransformListener(buffer)
 
-    def is_there():
-        try:
-            found = buffer.lookup_transform("rpbi/world", "rpbi/arm/lbr_iiwa_link_7", rospy.Time(0)).transform
-        except tf2_ros.TransformException:
-            return False
-        p = found.translation
-        return math.dist((p.x, p.y, p.z), (0.5, 0.1, 0.6)) < 5e-3
+        def is_there():
+            try:
+                found = buffer.lookup_transform("rpbi/world", "rpbi/arm/lbr_iiwa_link_7", rospy.Time(0)).transform
+            except tf2_ros.TransformException:
+                return False
+            p = found.translation
+            return math.dist((p.x, p.y, p.z), (0.5, 0.1, 0.6)) < 5e-3
 
-    wait_until(is_there, "the arm goes to the target", 30.0)
+        wait_until(is_there, "the arm goes to the target", 30.0)
 
 
 def test_frame_that_is_dragged_in_rviz_is_broadcast_where_the_handles_are(ros):

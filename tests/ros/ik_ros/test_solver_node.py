@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 import rospy
-import tf2_ros
 from geometry_msgs.msg import Point, Pose, Quaternion, Transform, Vector3
-from ik_nodes import HOME, JOINTS, TIP, forward, problem, start_at, start_node, start_solver, transform
+from ik_nodes import HOME, JOINTS, TIP, forward, problem, start_at, start_node, start_solver, static_transform
 from node_world import Rosout, publishing
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
@@ -147,8 +146,6 @@ def test_switched_off_it_does_not_listen(ros):
 
 def test_poses_of_other_frames_are_turned_into_the_base(ros):
     base_in_world = Pose(Point(1.0, 2.0, 0.0), Quaternion(0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)))
-    broadcaster = tf2_ros.StaticTransformBroadcaster()
-    broadcaster.sendTransform(transform("room", "foot", base_in_world, rospy.Time(0)))
     start_solver(ros, base_frame_id="foot")
     p = forward(BENT)
     # A quarter turn about z takes x, y to -y, x
@@ -161,7 +158,8 @@ def test_poses_of_other_frames_are_turned_into_the_base(ros):
         answer = ros.call("ik/solver/kdl/solve", SolveIK, asked)
         return answer if answer.success else None
 
-    assert_there(wait_until(solution, "TF is known and it is solved").solution.position, p)
+    with static_transform("room", "foot", base_in_world):
+        assert_there(wait_until(solution, "TF is known and it is solved").solution.position, p)
     asked.header.frame_id = "nowhere"
     refused = ros.call("ik/solver/kdl/solve", SolveIK, asked)
     assert not refused.success and "'nowhere'" in refused.message and "'foot'" in refused.message

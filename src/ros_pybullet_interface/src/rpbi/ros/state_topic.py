@@ -31,7 +31,7 @@ class StateOutlet:
         self._period_s = 1.0 / config.state_hz if config.state_hz else float("inf")
         self._schedule = Schedule(config.state_hash_hz, world.clock.dt_ns) if config.state_hash_hz else None
         self._topic = FastTopic("rpbi/state", SimulationState)
-        self._due_s = time.monotonic()
+        self._due_s = time.monotonic() if config.state_hz else float("inf")
         self._factor = 0.0
         self._moves = False
         self.is_stepping = False

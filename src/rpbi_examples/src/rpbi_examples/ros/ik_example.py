@@ -4,22 +4,31 @@ from __future__ import annotations
 
 import sys
 
+import numpy as np
 import rospy
-from geometry_msgs.msg import Point, Pose
+from geometry_msgs.msg import Pose
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool
+from trajectory_msgs.msg import JointTrajectory
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.run_node import run_node
 from custom_ros_tools.ros.tf_interface import TfInterface
-from ik_ros.msg import IKProblem
+from custom_ros_tools.ros.transform_messages import as_pose
+from custom_ros_tools.transforms import pose_of
+from ik_ros.msg import IKProblem, Waypoint
 from ik_ros.srv import SolveIK
 from ros_pybullet_interface.srv import ResetJointState
+
+from ..figure_eight import FigureEight
 
 HOME = {"lwr_arm_1_joint": 0.52, "lwr_arm_3_joint": -1.57, "lwr_arm_5_joint": 1.05}
 """Where the search begins [rad]; other joints at 0."""
 APPROACH_S = 5.0
 """Time for the way to the figure [s]."""
+WAYPOINTS = 8
+"""How many a round has, where the trajectory is planned as a whole."""
+WHOLE_TRAJECTORIES = "trajectory"
 
 
 def main() -> None:
@@ -32,7 +41,18 @@ def _run() -> None:
     if len(arguments) != 2:
         raise InterfaceError(f"expected the names of a robot and a solver, got {len(arguments)}")
     robot, solver = arguments
-    start = _start_of_the_figure(solver)
+    base, target = rospy.get_param("~base_frame"), rospy.get_param("~target_frame")
+    in_base = TfInterface.msg_to_matrix(TfInterface().wait_for_tf_msg(base, target))
+    if solver == WHOLE_TRAJECTORIES:
+        _draw_a_round(robot, in_base)
+    else:
+        _track(robot, solver, in_base)
+
+
+def _track(robot: str, solver: str, target: np.ndarray) -> None:
+    """Switches setup and solver on, when the arm is where the figure begins."""
+    problem = IKProblem(has_target=True, target=_pose(target), start=_state(HOME))
+    start = _call(f"ik/solver/{solver}/solve", SolveIK, problem).solution
     _call(f"rpbi/{robot}/move_to_joint_state", ResetJointState, start, APPROACH_S)
     figure = ("toggle_figure_eight",) if rospy.get_param("~figure_moves", True) else ()
     for toggle in (f"ik/setup/{solver}/toggle", f"ik/solver/{solver}/toggle", *figure):
@@ -40,17 +60,31 @@ def _run() -> None:
     rospy.loginfo("the arm tracks its target by '%s'", solver)
 
 
-def _start_of_the_figure(solver: str) -> JointState:
-    """Returns the joints' positions where the figure begins [rad]."""
-    base, target = rospy.get_param("~base_frame"), rospy.get_param("~target_frame")
-    transform = TfInterface().wait_for_tf_msg(base, target).transform
-    problem = IKProblem(has_target=True, start=JointState(name=list(HOME), position=list(HOME.values())))
-    problem.target = Pose(Point(*_components(transform.translation)), transform.rotation)
-    return _call(f"ik/solver/{solver}/solve", SolveIK, problem).solution
+def _draw_a_round(robot: str, start: np.ndarray) -> None:
+    """Plans the way to the figure and once around it, and has the robot's trajectory controller follow."""
+    figure = FigureEight()
+    times_s = figure.period_s / WAYPOINTS * np.arange(WAYPOINTS + 1)
+    problem = IKProblem(start=_state(HOME))
+    for time_s in times_s:
+        shifted = start @ TfInterface.pos_quat_to_matrix(figure.position(time_s))
+        problem.waypoints.append(Waypoint(rospy.Duration.from_sec(APPROACH_S + time_s), _pose(shifted)))
+    answer = _call(f"ik/solver/{WHOLE_TRAJECTORIES}/solve", SolveIK, problem)
+    _call(f"rpbi/{robot}/move_to_joint_state", ResetJointState, _state(HOME), APPROACH_S)
+    command = rospy.Publisher(
+        f"rpbi/{robot}/joint_trajectory_controller/command", JointTrajectory, queue_size=1, latch=True
+    )
+    command.publish(answer.trajectory)
+    rospy.loginfo("the arm draws the figure along one trajectory of %d points", len(answer.trajectory.points))
+    rospy.sleep(APPROACH_S)
+    _call("toggle_figure_eight", SetBool, True)
 
 
-def _components(vector: object) -> tuple[float, float, float]:
-    return vector.x, vector.y, vector.z
+def _state(positions: dict[str, float]) -> JointState:
+    return JointState(name=list(positions), position=list(positions.values()))
+
+
+def _pose(matrix: np.ndarray) -> Pose:
+    return as_pose(TfInterface.pack_tf(*pose_of(matrix)))
 
 
 def _call(service: str, kind: type, *arguments: object) -> object:
