@@ -123,7 +123,9 @@ def test_robots_that_come_and_go_leave_no_threads_behind(start):
 
 def test_each_of_many_goals_has_its_answer(start):
     robot = start()
-    goals = [Goal(robot, trajectory((0.5, moved(0.01 * number)))) for number in range(60)]
+    # The last one alone is short: no other may arrive before the next one comes
+    durations_s = [20.0] * 59 + [0.5]
+    goals = [Goal(robot, trajectory((time_s, moved(0.01 * n)))) for n, time_s in enumerate(durations_s)]
     *others, last = [goal.wait()[0] for goal in goals]
     assert last == GoalStatus.SUCCEEDED
     assert set(others) == {GoalStatus.PREEMPTED}
