@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from ros_system import RosSystem, wait_until
+from scipy import ndimage
 from screen import Screen
 
 TORUS = (242, 115, 92)
@@ -25,8 +26,9 @@ def picture(ros_master, tmp_path_factory, screen):
     system = RosSystem(tmp_path_factory.mktemp("soft_body_in_rviz"))
     try:
         command = ["roslaunch", "rpbi_examples", "soft_body.launch", "headless:=false"]
-        system.start(command, **screen.environment)
+        example = system.start(command, **screen.environment)
         yield lambda: screen.grab()[:, 420:]
+        print(system.output(example))  # pytest shows it if a test failed
     finally:
         system.close()
 
@@ -38,17 +40,28 @@ def _of_hue(picture, colour, tolerance=0.06):
     return (np.abs(shares - wanted).max(axis=2) < tolerance) & (picture.sum(axis=2) > 120)
 
 
-def test_the_torus_is_there_with_its_hole(picture):
-    def shows_torus_and_hole():
-        is_torus = _of_hue(picture(), TORUS)
-        if np.count_nonzero(is_torus) < 10_000:
-            return False
-        row, column = (int(places.mean()) for places in np.nonzero(is_torus))
-        return np.count_nonzero(is_torus[row - 5 : row + 5, column - 5 : column + 5]) < 50
+def _wait_for_pixels(count, least, what):
+    """Waits until as many pixels are seen; says how many there were at last."""
+    seen = []
 
-    # While it falls and settles, the hole may be hidden
-    wait_until(shows_torus_and_hole, "RViz shows the torus and its hole", SLOW_S)
+    def are_enough():
+        seen.append(count())
+        return seen[-1] >= least
+
+    try:
+        wait_until(are_enough, what, SLOW_S)
+    except TimeoutError as error:
+        pytest.fail(f"{error}: at least {least} pixels, but there were {seen[-5:]}")
+
+
+def test_the_torus_is_there_with_its_hole(picture):
+    def of_hole():
+        is_torus = ndimage.binary_opening(_of_hue(picture(), TORUS))
+        return np.count_nonzero(ndimage.binary_fill_holes(is_torus) & ~is_torus)
+
+    _wait_for_pixels(lambda: np.count_nonzero(_of_hue(picture(), TORUS)), 10_000, "RViz shows the torus")
+    _wait_for_pixels(of_hole, 1_000, "RViz shows the torus' hole")  # hidden while it falls
 
 
 def test_forces_on_the_cube_are_there_as_arrows(picture):
-    wait_until(lambda: np.count_nonzero(_of_hue(picture(), ARROW)) > 30, "RViz shows arrows", SLOW_S)
+    _wait_for_pixels(lambda: np.count_nonzero(_of_hue(picture(), ARROW)), 100, "RViz shows arrows")
