@@ -47,6 +47,7 @@ def open_world(
     paths = f"{control_msgs}:{os.environ.get('PYTHONPATH', '')}"
     process = ros.simulator(main_config(folder, robots=(robot,), **main), use_sim_time=use_sim_time, PYTHONPATH=paths)
     states = ros.listen("/rpbi/iiwa/joint_states", JointState)
+    rospy.set_param("actionlib_client_pub_queue_size", 1000)  # else a burst of more than 10 goals loses some
     client = actionlib.ActionClient(f"{CONTROLLER}/follow_joint_trajectory", FollowJointTrajectoryAction)
     assert client.wait_for_server(rospy.Duration(20.0))
     states.wait_for(1)
