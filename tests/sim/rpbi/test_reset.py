@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import deterministic_session as session
 import pytest
 import scripted_session as script
@@ -113,11 +115,20 @@ def test_no_input_is_ever_lost(arm):
 
 def test_inputs_are_taken_all_the_time(arm):
     """Those who put meanwhile, from other threads, must not be told that there is no such input."""
-    seen = []
-    build = arm._build
-    arm._build = lambda: (seen.append("iiwa/target" in arm.inputs), build(), seen.append("iiwa/target" in arm.inputs))
-    arm.reset()
-    assert seen == [True, True]
+    over = threading.Event()
+    missed = []
+
+    def look():
+        while not over.is_set():
+            missed.append("iiwa/target" not in arm.inputs)
+
+    looking = threading.Thread(target=look)
+    looking.start()
+    for _ in range(5):
+        arm.reset()
+    over.set()
+    looking.join()
+    assert len(missed) > 100 and not any(missed)
 
 
 def test_the_log_is_that_of_the_new_start(rich):
@@ -142,7 +153,8 @@ def test_a_world_that_is_not_finite_any_more_is_mended(arm):
 def test_a_file_that_has_gone_is_told_and_a_later_reset_finds_it_again(tmp_path):
     from mobile_base import mobile_base
 
-    path = write_world(tmp_path, robots=(mobile_base(tmp_path),))
+    camera = {"name": "eye", "hz": 10, "object_tf": {"tf_id": "eye"}}
+    path = write_world(tmp_path, robots=(mobile_base(tmp_path),), dynamic=(ball(),), rgbd_sensor=camera)
     world = World.from_file(path)
     start = world.state_hash()
     urdf = tmp_path / "mobile_base.urdf"
@@ -150,7 +162,8 @@ def test_a_file_that_has_gone_is_told_and_a_later_reset_finds_it_again(tmp_path)
     urdf.unlink()
     with pytest.raises(InterfaceError, match=r"mobile_base\.urdf"):
         world.reset()
-    assert "mobile" not in world.bodies
+    assert list(world.bodies) == ["ball"] and list(world.cameras) == ["eye"]
+    assert {"mobile/target", "ball/pose", "eye/pose"} & world.inputs.keys() == {"eye/pose"}
     urdf.write_text(text)
     world.reset()
     assert world.state_hash() == start

@@ -8,7 +8,7 @@ from typing import Any
 
 import pybullet
 
-from custom_ros_tools.errors import ConfigError, PhysicsError, PluginError, Problem, UnknownNameError
+from custom_ros_tools.errors import UnknownNameError
 
 from .actions import ACTIONS
 from .bodies import BODY_TYPES, Body, BodyConfig
@@ -16,21 +16,18 @@ from .client import Client
 from .clock import Clock
 from .command_log import CommandLog, WorldCommand
 from .config import LoadedWorld, load_world
-from .contact_reader import ContactReader
 from .dynamics import read_dynamics
-from .equipment import equipment
 from .inputs import Input
 from .link_dynamics import LinkDynamics
-from .load_log import LogEntry, apply
 from .mailbox import Mailbox
 from .plugin_faults import blame, blaming
 from .pybullet_models import ChangeDynamics
-from .rgbd_config import FIRST_TOPIC_NAME, RgbdSensorConfig
-from .sensor_schedule import SensorSchedule
+from .rgbd_config import RgbdSensorConfig
 from .sensors import RgbdSensor
 from .sensors.sensor import Sensor
 from .state_hash import state_hash
 from .window import Window, check_recording
+from .world_contents import WorldContents
 
 log = logging.getLogger(__name__)
 
@@ -57,21 +54,12 @@ class World:
         self.config = loaded.config
         self.clock = Clock(self.config.timeStep, simulated_time)
         self.mailbox = Mailbox()
-        self.bodies: dict[str, Body] = {}
-        self.cameras: dict[str, RgbdSensor] = {}
-        self.log: list[LogEntry] = []
         self.commands = CommandLog()
         """What entered it since it was built or reset."""
         self.resets = 0
         """How often it was reset."""
         self.loaded = loaded
         """What it was built from, and is again when it is reset."""
-        self._is_built = False
-        self._built_entries = 0
-        """How many entries of the log are of building it."""
-        self._inputs: dict[str, Input] = {}
-        self._sensors = SensorSchedule(self.clock)
-        self._stepping: list[Body] = []
         connect = self.config.connect.kwargs()
         configured_mode = connect.pop("connection_mode")
         mode = configured_mode if connection_mode is None else connection_mode
@@ -79,11 +67,16 @@ class World:
             check_recording(connect.get("options", ""))
         self.pb = Client(mode, **connect)
         self.window = None if mode == pybullet.DIRECT else Window(self.pb)
-        self.contacts = ContactReader(self.pb, self.bodies)
+        self._contents = WorldContents(self.pb, self.clock, self)
+        self.bodies = self._contents.bodies
+        self.contacts = self._contents.contacts
+        self.log = self._contents.log
+        self._sensors = self._contents.sensors
+        self._stepping = self._contents.stepping
         try:
             if mode == pybullet.GUI:
                 self._set_up_window()
-            self._build()
+            self._contents.fill(loaded)
         except BaseException:
             self.close()
             raise
@@ -114,21 +107,8 @@ class World:
             PhysicsError: If PyBullet refuses.
             PluginError: If a class of another package fails.
         """
-        name = config.name
-        self._require_new(name, file)
-        try:
-            self._append(LogEntry(name, "add", (kind, config)))
-            body = self.bodies[name]
-            try:
-                self._register(name, *equipment(body, config))
-            except Exception:
-                self._append(LogEntry(name, "remove"))
-                raise
-        except ConfigError as error:
-            raise ConfigError([Problem(file or name, each.key, each.message) for each in error.problems]) from None
-        self._note(name, "add", (kind, config))
-        if type(body).before_step is not Body.before_step:
-            self._stepping.append(body)
+        body = self._contents.add(kind, config, file)
+        self._note(config.name, "add", (kind, config))
         return body
 
     def add_camera(self, config: RgbdSensorConfig, file: str | None = None) -> RgbdSensor:
@@ -143,16 +123,7 @@ class World:
         Raises:
             ConfigError: If the name is taken.
         """
-        self._require_new(config.name, file)
-        taken = {camera.topic_name for camera in self.cameras.values()}
-        topic_name = config.name if FIRST_TOPIC_NAME in taken else FIRST_TOPIC_NAME
-        if topic_name in taken:
-            message = f"'{topic_name}' is what the topics of the first camera are called; use another name"
-            raise ConfigError([Problem(file or config.name, "name", message)])
-        camera = RgbdSensor(config, self.bodies, self.clock, topic_name)
-        self.cameras = {**self.cameras, camera.name: camera}
-        self._register(camera.name, (camera,), camera.inputs())
-        return camera
+        return self._contents.add_camera(config, file)
 
     def remove(self, name: str) -> None:
         """Removes a body or a camera.
@@ -160,16 +131,10 @@ class World:
         Raises:
             UnknownNameError: If there is none of that name.
         """
-        if name in self.cameras:
-            self.cameras = {other: camera for other, camera in self.cameras.items() if other != name}
-        else:
-            body = self.bodies.get(name)
-            self._append(LogEntry(name, "remove"))
+        is_body = name in self.bodies
+        self._contents.remove(name)
+        if is_body:
             self._note(name, "remove", None)
-            if body in self._stepping:
-                self._stepping.remove(body)
-        self._sensors.remove(name)
-        self._inputs = {slot: taken for slot, taken in self._inputs.items() if slot.split("/")[0] != name}
         self.take_inputs()  # what still waits for it must not meet a later body of the same name
 
     def dynamics(self, object_name: str) -> LinkDynamics:
@@ -182,9 +147,7 @@ class World:
             UnknownNameError: If there is none of that name.
         """
         name, _, link = object_name.partition("/")
-        if name not in self.bodies:
-            raise UnknownNameError("object", name, list(self.bodies))
-        return read_dynamics(self.bodies[name], link)
+        return read_dynamics(self._contents.body(name), link)
 
     def change_dynamics(self, object_name: str, change: ChangeDynamics) -> None:
         """Changes how an object or a link behaves; when it raises, nothing has changed.
@@ -199,7 +162,7 @@ class World:
             PhysicsError: If PyBullet refuses.
         """
         name, _, link = object_name.partition("/")
-        self._append(LogEntry(name, "dynamics", (link, change)))
+        self._contents.change_dynamics(name, link, change)
         self._note(object_name, "dynamics", change)
 
     def act(self, name: str, what: str, value: Any, do: Callable[[Any], Any] | None = None) -> Any:
@@ -218,9 +181,7 @@ class World:
             UnknownNameError: If there is no such body.
             ValueError: If the value is refused.
         """
-        body = self.bodies.get(name)
-        if body is None:
-            raise UnknownNameError("object", name, list(self.bodies))
+        body = self._contents.body(name)
         result = ACTIONS[what](body, self.clock, value) if do is None else do(body)
         self._note(name, what, value)
         return result
@@ -237,15 +198,21 @@ class World:
             ValueError: If the value is refused, for instance because it is not finite.
         """
         era = self.mailbox.era
-        taken = self._inputs.get(slot)
-        if taken is None:
-            raise UnknownNameError("input", slot, list(self._inputs))
+        inputs = self.inputs
+        if slot not in inputs:
+            raise UnknownNameError("input", slot, list(inputs))
+        taken = inputs[slot]
         self.mailbox.put(slot, taken.check(value), taken.merge, era)
 
     @property
     def inputs(self) -> dict[str, Input]:
         """What the world takes while it runs, by slot."""
-        return self._inputs
+        return self._contents.inputs
+
+    @property
+    def cameras(self) -> dict[str, RgbdSensor]:
+        """The cameras by name; a new dictionary whenever one comes or goes."""
+        return self._contents.cameras
 
     def sensors_of(self, name: str) -> list[Sensor]:
         """Returns the sensors of a body, or the camera of that name."""
@@ -262,14 +229,14 @@ class World:
         Every step does so first; a world that stands still needs it for the poses that come from TF.
         """
         for slot, value in self.mailbox.take().items():
-            if slot in self._inputs:
+            if slot in self.inputs:
                 self.take_input(slot, value)
 
     def take_input(self, slot: str, value: Any) -> None:
         """Acts on a value that was checked, and notes it if it is for a body."""
         body = self.bodies.get(slot.split("/")[0])
         with blaming(body or self, f"taking '{slot}' at tick {self.clock.tick}"):
-            self._inputs[slot].apply(value)
+            self.inputs[slot].apply(value)
         if body is not None:
             self._note(slot, "input", value)
 
@@ -328,28 +295,18 @@ class World:
                 world lacks it.
         """
         self.halt("the world was reset")
-        for body in self.bodies.values():
-            body.remove()
-        self.bodies.clear()
-        self.log.clear()
-        self._sensors.clear()
-        self._stepping.clear()
+        self._contents.clear()
         self.clock.restart()
         self.resets += 1
-        old = self._inputs  # they stay till their like has come, for those who put meanwhile
-        self._is_built = False
         try:
-            self._build()
+            self._contents.fill(self.loaded)
         finally:
-            self._is_built = True
-            self.contacts.outdate()
-            self._inputs = {slot: taken for slot, taken in self._inputs.items() if taken is not old.get(slot)}
             self.commands.clear()
             self.mailbox.drop()
 
     def changed_names(self) -> set[str]:
         """Returns the names of all objects that came or went since the world was built or reset."""
-        return {entry.name for entry in self.log[self._built_entries :] if entry.what in ("add", "remove")}
+        return self._contents.changed_names()
 
     def state_hash(self) -> str:
         """Returns a text that is the same for worlds in the same state at the same tick, see `state_hash`."""
@@ -369,52 +326,5 @@ class World:
             self.pb.configureDebugVisualizer(**arguments)
         self.pb.resetDebugVisualizerCamera(**self.config.resetDebugVisualizerCamera.kwargs())
 
-    def _build(self) -> None:
-        self._append(LogEntry("", "world", self.config))
-        problems: list[Problem] = []
-        for item in self.loaded.objects:
-            try:
-                self.add(item.type, item.config, item.file)
-            except ConfigError as error:
-                problems += error.problems
-            except (PhysicsError, PluginError) as error:
-                problems.append(Problem(item.file, "", str(error)))
-        if problems:
-            raise ConfigError(problems)
-        self._build_cameras()
-        self._built_entries = len(self.log)
-        self._is_built = True
-
-    def _build_cameras(self) -> None:
-        """Adds the cameras; those that have been there since the last time stay, with the pose that they have."""
-        before, self.cameras = self.cameras, {}
-        configs = [item.config for item in self.loaded.cameras]
-        for name, camera in before.items():
-            if any(camera.config is config for config in configs):
-                self.cameras = {**self.cameras, name: camera}
-                self._register(name, (camera,), camera.inputs())
-        for config, file in self.loaded.cameras:
-            if config.name not in self.cameras:
-                self.add_camera(config, file)
-
-    def _require_new(self, name: str, file: str | None) -> None:
-        if name in self._sensors:
-            message = f"'{name}' is taken already; names are unique in a world"
-            raise ConfigError([Problem(file or name, "name", message)])
-
-    def _append(self, entry: LogEntry) -> None:
-        """The one way into the world: does what the entry says and logs it."""
-        self.contacts.outdate()
-        apply(self.pb, self.bodies, entry)
-        self.log.append(entry)
-
     def _note(self, name: str, what: str, value: Any) -> None:
-        if self._is_built:
-            self.commands.note(WorldCommand(self.clock.tick, name, what, value))
-
-    def _register(self, name: str, sensors: tuple[Sensor, ...], inputs: Any) -> None:
-        for sensor in sensors:
-            with blaming(sensor, f"enter of '{sensor.name}'"):
-                sensor.enter(self)
-        self._sensors.add(name, sensors)
-        self._inputs = {**self._inputs, **{f"{name}/{key}": value for key, value in inputs.items()}}
+        self.commands.note(WorldCommand(self.clock.tick, name, what, value))

@@ -22,7 +22,7 @@ from .debug_camera import GET_SERVICE, RESET_TOPIC
 from .dynamics_services import DYNAMICS_SERVICES
 from .inputs import topic_input
 from .node_topics import NODE_TOPICS
-from .outlets import sample_topic
+from .sample_topics import sample_topic
 from .services import NODE_SERVICES
 from .time_services import TIME_SERVICES
 from .trajectory_commands import action_suffixes

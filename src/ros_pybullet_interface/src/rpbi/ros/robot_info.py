@@ -11,7 +11,7 @@ from ..bodies.jointed import JointedBody
 from ..joint_model import Joint
 from ..sensors.joint_state import JointStateSensor
 from .body_context import BodyContext
-from .outlets import joint_state_message
+from .sample_topics import joint_state_message
 
 
 def robot_info(context: BodyContext, _: RobotInfoRequest) -> RobotInfoResponse:

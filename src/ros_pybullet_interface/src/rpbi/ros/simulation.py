@@ -6,7 +6,6 @@ import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
-from typing import Any
 
 from custom_ros_tools.errors import InterfaceError
 
@@ -17,6 +16,7 @@ from .outlets import Outlet
 from .state_topic import StateOutlet
 from .status import ClockOutlet, StatusOutlet
 from .step_burst import StepBurst
+from .tick_outlets import TickOutlets
 
 log = logging.getLogger(__name__)
 
@@ -59,14 +59,12 @@ class Simulation:
         self._burst: StepBurst | None = None
         self.passes = 0
         """Grows as long as the loop is alive."""
-        self._outlets = outlets
-        self._clock = clock
+        idle_ticks = max(1, round(IDLE_PERIOD_S / world.clock.dt_s))
+        self._outlets = TickOutlets(world, outlets, clock, idle_ticks)
         self._helpers = helpers
         self._before_tick = before_tick
         self._pacer = Pacer(world.clock.dt_s, real_time_factor)
         self._idle_pacer = Pacer(max(world.clock.dt_s, IDLE_PERIOD_S))
-        self._idle_ticks_a_pass = max(1, round(IDLE_PERIOD_S / world.clock.dt_s))
-        self._idle_tick = 0
         self._status = StatusOutlet(world.clock, self._pacer, status_hz, real_time_factor, facts)
         self._state = StateOutlet(world, self._pacer, real_time_factor)
         self._commands = CommandOutlet(world)
@@ -162,12 +160,7 @@ class Simulation:
         refill()
         self.world.take_inputs()
         self._pacer.restart()
-        self._idle_tick = 0
-        for outlet in self._outlets.values():
-            outlet.restart()
-        if self._clock is not None:
-            self._clock.publish_now()
-        self._publish(self.world.read_rest())
+        self._outlets.restart()
         self._state.restart()
 
     def run(self, is_over: Callable[[], bool]) -> None:
@@ -199,20 +192,13 @@ class Simulation:
 
     def _take_tick(self) -> None:
         self._before_tick()
-        samples = self.world.step()
-        if self._clock is not None:
-            self._clock.publish_tick()
-        if samples:
-            self._publish(samples)
+        self._outlets.tell(self.world.step())
         self._state.take_tick()
 
     def _take_last_tick(self) -> None:
         """Goes one tick on before standing still: all of it is told, whatever is due."""
         self._before_tick()
-        samples = self.world.step()
-        if self._clock is not None:
-            self._clock.publish_now()
-        self._publish(samples + self.world.read_rest())
+        self._outlets.tell_all(self.world.step())
         self._state.take_tick()
 
     def _advance_burst(self, burst: StepBurst) -> None:
@@ -254,41 +240,19 @@ class Simulation:
         if self._burst is not None:
             self._end_burst().fail(error)
         self.world.halt("the simulation broke off")
-        self._idle_tick = self.world.clock.tick
-        if self._clock is not None:
-            self._clock.publish_now()
+        self._outlets.tell_end()
         self._status.publish(False)
 
     def _halt(self) -> None:
         self.running = False
         self.world.pause("the simulation was stopped")
-        self._idle_tick = self.world.clock.tick
-        if self._clock is not None:
-            self._clock.publish_now()
-        self._publish(self.world.read_rest())
+        self._outlets.tell_all([])
         self._status.publish(False)
 
     def _idle(self) -> None:
-        """Keeps a world that stands still visible to those who come late, without repeating a stamp."""
         if not self._idle_pacer.is_due():
             return
-        if self._clock is not None:
-            self._clock.repeat()
-        if self._broken:
-            return
-        self.world.take_inputs()
-        if self._clock is not None:
-            self._publish(self.world.read_rest())
-            for outlet in self._outlets.values():
-                outlet.serve_late()
-        else:
-            since, self._idle_tick = self._idle_tick, self._idle_tick + self._idle_ticks_a_pass
-            self.world.clock.restamp()
-            self._publish(self.world.read_idle(self._idle_tick, since))
-
-    def _publish(self, samples: list[Any]) -> None:
-        stamp_ns = self.world.clock.stamp_ns
-        for sample in samples:
-            self._outlets[type(sample)].publish(sample, stamp_ns)
-        for outlet in self._outlets.values():
-            outlet.flush()
+        self._outlets.tell_time_again()
+        if not self._broken:
+            self.world.take_inputs()
+            self._outlets.tell_idle()

@@ -7,7 +7,7 @@ from std_msgs.msg import Float64
 
 from rpbi.ros.frames import prefixed
 from rpbi.ros.inputs import TopicInput
-from rpbi.ros.outlets import SampleTopic
+from rpbi.ros.sample_topics import SampleTopic
 from rpbi.ros.stamps import to_ros_time
 
 from ..range_finder import RangeSample

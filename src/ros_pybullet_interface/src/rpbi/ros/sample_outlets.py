@@ -1,0 +1,69 @@
+"""The outlets of a world's samples, and which topics a body has among them."""
+
+from __future__ import annotations
+
+from ..inputs import PoseInput
+from ..samples import LinkPoseSample, SceneSample
+from ..world import World
+from .camera_outlet import CameraOutlet
+from .inputs import topic_input
+from .outlets import Outlet, SampleOutlet
+from .sample_topics import TOPICS, sample_topic
+from .topics import FastTopic
+from .transform_outlet import TransformOutlet
+
+
+class SampleOutlets:
+    """All outlets of a world.
+
+    Args:
+        world: The world.
+
+    Attributes:
+        cameras: That of the images.
+        by_type: All of them by type of sample; more come with bodies that other packages add.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._topics = {sample_type: SampleOutlet() for sample_type in TOPICS}
+        self._transforms = TransformOutlet()
+        self.cameras = CameraOutlet(world)
+        self.by_type: dict[type, Outlet] = {
+            **self._topics,
+            LinkPoseSample: self._transforms,
+            SceneSample: self.cameras,
+        }
+
+    def find_topics(self, name: str) -> None:
+        """Finds the topics of a body before its first sample, those that other packages name too.
+
+        Raises:
+            InterfaceError: If there is one that cannot be found.
+        """
+        for sensor in self._world.sensors_of(name):
+            if sample_topic(sensor) is not None and sensor.sample_type not in self._topics:
+                self._topics[sensor.sample_type] = self.by_type[sensor.sample_type] = SampleOutlet()
+        for key, taken in self._world.bodies[name].inputs().items():
+            if not isinstance(taken, PoseInput):
+                topic_input(key, taken)
+
+    def open(self, name: str) -> None:
+        """Opens the topics of a body's samples."""
+        for sensor in self._world.sensors_of(name):
+            topic = sample_topic(sensor)
+            if topic is not None:
+                self._topics[sensor.sample_type].open(sensor.name, topic)
+
+    def take_out(self, name: str) -> list[FastTopic]:
+        """Takes a body out of the world and drops what is kept of its samples; for the simulation thread.
+
+        Returns:
+            The topics that are left to close, by another thread.
+        """
+        sensors = self._world.sensors_of(name) if name in self._world.bodies else []
+        self._world.remove(name)
+        self._transforms.forget(name)
+        outlets = [(self._topics.get(each.sample_type), each.name) for each in sensors]
+        topics = [outlet.forget(sensor) for outlet, sensor in outlets if outlet is not None]
+        return [topic for topic in topics if topic is not None]
