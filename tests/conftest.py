@@ -67,6 +67,18 @@ def ros(ros_master: str, tmp_path: Path) -> Iterator[RosSystem]:  # noqa: F821
         system.close()
 
 
+@pytest.fixture(scope="module")
+def module_ros(ros_master: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[RosSystem]:  # noqa: F821
+    """Nodes that all tests of a module use; each test leaves them as it found them."""
+    from ros_system import RosSystem
+
+    system = RosSystem(tmp_path_factory.mktemp("module"))
+    try:
+        yield system
+    finally:
+        system.close()
+
+
 @pytest.fixture
 def second_master(ros: RosSystem) -> SecondMaster:  # noqa: F821
     """A master that may be killed; the tests' own one goes on."""

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import ast
+import importlib
+import inspect
+import pkgutil
 import re
+import subprocess
+import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -104,18 +109,64 @@ def test_only_the_world_and_its_parts_call_pybullet_from_the_simulator_node():
         assert path.name == "robot_info.py" or calls == [], path
 
 
-def _tables() -> dict[str, list[str]]:
-    from rpbi.bodies import BODY_TYPES
-    from rpbi.sensors import SENSOR_TYPES
+FAMILIES = {
+    "body": ("rpbi.bodies:BODY_TYPES", "rpbi.bodies.body:Body", "concepts.md"),
+    "sensor": ("rpbi.sensors:SENSOR_TYPES", "rpbi.sensors.sensor:Sensor", "concepts.md"),
+    "solver": ("ik_ros.solvers:SOLVERS", "ik_ros.solver:Solver", "ik_solvers.md"),
+    "task": ("ik_ros.tasks:TASKS", "ik_ros.tasks.task:Task", "ik_tasks.md"),
+}
+"""Table, base class and page of each family of plug-ins; their files are where the table is."""
 
-    return {"body": list(BODY_TYPES), "sensor": list(SENSOR_TYPES)}
 
-
-@pytest.mark.parametrize("family", ["body", "sensor"])
+@pytest.mark.parametrize("family", FAMILIES)
 def test_every_plug_in_is_explained(family):
-    text = (ROOT / "docs/concepts.md").read_text()
-    for name in _tables()[family]:
-        assert f"`{name}`" in text, f"docs/concepts.md does not tell of {family} '{name}'"
+    table, _, page = FAMILIES[family]
+    text = (ROOT / "docs" / page).read_text()
+    for name in pkgutil.resolve_name(table):
+        assert f"| `{name}` |" in text, f"docs/{page} does not tell of {family} '{name}'"
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_plug_in_has_a_file_of_its_own_and_a_line_in_the_table(family):
+    table, base, _ = FAMILIES[family]
+    package = table.split(":")[0]
+    for module in pkgutil.iter_modules(importlib.import_module(package).__path__, f"{package}."):
+        importlib.import_module(module.name)
+    entries = pkgutil.resolve_name(table).values()
+    in_table = [pkgutil.resolve_name(entry) if isinstance(entry, str) else entry for entry in entries]
+    there = {each for each in _descendants(pkgutil.resolve_name(base)) if each.__module__.startswith(f"{package}.")}
+    with_parents = {parent for each in in_table for parent in each.__mro__}
+    unknown = [each for each in there - with_parents if not inspect.isabstract(each)]
+    assert unknown == [], "neither in the table nor a base of what is there"
+    assert set(in_table) <= there
+    assert len({each.__module__ for each in in_table}) == len(in_table)
+
+
+def _descendants(base: type) -> set[type]:
+    """Returns all classes that derive from one."""
+    return {base}.union(*map(_descendants, base.__subclasses__()))
+
+
+def test_solvers_and_tasks_are_imported_when_they_are_asked_for():
+    program = """
+import pkgutil, sys
+import ik_ros.lookup, ik_ros.solvers, ik_ros.tasks
+paths = [*ik_ros.solvers.SOLVERS.values(), *ik_ros.tasks.TASKS.values()]
+assert not sys.modules.keys() & {path.split(":")[0] for path in paths}
+assert not sys.modules.keys() & {"PyKDL", "pytracik", "pinocchio", "daqp", "casadi"}
+"""
+    environment = {"PYTHONPATH": ":".join(sys.path)}
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, done.stderr
+
+
+def test_every_solver_is_shown_in_the_example_and_held_to_the_conformance_suite():
+    from ik_ros.solvers import SOLVERS
+
+    tests = "".join(path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
+    for name in SOLVERS:
+        assert (SRC / f"rpbi_examples/configs/kuka_lwr_ik_example/{name}.yaml").exists(), name
+        assert f'    solver_name = "{name}"\n' in tests, f"no SolverConformance has solver '{name}'"
 
 
 def test_every_body_type_is_shown_in_an_example_and_tested():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import time
 from pathlib import Path
@@ -14,6 +13,7 @@ import yaml
 from PIL import Image, ImageDraw
 from robot_shape import link_triangles, moved, pose_matrix
 from ros_system import RosSystem, stop_group, wait_until
+from rviz_view import RvizView, find_view
 from sensor_msgs.msg import CameraInfo
 from sensor_msgs.msg import Image as ImageMessage
 from tf2_msgs.msg import TFMessage
@@ -27,8 +27,6 @@ ARM = link_triangles(EXAMPLES / "robots/kuka_lwr.urdf", EXAMPLES)
 CAMERA = "/rpbi/camera"
 BOX_SIZE_M = np.array([0.20, 0.16, 0.12])
 
-FIELD_OF_VIEW = math.radians(45.0)
-"""Vertical opening of RViz's view."""
 DARK_GREEN = (0, 60, 0)
 """A background that nothing in the scene looks like."""
 DIFFERENT = 12
@@ -40,32 +38,8 @@ HARMLESS = re.compile(r"arrived closer .* than the lower bound you provided")
 SLOW_S = 120.0
 
 
-class View:
-    """RViz's orbit view of its config.
-
-    Args:
-        width: Columns of the picture [px].
-        height: Rows [px].
-    """
-
-    def __init__(self, width, height):
-        view = CONFIG["Views"]["Current"]
-        focus = np.array([view["Focal Point"][axis] for axis in "XYZ"])
-        yaw, pitch = view["Yaw"], view["Pitch"]
-        away = np.array([math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), math.sin(pitch)])
-        self._eye = focus + view["Distance"] * away
-        right = np.cross(-away, [0.0, 0.0, 1.0])
-        right /= np.linalg.norm(right)
-        self._axes = np.array([right, np.cross(-away, right), -away])
-        self._focal_px = height / 2 / math.tan(FIELD_OF_VIEW / 2)
-        self.width, self.height = width, height
-
-    def project(self, points):
-        """Returns columns, rows and depths [px, px, m] of points of the world; shape (..., 3)."""
-        in_view = (points - self._eye) @ self._axes.T
-        depth = in_view[..., 2:]
-        pixels = in_view[..., :2] / depth * self._focal_px + np.array([self.width, self.height]) / 2 - 0.5
-        return np.concatenate([pixels, depth], axis=-1)
+class View(RvizView):
+    """RViz's view of the example, and what things look like in it."""
 
     def silhouette(self, triangles):
         """Returns the pixels that triangles of the world cover by half at least."""
@@ -183,7 +157,7 @@ def show(example, screen, shipped):
         )
         stop_group(rviz)
         wait_until(lambda: not screen.windows(), "RViz has closed", SLOW_S)
-        return picture, View(window.width, window.height)
+        return picture, View(CONFIG_FILE, window.width, window.height)
 
     return show
 
@@ -192,14 +166,6 @@ def show(example, screen, shipped):
 def bare(show):
     """The picture without robot and depth."""
     return show({"rviz/Grid"}, lambda picture, _: differs(picture, DARK_GREEN).any(), "the grid is shown")[0]
-
-
-def find_view(screen):
-    """Returns where RViz's view is, the largest of its windows that have no title; None if it is not there yet."""
-    windows = screen.windows()
-    views = [window for window in windows if not window.title and min(window.width, window.height) > 300]
-    is_open = any("- RViz" in window.title for window in windows)
-    return max(views, key=lambda window: window.width * window.height) if is_open and views else None
 
 
 def settled(screen, is_shown, what):
@@ -214,7 +180,7 @@ def settled(screen, is_shown, what):
             seen.clear()
         if window is not None:
             seen.append((picture, window))
-        return len(seen) >= 4 and is_shown(picture, View(window.width, window.height))
+        return len(seen) >= 4 and is_shown(picture, View(CONFIG_FILE, window.width, window.height))
 
     wait_until(is_settled, what, SLOW_S)
     return seen[-1]

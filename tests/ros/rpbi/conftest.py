@@ -11,18 +11,6 @@ from typing import Any
 import pytest
 
 
-@pytest.fixture(scope="module")
-def module_ros(ros_master: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """Nodes that all tests of a module use; each test leaves them as it found them."""
-    from ros_system import RosSystem
-
-    system = RosSystem(tmp_path_factory.mktemp("module"))
-    try:
-        yield system
-    finally:
-        system.close()
-
-
 @pytest.fixture(scope="session")
 def control_msgs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """The package control_msgs for this process; the folder of its Python modules, for others."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from importlib import import_module
 from typing import Any, cast
 
-from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
+from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import ConfigModel
+from rpbi.plugins import find_in_table
 
 from .solver import Solver
 from .solvers import SOLVERS
@@ -21,20 +21,13 @@ def solver_class(name: str) -> type[Solver]:
 
     Raises:
         UnknownNameError: If the table does not have the name.
-        MissingDependency: If the solver needs a library that is not installed.
-        ConfigError: If there is no such module or class, or it is not a `Solver`.
+        MissingDependency: If a solver of the table needs a library that is not installed.
+        ConfigError: If another package has no such class, or its module cannot be imported.
     """
-    path = name if ":" in name else SOLVERS.get(name)
-    if path is None:
-        raise UnknownNameError("solver", name, [*SOLVERS, "their_package.module:Class"])
-    module_name, _, class_name = path.partition(":")
     try:
-        found = getattr(import_module(module_name), class_name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise _no_solver(name, str(error)) from error
-    if not (isinstance(found, type) and issubclass(found, Solver)):
-        raise _no_solver(name, "expected a class derived from ik_ros.solver.Solver")
-    return found
+        return cast(type[Solver], find_in_table(name, Solver, SOLVERS, "solver"))
+    except ValueError as error:
+        raise ConfigError([Problem("", "", f"solver '{name}': {error}")]) from error
 
 
 def make_solver(
@@ -56,7 +49,3 @@ def make_solver(
     kind = solver_class(name)
     make = cast(Callable[[ConfigModel], Solver], kind)
     return make(kind.Config.parse(data, file, context))
-
-
-def _no_solver(name: str, why: str) -> ConfigError:
-    return ConfigError([Problem("", "", f"solver '{name}': {why}")])

@@ -5,10 +5,11 @@ from __future__ import annotations
 import importlib
 import pkgutil
 import traceback
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from custom_ros_tools.errors import hint
+from custom_ros_tools.errors import UnknownNameError, hint
 
 _Kind = TypeVar("_Kind")
 
@@ -55,6 +56,27 @@ def find_class(name: str, base: type) -> Any:
     if isinstance(found, type) and issubclass(found, base):
         return found
     raise ValueError(f"expected a subclass of {full_name(base)}, got '{name}'")
+
+
+def find_in_table(name: str, base: type, table: Mapping[str, str], kind: str) -> Any:
+    """Returns a class of a table, or of another package.
+
+    Args:
+        name: A name of the table, or `module:Class`.
+        base: What a class of another package must be a subclass of.
+        table: `module:Class` by name; a module is imported when it is asked for.
+        kind: What the classes are, for the message.
+
+    Raises:
+        UnknownNameError: If the table does not have the name.
+        ValueError: If another package has no such class.
+        MissingDependency: If the module of the table says so.
+    """
+    if ":" in name:
+        return find_class(name, base)
+    if name not in table:
+        raise UnknownNameError(kind, name, [*table, "their_package.module:Class"])
+    return pkgutil.resolve_name(table[name])
 
 
 def config_of(found: Any, base: type[_Kind]) -> type[_Kind]:

@@ -41,7 +41,6 @@ class AccelerationLimits(JointTask):
     def __init__(self, config: AccelerationLimitsConfig, robot: Robot) -> None:
         super().__init__(config, robot, list(config.limits), "limits")
         self._way = np.array(list(config.limits.values())) * config.dt_s**2
-        self._ahead: np.ndarray | None = None
 
     def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
         """See `Task`."""
@@ -49,11 +48,5 @@ class AccelerationLimits(JointTask):
         known = [self.positions(solution) for solution in problem.previous[-2:]]
         newest = known[-1] if known else None
         older = known[0] if known else None
-        self._ahead = None if newest is None else newest if older is None else 2.0 * newest - older
-
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """See `JointTask`."""
-        if self._ahead is None:
-            unlimited = np.full(len(self._way), np.inf)
-            return -unlimited, unlimited
-        return self._ahead - self._way, self._ahead + self._way
+        ahead = None if newest is None else newest if older is None else 2.0 * newest - older
+        self.keep_near(ahead, self._way)

@@ -22,14 +22,9 @@ class Closeness(JointTask):
 
     def __init__(self, config: TaskConfig, robot: Robot) -> None:
         super().__init__(config, robot, robot.joint_names, "name")
-        self._goal = np.zeros(len(self.indices))
 
     def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
         """See `Task`."""
         super().begin(problem, goal, q)
         previous = self.positions(problem.previous[-1]) if problem.previous else None
-        self._goal = self.robot.positions(q) if previous is None else previous
-
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """See `JointTask`."""
-        return self._goal, self._goal
+        self.bring_to(self.robot.positions(q) if previous is None else previous)

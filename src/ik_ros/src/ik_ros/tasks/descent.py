@@ -86,7 +86,7 @@ class Descent:
         for part in self._parts:
             if part.is_hard and isinstance(part.task, JointTask):
                 i = part.task.indices
-                lower, upper = part.task.bounds()
+                lower, upper = part.task.bounds
                 self.lower[i] = np.minimum(np.maximum(self.lower[i], lower), self.upper[i])
                 self.upper[i] = np.maximum(np.minimum(self.upper[i], upper), self.lower[i])
 

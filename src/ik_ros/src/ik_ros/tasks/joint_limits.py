@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 from pydantic import Field
 
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Positive
@@ -49,8 +48,4 @@ class JointLimits(JointTask):
             if low > high:
                 key = f"limits.{name}" if name in config.limits else "margin"
                 raise KeyedError(key, f"leaves '{name}' no position: {low:g} to {high:g}")
-        self._bounds = lower, upper
-
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """See `JointTask`."""
-        return self._bounds
+        self.bounds = lower, upper

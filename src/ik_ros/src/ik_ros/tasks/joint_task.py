@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -24,6 +23,10 @@ class JointTask(Task):
         robot: The robot.
         joints: Names of the k joints.
         key: The option that names them, for messages.
+
+    Attributes:
+        indices: Where the k joints are among those of the robot.
+        bounds: k lower and k upper bounds [rad or m]; infinite at first.
     """
 
     def __init__(self, config: TaskConfig, robot: Robot, joints: Sequence[str], key: str) -> None:
@@ -33,10 +36,17 @@ class JointTask(Task):
         except UnknownNameError as error:
             raise KeyedError(key, str(error)) from None
         self._jacobian = robot.joint_rows(self.indices)
+        self.keep_near(None, 0.0)
 
-    @abstractmethod
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Returns k lower and k upper bounds [rad or m]."""
+    def keep_near(self, middle: np.ndarray | None, distance: np.ndarray | float) -> None:
+        """Sets bounds a distance away from k positions [rad or m]; without positions, the joints are free."""
+        if middle is None:
+            middle, distance = np.zeros(len(self.indices)), np.inf
+        self.bounds = middle - distance, middle + distance
+
+    def bring_to(self, goal: np.ndarray) -> None:
+        """Sets k positions as bounds [rad or m]."""
+        self.bounds = goal, goal
 
     def positions(self, named: Mapping[str, float]) -> np.ndarray | None:
         """Returns the k positions of a problem's solution [rad or m], None if it lacks one of them."""
@@ -45,7 +55,7 @@ class JointTask(Task):
 
     def rows(self, q: np.ndarray) -> Rows:
         """See `Task`."""
-        return Rows(self.robot.positions(q)[self.indices], self._jacobian, *self.bounds())
+        return Rows(self.robot.positions(q)[self.indices], self._jacobian, *self.bounds)
 
     def residual(self, beyond: np.ndarray) -> Residual:
         """See `Task`."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
+from typing import cast
 
-from custom_ros_tools.errors import UnknownNameError
+from rpbi.plugins import find_in_table
 
 from . import TASKS
 from .task import Task
@@ -20,14 +20,4 @@ def task_class(name: str) -> type[Task]:
         UnknownNameError: If the table does not have the name.
         ValueError: If there is no such module or class, or it is not a `Task`.
     """
-    path = name if ":" in name else TASKS.get(name)
-    if path is None:
-        raise UnknownNameError("task", name, [*TASKS, "their_package.module:Class"])
-    module_name, _, class_name = path.partition(":")
-    try:
-        found = getattr(import_module(module_name), class_name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise ValueError(f"'{name}': {error}") from error
-    if not (isinstance(found, type) and issubclass(found, Task)):
-        raise ValueError(f"'{name}': expected a class derived from ik_ros.tasks.task.Task")
-    return found
+    return cast(type[Task], find_in_table(name, Task, TASKS, "task"))

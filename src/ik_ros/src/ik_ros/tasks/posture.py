@@ -36,14 +36,10 @@ class Posture(JointTask):
     def __init__(self, config: PostureConfig, robot: Robot) -> None:
         super().__init__(config, robot, list(config.goal), "goal")
         self._default = np.array(list(config.goal.values()))
-        self._goal = self._default
+        self.bring_to(self._default)
 
     def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
         """See `Task`."""
         if goal is not None and len(goal) != len(self._default):
             raise ValueError(f"expected {len(self._default)} positions, got {len(goal)}")
-        self._goal = self._default if goal is None else np.array(goal)
-
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """See `JointTask`."""
-        return self._goal, self._goal
+        self.bring_to(self._default if goal is None else np.array(goal))

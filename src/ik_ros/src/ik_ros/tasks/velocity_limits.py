@@ -44,16 +44,8 @@ class VelocityLimits(JointTask):
         super().__init__(config, robot, list(config.limits) or robot.joint_names, "limits")
         speeds = np.array(list(config.limits.values())) if config.limits else robot.max_velocity
         self._way = speeds * config.factor * config.dt_s
-        self._previous: np.ndarray | None = None
 
     def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
         """See `Task`."""
         super().begin(problem, goal, q)
-        self._previous = self.positions(problem.previous[-1]) if problem.previous else None
-
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """See `JointTask`."""
-        if self._previous is None:
-            unlimited = np.full(len(self._way), np.inf)
-            return -unlimited, unlimited
-        return self._previous - self._way, self._previous + self._way
+        self.keep_near(self.positions(problem.previous[-1]) if problem.previous else None, self._way)

@@ -1,0 +1,53 @@
+"""RViz's view of a config: where it is on the screen, and where points of the world are in it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import yaml
+from screen import Screen, Window
+
+FIELD_OF_VIEW = math.radians(45.0)
+"""Vertical opening of RViz's view."""
+
+Array = npt.NDArray[np.float64]
+
+
+class RvizView:
+    """RViz's orbit view, as its config has it.
+
+    Args:
+        config: The `.rviz` file.
+        width: Columns of the picture [px].
+        height: Rows [px].
+    """
+
+    def __init__(self, config: Path, width: int, height: int) -> None:
+        view = yaml.safe_load(config.read_text())["Visualization Manager"]["Views"]["Current"]
+        focus = np.array([view["Focal Point"][axis] for axis in "XYZ"])
+        yaw, pitch = view["Yaw"], view["Pitch"]
+        away = np.array([math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), math.sin(pitch)])
+        self._eye = focus + view["Distance"] * away
+        right = np.cross(-away, [0.0, 0.0, 1.0])
+        right /= np.linalg.norm(right)
+        self._axes = np.array([right, np.cross(-away, right), -away])
+        self._focal_px = height / 2 / math.tan(FIELD_OF_VIEW / 2)
+        self.width, self.height = width, height
+
+    def project(self, points: Array) -> Array:
+        """Returns columns, rows and depths [px, px, m] of points of the world; shape (..., 3)."""
+        in_view = (points - self._eye) @ self._axes.T
+        depth = in_view[..., 2:]
+        pixels = in_view[..., :2] / depth * self._focal_px + np.array([self.width, self.height]) / 2 - 0.5
+        return np.concatenate([pixels, depth], axis=-1)
+
+
+def find_view(screen: Screen) -> Window | None:
+    """Returns where RViz's view is, the largest of its windows that have no title; None if it is not there yet."""
+    windows = screen.windows()
+    views = [window for window in windows if not window.title and min(window.width, window.height) > 300]
+    is_open = any("- RViz" in window.title for window in windows)
+    return max(views, key=lambda window: window.width * window.height) if is_open and views else None
