@@ -21,6 +21,11 @@ def test_ruff_finds_nothing() -> None:
     assert result.returncode == 0, result.stdout + result.stderr
 
 
+def test_files_are_formatted() -> None:
+    result = run("ruff", "format", "--check", "--diff", "--no-cache", ".")
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
 def test_mypy_finds_nothing_in_the_cores() -> None:
     result = run("mypy", "--cache-dir", str(ROOT / ".rpbi" / "mypy"))
     assert result.returncode == 0, result.stdout + result.stderr

@@ -39,9 +39,7 @@ def window(screen: Screen) -> Window | None:
     return next((each for each in screen.windows() if each.title.startswith("Bullet Physics")), None)
 
 
-def floating_ball(
-    ros: Any, name: str, rgba: list[float], position: list[float], radius_m: float = 0.15
-) -> str:
+def floating_ball(ros: Any, name: str, rgba: list[float], position: list[float], radius_m: float = 0.15) -> str:
     """Writes the configuration of a ball that floats; returns its file."""
     shape = {
         "shapeType": "GEOM_SPHERE",

@@ -54,8 +54,12 @@ def test_target_start_tolerances_and_previous_solutions_come_together(ros, targe
         problem = hear(
             problems,
             target,
-            lambda one: one.start.name and one.rotation_tolerance.z and len(one.previous_solutions) == 2
-            and one.previous_solutions[-1].position == (0.3,),
+            lambda one: (
+                one.start.name
+                and one.rotation_tolerance.z
+                and len(one.previous_solutions) == 2
+                and one.previous_solutions[-1].position == (0.3,)
+            ),
             "a problem has all of it",
         )
     assert problem.has_target and problem.target == TARGET
@@ -223,6 +227,7 @@ def test_frame_that_is_dragged_in_rviz_is_broadcast_where_the_handles_are(ros):
 
     wait_until(lambda: position() == (0.1, 0.2, 0.3), "it is where the parameters say")
     with publishing("ik_target/feedback", InteractiveMarkerFeedback) as mouse:
+
         def drag(pose):
             feedback = InteractiveMarkerFeedback(
                 client_id="test", marker_name="dragged", event_type=InteractiveMarkerFeedback.POSE_UPDATE, pose=pose

@@ -241,14 +241,12 @@ CHAIN_OF_TEST = {
 def test_users_own_solver_serves_by_module_and_class(ros, tmp_path, monkeypatch):
     (tmp_path / "lazy_lab.py").write_text(OWN_SOLVER)
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{__import__('os').environ.get('PYTHONPATH', '')}")
-    start_node(
-        ros, "ik_solver_node.py", "lazy_lab:Stubborn", "ik/solver/lazy_lab/Stubborn/solve", position=0.25
-    )
+    start_node(ros, "ik_solver_node.py", "lazy_lab:Stubborn", "ik/solver/lazy_lab/Stubborn/solve", position=0.25)
     answer = ros.call("ik/solver/lazy_lab/Stubborn/solve", SolveIK, IKProblem())
     assert answer.success and answer.solution.name == ["joint"] and answer.solution.position == (0.25,)
 
 
-OWN_SOLVER = '''
+OWN_SOLVER = """
 from custom_ros_tools.schema import ConfigModel
 from ik_ros.solution import IKSolution
 from ik_ros.solver import Solver
@@ -268,4 +266,4 @@ class Stubborn(Solver):
 
     def solve(self, problem):
         return IKSolution(True, "as always", self.joint_names, (self._position,))
-'''
+"""

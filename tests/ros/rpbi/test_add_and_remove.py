@@ -232,9 +232,7 @@ def test_a_bad_object_is_refused_with_all_reasons_and_changes_nothing(ros, world
     assert "Traceback" not in ros.output(world)
 
 
-WITH_MESH = (
-    "<robot name='r'><link name='a'><visual><geometry><mesh filename='{}'/></geometry></visual></link></robot>"
-)
+WITH_MESH = "<robot name='r'><link name='a'><visual><geometry><mesh filename='{}'/></geometry></visual></link></robot>"
 
 
 @pytest.mark.parametrize(
@@ -315,9 +313,7 @@ def test_two_hundred_objects_leave_nothing_behind(ros, world):
 
 def test_of_many_who_add_the_same_name_at_once_one_succeeds(ros, world):
     answers = []
-    threads = [
-        threading.Thread(target=lambda: answers.append(add(ros, ROBOT, iiwa("same")).success)) for _ in range(6)
-    ]
+    threads = [threading.Thread(target=lambda: answers.append(add(ros, ROBOT, iiwa("same")).success)) for _ in range(6)]
     for thread in threads:
         thread.start()
     for thread in threads:

@@ -100,8 +100,10 @@ def test_the_joints_that_move_the_base_are_told_to_nobody(ros):
     assert [joint.jointName for joint in info.joint_info] == ["shoulder"]
     with publishing("/rpbi/mobile/joint_states/target", JointState) as targets:
         wait_until(
-            lambda: targets.publish(JointState(name=["shoulder"], position=[0.7]))
-            or joint_states.messages[-1].position[0] == pytest.approx(0.7, abs=1e-3),
+            lambda: (
+                targets.publish(JointState(name=["shoulder"], position=[0.7]))
+                or joint_states.messages[-1].position[0] == pytest.approx(0.7, abs=1e-3)
+            ),
             "the arm has moved",
         )
 

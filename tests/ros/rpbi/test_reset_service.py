@@ -202,9 +202,10 @@ def test_a_hundred_resets_leave_no_trace(ros, start, tmp_path):
     wait_until(lambda: "transform" in ros.output(listener), "TF is listened to")
     stop = threading.Event()
     bag = tmp_path / "resets.bag"
-    with Recorder(bag, ["/tf", "/rpbi/iiwa/joint_states", "/clock"]), publishing(
-        "/rpbi/iiwa/joint_states/target", JointState
-    ) as target:
+    with (
+        Recorder(bag, ["/tf", "/rpbi/iiwa/joint_states", "/clock"]),
+        publishing("/rpbi/iiwa/joint_states/target", JointState) as target,
+    ):
 
         def control():
             while not stop.wait(0.005):

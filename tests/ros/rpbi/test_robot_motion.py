@@ -83,9 +83,7 @@ def test_a_robot_moves_to_a_joint_state_and_answers_when_it_is_there(ros, states
 
 def test_it_moves_back_to_where_it_started_whatever_the_request_says(ros, states):
     move(ros, 0.3, j1=0.4)
-    answer = ros.call(
-        "/rpbi/iiwa/move_to_initial_joint_state", ResetJointState, JointState(name=["no joint"]), 0.3
-    )
+    answer = ros.call("/rpbi/iiwa/move_to_initial_joint_state", ResetJointState, JointState(name=["no joint"]), 0.3)
     assert answer.success, answer.message
     assert [now(states)[name] for name in JOINTS] == pytest.approx(
         [math.radians(BENT[name]) for name in JOINTS], abs=0.01
@@ -104,9 +102,7 @@ def test_its_hand_moves_to_a_pose(ros, states):
     assert answer.success, answer.message
     assert "link 'lbr_iiwa_link_7' is " in answer.message
     assert float(answer.message.split("link 'lbr_iiwa_link_7' is ")[1].split(" mm")[0]) < 2.0
-    assert [now(states)[name] for name in here.solution.name] == pytest.approx(
-        list(here.solution.position), abs=0.02
-    )
+    assert [now(states)[name] for name in here.solution.name] == pytest.approx(list(here.solution.position), abs=0.02)
 
 
 def test_a_pose_out_of_reach_moves_nothing(ros, states):

@@ -165,8 +165,10 @@ def test_targets_that_wait_for_the_same_tick_are_merged(ros, simulator):
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     ros.call("/rpbi/start", Trigger)
     wait_until(
-        lambda: joint_states.messages
-        and all(abs(joint_states.messages[-1].position[number - 1] - goal) < 0.01 for number, goal in goals.items()),
+        lambda: (
+            joint_states.messages
+            and all(abs(joint_states.messages[-1].position[number - 1] - goal) < 0.01 for number, goal in goals.items())
+        ),
         "all three joints arrive",
     )
 

@@ -103,9 +103,7 @@ def test_marker_is_where_its_yaml_says_and_looks_like_it(start, object_tf):
 
 def test_tf_prefix_is_put_before_frames_of_ours_only(start):
     following = {**MARK, "object_tf": {"tf_id": "somewhere"}}
-    listener = start(
-        visual=(following,), collision=(FLOOR,), dynamic=(ball(broadcast_hz=50),), tf_prefix="twin"
-    )
+    listener = start(visual=(following,), collision=(FLOOR,), dynamic=(ball(broadcast_hz=50),), tf_prefix="twin")
     frames = {marker.ns: marker.header.frame_id for marker in shown(listener).values()}
     assert frames == {"mark": "somewhere", "floor": "twin/rpbi/world", "ball": "twin/rpbi/ball"}
 

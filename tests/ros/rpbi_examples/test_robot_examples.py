@@ -25,9 +25,7 @@ def launch(ros, example: str, **arguments: object) -> None:
     """Starts an example without windows and waits until its world runs."""
     given = [f"{key}:={value}" for key, value in arguments.items()]
     process = ros.start(["roslaunch", "rpbi_examples", f"{example}.launch", "headless:=true", *given])
-    wait_until(
-        lambda: process.poll() is not None or _serves("/rpbi/list_objects"), f"{example} is up", 40.0
-    )
+    wait_until(lambda: process.poll() is not None or _serves("/rpbi/list_objects"), f"{example} is up", 40.0)
     assert process.poll() is None, ros.output(process)
 
 

@@ -27,9 +27,7 @@ def _read(path: Path) -> pd.DataFrame:
 
 @pytest.fixture
 def bag(write_bag: WriteBag) -> Path:
-    states = [
-        ("/kuka/joint_states", JointState(name=["a", "b"], position=[index, -index])) for index in range(10)
-    ]
+    states = [("/kuka/joint_states", JointState(name=["a", "b"], position=[index, -index])) for index in range(10)]
     return write_bag([*states, ("/target", Float64(1.5)), ("/image", Image(data=b"\0\1"))], name="run.bag")
 
 

@@ -122,9 +122,7 @@ def test_tables_say_what_the_messages_say(type_name: str, write_bag: Callable[..
         messages = [(message, time.to_sec()) for _, message, time in bag.read_messages()]
     assert len(table) == len(messages) == 60
     columns = {"record_time"}
-    for (message, record_time), index, row in zip(
-        messages, table.index, table.to_dict("records"), strict=True
-    ):
+    for (message, record_time), index, row in zip(messages, table.index, table.to_dict("records"), strict=True):
         expected = dict(_flatten(message))
         stamp = expected.pop("header/stamp", 0.0)
         assert index == (stamp or record_time)
@@ -139,9 +137,7 @@ def test_tables_say_what_the_messages_say(type_name: str, write_bag: Callable[..
 def _joint_state(stamp_s: float, **positions: float) -> JointState:
     header = Header(stamp=genpy.Time.from_sec(stamp_s))
     names = list(positions)
-    return JointState(
-        header=header, name=names, position=list(positions.values()), effort=[-1.0] * len(names)
-    )
+    return JointState(header=header, name=names, position=list(positions.values()), effort=[-1.0] * len(names))
 
 
 @pytest.mark.parametrize("compression", ["none", "bz2", "lz4"])
@@ -149,9 +145,7 @@ def test_joint_states_are_columns_by_name_in_bags_of_any_compression(
     compression: str, write_bag: Callable[..., Path]
 ) -> None:
     states = [_joint_state(1 + index / 1000, b=index, a=-index) for index in range(500)]
-    table = bag_to_dataframes(write_bag((("/states", state) for state in states), compression=compression))[
-        "/states"
-    ]
+    table = bag_to_dataframes(write_bag((("/states", state) for state in states), compression=compression))["/states"]
     assert list(table.columns[1:]) == [
         "header/seq", "header/frame_id", "position/b", "position/a", "effort/b", "effort/a"
     ]  # fmt: skip
@@ -181,9 +175,7 @@ def test_transforms_are_rows(write_bag: Callable[..., Path]) -> None:
     first = TFMessage([transform(7, "a", 1.0), transform(7, "b", 2.0)])
     second = TFMessage([transform(6, "longer", 3.0)])
     static = TFMessage([transform(0, "c", 4.0)])
-    tables = bag_to_dataframes(
-        write_bag([("/tf", first), ("/tf", second), ("/tf", TFMessage()), ("/tf", static)])
-    )
+    tables = bag_to_dataframes(write_bag([("/tf", first), ("/tf", second), ("/tf", TFMessage()), ("/tf", static)]))
     table = tables["/tf"]
     axes = [*(f"translation/{axis}" for axis in "xyz"), *(f"rotation/{axis}" for axis in "xyzw")]
     assert list(table.columns) == ["record_time", "parent", "child", *axes]
@@ -194,9 +186,7 @@ def test_transforms_are_rows(write_bag: Callable[..., Path]) -> None:
 
 
 def test_diagnostics_are_rows_with_columns_by_key(write_bag: Callable[..., Path]) -> None:
-    loop = DiagnosticStatus(
-        name="loop", level=1, values=[KeyValue("overruns", "3"), KeyValue("factor", "0.99")]
-    )
+    loop = DiagnosticStatus(name="loop", level=1, values=[KeyValue("overruns", "3"), KeyValue("factor", "0.99")])
     camera = DiagnosticStatus(name="camera", message="fine", values=[KeyValue("factor", "")])
     message = DiagnosticArray(Header(stamp=genpy.Time(5)), [loop, camera])
     table = bag_to_dataframes(write_bag([("/diagnostics", message)]))["/diagnostics"]
@@ -209,9 +199,7 @@ def test_diagnostics_are_rows_with_columns_by_key(write_bag: Callable[..., Path]
 
 def test_topics_without_header_are_indexed_by_the_time_of_recording(write_bag: Callable[..., Path]) -> None:
     tables = bag_to_dataframes(
-        write_bag(
-            [("/clock", Clock(genpy.Time(3, 500_000_000))), ("/target", Float64MultiArray(data=[1.0, 2.0]))]
-        )
+        write_bag([("/clock", Clock(genpy.Time(3, 500_000_000))), ("/target", Float64MultiArray(data=[1.0, 2.0]))])
     )
     assert list(tables["/clock"].index) == [100.0]
     assert list(tables["/clock"]["clock"]) == [3.5]
@@ -289,9 +277,7 @@ def test_an_empty_bag_gives_no_tables(write_bag: Callable[..., Path]) -> None:
     assert bag_to_dataframes(write_bag([])) == {}
 
 
-def test_progress_is_reported_up_to_the_end(
-    write_bag: Callable[..., Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_progress_is_reported_up_to_the_end(write_bag: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
     path = write_bag([("/a", Float64(1.0))] * 2500 + _pictures())
     reports: list[tuple[int, int]] = []
     bag_to_dataframes(path, progress=lambda done, total: reports.append((done, total)))
@@ -310,9 +296,7 @@ def test_a_bag_with_an_own_type_needs_no_installed_class(tmp_path: Path) -> None
     assert (row["x"], row["text"]) == (1.5, "hello")
 
 
-def test_reading_needs_neither_master_nor_node(
-    write_bag: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_reading_needs_neither_master_nor_node(write_bag: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_bag([("/a", Float64(1.0))])
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
     pd.testing.assert_series_equal(

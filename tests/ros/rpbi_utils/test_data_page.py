@@ -30,9 +30,7 @@ def recording(write_bag: Callable[..., Path]) -> Path:
         header = Header(stamp=genpy.Time.from_sec(1 + index / 100), frame_id="rpbi/world")
         angle = index / 1000
         target = JointState(header, ["lwr_arm_0_joint"], [angle + 0.01], [], [])
-        state = JointState(
-            header, ["lwr_arm_0_joint", "lwr_arm_1_joint"], [angle, 0.0], [0.1, 0.0], [1.0, 2.0]
-        )
+        state = JointState(header, ["lwr_arm_0_joint", "lwr_arm_1_joint"], [angle, 0.0], [0.1, 0.0], [1.0, 2.0])
         box = TransformStamped(header=header, child_frame_id="rpbi/box")
         loop = DiagnosticStatus(name="loop", values=[KeyValue("overruns", str(index))])
         pixels = np.full((2, 3), 1.5, np.float32)

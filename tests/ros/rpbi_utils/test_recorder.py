@@ -42,9 +42,7 @@ with Recorder(sys.argv[1], ["/a"]):
 
 def _recorders() -> list[str]:
     """Returns the command lines of this process's recorders that still run."""
-    listing = subprocess.run(
-        ["ps", "--ppid", str(os.getpid()), "-o", "args="], capture_output=True, text=True
-    )
+    listing = subprocess.run(["ps", "--ppid", str(os.getpid()), "-o", "args="], capture_output=True, text=True)
     return [line for line in listing.stdout.splitlines() if "rosbag/record" in line]
 
 
@@ -106,9 +104,7 @@ def test_what_is_published_at_the_very_end_is_in_the_bag(ros: Any, tmp_path: Pat
     publisher.unregister()
 
 
-def test_a_topic_that_nobody_publishes_yet_is_recorded_from_its_first_message(
-    ros: Any, tmp_path: Path
-) -> None:
+def test_a_topic_that_nobody_publishes_yet_is_recorded_from_its_first_message(ros: Any, tmp_path: Path) -> None:
     with Recorder(tmp_path / "a.bag", ["/late"], lz4=False):
         publisher = rospy.Publisher("/late", Float64, queue_size=10, latch=True)
         publisher.publish(7.0)
@@ -122,9 +118,7 @@ def test_the_bag_before_is_replaced_and_nothing_else_is_left(ros: Any, tmp_path:
     for topic in ("/first", "/second"):
         with Counter([topic]) as counter, Recorder(path, [topic]):
             start = counter.last
-            wait_until(
-                lambda counter=counter, start=start: counter.last > start + 5, "something is published"
-            )
+            wait_until(lambda counter=counter, start=start: counter.last > start + 5, "something is published")
         assert list(bag_to_dataframes(path)) == [topic]
         assert os.listdir(tmp_path) == ["a.bag"]
 

@@ -51,9 +51,11 @@ def _world(folder, **main):
 def _session(ros, seconds):
     """Does to the world what can be done by ROS."""
     begin_s = time.monotonic()
-    with publishing("/rpbi/iiwa/joint_states/target", JointState) as target, publishing(
-        "/rpbi/mobile/cmd_vel", Twist
-    ) as cmd_vel, publishing("/rpbi/iiwa/joint_trajectory_controller/command", JointTrajectory) as command:
+    with (
+        publishing("/rpbi/iiwa/joint_states/target", JointState) as target,
+        publishing("/rpbi/mobile/cmd_vel", Twist) as cmd_vel,
+        publishing("/rpbi/iiwa/joint_trajectory_controller/command", JointTrajectory) as command,
+    ):
         for turn in range(int(seconds * 50)):
             phase = 2.0 * math.pi * turn / 50
             target.publish(JointState(name=JOINTS, position=[math.sin(phase), 0.8 + 0.3 * math.sin(2 * phase), -1.0]))

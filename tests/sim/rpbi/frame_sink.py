@@ -34,9 +34,7 @@ class FolderSink:
         except (FileNotFoundError, json.JSONDecodeError):
             return {}
         return {
-            name: Demand(frozenset(streams), seen)
-            for name, (streams, seen) in demands.items()
-            if name in self.cameras
+            name: Demand(frozenset(streams), seen) for name, (streams, seen) in demands.items() if name in self.cameras
         }
 
     def write(self, frame: Frame) -> None:

@@ -131,9 +131,7 @@ class Script:
             goal = {robot.model[name].index: draw.uniform(-0.5, 0.5) for name in JOINTS[:3]}
             world.act("iiwa", "move", TimedGoal(goal, draw.uniform(0.1, 1.0)))
         else:
-            points = tuple(
-                Waypoint(time_s, tuple(draw.uniform(-0.5, 0.5) for _ in JOINTS)) for time_s in (0.5, 1.0)
-            )
+            points = tuple(Waypoint(time_s, tuple(draw.uniform(-0.5, 0.5) for _ in JOINTS)) for time_s in (0.5, 1.0))
             stamp_ns = world.clock.stamp_ns + draw.choice((0, 100_000_000))
             request = TrajectoryRequest(tuple(JOINTS), points, stamp_ns)
             world.act("iiwa", "follow", RecordedTrajectory.of(request, None, world.clock))

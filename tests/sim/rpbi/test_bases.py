@@ -120,9 +120,7 @@ def test_a_floating_base_flies_as_it_was_thrown(build, tmp_path):
 
 def test_the_twist_of_a_spinning_base_is_that_of_its_frame_not_of_its_centre_of_mass(build, tmp_path):
     spin = {"linearVelocity": [0.3, 0.0, 0.0], "angularVelocity": [0.0, 0.0, 2.0]}
-    robot = mobile_base(
-        tmp_path, loadURDF={"baseOrientation": [0.0, 0.0, 0.6, 0.8]}, resetBaseVelocity=spin, **STILL
-    )
+    robot = mobile_base(tmp_path, loadURDF={"baseOrientation": [0.0, 0.0, 0.6, 0.8]}, resetBaseVelocity=spin, **STILL)
     world = build(robot, setGravity={"gravZ": 0.0})
     sample = next(sample for sample in world.read_rest() if isinstance(sample, BaseStateSample))
     assert (sample.name, sample.frame) == ("mobile", "rpbi/mobile/base_link")

@@ -159,9 +159,7 @@ def test_what_has_no_mass_counts_as_fixed(build):
 
 def test_a_floating_base_starts_with_its_velocity_and_follows_nothing(build, caplog):
     with caplog.at_level(logging.WARNING):
-        world = build(
-            fixed=False, object_tf={"tf_id": "hand"}, resetBaseVelocity={"linearVelocity": [1.0, 0.0, 0.0]}
-        )
+        world = build(fixed=False, object_tf={"tf_id": "hand"}, resetBaseVelocity={"linearVelocity": [1.0, 0.0, 0.0]})
     assert caplog.messages == ["door: object_tf: has no effect: physics moves a base that is not fixed"]
     assert not world.inputs
     run(world, 100)

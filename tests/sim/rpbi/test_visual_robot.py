@@ -121,9 +121,7 @@ def test_a_robot_that_is_not_visual_needs_motors(build):
         build(robot)
 
 
-INERTIAL = (
-    '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
-)
+INERTIAL = '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
 STONE = f'<robot name="r"><link name="a">{INERTIAL}</link></robot>'
 SPHERICAL = STONE.replace(
     "</robot>",

@@ -162,9 +162,7 @@ def test_inertias_belong_to_bodies_that_can_exist() -> None:
 
 
 def test_inertias_are_those_of_the_meshes() -> None:
-    script = subprocess.run(
-        [sys.executable, MESHES / "print_inertials.py"], capture_output=True, text=True, check=True
-    )
+    script = subprocess.run([sys.executable, MESHES / "print_inertials.py"], capture_output=True, text=True, check=True)
     text = (ROBOTS / "kuka_lwr.urdf").read_text()
     printed = [line for line in script.stdout.splitlines() if line.startswith(" ")]
     assert len(printed) == 5 * len(ARM_LINKS + TOOL_LINKS)

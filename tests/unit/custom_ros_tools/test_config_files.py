@@ -52,9 +52,7 @@ def test_unknown_package_is_named_with_a_suggestion(package: Path) -> None:
 
 
 def test_unknown_package_with_no_near_name_tells_where_it_was_sought(package: Path) -> None:
-    with pytest.raises(
-        ConfigError, match=f"unknown ROS package 'zebra' .ROS_PACKAGE_PATH is {package.parent}"
-    ):
+    with pytest.raises(ConfigError, match=f"unknown ROS package 'zebra' .ROS_PACKAGE_PATH is {package.parent}"):
         replace_package("package://zebra/a.yaml")
 
 
@@ -102,9 +100,7 @@ def test_merged_key_may_be_overridden() -> None:
     assert load_configs("a: &a {x: 1, y: 2}\nb: {<<: *a, x: 3}\n")["b"] == {"x": 3, "y": 2}
 
 
-@pytest.mark.parametrize(
-    ("name", "told"), [("none.yaml", "no such file or directory"), ("folder", "is a directory")]
-)
+@pytest.mark.parametrize(("name", "told"), [("none.yaml", "no such file or directory"), ("folder", "is a directory")])
 def test_unreadable_file_is_told(tmp_path: Path, name: str, told: str) -> None:
     (tmp_path / "folder").mkdir()
     with pytest.raises(ConfigError, match=f"^{tmp_path / name}: {told}$"):

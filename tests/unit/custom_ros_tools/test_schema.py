@@ -32,9 +32,7 @@ class Lens(ConfigModel):
     """A lens."""
 
     fov: float = Field(40.0, gt=0, lt=180, description="Opening.", json_schema_extra={"unit": "deg"})
-    range: Annotated[tuple[float, float], Field(strict=False), Unit("m")] = Field(
-        (0.1, 10.0), description="Range."
-    )
+    range: Annotated[tuple[float, float], Field(strict=False), Unit("m")] = Field((0.1, 10.0), description="Range.")
 
     @model_validator(mode="after")
     def _in_order(self) -> Lens:

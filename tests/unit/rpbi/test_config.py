@@ -151,9 +151,7 @@ def test_all_faults_of_all_files_are_told_at_once(folder: Path) -> None:
         folder / "arm.yaml",
         {"name": "arm", "loadURDF": {"fileName": "none.urdf"}, "joint_state_publisher_hz": 0},
     )
-    write(
-        folder / "ball.yaml", {**BALL, "changeDynamics": {"lateralFrction": 1, "restitution": float("nan")}}
-    )
+    write(folder / "ball.yaml", {**BALL, "changeDynamics": {"lateralFrction": 1, "restitution": float("nan")}})
     write(folder / "twin.yaml", {"name": "arm", "createVisualShape": {"shapeType": "GEOM_BX"}})
     (folder / "broken.yaml").write_text("name: [\n")
     data = pybullet_data.getDataPath()
@@ -173,8 +171,7 @@ def test_all_faults_of_all_files_are_told_at_once(folder: Path) -> None:
         "world.yaml: rgbd_sensor.object_tf.tf_id: missing, expected a TF frame",
         "world.yaml: setGravty: unknown key 'setGravty'; did you mean 'setGravity'?",
         "ball.yaml: changeDynamics.restitution: must be a finite number, got .nan",
-        "ball.yaml: changeDynamics.lateralFrction: unknown key 'lateralFrction'; "
-        "did you mean 'lateralFriction'?",
+        "ball.yaml: changeDynamics.lateralFrction: unknown key 'lateralFrction'; did you mean 'lateralFriction'?",
         "twin.yaml: createVisualShape.shapeType: unknown shape type 'GEOM_BX'; did you mean 'GEOM_BOX'?",
         "broken.yaml: line 2, column 1: expected the node content, but found '<stream end>'",
         f"world.yaml: visual_objects[3]: no such file: missing.yaml (looked in {folder}, {data})",
@@ -286,8 +283,7 @@ def test_single_object_is_checked_like_one_of_the_world(tmp_path: Path) -> None:
     with pytest.raises(ConfigError) as caught:
         load_object("robot", data, "config", BODY_TYPES)
     assert str(caught.value) == (
-        "config: name: 'world' is reserved\n"
-        "config: joint_state_publisher_hz: expected a number [Hz], got text 'fast'"
+        "config: name: 'world' is reserved\nconfig: joint_state_publisher_hz: expected a number [Hz], got text 'fast'"
     )
 
 

@@ -55,8 +55,7 @@ def test_old_and_new_spelling_together_are_refused() -> None:
     with pytest.raises(ConfigError) as caught:
         robot(publish_joint_state_frequency=100, joint_state_publisher_hz=50)
     assert str(caught.value) == (
-        "iiwa.yaml: publish_joint_state_frequency: means joint_state_publisher_hz, "
-        "which is given too: remove one"
+        "iiwa.yaml: publish_joint_state_frequency: means joint_state_publisher_hz, which is given too: remove one"
     )
 
 
@@ -82,9 +81,7 @@ def test_fault_in_an_old_spelling_is_told_as_the_user_spelt_it() -> None:
         ),
     ],
 )
-def test_key_without_effect_is_warned_of(
-    caplog: pytest.LogCaptureFixture, main: dict[str, Any], told: str
-) -> None:
+def test_key_without_effect_is_warned_of(caplog: pytest.LogCaptureFixture, main: dict[str, Any], told: str) -> None:
     load_world_dict(main, "~config", BODY_TYPES)
     (message,) = caplog.messages
     assert message.startswith(told)

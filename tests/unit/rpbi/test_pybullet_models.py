@@ -246,8 +246,7 @@ def test_visualizer_flags_become_one_call_each() -> None:
         (
             SetJointMotorControlArray,
             {},
-            "controlMode: missing, expected a control mode "
-            "(POSITION_CONTROL, VELOCITY_CONTROL, TORQUE_CONTROL)",
+            "controlMode: missing, expected a control mode (POSITION_CONTROL, VELOCITY_CONTROL, TORQUE_CONTROL)",
         ),
     ],
 )
@@ -266,7 +265,5 @@ def test_every_key_has_a_description() -> None:
 
 
 def test_file_that_does_not_exist_is_told_with_the_folders_searched(tmp_path: Path) -> None:
-    with pytest.raises(
-        ConfigError, match=rf"f.yaml: fileName: no such file: robot.urdf \(looked in {tmp_path}, "
-    ):
+    with pytest.raises(ConfigError, match=rf"f.yaml: fileName: no such file: robot.urdf \(looked in {tmp_path}, "):
         LoadURDF.parse({"fileName": "robot.urdf"}, str(tmp_path / "f.yaml"))

@@ -9,9 +9,7 @@ import pytest
 from rpbi_utils.layout import BYTES, MAX_ARRAY_COLUMNS, Leaf, lay_out
 from rpbi_utils.message_type import MessageType
 
-MIXED = MessageType.parse(
-    "a_msgs/Mixed", "uint8 a\nstring text\nint16[2] pair\nfloat64[] values\ntime stamp\n"
-)
+MIXED = MessageType.parse("a_msgs/Mixed", "uint8 a\nstring text\nint16[2] pair\nfloat64[] values\ntime stamp\n")
 
 
 def _mixed(text: bytes, values: list[float]) -> bytes:

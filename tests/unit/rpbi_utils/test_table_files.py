@@ -53,9 +53,7 @@ def test_parquet_gives_back_what_went_in(table: pd.DataFrame, tmp_path: Path) ->
     assert list(back.columns) == list(table.columns)
     pd.testing.assert_index_equal(back.index, table.index)
     for name in table.columns.drop("mixed"):
-        assert [None if pd.isna(x) else x for x in back[name]] == [
-            None if pd.isna(x) else x for x in table[name]
-        ]
+        assert [None if pd.isna(x) else x for x in back[name]] == [None if pd.isna(x) else x for x in table[name]]
     assert list(back["mixed"]) == ["1.5", "x"]  # Parquet has one type a column
 
 

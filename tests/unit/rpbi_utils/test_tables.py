@@ -56,9 +56,7 @@ def test_joints_keep_their_columns_when_order_and_set_change(
     np.testing.assert_array_equal(table[joints].to_numpy(), expected)
 
 
-def test_columns_come_in_the_order_of_appearance(
-    joint_state_type: MessageType, pack_joint_state: Pack
-) -> None:
+def test_columns_come_in_the_order_of_appearance(joint_state_type: MessageType, pack_joint_state: Pack) -> None:
     names = [["a"], ["longer"], ["c"], ["d", "a"]]
     table = _table(joint_state_type, [pack_joint_state(1, each, [0.0] * len(each)) for each in names])
     assert list(table.columns[3:]) == ["position/a", "position/longer", "position/c", "position/d"]
@@ -87,9 +85,7 @@ def test_rows_are_in_the_order_of_stamps_and_equal_stamps_in_that_of_recording(
     joint_state_type: MessageType, pack_joint_state: Pack
 ) -> None:
     stamps = [5, 3, 3, 4]
-    table = _table(
-        joint_state_type, [pack_joint_state(stamp, ["a"], [index]) for index, stamp in enumerate(stamps)]
-    )
+    table = _table(joint_state_type, [pack_joint_state(stamp, ["a"], [index]) for index, stamp in enumerate(stamps)])
     assert list(table.index) == [3.0, 3.0, 4.0, 5.0]
     assert list(table["position/a"]) == [1.0, 2.0, 3.0, 0.0]
     assert list(table["record_time"]) == [101.0, 102.0, 103.0, 100.0]

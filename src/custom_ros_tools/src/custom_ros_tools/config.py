@@ -75,9 +75,7 @@ def load_config(path: str) -> dict[str, Any]:
     except OSError as error:
         raise ConfigError([Problem(path, "", (error.strerror or str(error)).lower())]) from None
     except UnicodeDecodeError as error:
-        raise ConfigError(
-            [Problem(path, "", f"is not UTF-8 text: {error.reason} at byte {error.start}")]
-        ) from None
+        raise ConfigError([Problem(path, "", f"is not UTF-8 text: {error.reason} at byte {error.start}")]) from None
     return load_configs(text, path)
 
 
@@ -103,9 +101,7 @@ def load_configs(text: str, file: str = "text") -> dict[str, Any]:
     if data is None:
         return {}
     if not isinstance(data, dict):
-        raise ConfigError(
-            [Problem(file, "", f"expected a mapping of keys to values, got {type(data).__name__}")]
-        )
+        raise ConfigError([Problem(file, "", f"expected a mapping of keys to values, got {type(data).__name__}")])
     return cast(dict[str, Any], data)
 
 

@@ -95,9 +95,7 @@ class MarkerConfig(ConfigModel):
     )
     action: Annotated[
         str, AfterValidator(_known_action), _in_any_case(MARKER_ACTIONS), Expects("the name of a marker action")
-    ] = Field(
-        "ADD", description="Constant of the message in any case: `add`, `modify`, `delete` or `deleteall`."
-    )
+    ] = Field("ADD", description="Constant of the message in any case: `add`, `modify`, `delete` or `deleteall`.")
     position: Position = Field((0.0, 0.0, 0.0), description="Where it is in that frame.")
     orientation: Annotated[ListOf[float], Expects("roll, pitch, yaw or a quaternion x, y, z, w")] = Field(
         (0.0, 0.0, 0.0),

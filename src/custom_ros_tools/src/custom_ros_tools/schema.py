@@ -42,14 +42,10 @@ class ConfigModel(BaseModel):
     A whole number is accepted for a number and a list for a tuple; nothing else is converted.
     """
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True
-    )
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True)
 
     @classmethod
-    def parse(
-        cls: type[Model], data: Mapping[str, Any], file: str, context: Mapping[str, Any] | None = None
-    ) -> Model:
+    def parse(cls: type[Model], data: Mapping[str, Any], file: str, context: Mapping[str, Any] | None = None) -> Model:
         """Validate what was read from a file.
 
         Args:
@@ -85,9 +81,7 @@ def _switch(value: Any) -> Any:
 
 def _name(value: str) -> str:
     if not re.fullmatch(_NAME, value):
-        raise ValueError(
-            f"use letters, digits and '_' only (topics and frames are named after it), got {value!r}"
-        )
+        raise ValueError(f"use letters, digits and '_' only (topics and frames are named after it), got {value!r}")
     return value
 
 

@@ -33,9 +33,7 @@ _TYPE_ERRORS = {
 }
 
 
-def problems_of(
-    error: ValidationError, model: type[BaseModel], data: Mapping[str, Any], file: str
-) -> list[Problem]:
+def problems_of(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any], file: str) -> list[Problem]:
     """Translate a validation error.
 
     Args:

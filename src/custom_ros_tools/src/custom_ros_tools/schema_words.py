@@ -76,9 +76,7 @@ def expected(field: FieldInfo | None, depth: int = 0) -> str:
             return part.in_words()
     annotation: Any = field.annotation
     for _ in range(depth):
-        annotation = next(
-            (get_args(p)[0] for p in parts_of(annotation) if get_origin(p) in (tuple, list)), None
-        )
+        annotation = next((get_args(p)[0] for p in parts_of(annotation) if get_origin(p) in (tuple, list)), None)
     return _in_words(annotation)
 
 
@@ -94,9 +92,7 @@ def _in_words(annotation: Any, plural: bool = False) -> str:
         items = get_args(annotation)
         count = "" if Ellipsis in items or origin is list else f"{len(items)} "
         return f"{'lists' if plural else 'a list'} of {count}{_in_words(items[0], plural=True)}"
-    singular = (
-        "a mapping" if is_model(annotation) or origin is dict else TYPE_WORDS.get(annotation, "a value")
-    )
+    singular = "a mapping" if is_model(annotation) or origin is dict else TYPE_WORDS.get(annotation, "a value")
     return singular.removeprefix("a ") + "s" if plural and singular.startswith("a ") else singular
 
 

@@ -58,9 +58,7 @@ def quat_of(orientation: ArrayLike, in_deg: bool = False) -> Array:
     if values.shape == (4,):
         return unit_quat(values)
     if values.shape != (3,):
-        raise ValueError(
-            f"orientation: expected roll, pitch, yaw or a quaternion x, y, z, w, got shape {values.shape}"
-        )
+        raise ValueError(f"orientation: expected roll, pitch, yaw or a quaternion x, y, z, w, got shape {values.shape}")
     rpy = finite_vector(values, 3, "roll, pitch, yaw")
     return np.asarray(Rotation.from_euler("xyz", rpy, degrees=in_deg).as_quat())
 

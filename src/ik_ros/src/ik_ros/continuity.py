@@ -39,9 +39,7 @@ class Continuity:
         ValueError: If the configuration names a joint that is not there, or a joint has no limit at all.
     """
 
-    def __init__(
-        self, config: ContinuityConfig, joint_names: Sequence[str], velocity_limits: Sequence[float]
-    ) -> None:
+    def __init__(self, config: ContinuityConfig, joint_names: Sequence[str], velocity_limits: Sequence[float]) -> None:
         limits = dict(zip(joint_names, velocity_limits))
         given = config.max_velocity
         if isinstance(given, dict):

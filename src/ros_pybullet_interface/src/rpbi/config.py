@@ -55,9 +55,7 @@ class LoadedWorld:
     cameras: tuple[CameraConfig, ...] = ()
 
 
-def load_world(
-    path: str, body_types: Mapping[str, BodyType], robot_description: str | None = None
-) -> LoadedWorld:
+def load_world(path: str, body_types: Mapping[str, BodyType], robot_description: str | None = None) -> LoadedWorld:
     """Read a main YAML file and all files that it names.
 
     Args:

@@ -43,9 +43,7 @@ NO_EFFECT: dict[str, dict[str, str]] = {
 """By section: a key that older worlds carry and that never did anything, and what to do instead."""
 
 
-def modernise(
-    section: str, data: Mapping[str, Any], file: str
-) -> tuple[dict[str, Any], dict[str, str], list[Problem]]:
+def modernise(section: str, data: Mapping[str, Any], file: str) -> tuple[dict[str, Any], dict[str, str], list[Problem]]:
     """Bring a mapping up to date, with a logged warning for each key that was changed or has no effect.
 
     Args:
@@ -64,9 +62,7 @@ def modernise(
             continue
         value = current.pop(old)
         if new in current:
-            problems.append(
-                Problem(file, old, f"means {spellings.get(new, new)}, which is given too: remove one")
-            )
+            problems.append(Problem(file, old, f"means {spellings.get(new, new)}, which is given too: remove one"))
             continue
         current[new] = value
         spellings[new] = old

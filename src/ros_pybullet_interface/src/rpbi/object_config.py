@@ -104,9 +104,7 @@ def load_object(
     Raises:
         ConfigError: with all of its problems; one of them may be that there is no such type.
     """
-    problems = (
-        [Problem(file, "name", f"'{RESERVED_NAME}' is reserved")] if name_in(data) == RESERVED_NAME else []
-    )
+    problems = [Problem(file, "name", f"'{RESERVED_NAME}' is reserved")] if name_in(data) == RESERVED_NAME else []
     try:
         body_type = _body_type(kind, file, body_types)
         if isinstance(data, Mapping):

@@ -137,6 +137,4 @@ URDF_FLAGS = Flags("URDF flag", _starting_with("URDF_"))
 ACTIVATION_STATES = Flags("activation state", _starting_with("ACTIVATION_STATE_"))
 JOINT_FEEDBACK_MODES = Flags("joint feedback mode", _starting_with("JOINT_FEEDBACK_"))
 VISUAL_SHAPE_FLAGS = Flags("visual shape flag", ("VISUAL_SHAPE_DOUBLE_SIDED",))
-COLLISION_SHAPE_FLAGS = Flags(
-    "collision shape flag", ("GEOM_FORCE_CONCAVE_TRIMESH", "GEOM_CONCAVE_INTERNAL_EDGE")
-)
+COLLISION_SHAPE_FLAGS = Flags("collision shape flag", ("GEOM_FORCE_CONCAVE_TRIMESH", "GEOM_CONCAVE_INTERNAL_EDGE"))

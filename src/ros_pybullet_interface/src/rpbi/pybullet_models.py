@@ -74,13 +74,9 @@ class LoadURDF(PybulletModel):
 
     fileName: RobotFile = Field(description="URDF file, or the word `robot_description` for the parameter.")
     basePosition: Position | None = Field(None, description="Position of the base in the world.")
-    baseOrientation: Quat | None = Field(
-        None, description="Orientation of the base in the world as x, y, z, w."
-    )
+    baseOrientation: Quat | None = Field(None, description="Orientation of the base in the world as x, y, z, w.")
     useFixedBase: Switch | None = Field(None, description="Whether the base is fixed to the world.")
-    useMaximalCoordinates: Switch | None = Field(
-        None, description="Whether joints are solved as constraints."
-    )
+    useMaximalCoordinates: Switch | None = Field(None, description="Whether joints are solved as constraints.")
     flags: Annotated[int, URDF_FLAGS] | None = Field(None, description="URDF_... flags.")
     globalScaling: Positive | None = Field(None, description="Factor on all lengths.")
 
@@ -98,12 +94,8 @@ class CreateVisualShape(PybulletModel):
     flags: Annotated[int, VISUAL_SHAPE_FLAGS] | None = Field(None, description="VISUAL_SHAPE_... flags.")
     rgbaColor: Rgba | None = Field(None, description="Colour and opacity, each from 0 to 1.")
     specularColor: Rgb | None = Field(None, description="Colour of highlights, each from 0 to 1.")
-    visualFramePosition: Position | None = Field(
-        None, description="Position of the shape in the body's frame."
-    )
-    visualFrameOrientation: Quat | None = Field(
-        None, description="Orientation in the body's frame as x, y, z, w."
-    )
+    visualFramePosition: Position | None = Field(None, description="Position of the shape in the body's frame.")
+    visualFrameOrientation: Quat | None = Field(None, description="Orientation in the body's frame as x, y, z, w.")
     vertices: ListOf[Position] | None = Field(None, description="Corners of a mesh that has no file.")
     indices: ListOf[Count] | None = Field(None, description="Corner numbers of its triangles.")
     normals: ListOf[Vec3] | None = Field(None, description="Normals at its corners.")
@@ -128,17 +120,11 @@ class CreateCollisionShape(PybulletModel):
     meshScale: Vec3 | None = Field(None, description="Factors on a mesh along x, y and z.")
     planeNormal: Vec3 | None = Field(None, description="Normal of a plane.")
     flags: Annotated[int, COLLISION_SHAPE_FLAGS] | None = Field(None, description="GEOM_... flags.")
-    collisionFramePosition: Position | None = Field(
-        None, description="Position of the shape in the body's frame."
-    )
-    collisionFrameOrientation: Quat | None = Field(
-        None, description="Orientation in the body's frame as x, y, z, w."
-    )
+    collisionFramePosition: Position | None = Field(None, description="Position of the shape in the body's frame.")
+    collisionFrameOrientation: Quat | None = Field(None, description="Orientation in the body's frame as x, y, z, w.")
     vertices: ListOf[Position] | None = Field(None, description="Corners of a mesh that has no file.")
     indices: ListOf[Count] | None = Field(None, description="Corner numbers of its triangles.")
-    heightfieldTextureScaling: Positive | None = Field(
-        None, description="Repetitions of a height field's texture."
-    )
+    heightfieldTextureScaling: Positive | None = Field(None, description="Repetitions of a height field's texture.")
     heightfieldData: ListOf[Metres] | None = Field(None, description="Heights, row by row.")
     numHeightfieldRows: Count | None = Field(None, description="Rows of the height field.")
     numHeightfieldColumns: Count | None = Field(None, description="Columns of the height field.")
@@ -157,17 +143,11 @@ class ChangeDynamics(PybulletModel):
     lateralFriction: NonNegative | None = Field(None, description="Coulomb friction coefficient.")
     spinningFriction: NonNegative | None = Field(None, description="Friction about the contact normal.")
     rollingFriction: NonNegative | None = Field(None, description="Friction against rolling.")
-    restitution: NonNegative | None = Field(
-        None, description="Bounciness; 0 does not bounce, 1 keeps all energy."
-    )
+    restitution: NonNegative | None = Field(None, description="Bounciness; 0 does not bounce, 1 keeps all energy.")
     linearDamping: NonNegative | None = Field(None, description="Share of linear velocity lost.")
     angularDamping: NonNegative | None = Field(None, description="Share of angular velocity lost.")
-    contactStiffness: Annotated[NonNegative, Unit("N/m")] | None = Field(
-        None, description="Stiffness of contacts."
-    )
-    contactDamping: Annotated[NonNegative, Unit("N s/m")] | None = Field(
-        None, description="Damping of contacts."
-    )
+    contactStiffness: Annotated[NonNegative, Unit("N/m")] | None = Field(None, description="Stiffness of contacts.")
+    contactDamping: Annotated[NonNegative, Unit("N s/m")] | None = Field(None, description="Damping of contacts.")
     frictionAnchor: Switch | None = Field(None, description="Whether friction drift is corrected.")
     localInertiaDiagonal: (
         Annotated[tuple[NonNegative, NonNegative, NonNegative], Field(strict=False), Unit("kg m^2")] | None
@@ -178,9 +158,7 @@ class ChangeDynamics(PybulletModel):
     contactProcessingThreshold: Annotated[NonNegative, Unit("m")] | None = Field(
         None, description="Distance below which contacts are solved."
     )
-    activationState: Annotated[int, ACTIVATION_STATES] | None = Field(
-        None, description="ACTIVATION_STATE_... flags."
-    )
+    activationState: Annotated[int, ACTIVATION_STATES] | None = Field(None, description="ACTIVATION_STATE_... flags.")
     jointDamping: Annotated[NonNegative, Unit("N m s/rad or N s/m")] | None = Field(
         None, description="Damping of the joint."
     )
@@ -188,9 +166,7 @@ class ChangeDynamics(PybulletModel):
     maxJointVelocity: Annotated[Positive, Unit("rad/s or m/s")] | None = Field(
         None, description="Largest velocity of the joint."
     )
-    collisionMargin: Annotated[NonNegative, Unit("m")] | None = Field(
-        None, description="Margin around the shape."
-    )
+    collisionMargin: Annotated[NonNegative, Unit("m")] | None = Field(None, description="Margin around the shape.")
     jointLowerLimit: Annotated[float, Unit("rad or m")] | None = Field(None, description="Lower limit of the joint.")
     jointUpperLimit: Annotated[float, Unit("rad or m")] | None = Field(None, description="Upper limit of the joint.")
     jointLimitForce: Annotated[NonNegative, Unit("N m or N")] | None = Field(

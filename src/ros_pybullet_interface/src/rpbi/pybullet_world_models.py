@@ -43,9 +43,7 @@ class Connect(PybulletModel):
         description="GUI opens PyBullet's window, DIRECT needs no screen.",
         json_schema_extra={"default": "GUI"},
     )
-    options: Text | None = Field(
-        None, description="Further options, such as `--mp4=FILE` to record the window."
-    )
+    options: Text | None = Field(None, description="Further options, such as `--mp4=FILE` to record the window.")
     key: Count | None = Field(None, description="Key of the shared memory.")
     hostName: Text | None = Field(None, description="Host of a server to connect to.")
     port: Annotated[int, Field(ge=1, le=65535)] | None = Field(None, description="Port of that server.")
@@ -83,9 +81,7 @@ class SetPhysicsEngineParameter(PybulletModel):
     """How contacts and joints are solved; without `fixedTimeStep`, since `timeStep` says that."""
 
     numSolverIterations: Iterations | None = Field(None, description="Most iterations of the solver.")
-    useSplitImpulse: Switch | None = Field(
-        None, description="Whether penetration is solved apart from velocity."
-    )
+    useSplitImpulse: Switch | None = Field(None, description="Whether penetration is solved apart from velocity.")
     splitImpulsePenetrationThreshold: Annotated[float, Unit("m")] | None = Field(
         None, description="Penetration from which it is solved apart."
     )
@@ -110,9 +106,7 @@ class SetPhysicsEngineParameter(PybulletModel):
     jointFeedbackMode: Annotated[int, JOINT_FEEDBACK_MODES] | None = Field(
         None, description="JOINT_FEEDBACK_... flags: where force and torque of a joint are told."
     )
-    solverResidualThreshold: NonNegative | None = Field(
-        None, description="Residual at which the solver stops."
-    )
+    solverResidualThreshold: NonNegative | None = Field(None, description="Residual at which the solver stops.")
     contactSlop: Annotated[NonNegative, Unit("m")] | None = Field(None, description="Penetration left alone.")
     enableSAT: Switch | None = Field(None, description="Whether the separating axis test is used.")
     constraintSolverType: Annotated[int, SOLVER_TYPES] | None = Field(
@@ -121,9 +115,7 @@ class SetPhysicsEngineParameter(PybulletModel):
     globalCFM: NonNegative | None = Field(None, description="Softness of all constraints.")
     minimumSolverIslandSize: Count | None = Field(None, description="Fewest constraints solved together.")
     reportSolverAnalytics: Switch | None = Field(None, description="Whether the solver tells what it did.")
-    warmStartingFactor: NonNegative | None = Field(
-        None, description="Share of the last step's solution reused."
-    )
+    warmStartingFactor: NonNegative | None = Field(None, description="Share of the last step's solution reused.")
     sparseSdfVoxelSize: PositiveMetres | None = Field(None, description="Voxel size for soft bodies.")
     numNonContactInnerIterations: Iterations | None = Field(
         None, description="Iterations on joints in each of the solver's."
@@ -154,9 +146,7 @@ class ConfigureDebugVisualizer(PybulletModel):
     shadowMapResolution: Count | None = Field(
         None, description="Resolution of shadows.", json_schema_extra={"unit": "px"}
     )
-    shadowMapWorldSize: Count | None = Field(
-        None, description="Extent of shadows.", json_schema_extra={"unit": "m"}
-    )
+    shadowMapWorldSize: Count | None = Field(None, description="Extent of shadows.", json_schema_extra={"unit": "m"})
     remoteSyncTransformInterval: NonNegative | None = Field(
         None, description="Time between updates of a remote window.", json_schema_extra={"unit": "s"}
     )

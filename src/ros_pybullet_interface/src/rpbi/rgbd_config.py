@@ -31,9 +31,7 @@ class IntrinsicsConfig(ConfigModel):
 
     width: ImageSide = Field(640, description="Columns of the images.")
     height: ImageSide = Field(480, description="Rows of the images.")
-    fov: float = Field(
-        40.0, gt=0, lt=180, description="Vertical field of view.", json_schema_extra={"unit": "deg"}
-    )
+    fov: float = Field(40.0, gt=0, lt=180, description="Vertical field of view.", json_schema_extra={"unit": "deg"})
     range: Annotated[tuple[PositiveMetres, PositiveMetres], Field(strict=False)] = Field(
         (0.01, 100.0), description="Nearest and farthest distance along the optical axis."
     )
@@ -60,7 +58,5 @@ class RgbdSensorConfig(ConfigModel):
         0.0, description="What the squared depth adds to that deviation; about 0.0014 for a structured-light camera."
     )
     seed: Count | None = Field(None, description="Seed of the noise; without it, one that follows from the name.")
-    intrinsics: IntrinsicsConfig = Field(
-        IntrinsicsConfig(), description="Image size, field of view and range."
-    )
+    intrinsics: IntrinsicsConfig = Field(IntrinsicsConfig(), description="Image size, field of view and range.")
     object_tf: ObjectTf = Field(description="TF frame of the camera: x right, y down, z forward.")

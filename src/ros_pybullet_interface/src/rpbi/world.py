@@ -48,9 +48,7 @@ class World:
         PhysicsError: If PyBullet does not connect or cannot load something.
     """
 
-    def __init__(
-        self, loaded: LoadedWorld, simulated_time: bool = True, connection_mode: int | None = None
-    ) -> None:
+    def __init__(self, loaded: LoadedWorld, simulated_time: bool = True, connection_mode: int | None = None) -> None:
         self.config = loaded.config
         self.clock = Clock(self.config.timeStep, simulated_time)
         self.mailbox = Mailbox()

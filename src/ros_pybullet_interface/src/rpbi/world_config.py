@@ -75,9 +75,7 @@ class WorldConfig(ConfigModel):
     )
     resetSimulation: ResetSimulation = Field(ResetSimulation(), description="What kind of world it is.")
     setGravity: SetGravity = Field(SetGravity(), description="Gravity; there is none unless given.")
-    timeStep: Annotated[Seconds, AfterValidator(_whole_nanoseconds)] = Field(
-        0.02, description="Length of a step."
-    )
+    timeStep: Annotated[Seconds, AfterValidator(_whole_nanoseconds)] = Field(0.02, description="Length of a step.")
     setPhysicsEngineParameter: SetPhysicsEngineParameter = Field(
         SetPhysicsEngineParameter(), description="How contacts and joints are solved."
     )
@@ -116,9 +114,7 @@ class WorldConfig(ConfigModel):
     )
     visualizer_image_width: Pixels = Field(640, description="Columns of that image.")
     visualizer_image_height: Pixels = Field(480, description="Its rows.")
-    markers_hz: HzOrOff = Field(
-        10.0, description="How often `rpbi/markers` is looked after, in wall time; 0 is off."
-    )
+    markers_hz: HzOrOff = Field(10.0, description="How often `rpbi/markers` is looked after, in wall time; 0 is off.")
     visual_objects: ListOf[ObjectEntry] = Field((), description="Files of objects that are seen and never felt.")
     collision_objects: ListOf[ObjectEntry] = Field((), description="Files of objects that nothing moves.")
     dynamic_objects: ListOf[ObjectEntry] = Field((), description="Files of objects that physics moves.")

@@ -88,8 +88,7 @@ class WorldDescription:
         """
         config = from_text(self._config)
         objects = [
-            ObjectConfig(each["type"], self._read(each["config"], each["file"]), each["file"])
-            for each in self._objects
+            ObjectConfig(each["type"], self._read(each["config"], each["file"]), each["file"]) for each in self._objects
         ]
         return World(LoadedWorld(config, tuple(objects), self._file), connection_mode=pybullet.DIRECT)
 

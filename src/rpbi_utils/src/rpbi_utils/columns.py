@@ -67,9 +67,7 @@ class Pieces:
                 dtype = np.dtype(float)
             elif dtype.kind == "b":
                 dtype = np.dtype(object)
-        column: Array = np.full(
-            rows, None if dtype.kind == "O" else np.nan if dtype.kind == "f" else 0, dtype
-        )
+        column: Array = np.full(rows, None if dtype.kind == "O" else np.nan if dtype.kind == "f" else 0, dtype)
         for start, values in self._pieces:
             column[start : start + len(values)] = values
         return column

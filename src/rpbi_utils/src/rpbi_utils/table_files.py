@@ -52,9 +52,7 @@ def write_table(table: pd.DataFrame, path: Path) -> None:
     except ImportError as error:
         raise MissingDependency("fastparquet", "pip install fastparquet, or write CSV") from error
     encodings = {name: encoding for name in table.columns if (encoding := _encoding(table[name]))}
-    texts = {
-        name: table[name].map(str, na_action="ignore") for name in encodings if encodings[name] == "utf8"
-    }
+    texts = {name: table[name].map(str, na_action="ignore") for name in encodings if encodings[name] == "utf8"}
     table.assign(**texts).to_parquet(path, engine="fastparquet", object_encoding=encodings or "infer")
 
 

@@ -81,9 +81,7 @@ class TableBuilder:
         fields = list(dict.fromkeys(name.split("/")[0] for name in self._columns))
         names = sorted(self._columns, key=lambda name: fields.index(name.split("/")[0]))  # stable
         columns = {name: self._columns.pop(name).join(self._rows)[order] for name in names}
-        return pd.DataFrame(
-            {RECORD_TIME: record_time[order], **columns}, index=pd.Index(time[order], name=INDEX)
-        )
+        return pd.DataFrame({RECORD_TIME: record_time[order], **columns}, index=pd.Index(time[order], name=INDEX))
 
     def _read_batch(self) -> None:
         """Reads the messages that are waiting, sorted by type and size."""

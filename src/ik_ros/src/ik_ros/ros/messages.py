@@ -48,9 +48,7 @@ def problem_in_trac_ik(message: TracIKProblem) -> IKProblem:
     """
     translation, rotation = message.goal.translation, message.goal.rotation
     return IKProblem(
-        target=Pose(
-            (translation.x, translation.y, translation.z), (rotation.x, rotation.y, rotation.z, rotation.w)
-        ),
+        target=Pose((translation.x, translation.y, translation.z), (rotation.x, rotation.y, rotation.z, rotation.w)),
         position_tolerance=(message.bx, message.by, message.bz),
         rotation_tolerance=(message.brx, message.bry, message.brz),
         start=positions_in("qinit", message.qinit),

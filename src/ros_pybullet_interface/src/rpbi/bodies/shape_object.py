@@ -55,9 +55,7 @@ class ShapeObject(Body):
 
     def inputs(self) -> Mapping[str, Input]:
         """Takes `pose`, the pose of the TF frame that it follows, if it follows one."""
-        return {} if self._object_tf is None else {
-            "pose": PoseInput.following(self._object_tf, self.set_base_pose)
-        }
+        return {} if self._object_tf is None else {"pose": PoseInput.following(self._object_tf, self.set_base_pose)}
 
 
 def _check_meshes(name: str, **shapes: CreateVisualShape | CreateCollisionShape | None) -> None:

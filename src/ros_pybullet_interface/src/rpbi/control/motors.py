@@ -18,9 +18,7 @@ QUANTITIES = {
     pybullet.TORQUE_CONTROL: "effort",
 }
 """What a target is in each control mode."""
-MODE_NAMES = {
-    getattr(pybullet, name): name for name in ("POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL")
-}
+MODE_NAMES = {getattr(pybullet, name): name for name in ("POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL")}
 
 
 class Command(NamedTuple):
@@ -178,9 +176,7 @@ class Motors:
                 self._limited(index, self._targets[index] + extra)
                 for index, extra in zip(self._indices, self._feed_forward)
             ]
-            self._pb.setJointMotorControlArray(
-                self._body_id, self._indices, pybullet.TORQUE_CONTROL, forces=efforts
-            )
+            self._pb.setJointMotorControlArray(self._body_id, self._indices, pybullet.TORQUE_CONTROL, forces=efforts)
             self.applied_efforts = dict(zip(self._indices, efforts))
 
     def _expire(self, tick: int) -> None:

@@ -72,8 +72,7 @@ class TimedMotion(Motion):
         before, duration_s = self._set_point, time_s - self._time_s
         self._set_point, self._time_s = self._trajectory.sample(time_s).position, time_s
         return {
-            index: (start, (end - start) / duration_s)
-            for index, start, end in zip(self._goal, before, self._set_point)
+            index: (start, (end - start) / duration_s) for index, start, end in zip(self._goal, before, self._set_point)
         }
 
     def halt(self, reason: str, measured: JointMotion) -> None:

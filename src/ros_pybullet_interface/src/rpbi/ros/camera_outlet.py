@@ -123,9 +123,7 @@ class CameraOutlet:
         self._sensors = cameras
         self._synchronous = tuple(sensor for sensor in cameras.values() if sensor.config.synchronous)
 
-    def _wait_for(
-        self, condition: Callable[[], bool], name: str, missing: str, needs_renderer: bool = False
-    ) -> None:
+    def _wait_for(self, condition: Callable[[], bool], name: str, missing: str, needs_renderer: bool = False) -> None:
         """Waits for something of a synchronous camera, or until the node shuts down."""
         end_s = time.monotonic() + LONGEST_WAIT_S
         while not (condition() or rospy.core.is_shutdown_requested()):

@@ -32,9 +32,7 @@ class RgbdSensor(Sensor):
     Config = RgbdSensorConfig
     sample_type = SceneSample
 
-    def __init__(
-        self, config: RgbdSensorConfig, bodies: Mapping[str, Body], clock: Clock, topic_name: str
-    ) -> None:
+    def __init__(self, config: RgbdSensorConfig, bodies: Mapping[str, Body], clock: Clock, topic_name: str) -> None:
         super().__init__(config.name, config.hz)
         self.config = config
         self.topic_name = topic_name

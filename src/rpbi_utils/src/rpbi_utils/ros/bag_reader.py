@@ -54,13 +54,9 @@ class BagReader:
             raise BagError(self.path, "there is no such file" if not self.path.exists() else "not a file")
         self._bag = self._open()
         try:
-            self._connections = sorted(
-                self._bag._get_connections(), key=lambda connection: str(connection.topic)
-            )
+            self._connections = sorted(self._bag._get_connections(), key=lambda connection: str(connection.topic))
             self._types = {
-                (connection.datatype, connection.md5sum): MessageType.parse(
-                    connection.datatype, connection.msg_def
-                )
+                (connection.datatype, connection.md5sum): MessageType.parse(connection.datatype, connection.msg_def)
                 for connection in self._connections
             }
             info = self._bag.get_type_and_topic_info().topics
@@ -106,9 +102,7 @@ class BagReader:
         if not topics:  # to rosbag, no topics means all
             return
         try:
-            for topic, (datatype, raw, md5sum, *_), time in self._bag.read_messages(
-                topics=list(topics), raw=True
-            ):
+            for topic, (datatype, raw, md5sum, *_), time in self._bag.read_messages(topics=list(topics), raw=True):
                 yield BagMessage(topic, self._types[datatype, md5sum], raw, time.to_sec())
         except Exception as error:  # rosbag lets out what struct, bz2, lz4 and its own checks raise
             message = f"damaged: {error}; what is left can be saved with 'rosbag reindex {self.path}'"
@@ -127,7 +121,5 @@ class BagReader:
     def _why_unindexed(self) -> str:
         repair = f"'rosbag reindex {self.path}'"
         if self.path.suffix == _ACTIVE_SUFFIX:
-            return (
-                f"still being recorded, or its recorder died: stop the recorder, or repair it with {repair}"
-            )
+            return f"still being recorded, or its recorder died: stop the recorder, or repair it with {repair}"
         return f"has no index, as it was not closed properly or is cut off: repair it with {repair}"

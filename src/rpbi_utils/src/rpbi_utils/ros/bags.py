@@ -77,9 +77,7 @@ def _choose(bag: BagReader, topics: Iterable[str] | None, images: bool) -> list[
 def _watched(messages: Iterator[BagMessage], total: int, progress: bool | Progress) -> Iterator[BagMessage]:
     """Yields the messages, and shows or reports how many there were."""
     if not callable(progress):
-        yield from tqdm(
-            messages, total=total, unit=" messages", unit_scale=True, leave=False, disable=not progress
-        )
+        yield from tqdm(messages, total=total, unit=" messages", unit_scale=True, leave=False, disable=not progress)
         return
     for count, message in enumerate(messages):
         if count % _REPORT_EVERY == 0:

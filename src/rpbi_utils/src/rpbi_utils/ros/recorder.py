@@ -129,17 +129,11 @@ class Recorder:
         active = self.path.with_name(self.path.name + ".active")
         self._raise_if_not_writing()
         if died:
-            raise RecordingError(
-                self.path, f"the recorder ended early{self._last_words()}{_what_is_left(active)}"
-            )
+            raise RecordingError(self.path, f"the recorder ended early{self._last_words()}{_what_is_left(active)}")
         if not active.exists() and not self.path.exists():
-            raise RecordingError(
-                self.path, "no bag was begun; with use_sim_time the recorder waits for /clock"
-            )
+            raise RecordingError(self.path, "no bag was begun; with use_sim_time the recorder waits for /clock")
         if not closed or active.exists():
-            raise RecordingError(
-                self.path, f"the bag was not closed{self._last_words()}{_what_is_left(active)}"
-            )
+            raise RecordingError(self.path, f"the bag was not closed{self._last_words()}{_what_is_left(active)}")
         return self.path
 
     def _command(self) -> list[str]:
@@ -170,9 +164,7 @@ class Recorder:
                 break
             time.sleep(_POLL_S)
         if missing:
-            raise RecordingError(
-                self.path, f"no subscription to {', '.join(missing)} after {self._timeout_s} s"
-            )
+            raise RecordingError(self.path, f"no subscription to {', '.join(missing)} after {self._timeout_s} s")
         _log.warning("recording %s: not connected to %s", self.path, ", ".join(silent))
 
     def _end(self) -> bool:
