@@ -134,10 +134,12 @@ class SolverConformance:
     # --- The tests.
 
     def test_its_joints_and_limits_belong_together(self) -> None:
-        """Names are unique, and each has limits in order."""
+        """Names are unique, and each has limits in order and a velocity, which continuity needs."""
         names, lower, upper = self.solver.joint_names, self.solver.lower, self.solver.upper
         assert names and len(set(names)) == len(names) == len(lower) == len(upper)
         assert all(low <= high for low, high in zip(lower, upper))
+        assert len(self.solver.velocity_limits) == len(names)
+        assert all(velocity > 0.0 for velocity in self.solver.velocity_limits)
 
     def test_reachable_targets_are_reached(self) -> None:
         """Successes are true, and there are enough of them: always answering false fails here."""

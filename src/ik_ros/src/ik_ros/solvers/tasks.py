@@ -64,6 +64,7 @@ class TasksSolver(Solver):
         robot = self.tasks.robot
         self.joint_names = robot.joint_names
         self.lower, self.upper = tuple(robot.lower.tolist()), tuple(robot.upper.tolist())
+        self.velocity_limits = tuple(robot.max_velocity.tolist())
         self.base_frame = self.tasks.base_frame
         self._descent = Descent(robot, list(self.tasks.parts.values()))
         self._names = list(self.tasks.parts)
