@@ -8,9 +8,9 @@ import rospy
 import tf2_ros
 
 from custom_ros_tools.errors import InterfaceError
-from rpbi.pose import Pose
 
 from ..problem import IKProblem, Waypoint
+from .messages import transform_in
 
 
 class BaseFrame:
@@ -44,8 +44,7 @@ class BaseFrame:
         except tf2_ros.TransformException as error:
             where = f"poses are in '{frame_id}', the solver's base is '{self._frame_id}'"
             raise InterfaceError(f"{where}: {error}") from None
-        p, q = transform.translation, transform.rotation
-        base = Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
+        base = transform_in(transform)
         return dataclasses.replace(
             problem,
             target=None if problem.target is None else base @ problem.target,

@@ -10,6 +10,8 @@ import tf2_ros
 from custom_ros_tools.errors import InterfaceError
 from rpbi.pose import Pose
 
+from .messages import transform_in
+
 
 class FreshTf:
     """The pose of one frame in another, as long as TF goes on.
@@ -45,5 +47,4 @@ class FreshTf:
         elif self._stamp and now_s - self._changed_s > self._timeout_s:
             age = f"for {now_s - self._changed_s:.1f} s"
             raise InterfaceError(f"TF from '{self._parent}' to '{self._child}' is stale: nothing new has come {age}")
-        p, q = message.transform.translation, message.transform.rotation
-        return Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
+        return transform_in(message.transform)

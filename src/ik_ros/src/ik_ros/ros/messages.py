@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import rospy
-from geometry_msgs.msg import Point, Quaternion, Vector3
+from geometry_msgs.msg import Point, Quaternion, Transform, Vector3
 from geometry_msgs.msg import Pose as PoseMessage
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
@@ -46,9 +46,8 @@ def problem_in_trac_ik(message: TracIKProblem) -> IKProblem:
     Raises:
         ValueError: As for `problem_in`.
     """
-    translation, rotation = message.goal.translation, message.goal.rotation
     return IKProblem(
-        target=Pose((translation.x, translation.y, translation.z), (rotation.x, rotation.y, rotation.z, rotation.w)),
+        target=transform_in(message.goal),
         position_tolerance=(message.bx, message.by, message.bz),
         rotation_tolerance=(message.brx, message.bry, message.brz),
         start=positions_in("qinit", message.qinit),
@@ -115,6 +114,12 @@ def trajectory_message(joint_names: tuple[str, ...], trajectory: Trajectory | No
 def pose_in(message: PoseMessage) -> Pose:
     """Returns the pose in a message; its numbers are not checked."""
     p, q = message.position, message.orientation
+    return Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
+
+
+def transform_in(message: Transform) -> Pose:
+    """Returns the pose in a transform; its numbers are not checked."""
+    p, q = message.translation, message.rotation
     return Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
 
 
