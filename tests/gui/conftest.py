@@ -9,8 +9,10 @@ from screen import Screen
 
 
 @pytest.fixture(scope="module")
-def screen() -> Iterator[Screen]:
-    """A virtual screen."""
+def screen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Screen]:
+    """A virtual screen, with a home for what RViz reads and writes there."""
     screen = Screen()
+    home = str(tmp_path_factory.mktemp("home"))
+    screen.environment.update(HOME=home, XDG_RUNTIME_DIR=home)
     yield screen
     screen.close()

@@ -26,8 +26,6 @@ SLOW_S = 120.0
 def example(ros_master, screen, tmp_path_factory):
     """The example as a user with a screen launches it to drag the arm; it tracks the target."""
     system = RosSystem(tmp_path_factory.mktemp("drag"))
-    home = {"HOME": str(system.folder), "XDG_RUNTIME_DIR": str(system.folder)}  # for what RViz writes there
-    screen.environment.update(home)
     try:
         command = ["roslaunch", "rpbi_examples", "kuka_lwr_ik_example.launch", "drag:=true", "headless:=false"]
         process = system.start(command, **screen.environment)

@@ -12,7 +12,6 @@ SLOW_S = 120.0
 @pytest.fixture
 def example(ros_master, screen, tmp_path):
     system = RosSystem(tmp_path)
-    screen.environment.update({"HOME": str(tmp_path), "XDG_RUNTIME_DIR": str(tmp_path)})  # for what RViz writes there
     try:
         command = ["roslaunch", "rpbi_examples", "pybullet_rgbd_example.launch", "headless:=false"]
         system.start(command, **screen.environment)

@@ -78,8 +78,6 @@ class View(RvizView):
 def example(ros_master, screen, tmp_path_factory):
     """The example as a user with a screen launches it, with the arm standing still."""
     system = RosSystem(tmp_path_factory.mktemp("rviz"))
-    home = {"HOME": str(system.folder), "XDG_RUNTIME_DIR": str(system.folder)}  # for what RViz writes there
-    screen.environment.update(home)
     arguments = ["headless:=false", "move:=false"]
     try:
         system.start(["roslaunch", "rpbi_examples", "basic_example_kuka_lwr.launch", *arguments], **screen.environment)

@@ -6,18 +6,10 @@ import numpy as np
 import pytest
 from ros_system import RosSystem, wait_until
 from scipy import ndimage
-from screen import Screen
 
 TORUS = (242, 115, 92)
 ARROW = (217, 26, 26)
 SLOW_S = 120.0
-
-
-@pytest.fixture(scope="module")
-def screen():
-    screen = Screen()
-    yield screen
-    screen.close()
 
 
 @pytest.fixture(scope="module")

@@ -173,6 +173,7 @@ def test_roslaunch_names_and_remaps_everything(ros, tmp_path):
     [
         (ARRAY_NODE, {"config": {"field": "torque"}}, "~config: field: must be 'position', 'velocity' or 'effort'"),
         (ARRAY_NODE, {"config": "a"}, "~config: expected a mapping of keys to values, got str"),
+        (ARRAY_NODE, {"config": "a", "start_on_init": "on"}, f"/{ARRAY_NODE}: start_on_init: expected true or false"),
         (ARRAY_NODE, {"start_on_init": "on"}, f"/{ARRAY_NODE}: start_on_init: expected true or false, got text 'on'"),
         ("remap_joint_state", {"start_on_init": 2}, "start_on_init: expected true or false, got 2"),
     ],

@@ -150,6 +150,7 @@ def test_what_is_set_while_simulated_time_stands_still_reaches_who_comes(ros, cl
         ("0 0 0 nan 0 0 world box", {}, "must be finite"),
         ("0 0 0 0 0 0 world box", {"hz": 0}, f"/{NAMES[0]}: hz: must be > 0 [Hz], got 0"),
         ("0 0 0 0 0 0 world box", {"hz": "fast"}, "hz: expected a number [Hz], got text 'fast'"),
+        ("a 0 0 0 0 0 world box", {"hz": 0}, f"/{NAMES[0]}: hz: must be > 0 [Hz], got 0"),
     ],
 )
 def test_wrong_arguments_and_parameters_are_named_and_end_the_node(ros, arguments, parameters, told):

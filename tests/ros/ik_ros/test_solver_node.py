@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 
 import numpy as np
 import pytest
@@ -45,7 +46,9 @@ def test_problems_become_targets_that_reach(ros, solver):
     asked.header.stamp = rospy.Time(12, 5)
     with publishing("ik", IKProblem) as ik:
         target = send_until(ik, asked, targets)
-        solution = solutions.wait_for()[0]
+        solution = wait_until(
+            lambda: next((each for each in list(solutions.messages) if each.success), None), "a solution comes"
+        )
     assert list(target.name) == JOINTS == list(solution.joint_names)
     assert_there(target.position, asked.target)
     assert (solution.success, solution.interface_name) == (True, solver)
@@ -171,7 +174,11 @@ def test_targets_go_on_from_the_last_one_when_problems_have_no_start(ros):
     with publishing("ik", IKProblem) as ik:
         send_until(ik, problem(BENT, start=start_at(BENT)), targets)
         near = np.add(BENT, 0.01)
-        last = send_until(ik, problem(near), targets, 3)
+        asked = problem(near)
+        asked.header.stamp = rospy.Time(7)
+        send_until(ik, asked, targets, 3)
+        last = targets.messages[-1]
+    assert last.header.stamp == asked.header.stamp
     assert np.abs(np.subtract(last.position, near)).max() < 0.1, "another posture would be further away"
 
 
@@ -238,15 +245,46 @@ CHAIN_OF_TEST = {
 }
 
 
-def test_users_own_solver_serves_by_module_and_class(ros, tmp_path, monkeypatch):
+@pytest.fixture
+def lazy_lab(tmp_path, monkeypatch):
+    """Makes a package of a user's known to the nodes; returns its folder."""
     (tmp_path / "lazy_lab.py").write_text(OWN_SOLVER)
-    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{__import__('os').environ.get('PYTHONPATH', '')}")
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}")
+    return tmp_path
+
+
+def test_switched_off_it_tells_nothing_more_of_what_it_is_about(ros, lazy_lab):
+    begun = lazy_lab / "begun"
+    parameters = {"position": 0.25, "begun": str(begun), "takes_s": 1.0, "start_on_init": True}
+    start_node(ros, "ik_solver_node.py", "lazy_lab:Stubborn", "ik/solver/lazy_lab/Stubborn/solve", **parameters)
+    targets, solutions = ros.listen("joint_states/target", JointState), ros.listen("ik/solution", IKSolution)
+    with publishing("ik", IKProblem) as ik:
+        wait_until(lambda: targets.is_connected and solutions.is_connected, "answers would be heard")
+        wait_until(lambda: ik.publish(IKProblem()) or begun.exists(), "it is at work")
+        assert ros.call("ik/solver/lazy_lab/Stubborn/toggle", SetBool, False).success
+    for _ in range(2):  # they wait for what it is about, so it is over then
+        assert ros.call("ik/solver/lazy_lab/Stubborn/solve", SolveIK, IKProblem()).success
+    assert targets.messages == solutions.messages == []
+
+
+def test_start_outside_limits_is_warned_of(ros):
+    rosout = Rosout(ros)
+    start_solver(ros, start_on_init=False)
+    answer = ros.call("ik/solver/kdl/solve", SolveIK, problem(BENT, start=start_at((9.0, *HOME[1:]))))
+    assert answer.success
+    wait_until(lambda: rosout.logs("the start is outside limits"), "it is warned of")
+
+
+def test_users_own_solver_serves_by_module_and_class(ros, lazy_lab):
     start_node(ros, "ik_solver_node.py", "lazy_lab:Stubborn", "ik/solver/lazy_lab/Stubborn/solve", position=0.25)
     answer = ros.call("ik/solver/lazy_lab/Stubborn/solve", SolveIK, IKProblem())
     assert answer.success and answer.solution.name == ["joint"] and answer.solution.position == (0.25,)
 
 
 OWN_SOLVER = """
+import time
+from pathlib import Path
+
 from custom_ros_tools.schema import ConfigModel
 from ik_ros.solution import IKSolution
 from ik_ros.solver import Solver
@@ -254,6 +292,8 @@ from ik_ros.solver import Solver
 
 class StubbornConfig(ConfigModel):
     position: float
+    begun: str = ""
+    takes_s: float = 0.0
 
 
 class Stubborn(Solver):
@@ -262,8 +302,11 @@ class Stubborn(Solver):
     joint_names, lower, upper, velocity_limits, base_frame = ("joint",), (-1.0,), (1.0,), (1.0,), "base"
 
     def __init__(self, config):
-        self._position = config.position
+        self._position, self._begun, self._takes_s = config.position, config.begun, config.takes_s
 
     def solve(self, problem):
+        if self._begun:
+            Path(self._begun).touch()
+        time.sleep(self._takes_s)
         return IKSolution(True, "as always", self.joint_names, (self._position,))
 """

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -35,8 +37,9 @@ def box_world(ros: Any, **more: Any) -> dict[str, Any]:
     }
 
 
+@contextmanager
 def place(*frames: str, height_m: float = HEIGHT_M) -> Iterator[None]:
-    """Puts frames above the floor, looking straight down, until it is closed."""
+    """Has frames above the floor, looking straight down."""
     message = TFMessage()
     for frame in frames:
         transform = TransformStamped(child_frame_id=frame)
@@ -46,8 +49,16 @@ def place(*frames: str, height_m: float = HEIGHT_M) -> Iterator[None]:
         message.transforms.append(transform)
     publisher = rospy.Publisher("/tf_static", TFMessage, latch=True, queue_size=1)
     publisher.publish(message)
-    yield
-    publisher.unregister()
+    try:
+        yield
+    finally:
+        publisher.unregister()
+
+
+def renderers(simulator: subprocess.Popen) -> list[int]:
+    """Returns the process ids of all renderers that a simulator has."""
+    found = subprocess.run(["pgrep", "-g", str(simulator.pid), "-f", "rpbi.render"], capture_output=True, text=True)
+    return [int(line) for line in found.stdout.split()]
 
 
 def points_of(cloud: Any) -> npt.NDArray[np.float32]:

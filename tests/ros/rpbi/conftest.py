@@ -23,6 +23,15 @@ def control_msgs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 @pytest.fixture
+def placed(ros: Any) -> Iterator[None]:
+    """Has the camera of `camera_world` above the floor."""
+    from camera_world import place
+
+    with place("rpbi/eye"):
+        yield
+
+
+@pytest.fixture
 def start(ros: Any, control_msgs: str, tmp_path: Path) -> Callable[..., Any]:
     """Starts a world with an arm that follows trajectories; see `open_world` for the arguments."""
     from trajectory_world import open_world

@@ -19,7 +19,8 @@ CLOUD, COLOUR, DEPTH = (f"/rpbi/camera/{suffix}" for suffix in ("pointcloud", "c
 
 @pytest.fixture(autouse=True)
 def placed(ros):
-    yield from place("rpbi/eye", "rpbi/other")
+    with place("rpbi/eye", "rpbi/other"):
+        yield
 
 
 def topics_of_cameras():

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 
 import numpy as np
 import pytest
-from camera_world import CAMERA, HEIGHT_M, box_world, place
+from camera_world import CAMERA, HEIGHT_M, box_world, renderers
 from ros_system import wait_until
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int64
@@ -17,17 +16,6 @@ from std_srvs.srv import Trigger
 DEPTH = "/rpbi/camera/depth/image"
 DT_NS = 10_000_000
 SYNCHRONOUS = {**CAMERA, "synchronous": True}
-
-
-@pytest.fixture
-def placed(ros):
-    yield from place("rpbi/eye")
-
-
-def renderers(simulator):
-    """Returns the process ids of all renderers that a simulator has."""
-    found = subprocess.run(["pgrep", "-g", str(simulator.pid), "-f", "rpbi.render"], capture_output=True, text=True)
-    return [int(line) for line in found.stdout.split()]
 
 
 def test_every_due_tick_has_its_image_though_the_world_runs_free(ros, placed):

@@ -5,77 +5,35 @@ from __future__ import annotations
 import math
 import os
 import signal
-import subprocess
 import time
 
 import numpy as np
 import pytest
 import rosgraph
 import rospy
-from geometry_msgs.msg import TransformStamped
+from camera_world import CAMERA, HEIGHT_M, box_world, place, renderers
 from ros_system import wait_until
 from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_srvs.srv import Trigger
-from tf2_msgs.msg import TFMessage
-from worlds import FLOOR, box, iiwa
+from worlds import iiwa
 
-CAMERA = {
-    "name": "eye",
-    "hz": 30,
-    "intrinsics": {"width": 160, "height": 120, "fov": 50.0, "range": [0.1, 10.0]},
-    "object_tf": {"tf_id": "rpbi/eye"},
-}
 COLOUR, DEPTH, SEGMENTATION = (f"/rpbi/camera/{suffix}" for suffix in ("colour/image", "depth/image", "segmentation"))
 COLOUR_INFO, DEPTH_INFO = "/rpbi/camera/colour/camera_info", "/rpbi/camera/depth/camera_info"
-HEIGHT_M = 2.0
 
 
 def world(ros, **more):
     """Returns the main configuration of a box on a floor beside an arm, seen by a camera."""
-    files = {}
-    sections = {"collision_objects": FLOOR, "dynamic_objects": box(), "robots": iiwa()}
-    for section, config in sections.items():
-        files[section] = [ros.write_yaml(f"{config['name']}.yaml", config)]
-    return {
-        "connect": {"connection_mode": "DIRECT"},
-        "setAdditionalSearchPath": "pybullet_data_path",
-        "timeStep": 0.01,
-        "rgbd_sensor": CAMERA,
-        **files,
-        **more,
-    }
-
-
-@pytest.fixture
-def place_camera(ros):
-    """Puts the camera above the floor, looking straight down."""
-    publishers = []
-
-    def place():
-        message = TransformStamped(child_frame_id="rpbi/eye")
-        message.header.frame_id = "rpbi/world"
-        message.transform.translation.z = HEIGHT_M
-        message.transform.rotation.x = 1.0
-        publishers.append(rospy.Publisher("/tf_static", TFMessage, latch=True, queue_size=1))
-        publishers[0].publish(TFMessage([message]))
-
-    yield place
-    for publisher in publishers:
-        publisher.unregister()
+    load = {"fileName": "kuka_iiwa/model.urdf", "useFixedBase": True, "basePosition": [0.8, 0.0, 0.0]}
+    robots = [ros.write_yaml("iiwa.yaml", iiwa(loadURDF=load))]
+    arm_and_camera = {"setAdditionalSearchPath": "pybullet_data_path", "robots": robots, "rgbd_sensor": CAMERA}
+    return box_world(ros, **{**arm_and_camera, **more})
 
 
 def pixels(message, dtype, channels=1):
     return np.frombuffer(message.data, dtype).reshape(message.height, message.width, channels).squeeze()
 
 
-def renderers(simulator):
-    """Returns the process ids of all renderers that a simulator has."""
-    found = subprocess.run(["pgrep", "-g", str(simulator.pid), "-f", "rpbi.render"], capture_output=True, text=True)
-    return [int(line) for line in found.stdout.split()]
-
-
-def test_images_of_a_frame_share_stamp_frame_and_intrinsics(ros, place_camera):
-    place_camera()
+def test_images_of_a_frame_share_stamp_frame_and_intrinsics(ros, placed):
     listeners = {
         topic: ros.listen(topic, Image if "info" not in topic else CameraInfo)
         for topic in (COLOUR, DEPTH, SEGMENTATION, COLOUR_INFO, DEPTH_INFO)
@@ -101,29 +59,25 @@ def test_images_of_a_frame_share_stamp_frame_and_intrinsics(ros, place_camera):
     assert floor_m == pytest.approx(HEIGHT_M - 0.005, abs=1e-3)
 
 
-def test_segmentation_of_what_is_not_there_is_65535(ros, place_camera):
-    place_camera()
+def test_segmentation_of_what_is_not_there_is_65535(ros, placed):
     segmentation = ros.listen(SEGMENTATION, Image)
-    ros.simulator(world(ros, collision_objects=[], robots=[]), use_sim_time=True)
+    ros.simulator(world(ros, collision_objects=[], robots=[], setGravity={"gravZ": 0.0}), use_sim_time=True)
     image = pixels(segmentation.wait_for(3)[-1], np.uint16)
     assert image[0, 0] == 65535
     assert image[60, 80] == 0  # the box, the only body
 
 
-def test_no_image_comes_before_the_camera_has_a_pose(ros, place_camera):
+def test_no_image_comes_before_the_camera_has_a_pose(ros):
     colour = ros.listen(COLOUR, Image)
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     ros.simulator(world(ros), use_sim_time=True)
     joint_states.wait_for(100)
     assert not colour.messages
-    place_camera()
-    colour.wait_for(1)
+    with place("rpbi/eye"):
+        colour.wait_for(1)
 
 
-def test_viewer_that_comes_late_to_a_world_that_stands_still_gets_its_image_and_nobody_sees_a_stamp_twice(
-    ros, place_camera
-):
-    place_camera()
+def test_viewer_that_comes_late_to_a_world_that_stands_still_gets_its_image_and_nobody_sees_a_stamp_twice(ros, placed):
     first = ros.listen(DEPTH, Image)
     ros.simulator(world(ros, start_pybullet_after_initialization=False), use_sim_time=True)
     first.wait_for(1)
@@ -136,8 +90,7 @@ def test_viewer_that_comes_late_to_a_world_that_stands_still_gets_its_image_and_
     assert stamps_ns == sorted(set(stamps_ns))
 
 
-def test_killed_renderer_comes_back_and_no_joint_state_is_missing(ros, place_camera):
-    place_camera()
+def test_killed_renderer_comes_back_and_no_joint_state_is_missing(ros, placed):
     colour = ros.listen(COLOUR, Image)
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     simulator = ros.simulator(world(ros), use_sim_time=True)
@@ -152,8 +105,7 @@ def test_killed_renderer_comes_back_and_no_joint_state_is_missing(ros, place_cam
     assert steps_ns == {20_000_000}
 
 
-def test_stopped_viewer_holds_up_neither_physics_nor_other_viewers(ros, place_camera):
-    place_camera()
+def test_stopped_viewer_holds_up_neither_physics_nor_other_viewers(ros, placed):
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     colour = ros.listen(COLOUR, Image)
     ros.simulator(world(ros, timeStep=0.002), use_sim_time=True)
@@ -168,8 +120,7 @@ def test_stopped_viewer_holds_up_neither_physics_nor_other_viewers(ros, place_ca
     assert set(np.diff(joint_states.stamps_ns)) == {20_000_000}
 
 
-def test_camera_follows_the_namespace_and_the_remappings_of_its_simulator(ros, place_camera):
-    place_camera()
+def test_camera_follows_the_namespace_and_the_remappings_of_its_simulator(ros, placed):
     rospy.set_param("/use_sim_time", True)
     rospy.set_param("/left/simulator/config", world(ros))
     node = ["rosrun", "ros_pybullet_interface", "ros_pybullet_interface_node.py", "__ns:=/left", "__name:=simulator"]
@@ -180,8 +131,7 @@ def test_camera_follows_the_namespace_and_the_remappings_of_its_simulator(ros, p
     assert publishers["/seen"] == ["/left/simulator_camera"]
 
 
-def test_renderer_ends_with_its_simulator_and_takes_leave_of_the_master(ros, place_camera):
-    place_camera()
+def test_renderer_ends_with_its_simulator_and_takes_leave_of_the_master(ros, placed):
     simulator = ros.simulator(world(ros), use_sim_time=True)
     ros.listen(COLOUR, Image).wait_for(2)
     (renderer,) = renderers(simulator)
@@ -192,8 +142,7 @@ def test_renderer_ends_with_its_simulator_and_takes_leave_of_the_master(ros, pla
     assert COLOUR not in publishers
 
 
-def test_renderer_of_a_killed_simulator_ends_too(ros, place_camera):
-    place_camera()
+def test_renderer_of_a_killed_simulator_ends_too(ros, placed):
     simulator = ros.simulator(world(ros), use_sim_time=True)
     ros.listen(COLOUR, Image).wait_for(2)
     (renderer,) = renderers(simulator)

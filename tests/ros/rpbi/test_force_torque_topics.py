@@ -106,9 +106,10 @@ def test_stop_in_the_middle_of_zeroing_ends_it_with_a_reason(ros, simulator):
     listener = ros.listen(topic, WrenchStamped)
     errors = _fails_with(ros, topic, lambda: ros.call("/rpbi/stop", Trigger), listener)
     assert len(errors) == 1 and "stopped before 100 samples" in errors[0]
+    assert abs(listener.messages[-1].wrench.force.y) > 1.0, "the old zero stays: y is up, and the forearm weighs"
     ros.call("/rpbi/start", Trigger)
     ros.call(topic, Empty)
-    assert wait_until(lambda: listener.messages[-1].wrench.force.z < 1e-3, "it works the next time")
+    wait_until(lambda: abs(listener.messages[-1].wrench.force.y) < 1e-3, "it works the next time")
 
 
 def test_robot_that_goes_in_the_middle_of_zeroing_ends_it_with_a_reason(ros, simulator):

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import rospy
 import yaml
-from camera_world import CAMERA, place
-from node_world import Rosout, add, main_config, objects, remove
+from camera_world import CAMERA
+from node_world import Rosout, add, main_config, objects, publishing, remove
 from ros_system import wait_until
 from sensor_msgs.msg import Image, Range
 from std_msgs.msg import Float64
@@ -149,9 +149,7 @@ def test_its_own_topic_moves_its_object_and_refuses_nonsense(ros, lab):
     publisher.unregister()
 
 
-def test_it_is_seen_by_cameras_and_in_rviz(ros, lab):
-    frames = place("rpbi/eye")
-    next(frames)
+def test_it_is_seen_by_cameras_and_in_rviz(ros, lab, placed):
     answer = ros.call("/rpbi/add_rgbd_sensor", SetString, yaml.safe_dump(CAMERA))
     assert answer.success, answer.message
     image = ros.listen("/rpbi/camera/colour/image", Image).wait_for(1, 60.0)[0]
@@ -162,7 +160,6 @@ def test_it_is_seen_by_cameras_and_in_rviz(ros, lab):
     markers = ros.listen("/rpbi/markers", MarkerArray).wait_for(1)[0].markers
     (belt,) = [marker for marker in markers if marker.ns == "belt"]
     assert (belt.scale.x, belt.scale.y, belt.scale.z) == pytest.approx((2.0, 0.4, 0.1))
-    frames.close()
 
 
 def test_it_is_checked_and_tested_without_a_master(workspace):
@@ -190,6 +187,7 @@ def test_without_the_package_the_node_says_what_is_missing(ros, workspace):
 
 
 FAULTY = str(ROOT / "tests" / "sim" / "rpbi")
+FAULTY_TOPICS = str(ROOT / "tests" / "ros" / "rpbi")
 
 
 def _faulty(ros, tmp_path, **keys):
@@ -197,7 +195,7 @@ def _faulty(ros, tmp_path, **keys):
     config = main_config(tmp_path)
     thing = {"name": "thing", "type": "faulty_lab:Thing", **keys}
     config["objects"] = [ros.write_yaml("thing.yaml", thing)]
-    path = os.pathsep.join((os.environ["PYTHONPATH"], FAULTY))
+    path = os.pathsep.join((os.environ["PYTHONPATH"], FAULTY, FAULTY_TOPICS))
     return ros.simulator(config, use_sim_time=True, wait=False, PYTHONPATH=path)
 
 
@@ -233,3 +231,21 @@ def test_a_class_that_fails_in_a_tick_stops_the_simulation_with_one_line(ros, tm
     assert objects(ros) == {"thing": "faulty_lab:Thing"}
     assert remove(ros, "thing").success
     assert ros.call("/rpbi/start", Trigger).success
+
+
+@pytest.mark.parametrize(
+    ("keys", "cause"),
+    [
+        ({"topic": "faulty_topics:PUSH_X"}, f"AttributeError: 'float' object has no attribute 'x' ({FAULTY_TOPICS}/"),
+        ({"topic": "faulty_topics:PUSH", "fails": "check"}, f"KeyError: 'no such unit' ({FAULTY}/"),
+    ],
+)
+def test_a_message_that_its_class_fails_with_is_refused_and_says_where(ros, tmp_path, keys, cause):
+    process = _faulty(ros, tmp_path, takes="push", **keys)
+    refused = f"/rpbi/thing/push: message refused: faulty_lab:Thing._push failed in taking 'thing/push': {cause}"
+    with publishing("/rpbi/thing/push", Float64) as push:
+        push.publish(1.0)
+        wait_until(lambda: refused in ros.output(process), "it says so")
+    printed = ros.output(process)
+    assert "Traceback" not in printed and "bad callback" not in printed
+    assert "simulation stopped" not in printed

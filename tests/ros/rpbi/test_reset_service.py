@@ -43,7 +43,7 @@ def start(ros, tmp_path):
         arm = iiwa(
             joint_state_publisher_hz=500,
             broadcast_link_states=True,
-            enabled_joint_force_torque_sensors=["lbr_iiwa_joint_7"],
+            enabled_joint_force_torque_sensors=[{"joint": "lbr_iiwa_joint_7", "hz": 10}],
         )
         dynamic = (
             ball(basePosition=[1.0, 0.0, 0.5], broadcast_hz=100),
@@ -126,9 +126,14 @@ def test_objects_come_and_go_with_their_topics_and_the_rest_is_not_touched(ros, 
 def test_the_first_target_after_it_is_obeyed_and_one_from_before_is_not(ros, start):
     start(start_pybullet_after_initialization=False)
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
+    state = ros.listen("/rpbi/state", SimulationState)
+
+    def is_taken(resets):
+        return state.messages and state.messages[-1].resets == resets and state.messages[-1].commands == 1
+
     with publishing("/rpbi/iiwa/joint_states/target", JointState) as target:
         target.publish(JointState(name=[JOINT], position=[1.0]))
-        time.sleep(0.2)
+        wait_until(lambda: is_taken(resets=0), "the target has come")
         _reset(ros)
         ros.call("/rpbi/step_n", StepN, 500)
         last = ros.call("/rpbi/get_state_hash", GetStateHash).stamp.to_nsec()
@@ -136,13 +141,14 @@ def test_the_first_target_after_it_is_obeyed_and_one_from_before_is_not(ros, sta
         assert abs(joint_states.messages[-1].position[0]) < 0.01
         _reset(ros)
         target.publish(JointState(name=[JOINT], position=[0.3]))
-        time.sleep(0.2)
+        wait_until(lambda: is_taken(resets=2), "the target has come")
         ros.call("/rpbi/step_n", StepN, 1000)
         wait_until(lambda: abs(joint_states.messages[-1].position[0] - 0.3) < 0.01, "the target is obeyed")
 
 
 def test_who_waits_is_answered_with_the_reason(ros, start):
     start()
+    joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     answers = {}
 
     def move():
@@ -159,12 +165,15 @@ def test_who_waits_is_answered_with_the_reason(ros, start):
     threads = [threading.Thread(target=job) for job in (move, zero)]
     for thread in threads:
         thread.start()
-    time.sleep(0.1)
-    _reset(ros)
-    for thread in threads:
-        thread.join(10.0)
+    wait_until(lambda: joint_states.messages and joint_states.messages[-1].position[0] > 0.01, "the move is under way")
+
+    def all_answered():
+        _reset(ros)  # again, since the zeroing may not have been under way yet
+        return not any(thread.is_alive() for thread in threads)
+
+    wait_until(all_answered, "both are answered")
     assert not answers["move"].success and "the world was reset" in answers["move"].message
-    assert "the world was reset" in answers.get("zero", "the world was reset")  # it may have been quicker
+    assert "the world was reset" in answers["zero"]
 
 
 def test_poses_from_tf_are_taken_again(ros, tmp_path):

@@ -160,9 +160,10 @@ def test_a_stop_in_the_middle_is_answered_and_while_stopped_moves_are_refused(ro
 def test_removal_in_the_middle_is_answered(ros, node):
     load = {"fileName": "kuka_iiwa/model.urdf", "useFixedBase": True, "basePosition": [0.0, 3.0, 0.0]}
     assert add(ros, PybulletObject.ROBOT, iiwa("guest", loadURDF=load)).success
+    states = ros.listen("/rpbi/guest/joint_states", JointState)
     goal = JointState(name=[FIRST], position=[1.0])
     moving = in_background(lambda: ros.call("/rpbi/guest/move_to_joint_state", ResetJointState, goal, 5.0))
-    time.sleep(0.3)
+    wait_until(lambda: now(states)[FIRST] > 0.05, "it is under way")
     assert remove(ros, "guest").success
     answer = moving()
     assert not answer.success

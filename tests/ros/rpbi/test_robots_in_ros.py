@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import xml.etree.ElementTree as ElementTree
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -100,22 +101,32 @@ def test_two_worlds_share_a_master_and_a_tf_tree(ros, tmp_path):
     assert not buffer.can_transform("left/rpbi/world", "right/rpbi/world", rospy.Time(0))
 
 
-def test_a_robot_starts_where_another_one_is(ros, tmp_path):
+@contextmanager
+def _saying(topic, message):
+    """Publishes joint states again and again, as a real robot does."""
     stop = threading.Event()
-    publisher = rospy.Publisher("/real/joint_states", JointState, queue_size=1)
-    message = JointState(name=["gripper", FIRST, "lbr_iiwa_joint_4"], position=[0.02, 0.7, -1.1])
+    publisher = rospy.Publisher(topic, JointState, queue_size=1)
 
     def publish() -> None:
         while not stop.wait(0.05):
             publisher.publish(message)
 
-    threading.Thread(target=publish, daemon=True).start()
+    thread = threading.Thread(target=publish, daemon=True)
+    thread.start()
     try:
-        robot = iiwa(initial_joint_state_topic="/real/joint_states", initial_joint_position={"lbr_iiwa_joint_2": 20.0})
-        ros.simulator(main_config(tmp_path, robots=(robot,)))
-        state = ros.listen("/rpbi/iiwa/joint_states", JointState).wait_for(1)[-1]
+        yield
     finally:
         stop.set()
+        thread.join()
+        publisher.unregister()
+
+
+def test_a_robot_starts_where_another_one_is(ros, tmp_path):
+    message = JointState(name=["gripper", FIRST, "lbr_iiwa_joint_4"], position=[0.02, 0.7, -1.1])
+    robot = iiwa(initial_joint_state_topic="/real/joint_states", initial_joint_position={"lbr_iiwa_joint_2": 20.0})
+    with _saying("/real/joint_states", message):
+        ros.simulator(main_config(tmp_path, robots=(robot,)))
+        state = ros.listen("/rpbi/iiwa/joint_states", JointState).wait_for(1)[-1]
     positions = dict(zip(state.name, state.position))
     assert positions[FIRST] == pytest.approx(0.7, abs=2e-3)
     assert positions["lbr_iiwa_joint_4"] == pytest.approx(-1.1, abs=2e-3)
@@ -127,6 +138,15 @@ def test_a_robot_to_start_at_that_says_nothing_is_named(ros, tmp_path):
     node = ros.simulator(main_config(tmp_path, robots=(robot,)), wait=False)
     assert node.wait(30.0) == 1
     assert "initial_joint_state_topic: no joint states came on /nobody/joint_states within 5 s" in ros.output(node)
+
+
+def test_half_a_message_to_start_from_is_refused_whole(ros, tmp_path):
+    robot = iiwa(initial_joint_state_topic="/real/joint_states")
+    with _saying("/real/joint_states", JointState(name=[FIRST, "lbr_iiwa_joint_4"], position=[0.7])):
+        node = ros.simulator(main_config(tmp_path, robots=(robot,)), wait=False)
+        assert node.wait(30.0) == 1
+    complaint = "expected a position for each name on /real/joint_states, got 2 names, 1 positions"
+    assert f"initial_joint_state_topic: {complaint}" in ros.output(node)
 
 
 def test_one_file_makes_several_robots(ros, tmp_path):

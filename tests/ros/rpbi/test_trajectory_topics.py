@@ -18,6 +18,7 @@ from worlds import iiwa, write_world
 
 from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import JointTrajectoryControllerState, PybulletObject
+from rpbi.pacer import MAX_DEBT_S
 
 
 def test_without_control_msgs_there_are_topics_and_the_log_tells_what_is_missing(ros, tmp_path):
@@ -171,12 +172,16 @@ def test_goal_of_a_stopped_world_can_be_cancelled(start):
 @pytest.mark.parametrize("use_sim_time", [True, False])
 def test_goal_begins_at_its_stamp(start, use_sim_time):
     robot = start(use_sim_time=use_sim_time)
-    stamp = robot.states.messages[-1].header.stamp + rospy.Duration.from_sec(1.0)
+    stamp = robot.states.messages[-1].header.stamp + rospy.Duration.from_sec(2.0)
     goal = Goal(robot, trajectory((0.5, moved(0.4)), stamp=stamp))
     assert goal.wait()[0] == GoalStatus.SUCCEEDED
     messages = robot.states.messages
     moving = [message.header.stamp.to_sec() for message in messages if abs(message.velocity[0]) > 0.02]
-    assert moving[0] - stamp.to_sec() == pytest.approx(0.02, abs=0.03)
+    late_s = moving[0] - stamp.to_sec()
+    if use_sim_time:
+        assert late_s == pytest.approx(0.02, abs=0.03)
+    else:  # it waits in the world's time, which may fall behind the wall clock, or catch up with it
+        assert late_s > -MAX_DEBT_S
 
 
 @pytest.mark.parametrize("factor", [0, 0.3, 2])

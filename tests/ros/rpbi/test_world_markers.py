@@ -15,6 +15,7 @@ from worlds import FLOOR, ball, box, iiwa
 
 from custom_ros_tools.srv import SetTransform
 from ros_pybullet_interface.msg import PybulletObject
+from ros_pybullet_interface.srv import StepN
 
 TOPIC = "/rpbi/markers"
 MARK = {
@@ -128,15 +129,27 @@ def test_what_is_removed_is_deleted_and_the_rest_keeps_its_ids(ros, start):
     assert {marker.ns for marker in listener.messages[-1].markers if marker.action == Marker.ADD} == {"floor", "mark"}
 
 
-def test_object_that_is_not_on_tf_is_followed_until_it_lies_still(start):
-    listener = start(collision=(FLOOR,), dynamic=(box(basePosition=[0.0, 0.0, 0.4]),))
-    wait_until(lambda: shown(listener)["box", 0].pose.position.z < 0.101, "the box lies on the floor")
-    heights = [marker.pose.position.z for each in listener.messages for marker in each.markers if marker.ns == "box"]
-    assert len(set(heights)) > 3
-    time.sleep(0.5)
+def test_object_that_is_not_on_tf_is_followed_until_it_lies_still(ros, start):
+    falling = box(basePosition=[0.0, 0.0, 0.4])
+    listener = start(collision=(FLOOR,), dynamic=(falling,), start_pybullet_after_initialization=False)
+
+    def is_shown_at(height_m):
+        return shown(listener)["box", 0].pose.position.z == pytest.approx(height_m, abs=5e-3)
+
+    for fallen_s in (0.05, 0.1, 0.15, 0.2):
+        assert ros.call("/rpbi/step_n", StepN, 50).success
+        height_m = 0.4 - 9.81 / 2 * fallen_s**2
+        wait_until(lambda height_m=height_m: is_shown_at(height_m), f"it is shown at {height_m:g} m")
+    assert ros.call("/rpbi/step_n", StepN, 3000).success
+    wait_until(lambda: is_shown_at(0.1), "it lies on the floor")
+    assert add(ros, PybulletObject.VISUAL, MARK).success  # then all is told, as it is now
+    wait_until(lambda: ("mark", 0) in shown(listener), "the new one is shown")
     count = len(listener.messages)
-    time.sleep(0.5)
-    assert len(listener.messages) == count
+    assert ros.call("/rpbi/step_n", StepN, 500).success
+    time.sleep(0.5)  # some looks at what lies still
+    assert remove(ros, "mark").success
+    wait_until(lambda: ("mark", 0) not in shown(listener), "it has gone")
+    assert len(listener.messages) == count + 1
 
 
 def test_robot_that_is_not_on_tf_is_shown_where_its_joints_are(start):

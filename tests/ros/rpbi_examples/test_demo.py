@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import re
+import signal
 import subprocess
 from pathlib import Path
 
 import pandas as pd
 import pytest
 from PIL import Image
+from ros_system import wait_until
 
 ROOT = Path(__file__).resolve().parents[3]
 JOINTS = [f"lwr_arm_{number}_joint" for number in range(7)]
@@ -67,3 +71,39 @@ def test_bad_arguments_are_named():
     run = subprocess.run(["rosrun", "rpbi_examples", "demo.py", "--seconds", "0"], capture_output=True, text=True)
     assert run.returncode == 2
     assert "--seconds: expected 1 to 3600, got 0" in run.stderr
+
+
+def test_a_place_that_cannot_be_written_is_told_in_one_line():
+    run = subprocess.run(["rosrun", "rpbi_examples", "demo.py", "--out", "/proc/x"], capture_output=True, text=True)
+    assert run.returncode == 1
+    line = run.stderr.splitlines()[-1]  # PyBullet says before when it was built
+    assert line.startswith("demo: ") and "'/proc/x'" in line and "Traceback" not in run.stderr
+
+
+def _processes_with_master(port: str) -> list[str]:
+    """Returns the ids of the processes that were started to use the master at a port."""
+    wanted = re.compile(rf"(^|\0)ROS_MASTER_URI=[^\0]*:{port}/?\0")
+    found = []
+    for path in Path("/proc").glob("[0-9]*/environ"):
+        with contextlib.suppress(OSError):  # it has just ended, or is somebody else's
+            if wanted.search(path.read_text(errors="replace")):
+                found.append(path.parent.name)
+    return found
+
+
+def test_sigterm_closes_the_bag_and_leaves_no_process(tmp_path):
+    out, log = tmp_path / "out", tmp_path / "demo.log"
+    command = ["rosrun", "rpbi_examples", "demo.py", "--headless", "--seconds", "600", "--out", str(out)]
+    with open(log, "w") as file:
+        process = subprocess.Popen(command, stdout=file, stderr=subprocess.STDOUT, start_new_session=True)
+    try:
+        wait_until(lambda: process.poll() is not None or "recording 600 s" in log.read_text(), "it records", 90.0)
+        port = re.search(r"ROS_MASTER_URI=http://127\.0\.0\.1:(\d+)", log.read_text())[1]
+        assert len(_processes_with_master(port)) >= 4, "roslaunch, the master, the simulator, the recorder"
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(60.0) == 128 + signal.SIGTERM, log.read_text()
+    finally:
+        process.kill()
+    wait_until(lambda: not _processes_with_master(port), "all have ended")
+    assert (out / "recording.bag").exists()
+    assert "Traceback" not in log.read_text()

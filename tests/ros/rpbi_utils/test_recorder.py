@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -16,6 +17,7 @@ import rosgraph
 import rospy
 from ros_system import stop_group, wait_until
 from rosgraph_msgs.msg import Clock
+from second_master import SecondMaster
 from std_msgs.msg import Float64
 
 from rpbi_utils import Recorder, bag_to_dataframes
@@ -144,6 +146,35 @@ def test_a_folder_that_cannot_be_written_is_an_error(ros: Any) -> None:
     with pytest.raises(RecordingError, match="does not write .*Error opening file"):
         with Recorder("/proc/a.bag", ["/a"]):
             pass
+
+
+@pytest.mark.parametrize("path", ["/proc/missing/a.bag", "file/a.bag", "file/below/a.bag", "folder.bag"])
+def test_a_path_where_no_bag_can_be_is_an_error(ros: Any, tmp_path: Path, path: str) -> None:
+    (tmp_path / "file").touch()
+    (tmp_path / "folder.bag").mkdir()
+    with pytest.raises(RecordingError, match=f"{path}: cannot be written: .*Errno"):
+        Recorder(tmp_path / path, ["/a"]).start()
+
+
+def test_a_master_that_dies_while_it_waits_is_an_error(
+    second_master: SecondMaster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", second_master.uri)
+    with socket.create_server(("127.0.0.1", 0)) as silent:  # a publisher that never answers, so that it has to wait
+        silent.settimeout(20.0)
+        uri = f"http://127.0.0.1:{silent.getsockname()[1]}/"
+        rosgraph.Master("/silent").registerPublisher("/a", "std_msgs/Float64", uri)
+
+        def kill() -> None:
+            connection, _ = silent.accept()
+            second_master.kill()
+            connection.close()
+
+        killer = threading.Thread(target=kill)
+        killer.start()
+        with pytest.raises(RecordingError, match=f"the ROS master at {second_master.uri} does not answer any more"):
+            Recorder(tmp_path / "a.bag", ["/a"]).start()
+        killer.join()
 
 
 def test_a_recorder_that_died_is_an_error_that_tells_how_to_save_the_rest(ros: Any, tmp_path: Path) -> None:

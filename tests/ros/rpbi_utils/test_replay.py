@@ -92,6 +92,16 @@ def _replay(bag, *arguments):
     return subprocess.run(command, capture_output=True, text=True, env=environment, timeout=120)
 
 
+def _reached(states, tick, resets=0):
+    """Waits until the world has come to a tick, and returns the one at which it is."""
+
+    def now():
+        newest = states.messages[-1] if states.messages else None
+        return newest and newest.resets == resets and newest.tick >= tick and newest.tick
+
+    return wait_until(now, f"tick {tick} comes after reset {resets}", 60.0)
+
+
 @pytest.fixture(scope="module")
 def bag(ros_master, tmp_path_factory):
     """A recording that begins when the world has run for a while, with a reset in it."""
@@ -102,15 +112,19 @@ def bag(ros_master, tmp_path_factory):
     try:
         ros.start(["rosrun", "tf2_ros", "static_transform_publisher", *"0.5 0.4 0.1 0 0 0 rpbi/world table".split()])
         ros.simulator(_world(folder), use_sim_time=True)
+        states = ros.listen("/rpbi/state", SimulationState)
         with publishing("/rpbi/iiwa/joint_states/target", JointState) as target:
+            begin = _reached(states, tick=1)
             target.publish(JointState(name=JOINTS[:1], position=[0.4]))
-            time.sleep(1.0)
+            begin = _reached(states, tick=begin + 1000)
         path = folder / "session.bag"
         with Recorder(path, TOPICS):
             _session(ros, 2.5)
+            _reached(states, tick=begin + 2500)
             assert ros.call("/rpbi/reset", Trigger).success
-            time.sleep(0.5)
+            _reached(states, tick=500, resets=1)
             _session(ros, 1.0)
+            _reached(states, tick=1500, resets=1)
         yield path
     finally:
         ros.close()

@@ -12,10 +12,11 @@ from rpbi.sensors import BodySensor
 
 
 class ThingConfig(BodyConfig):
-    """YAML of a thing: where it fails, and an input that it takes."""
+    """YAML of a thing: where it fails, and an input that it takes, with its topic."""
 
     fails: str = ""
     takes: str = ""
+    topic: str = ""
 
 
 class Thing(Body):
@@ -26,7 +27,7 @@ class Thing(Body):
     def __init__(self, pb: Any, config: ThingConfig) -> None:
         shape = pb.createCollisionShape(pb.GEOM_SPHERE, radius=0.1)
         super().__init__(pb, config.name, pb.createMultiBody(1.0, shape))
-        self.fails, self.takes = config.fails, config.takes
+        self.fails, self.takes, self.topic = config.fails, config.takes, config.topic
         if self.fails == "init":
             raise KeyError("no such key")
 
@@ -36,13 +37,23 @@ class Thing(Body):
         if self.fails == "pybullet":
             self.pb.getBasePositionAndOrientation(99)
 
+    def motion_state(self) -> tuple[float, ...]:
+        if self.fails == "motion_state":
+            raise LookupError("lost")
+        return super().motion_state()
+
     def sensors(self) -> tuple[Any, ...]:
         if self.fails == "sensors":
             raise RuntimeError("no sensors today")
         return ()
 
     def inputs(self) -> dict[str, Input]:
-        return {self.takes: Input(lambda value: value, self._push)} if self.takes else {}
+        return {self.takes: Input(self._check, self._push, ros_topic=self.topic)} if self.takes else {}
+
+    def _check(self, value: float) -> float:
+        if self.fails == "check":
+            raise KeyError("no such unit")
+        return value
 
     def _push(self, value: float) -> None:
         raise RuntimeError(f"no pushing by {value}")
@@ -83,6 +94,15 @@ class MisnamedGauge(Gauge):
 
     def read(self, tick: int) -> Any:
         return Number("gauge", (1.0,))
+
+
+class WatchingGauge(Gauge):
+    """Counts ticks after their physics; nothing is wrong with it."""
+
+    values = (0.0,)
+
+    def after_step(self, tick: int) -> None:
+        self.values = (self.values[0] + 1.0,)
 
 
 class OddGauge(Gauge):

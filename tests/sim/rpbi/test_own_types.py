@@ -211,6 +211,13 @@ def test_a_class_that_fails_in_a_tick_is_named_with_its_file(tmp_path, keys, mes
     world.close()
 
 
+def test_a_sensor_that_only_looks_after_each_tick_does(tmp_path):
+    world = build(tmp_path, thing(sensors=[gauge("WatchingGauge", hz=10.0)]))
+    samples = run(world, 100)
+    assert [sample.values for sample in samples] == [(100.0,)]
+    world.close()
+
+
 def test_an_input_that_fails_is_named(tmp_path):
     world = build(tmp_path, thing(takes="push"))
     world.put("thing/push", 3.0)

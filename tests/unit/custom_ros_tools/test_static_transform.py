@@ -33,3 +33,12 @@ def test_faulty_arguments_are_told(arguments: str, told: str) -> None:
     with pytest.raises(ConfigError) as caught:
         StaticTransform.from_arguments(arguments.split())
     assert told in str(caught.value)
+
+
+def test_faults_of_numbers_and_frames_are_told_together() -> None:
+    with pytest.raises(ConfigError) as caught:
+        StaticTransform.from_arguments("1 up nan 0 0 0 0 /world box".split())
+    assert [problem.key for problem in caught.value.problems] == ["y", "", "parent", "position[2]"]
+    with pytest.raises(ConfigError) as caught:
+        StaticTransform.from_arguments("0 0 0 left 0 0 0 world world".split())
+    assert [problem.key for problem in caught.value.problems] == ["qx", "child"], "a zero quaternion it need not be"

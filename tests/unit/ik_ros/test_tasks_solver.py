@@ -215,8 +215,8 @@ def test_links_of_a_floating_robot_stay_where_constraints_want_them(urdf):
 
 def test_starts_outside_limits_are_brought_in_with_one_warning(urdf, caplog):
     solver = make(urdf, "costs: [{name: bend, type: posture, goal: {left_1: 0.5}}]")
-    for _ in range(2):
-        solver.solve(IKProblem(start={"left_1": 2.5}))
+    for position in (2.5, 0.0, 2.5):
+        solver.solve(IKProblem(start={"left_1": position}))
     messages = [record.getMessage() for record in caplog.records]
     assert messages == ["the start is outside limits and is brought in: 'left_1' 2.5"]
 
@@ -228,11 +228,30 @@ def test_starts_outside_limits_are_brought_in_with_one_warning(urdf, caplog):
         (IKProblem(goals={"raech": [0.0] * 7}), UnknownNameError, "unknown task 'raech': known are reach; did"),
         (IKProblem(goals={"reach": [0.0]}), ValueError, r"target: expected a pose .*, got \[0.0\]"),
         (IKProblem(start={"elbow": 0.0}, target=Pose()), UnknownNameError, "unknown joint 'elbow': known are lbr_iiwa"),
+        (IKProblem(previous=({"elbow": 0.0},), target=Pose()), UnknownNameError, "unknown joint 'elbow': known are lb"),
     ],
 )
 def test_questions_that_make_no_sense_are_refused(problem, error, words):
     with pytest.raises(error, match=words):
         iiwa().solve(problem)
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        "type: velocity_limits, dt_s: 0.01, limits: {left_1: 1.0}",
+        "type: acceleration_limits, dt_s: 0.01, limits: {left_1: 1.0}",
+        "type: closeness",
+    ],
+)
+def test_previous_solutions_that_lack_a_joint_are_refused_since_limits_would_vanish(urdf, task):
+    solver = make(urdf, f"constraints: [{{name: slow, {task}}}]")
+    whole = dict.fromkeys(solver.joint_names, 0.1)
+    part = {name: position for name, position in whole.items() if name != "left_1"}
+    assert solver.solve(IKProblem(previous=(whole,))).success
+    assert solver.solve(IKProblem(previous=(part, whole, whole))).success, "the newest are those that count"
+    with pytest.raises(ValueError, match=r"^previous\[2\]: lacks 'left_1', which the task 'slow' needs"):
+        solver.solve(IKProblem(previous=(part, whole, part)))
 
 
 def test_targets_need_a_task_that_they_are_for(urdf):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import random
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +13,15 @@ import casadi
 import numpy as np
 import pybullet_data
 import pytest
+from tree_robot import TREE
 
 from custom_ros_tools.errors import ConfigError, UnknownNameError
 from ik_ros.lookup import make_solver
 from ik_ros.problem import IKProblem, Waypoint
 from ik_ros.solution import IKSolution, JointTrajectory
-from ik_ros.solvers.trajectory import TrajectorySolver
+from ik_ros.solvers.trajectory import KEPT_PROGRAMS, TrajectorySolver
 from ik_ros.trajectory.forward_kinematics import ForwardKinematics, rotation_vector
+from ik_ros.trajectory.program import Program
 from ik_ros.trajectory.spline import Spline
 from rpbi.kinematics import Kinematics
 from rpbi.pose import Pose
@@ -25,6 +29,7 @@ from rpbi.pose import Pose
 DATA = Path(pybullet_data.getDataPath())
 IIWA = str(DATA / "kuka_iiwa/model.urdf")
 TIP = "lbr_iiwa_link_7"
+ENDS = {"urdf_filename": IIWA, "base_link": "lbr_iiwa_link_0", "tip_link": TIP}
 JOINTS = [f"lbr_iiwa_joint_{i}" for i in range(1, 8)]
 BENT = (0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0)
 OBSTACLES = [
@@ -36,8 +41,7 @@ OBSTACLES = [
 
 
 def iiwa(**more: Any) -> TrajectorySolver:
-    options = {"urdf_filename": IIWA, "base_link": "lbr_iiwa_link_0", "tip_link": TIP, **more}
-    solver = make_solver("trajectory", options)
+    solver = make_solver("trajectory", {**ENDS, **more})
     assert isinstance(solver, TrajectorySolver)
     return solver
 
@@ -191,11 +195,60 @@ def test_random_problems_reachable_or_not_stay_within_limits():
         (IKProblem(waypoints=(Waypoint(0.0, Pose()),)), r"waypoints\[0\].time_s: must be after 0 s, got 0"),
         (IKProblem(waypoints=(Waypoint(2.0, Pose()), Waypoint(1.0, Pose()))), r"waypoints\[1\].time_s: must be after"),
         (IKProblem(waypoints=(Waypoint(1e8, Pose()),)), "are too many"),
+        (
+            IKProblem(waypoints=tuple(Waypoint(1.0 + i, Pose()) for i in range(65))),
+            "^waypoints: expected 64 at most, got 65",
+        ),
     ],
 )
 def test_questions_that_make_no_sense_are_refused(solver, problem, words):
     with pytest.raises(ValueError, match=words):
         solver.solve(problem)
+
+
+def test_speeds_of_joints_that_slide_are_in_metres(tmp_path):
+    path = tmp_path / "tree.urdf"
+    path.write_text(TREE)
+    options = {"urdf_filename": str(path), "base_link": "body", "tip_link": "left_arm"}
+    solver = make_solver("trajectory", options)
+    assert isinstance(solver, TrajectorySolver)
+    spline = Spline(4)
+    ramp = np.linspace(0.0, 1.0, spline.count)
+    for name, way, unit in (("slide", (1.0, 0.0), "m/s"), ("left_1", (0.0, 1.0), "rad/s")):
+        (fault,) = solver._too_fast(spline, np.outer(ramp, way), duration_s=0.1)
+        assert re.fullmatch(rf"'{name}' needs [\d.]+ {unit}, its limit is 2", fault)
+
+
+def test_only_the_newest_programs_are_kept(kinematics):
+    def programs() -> int:
+        gc.collect()
+        return sum(isinstance(one, Program) for one in gc.get_objects())
+
+    before = programs()
+    solver = iiwa(intervals=4)
+    pose = kinematics.forward(BENT, TIP)
+    for count in range(1, KEPT_PROGRAMS + 2):
+        solver.solve(IKProblem(start=start(), waypoints=tuple(Waypoint(2.0 * (i + 1), pose) for i in range(count))))
+    assert programs() - before == KEPT_PROGRAMS
+
+
+def test_fine_splines_are_sparse_programs():
+    """Otherwise those with many waypoints, or obstacles, take minutes to compile."""
+    solver = iiwa(shapes=OBSTACLES)
+    fine, finer = (solver._compiled(intervals, 4)._solve.get_function("nlp_hess_l").nnz_out(0) for intervals in (8, 16))
+    assert finer < 2.2 * fine
+
+
+def test_only_one_thread_at_a_time_judges(kinematics):
+    """The chain has one working memory: two threads in it would mix up their positions."""
+
+    class Watched(TrajectorySolver):
+        def residual(self, goal, q):
+            assert self._lock.locked()
+            return super().residual(goal, q)
+
+    solver = Watched(TrajectorySolver.Config.parse(ENDS, "~"))
+    assert solver.solve(IKProblem(start=start(), target=kinematics.forward(BENT, TIP))).success
 
 
 def test_unknown_joints_are_refused(solver):

@@ -75,6 +75,7 @@ def test_fault_in_an_old_spelling_is_told_as_the_user_spelt_it() -> None:
     [
         ({"gravity": -9.81}, "~config: gravity: has no effect: write setGravity"),
         ({"visual_object": ["a.yaml"]}, "~config: visual_object: has no effect: write visual_objects"),
+        ({"controls": {"robot_name": "arm"}}, "~config: controls: has no effect: there is no control window"),
         (
             {"setPhysicsEngineParameter": {"fixedTimeStep": 0.01}},
             "~config: setPhysicsEngineParameter.fixedTimeStep: has no effect: write timeStep",

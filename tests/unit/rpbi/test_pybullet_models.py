@@ -202,6 +202,11 @@ def test_visualizer_flags_become_one_call_each() -> None:
             "halfExtents[1]: must be > 0 [m], got 0",
         ),
         (
+            CreateCollisionShape,
+            {"shapeType": "GEOM_PLANE", "planeNormal": [0, 0, 0]},
+            "planeNormal: a direction cannot be all zeros",
+        ),
+        (
             CreateVisualShape,
             {"shapeType": 2, "rgbaColor": [1, 0, 0]},
             "rgbaColor: expected a list of 4 numbers, got 3",

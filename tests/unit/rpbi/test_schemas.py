@@ -159,7 +159,7 @@ def test_what_a_world_takes_the_schema_takes(kind: str, data: Any) -> None:
 
 
 BASES: dict[str, dict[str, Any]] = {
-    "world": {"rgbd_sensor": CAMERA, "controls": {"robot_name": "arm"}},
+    "world": {"rgbd_sensor": CAMERA},
     "visual_object": without(worlds.FLOOR, "changeDynamics"),
     "collision_object": worlds.FLOOR,
     "dynamic_object": worlds.box(),

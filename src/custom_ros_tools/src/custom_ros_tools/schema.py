@@ -75,6 +75,12 @@ def _unit_quaternion(value: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(v / norm for v in value)
 
 
+def _direction(value: tuple[float, ...]) -> tuple[float, ...]:
+    if math.hypot(*value) < 1e-6:
+        raise ValueError("a direction cannot be all zeros")
+    return value
+
+
 def _switch(value: Any) -> Any:
     return bool(value) if type(value) is int and value in (0, 1) else value
 
@@ -107,6 +113,8 @@ Degrees = Annotated[float, Unit("deg")]
 
 Vec3 = Annotated[tuple[float, float, float], Field(strict=False)]
 Position = Annotated[Vec3, Unit("m")]
+Direction = Annotated[Vec3, AfterValidator(_direction)]
+"""A direction of any length but zero."""
 Quat = Annotated[tuple[float, float, float, float], Field(strict=False), AfterValidator(_unit_quaternion)]
 """A rotation as x, y, z, w; any length but zero, normalised."""
 Rgba = Annotated[tuple[Fraction, Fraction, Fraction, Fraction], Field(strict=False)]

@@ -47,18 +47,26 @@ class StaticTransform(ConfigModel):
             wanted = " or ".join(f"'{' '.join(keys)}'" for keys in _KEYS.values())
             got = f"{len(arguments)} arguments" if arguments else "none"
             raise ConfigError([Problem(_ARGUMENTS, "", f"expected {wanted}, got {got}")])
-        numbers: list[float] = []
-        problems = []
-        for key, text in zip(keys[:-2], arguments):
+        problems: list[Problem] = []
+
+        def number(key: str, text: str) -> float:
             try:
-                numbers.append(float(text))
+                return float(text)
             except ValueError:
                 problems.append(Problem(_ARGUMENTS, key, f"expected a number, got {text!r}"))
-        if problems:
-            raise ConfigError(problems)
+                return 1.0  # stands in for it while the rest is checked
+
+        numbers = [number(key, text) for key, text in zip(keys[:-2], arguments)]
         data: dict[str, Any] = {"parent": arguments[-2], "child": arguments[-1], "position": numbers[:3]}
         try:
             data["quat_xyzw"] = quat_of(numbers[3:]).tolist()
         except ValueError as error:
-            raise ConfigError([Problem(_ARGUMENTS, "", str(error))]) from None
-        return cls.parse(data, _ARGUMENTS)
+            problems.append(Problem(_ARGUMENTS, "", str(error)))
+            data["quat_xyzw"] = [0.0, 0.0, 0.0, 1.0]  # likewise
+        try:
+            transform = cls.parse(data, _ARGUMENTS)
+        except ConfigError as error:
+            raise ConfigError([*problems, *error.problems]) from None
+        if problems:
+            raise ConfigError(problems)
+        return transform

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import threading
 from abc import abstractmethod
@@ -14,7 +13,6 @@ from pydantic import ValidationInfo, model_validator
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.schema import ConfigModel, KeyedError, Text
 from rpbi.asset_files import ExistingFile
-from rpbi.joint_model import LIMIT_ROUNDING
 from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
 from .chain import Chain
@@ -24,8 +22,7 @@ from .limits import Limits
 from .problem import IKProblem
 from .solution import IKSolution
 from .solver import Solver
-
-_log = logging.getLogger(__name__)
+from .start_limits import StartLimits
 
 
 class ChainConfig(ConfigModel):
@@ -78,12 +75,12 @@ class ChainSolver(Solver):
         self.velocity_limits = self.description.velocity_limits
         self.use_limits(self.description.lower, self.description.upper)
         self._lock = threading.Lock()
-        self._brought_in: list[str] = []
 
     def use_limits(self, lower: Sequence[float], upper: Sequence[float]) -> None:
         """Sets the n limits of the joints [rad or m], -inf and inf where there are none."""
         self.lower, self.upper = tuple(lower), tuple(upper)
         self.limits = Limits(lower, upper, self.description.is_revolute)
+        self._start_limits = StartLimits(self.joint_names, self.limits)
 
     @abstractmethod
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
@@ -139,16 +136,8 @@ class ChainSolver(Solver):
         for name in given:
             if name not in self.description.robot_joints:
                 raise UnknownNameError("joint", name, self.joint_names)
-        start = [given.get(name, middle) for name, middle in zip(self.joint_names, self.limits.middle)]
-        inside = self.limits.bring_in(start, start)[0]
-        outside = [
-            name for name, asked, used in zip(self.joint_names, start, inside) if abs(asked - used) > LIMIT_ROUNDING
-        ]
-        if outside and outside != self._brought_in:  # told once, not at every problem of a stream
-            positions = ", ".join(f"'{name}' {given[name]:g}" for name in outside)
-            _log.warning("the start is outside limits and is brought in: %s", positions)
-        self._brought_in = outside
-        return inside
+        middle = zip(self.joint_names, self.limits.middle)
+        return self._start_limits.bring_in([given.get(name, position) for name, position in middle])
 
     def _in_words(self, problem: IKProblem, goal: Goal, residual: Residual) -> str:
         with_angle = not goal.any_orientation

@@ -58,14 +58,9 @@ class Continuity:
         self._limits = config.velocity_scale * np.array(list(limits.values()))
         self._last: Array | None = None
 
-    @property
-    def last(self) -> Array | None:
-        """The n positions of the last target [rad or m], None before the first."""
-        return self._last
-
-    def restart(self, positions: Sequence[float] | None = None) -> None:
-        """Goes on from n positions [rad or m], or from wherever the first target is."""
-        self._last = None if positions is None else np.array(positions, dtype=float)
+    def begin(self, positions: Sequence[float]) -> None:
+        """Goes on from n positions [rad or m]; else the first target is wherever the first solution is."""
+        self._last = np.array(positions, dtype=float)
 
     def next(self, solution: Sequence[float], period_s: float) -> tuple[Array, float]:
         """Returns the next target.

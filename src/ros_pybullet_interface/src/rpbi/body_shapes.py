@@ -11,7 +11,6 @@ import pybullet
 
 from .bodies import Body
 from .bodies.shape_object import ShapeObject
-from .bodies.soft import SoftObject
 from .pose import Pose, Quaternion, Vector
 
 PLANE_SIZE_M = 40.0
@@ -65,8 +64,6 @@ def body_shapes(body: Body) -> list[BodyShape]:
     """
     if body.is_soft:
         return []  # it tells its surface itself
-    if isinstance(body, SoftObject):
-        return []
     found = body.pb.getVisualShapeData(body.body_id, pybullet.VISUAL_SHAPE_DATA_TEXTURE_UNIQUE_IDS)
     return [part for data in found for part in _parts(body, data)]
 

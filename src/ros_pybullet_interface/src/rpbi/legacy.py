@@ -28,6 +28,7 @@ NO_EFFECT: dict[str, dict[str, str]] = {
     MAIN: {
         "gravity": "write setGravity: {gravZ: -9.81}",
         "visual_object": "write visual_objects with a list of files",
+        "controls": "there is no control window; call rpbi/start, rpbi/stop and rpbi/step",
         "setPhysicsEngineParameter.fixedTimeStep": "write timeStep",
     },
     "robots": {
@@ -40,7 +41,7 @@ NO_EFFECT: dict[str, dict[str, str]] = {
     "visual_objects": {"object_tf.offset": "publish a TF frame with the offset in it"},
     "collision_objects": {"object_tf.offset": "publish a TF frame with the offset in it"},
 }
-"""By section: a key that older worlds carry and that never did anything, and what to do instead."""
+"""By section: a key that older worlds carry and that does nothing here, and what to do instead."""
 
 
 def modernise(section: str, data: Mapping[str, Any], file: str) -> tuple[dict[str, Any], dict[str, str], list[Problem]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 MAX_DEBT_S = 0.25
-"""How far the simulation may fall behind and still catch up; what is beyond is given up [s]."""
+"""How late a tick may be and still be caught up with; of one that is later, all the lateness is given up [s]."""
 
 MAX_SLEEP_S = 0.005
 """Longest sleep between two looks at requests, however slow the motion [s]."""
@@ -15,7 +15,7 @@ class Pacer:
     """Tells when the next tick is due by the wall clock, and counts what came late.
 
     Deadlines are absolute, so lateness does not add up: after a late tick the next ones follow at once until the debt
-    is paid, or given up beyond MAX_DEBT_S.
+    is paid; one beyond MAX_DEBT_S is given up whole.
 
     Args:
         dt_s: Length of a tick [s] of simulated time.

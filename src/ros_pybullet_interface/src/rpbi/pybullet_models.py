@@ -15,6 +15,7 @@ from custom_ros_tools.schema import (
     AlsoTakes,
     ConfigModel,
     Count,
+    Direction,
     Expects,
     FrameId,
     Hz,
@@ -90,7 +91,7 @@ class CreateVisualShape(PybulletModel):
     length: PositiveMetres | None = Field(None, description="Length of a capsule or cylinder.")
     fileName: ExistingFile | None = Field(None, description="Mesh file.")
     meshScale: Vec3 | None = Field(None, description="Factors on a mesh along x, y and z.")
-    planeNormal: Vec3 | None = Field(None, description="Normal of a plane.")
+    planeNormal: Direction | None = Field(None, description="Normal of a plane.")
     flags: Annotated[int, VISUAL_SHAPE_FLAGS] | None = Field(None, description="VISUAL_SHAPE_... flags.")
     rgbaColor: Rgba | None = Field(None, description="Colour and opacity, each from 0 to 1.")
     specularColor: Rgb | None = Field(None, description="Colour of highlights, each from 0 to 1.")
@@ -118,7 +119,7 @@ class CreateCollisionShape(PybulletModel):
     height: PositiveMetres | None = Field(None, description="Length of a capsule or cylinder.")
     fileName: ExistingFile | None = Field(None, description="Mesh or height field file.")
     meshScale: Vec3 | None = Field(None, description="Factors on a mesh along x, y and z.")
-    planeNormal: Vec3 | None = Field(None, description="Normal of a plane.")
+    planeNormal: Direction | None = Field(None, description="Normal of a plane.")
     flags: Annotated[int, COLLISION_SHAPE_FLAGS] | None = Field(None, description="GEOM_... flags.")
     collisionFramePosition: Position | None = Field(None, description="Position of the shape in the body's frame.")
     collisionFrameOrientation: Quat | None = Field(None, description="Orientation in the body's frame as x, y, z, w.")

@@ -138,13 +138,16 @@ class SensorSchedule:
     def _take_stock(self) -> None:
         self._queue = [(each.next_tick, each.order, each) for each in self._all()]
         heapq.heapify(self._queue)
-        self._watching = [
-            each.sensor for each in self._all() if type(each.sensor).before_step is not Sensor.before_step
-        ]
+        self._watching = [each.sensor for each in self._all() if _acts_at_ticks(type(each.sensor))]
 
     def _all(self) -> Iterator[_Scheduled]:
         for scheduled in self._scheduled.values():
             yield from scheduled
+
+
+def _acts_at_ticks(sensor_type: type[Sensor]) -> bool:
+    """Tells whether a type of sensors does anything before or after the physics of each tick."""
+    return sensor_type.before_step is not Sensor.before_step or sensor_type.after_step is not Sensor.after_step
 
 
 def _present(samples: Any) -> list[Any]:

@@ -13,7 +13,6 @@ from custom_ros_tools.schema import (
     Hz,
     HzOrOff,
     ListOf,
-    Name,
     NonNegative,
     Pixels,
     Seconds,
@@ -58,12 +57,6 @@ Folders = Annotated[
     BeforeValidator(_as_list),
     AlsoTakes({"type": "string", "minLength": 1}),
 ]
-
-
-class ControlsConfig(ConfigModel):
-    """What the control window works on."""
-
-    robot_name: Name = Field(description="Robot that the sliders move.")
 
 
 class WorldConfig(ConfigModel):
@@ -126,7 +119,6 @@ class WorldConfig(ConfigModel):
         None, description="Camera of colour, depth and segmentation; the first one if there are several."
     )
     rgbd_sensors: ListOf[ObjectEntry] = Field((), description="Files of further cameras.")
-    controls: ControlsConfig | None = Field(None, description="What the control window works on.")
 
     def search_paths(self) -> tuple[str, ...]:
         """Return the folders to look for files in, as absolute paths."""

@@ -7,6 +7,9 @@ from collections.abc import Callable
 
 import rospy
 
+PACKAGES = ("custom_ros_tools", "rpbi", "ik_ros", "rpbi_utils", "rpbi_examples")
+"""Those of this workspace."""
+
 
 class _RosHandler(logging.Handler):
     """Hands log records to rospy."""
@@ -27,10 +30,10 @@ def attach_logging(*modules: str) -> None:
     """Attaches the loggers of some modules to /rosout; call it once, after `rospy.init_node`.
 
     Args:
-        modules: Top-level Python modules, such as `rpbi`.
+        modules: Top-level Python modules, such as `rpbi`; without any, all of this workspace.
     """
     handler = _RosHandler(level=logging.DEBUG)
-    for module in modules:
+    for module in modules or PACKAGES:
         logger = logging.getLogger(module)
         logger.setLevel(logging.INFO)
         logger.propagate = False

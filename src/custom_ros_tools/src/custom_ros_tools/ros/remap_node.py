@@ -9,9 +9,7 @@ import rospy
 from sensor_msgs.msg import JointState
 
 from ..errors import InterfaceError
-from ..node_parameters import StartParameters
 from ..on_off import OnOff
-from .parameters import private_parameters
 from .throttle import ThrottledWarning
 from .toggle_service import ToggleService
 
@@ -30,15 +28,18 @@ class RemapNode:
         target: Topic of what is made of them.
         target_type: The ROS type of that.
         convert: Makes it; raises InterfaceError or ValueError for a message that must be refused.
-
-    Raises:
-        ConfigError: If a parameter is wrong.
+        start_on_init: Whether it is on from the start.
     """
 
     def __init__(
-        self, executable: str, source: str, target: str, target_type: type, convert: Callable[[JointState], Any]
+        self,
+        executable: str,
+        source: str,
+        target: str,
+        target_type: type,
+        convert: Callable[[JointState], Any],
+        start_on_init: bool,
     ) -> None:
-        start_on_init = private_parameters(StartParameters).start_on_init
         self._source, self._convert = rospy.resolve_name(source), convert
         self._warn = ThrottledWarning()
         self._publisher = rospy.Publisher(target, target_type, queue_size=QUEUE_SIZE, tcp_nodelay=True)

@@ -5,9 +5,11 @@ from __future__ import annotations
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
+from ..both import both
 from ..float_array_config import FloatArrayConfig
 from ..joint_values import JointValues
-from .parameters import private_config
+from ..node_parameters import StartParameters
+from .parameters import private_config, private_parameters
 from .remap_node import RemapNode
 from .run_node import run_node
 
@@ -18,12 +20,15 @@ class FloatArrayNode(RemapNode):
     """Publishes one quantity of joint states as numbers, in the order of `~config`.
 
     Raises:
-        ConfigError: If the configuration is wrong.
+        ConfigError: If the configuration or a parameter is wrong.
     """
 
     def __init__(self) -> None:
-        self._config = private_config(FloatArrayConfig)
-        super().__init__(NAME, "joint_states", "joint_states/floatarray", Float64MultiArray, self._numbers)
+        self._config, start = both(
+            lambda: private_config(FloatArrayConfig), lambda: private_parameters(StartParameters)
+        )
+        topics = "joint_states", "joint_states/floatarray"
+        super().__init__(NAME, *topics, Float64MultiArray, self._numbers, start.start_on_init)
 
     def _numbers(self, message: JointState) -> Float64MultiArray:
         field = self._config.field

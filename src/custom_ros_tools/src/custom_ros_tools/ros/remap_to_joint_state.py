@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from sensor_msgs.msg import JointState
 
+from ..node_parameters import StartParameters
 from .joint_states import values_in
+from .parameters import private_parameters
 from .remap_node import RemapNode
 from .run_node import run_node
 
@@ -13,7 +15,12 @@ NAME = "remap_joint_state_to_joint_state"
 
 def main() -> None:
     """Runs the node."""
-    run_node(NAME, lambda: RemapNode(NAME, "joint_states/from", "joint_states/to", JointState, _sound))
+    run_node(NAME, _start)
+
+
+def _start() -> RemapNode:
+    start_on_init = private_parameters(StartParameters).start_on_init
+    return RemapNode(NAME, "joint_states/from", "joint_states/to", JointState, _sound, start_on_init)
 
 
 def _sound(message: JointState) -> JointState:

@@ -29,7 +29,7 @@ def run_node(name: str, start: Callable[[], object], anonymous: bool = False) ->
     if not wait_for_master():
         return
     rospy.init_node(name, anonymous=anonymous, disable_signals=True)
-    attach_logging("custom_ros_tools")
+    attach_logging()
     MasterWatch()
     ended = threading.Event()
     rospy.on_shutdown(ended.set)

@@ -8,6 +8,7 @@ import rospy
 
 from custom_ros_tools.srv import SetTransform, SetTransformRequest, SetTransformResponse
 
+from ..both import both
 from ..node_parameters import RateParameters
 from ..static_transform import StaticTransform
 from .parameters import private_parameters
@@ -27,12 +28,14 @@ class StaticTransformNode:
     """
 
     def __init__(self) -> None:
-        given = StaticTransform.from_arguments(rospy.myargv(sys.argv)[1:])
-        hz = private_parameters(RateParameters).hz
+        given, rate = both(
+            lambda: StaticTransform.from_arguments(rospy.myargv(sys.argv)[1:]),
+            lambda: private_parameters(RateParameters),
+        )
         self._transform = transform_message(given.position, given.quat_xyzw)
         self._topic = TransformTopic(given.parent, given.child)
         rospy.Service("reset_tf", SetTransform, self._reset)
-        WallTimer(hz, lambda: self._topic.send(self._transform))
+        WallTimer(rate.hz, lambda: self._topic.send(self._transform))
 
     def _reset(self, request: SetTransformRequest) -> SetTransformResponse:
         try:

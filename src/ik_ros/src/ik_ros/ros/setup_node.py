@@ -10,7 +10,7 @@ import rospy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray, Header
 
-from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
 from custom_ros_tools.on_off import OnOff
 from custom_ros_tools.ros.parameters import private_parameters
 from custom_ros_tools.ros.run_node import run_node
@@ -18,6 +18,7 @@ from custom_ros_tools.ros.throttle import ThrottledWarning
 from custom_ros_tools.ros.toggle_service import ToggleService
 from custom_ros_tools.ros.wall_timer import WallTimer
 from ik_ros.msg import IKProblem as IKProblemMessage
+from rpbi.pose import Pose
 
 from ..problem import IKProblem, JointPositions
 from ..setup_parameters import SetupParameters
@@ -56,6 +57,7 @@ class SetupNode:
         self._previous: deque[JointPositions] = deque(maxlen=config.max_num_prev_solutions)
         self._goals = dict(config.goals)
         self._tolerances = {key: getattr(config, f"init_{key}") for key in TOLERANCES}
+        self._check_parameters()
         self._publisher = rospy.Publisher("ik", IKProblemMessage, queue_size=QUEUE_SIZE, tcp_nodelay=True)
         rospy.set_param("ik_ros/interface", name)
         self._subscribe()
@@ -64,6 +66,12 @@ class SetupNode:
             setup.on()
         ToggleService(f"{self._topics}/toggle", setup.on, setup.off)
         WallTimer(config.hz, self._publish)
+
+    def _check_parameters(self) -> None:
+        try:
+            self._problem(None)
+        except ValueError as error:
+            raise ConfigError([Problem(rospy.get_name(), "", str(error))]) from None
 
     def _subscribe(self) -> None:
         for topic in START_TOPICS:
@@ -113,12 +121,16 @@ class SetupNode:
         if not self._is_on:
             return
         try:
-            target = None if self._tf is None else self._tf.pose()
-        except InterfaceError as error:
+            problem = self._problem(None if self._tf is None else self._tf.pose())
+        except (InterfaceError, ValueError) as error:
             self._warn("no problem is published", str(error))
             return
+        header = Header(stamp=rospy.Time.now(), frame_id=self._config.parent_frame_id or "")
+        self._publisher.publish(problem_message(problem, header))
+
+    def _problem(self, target: Pose | None) -> IKProblem:
         with self._lock:
-            problem = IKProblem(
+            return IKProblem(
                 target=target,
                 **_fields(self._tolerances),
                 start=self._start,
@@ -126,8 +138,6 @@ class SetupNode:
                 goals=self._goals,
                 seed=self._config.seed,
             )
-        header = Header(stamp=rospy.Time.now(), frame_id=self._config.parent_frame_id or "")
-        self._publisher.publish(problem_message(problem, header))
 
 
 def _fields(tolerances: dict[str, float]) -> dict[str, tuple[float, ...]]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
 import threading
-import time
 from collections.abc import Callable
 
 import genpy
@@ -33,9 +31,10 @@ from ik_ros.srv import (
     TracIKResponse,
 )
 
-from ..continuity import Continuity, ContinuityConfig
+from ..continuity import Continuity
 from ..lookup import make_solver
 from ..problem import IKProblem
+from ..problem_stream import ProblemStream
 from ..solution import IKSolution
 from ..solver_node_parameters import SolverNodeParameters
 from .base_frame import BaseFrame
@@ -43,8 +42,6 @@ from .messages import pose_message, problem_in, problem_in_trac_ik, solution_mes
 from .solver_argument import solver_argument
 
 QUEUE_SIZE = 10
-LONGEST_PERIOD_S = 0.1
-"""Targets that come after a longer pause go on as if it had been this long."""
 PROBLEMS: dict[str, tuple[type[genpy.Message], Callable[[genpy.Message], IKProblem]]] = {
     IKProblemMessage._type: (IKProblemMessage, problem_in),
     TracIKProblem._type: (TracIKProblem, problem_in_trac_ik),
@@ -66,12 +63,14 @@ class SolverNode:
     def __init__(self, name: str) -> None:
         own, options = _parameters()
         self._name, self._solver = name, make_solver(name, options, rospy.get_name())
-        self._continuity = self._make_continuity(own.continuity)
+        self._continuity = own.continuity
+        self._new_stream()
         self._base = BaseFrame(own.base_frame_id)
         self._warn = ThrottledWarning()
-        self._lock = threading.Lock()
-        self._last: IKSolution | None = None
-        self._last_s: float | None = None
+        self._solving = threading.Lock()
+        self._publishing = threading.Lock()
+        self._stream: ProblemStream | None = None
+        self._topic = rospy.resolve_name("ik")
         self._target = rospy.Publisher("joint_states/target", JointState, queue_size=QUEUE_SIZE, tcp_nodelay=True)
         self._solution = rospy.Publisher("ik/solution", IKSolutionMessage, queue_size=QUEUE_SIZE, tcp_nodelay=True)
         self._trajectory = rospy.Publisher("ik/trajectory", JointTrajectory, queue_size=QUEUE_SIZE)
@@ -84,71 +83,48 @@ class SolverNode:
         rospy.Service(f"{services}/solve", SolveIK, self._serve)
         rospy.Service(f"{services}/solve_trac_ik", TracIK, self._serve_trac_ik)
 
-    def _make_continuity(self, config: ContinuityConfig | None) -> Continuity | None:
-        if config is None:
-            return None
+    def _new_stream(self) -> ProblemStream:
+        if self._continuity is None:
+            return ProblemStream(self._solver)
         try:
-            return Continuity(config, self._solver.joint_names, self._solver.velocity_limits)
+            continuity = Continuity(self._continuity, self._solver.joint_names, self._solver.velocity_limits)
         except ValueError as error:
             raise ConfigError([Problem(rospy.get_name(), "", str(error))]) from None
+        return ProblemStream(self._solver, continuity)
 
     def _listen(self) -> None:
-        with self._lock:
-            self._last = self._last_s = None
-            if self._continuity is not None:
-                self._continuity.restart()
+        self._stream = self._new_stream()
         # The newest problem is the one that counts
-        self._subscriber = rospy.Subscriber("ik", rospy.AnyMsg, self._take, queue_size=1, tcp_nodelay=True)
+        self._subscriber = rospy.Subscriber(
+            "ik", rospy.AnyMsg, self._take, callback_args=self._stream, queue_size=1, tcp_nodelay=True
+        )
 
     def _listen_no_more(self) -> None:
+        with self._publishing:
+            self._stream = None
         self._subscriber.unregister()
 
-    def _take(self, raw: rospy.AnyMsg) -> None:
+    def _take(self, raw: rospy.AnyMsg, stream: ProblemStream) -> None:
         type_name = raw._connection_header["type"]
         if type_name not in PROBLEMS:
-            self._warn(self._subscriber.resolved_name, f"expected {' or '.join(PROBLEMS)}, got {type_name}; refused")
+            self._warn(self._topic, f"expected {' or '.join(PROBLEMS)}, got {type_name}; refused")
             return
         message_type, read = PROBLEMS[type_name]
         message = message_type().deserialize(raw._buff)
+        header = message.header
         try:
-            with self._lock:
-                solution = self._follow(read(message), message.header)
+            with self._solving:
+                problem = self._base.with_poses_in_it(read(message), header.frame_id)
+                solution = stream.solve(problem, header.stamp.to_sec())
         except (InterfaceError, ValueError) as error:
-            self._warn(self._subscriber.resolved_name, f"problem refused: {error}")
+            self._warn(self._topic, f"problem refused: {error}")
             solution = IKSolution(False, str(error), self._solver.joint_names, ())
         else:
             if not solution.success:
                 self._warn("ik/solution", solution.message)
-        self._publish(solution, message.header)
-
-    def _follow(self, problem: IKProblem, header: Header) -> IKSolution:
-        """Solves a problem of a stream: from where the last one led, and no further than the joints are fast."""
-        continuity = self._continuity
-        if continuity is not None and continuity.last is None and problem.start:
-            continuity.restart([problem.start.get(name, 0.0) for name in self._solver.joint_names])
-        if continuity is not None and continuity.last is not None:
-            start = dict(zip(self._solver.joint_names, continuity.last.tolist()))
-            problem = dataclasses.replace(problem, start=start)
-        elif not problem.start and self._last is not None:
-            problem = dataclasses.replace(problem, start=dict(zip(self._last.joint_names, self._last.positions)))
-        solution = self._solver.solve(self._base.with_poses_in_it(problem, header.frame_id))
-        if not solution.success:
-            return solution
-        self._last = solution
-        if continuity is None:
-            return solution
-        target, share = continuity.next(solution.positions, self._period_s(header))
-        message = solution.message
-        if share < 1.0:
-            message = f"{message}; the joints are {share:.0%} of the way there"
-        return dataclasses.replace(solution, positions=tuple(target.tolist()), message=message)
-
-    def _period_s(self, header: Header) -> float:
-        """Returns the time since the last problem, by stamps if there are any [s]."""
-        now_s = header.stamp.to_sec() or time.monotonic()
-        period_s = 0.0 if self._last_s is None else now_s - self._last_s
-        self._last_s = now_s
-        return min(max(period_s, 0.0), LONGEST_PERIOD_S)
+        with self._publishing:
+            if stream is self._stream:  # it may have been switched off meanwhile
+                self._publish(solution, header)
 
     def _publish(self, solution: IKSolution, header: Header) -> None:
         answer = IKSolutionMessage(
@@ -192,7 +168,7 @@ class SolverNode:
         return TracIKResponse(solution.success, solution.message, solution_message(solution))
 
     def _solve_alone(self, problem: IKProblem, header: Header) -> IKSolution:
-        with self._lock:
+        with self._solving:
             return self._solver.solve(self._base.with_poses_in_it(problem, header.frame_id))
 
 

@@ -19,7 +19,9 @@ class GlobalConfig(KdlConfig):
     """Options of `global`.
 
     Attributes:
-        restarts: How many random starts follow the one that was given; all are made.
+        restarts: How many random starts follow the one that was given, also when a solution is found; fewer where they
+            are slow or of no use: 15 with tolerances or joints that mimic others, 3 beyond reach, and no more after
+            10 starts that do not even lead to the target outside limits.
         rank_by: What makes a solution better: `distance_to_start`, the length of the way of all joints together
             [rad or m, root of the sum of squares]; or `middle_of_limits`, how far the joint that is nearest to a
             limit is from the middle, as a part of half its range.

@@ -105,7 +105,7 @@ class KdlSolver(ChainSolver):
         """Tells where to start: where it was asked for, and then at random."""
         yield start
         generator = random.Random(problem.seed)
-        for _ in range(RESTARTS_BEYOND_REACH if self.is_beyond_reach(problem) else restarts):
+        for _ in range(min(restarts, RESTARTS_BEYOND_REACH) if self.is_beyond_reach(problem) else restarts):
             yield self.limits.random(generator, start)
 
     def _nearest(self, goal: Goal, first: Sequence[float], near: Sequence[float]) -> tuple[list[float], bool]:

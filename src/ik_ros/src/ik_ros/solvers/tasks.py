@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import logging
+import random
 import threading
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from custom_ros_tools.errors import MissingDependency, UnknownNameError
-from rpbi.joint_model import LIMIT_ROUNDING
+from custom_ros_tools.schema import KeyedError
 from rpbi.kinematics.residual import Residual
 
 from ..problem import IKProblem
 from ..solution import IKSolution
 from ..solver import Solver
+from ..start_limits import StartLimits
 
 try:
     import daqp  # noqa: F401
@@ -27,8 +28,6 @@ from ..tasks.formulation import Formulation, TaskSet
 from ..tasks.found import Found
 from ..tasks.frame_task import FrameTask
 from ..tasks.placement import from_base, to_se3
-
-_log = logging.getLogger(__name__)
 
 AIM = 0.1
 """What is required is aimed at with a tenth of the tolerance, so that solutions lie well within."""
@@ -74,13 +73,14 @@ class TasksSolver(Solver):
         self._has_wishes = len(self._required) < len(self.tasks.parts)
         self._patience = PATIENCE if len(self.tasks.parts) == 1 else PATIENCE_OF_MANY
         self._lock = threading.Lock()
-        self._brought_in: set[str] = set()
+        self._start_limits = StartLimits(robot.joint_names, robot.limits)
 
     def solve(self, problem: IKProblem) -> IKSolution:
         """Looks for joint positions that fulfil the formulation.
 
         Raises:
-            ValueError: If a goal is missing or makes no sense, or there is a target and no task that it is for.
+            ValueError: If a goal is missing or makes no sense, there is a target and no task that it is for, or a
+                previous solution lacks a joint that a task needs.
             UnknownNameError: If the problem names a joint or task that is not known.
         """
         with self._lock:
@@ -102,18 +102,13 @@ class TasksSolver(Solver):
         """Returns the configuration where the search starts, within limits."""
         robot = self.tasks.robot
         q = robot.configuration({**self._config.start, **problem.start})
-        asked = robot.positions(q).tolist()
-        inside = robot.limits.bring_in(asked, asked)[0]
-        joints = zip(self.joint_names, asked, inside)
-        outside = {name: one for name, one, used in joints if abs(one - used) > LIMIT_ROUNDING}
-        if outside and outside.keys() != self._brought_in:  # told once, not at every problem of a stream
-            positions = ", ".join(f"'{name}' {one:g}" for name, one in outside.items())
-            _log.warning("the start is outside limits and is brought in: %s", positions)
-        self._brought_in = set(outside)
-        return robot.with_positions(q, inside)
+        return robot.with_positions(q, self._start_limits.bring_in(robot.positions(q).tolist()))
 
     def _begin(self, problem: IKProblem, start: np.ndarray) -> None:
         """Tells all tasks what the problem wants of them."""
+        for solution in problem.previous:
+            for name in solution:
+                self.tasks.robot.joint_id(name)
         for name in problem.goals:
             if name not in self.tasks.parts:
                 raise UnknownNameError("task", name, self._names)
@@ -127,6 +122,8 @@ class TasksSolver(Solver):
                     part.task.aim(problem)
                 else:
                     part.task.begin(problem, problem.goals.get(name), start)
+            except KeyedError as error:
+                raise ValueError(f"{error.key}: {error.message}") from None
             except ValueError as error:
                 key = "target" if name == main else f"goals: {name}"
                 raise ValueError(f"{key}: {error}") from None
@@ -147,15 +144,13 @@ class TasksSolver(Solver):
     def _starts(self, problem: IKProblem, start: np.ndarray) -> Iterator[np.ndarray]:
         yield start
         robot = self.tasks.robot
-        generator = np.random.default_rng(problem.seed)
-        reference = robot.positions(start)
-        half = np.where(robot.is_revolute, np.pi, 1.0)
-        lower = np.where(np.isfinite(robot.lower), robot.lower, np.minimum(reference, robot.upper) - half)
-        upper = np.where(np.isfinite(robot.upper), robot.upper, np.maximum(reference, robot.lower) + half)
+        generator = random.Random(problem.seed)
+        reference = robot.positions(start).tolist()
         for i in range(self._config.restarts):
-            positions = generator.uniform(lower, upper)
             if robot.is_floating and i % 2 == 0:
-                positions = np.clip(generator.normal(reference, NEAR_RANGE), robot.lower, robot.upper)
+                positions = robot.limits.clip([generator.gauss(position, NEAR_RANGE) for position in reference])
+            else:
+                positions = robot.limits.random(generator, reference)
             yield robot.with_positions(start, positions)
 
     def _on_anchor(self, q: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ import random
 import threading
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -23,7 +24,7 @@ try:
 except ImportError:
     raise MissingDependency("casadi", "./rpbi setup mpc") from None
 
-from ..trajectory.config import MOST_INTERVALS, TrajectoryConfig
+from ..trajectory.config import MOST_INTERVALS, MOST_WAYPOINTS, TrajectoryConfig
 from ..trajectory.forward_kinematics import ForwardKinematics, rotation_matrix
 from ..trajectory.obstacles import Obstacles
 from ..trajectory.program import Program, Question
@@ -31,6 +32,8 @@ from ..trajectory.rates import largest_rates
 from ..trajectory.spline import Spline
 
 MOST_SAMPLES = 100_000
+KEPT_PROGRAMS = 4
+"""For so many numbers of waypoints programs stay compiled, those that were used last."""
 CHECKS = 10
 """At so many places in each interval the result is checked."""
 AIM = 0.3
@@ -56,8 +59,8 @@ class TrajectorySolver(KdlSolver):
         self._config = config
         self._kinematics = ForwardKinematics(self.description)
         self._obstacles = Obstacles(config.shapes)
-        self._max_velocity, self._max_acceleration = largest_rates(config, self.joint_names)
-        self._programs: dict[tuple[int, int], Program] = {}
+        self._max_velocity, self._max_acceleration = largest_rates(config, self.description)
+        self._compiled = lru_cache(KEPT_PROGRAMS)(self._compile)
         self._program_lock = threading.Lock()
         q = casadi.SX.sym("q", len(self.joint_names))
         distances = self._obstacles.distances(self._kinematics.frames(q)) or [casadi.inf]
@@ -67,13 +70,15 @@ class TrajectorySolver(KdlSolver):
         """Looks for a trajectory through the waypoints; through the target alone, if there are none.
 
         Raises:
-            ValueError: If there is neither, or the waypoints do not follow each other in time.
+            ValueError: If there is neither, or the waypoints do not follow each other in time or are too many.
             UnknownNameError: If the robot has no joint of a name in `start`.
         """
         waypoints = self._waypoints(problem)
         with self._lock:
             start = self._start(problem.start)
-        if (nearest := self._nearest_m(np.array([start]))) < self._config.clearance:
+        with self._program_lock:
+            nearest = self._nearest_m(np.array([start]))
+        if nearest < self._config.clearance:
             message = f"at the start, a sphere is as near as {nearest * 1e3:.4g} mm to an obstacle"
             return IKSolution(False, message, self.joint_names, tuple(start))
         goals = [Goal(replace(problem, target=waypoint.pose)) for waypoint in waypoints]
@@ -98,6 +103,8 @@ class TrajectorySolver(KdlSolver):
             if problem.target is None:
                 raise ValueError("waypoints: missing, and there is no target in their place")
             waypoints = (Waypoint(self._config.duration_s, problem.target),)
+        if len(waypoints) > MOST_WAYPOINTS:
+            raise ValueError(f"waypoints: expected {MOST_WAYPOINTS} at most, got {len(waypoints)}")
         last_s = 0.0
         for i, waypoint in enumerate(waypoints):
             if not waypoint.time_s > last_s:
@@ -157,7 +164,8 @@ class TrajectorySolver(KdlSolver):
             )
             nearest = self._nearest_m(spline.basis(_checks(spline)) @ points)
         passed = spline.basis(times_s[1:] / duration_s) @ points
-        residuals = [self.residual(goal, q.tolist()) for goal, q in zip(goals, passed)]
+        with self._lock:
+            residuals = [self.residual(goal, q.tolist()) for goal, q in zip(goals, passed)]
         faults = [
             f"the waypoint at {waypoint.time_s:g} s is missed by {_in_words(residual)}"
             for waypoint, residual in zip(waypoints, residuals)
@@ -185,11 +193,10 @@ class TrajectorySolver(KdlSolver):
         intervals = self._config.intervals
         while gap * intervals < 2.0 and intervals < MOST_INTERVALS:
             intervals *= 2
-        key = intervals, len(times_s) - 1
-        if key not in self._programs:
-            program = Program(self._kinematics, self._obstacles, len(self.joint_names), Spline(intervals), key[1])
-            self._programs[key] = program
-        return Spline(intervals), self._programs[key]
+        return Spline(intervals), self._compiled(intervals, len(times_s) - 1)
+
+    def _compile(self, intervals: int, waypoints: int) -> Program:
+        return Program(self._kinematics, self._obstacles, len(self.joint_names), Spline(intervals), waypoints)
 
     def _nearest_m(self, q: np.ndarray) -> float:
         """Returns the least distance of all pairs in k x n positions; inf without any [m]."""
@@ -200,11 +207,13 @@ class TrajectorySolver(KdlSolver):
     def _too_fast(self, spline: Spline, points: np.ndarray, duration_s: float) -> list[str]:
         """Tells where speeds or accelerations are beyond their limits, checked closely."""
         faults = []
-        for order, most, unit in ((1, self._max_velocity, "/s"), (2, self._max_acceleration, "/s^2")):
+        for order, most, per in ((1, self._max_velocity, "s"), (2, self._max_acceleration, "s^2")):
             values = np.abs(spline.basis(_checks(spline), order) @ points).max(axis=0) / duration_s**order
             i = int((values / most).argmax())
             if values[i] > most[i]:
-                faults.append(f"'{self.joint_names[i]}' needs {values[i]:.4g} rad{unit}, its limit is {most[i]:.4g}")
+                unit = "rad" if self.description.is_revolute[i] else "m"
+                needs = f"needs {values[i]:.4g} {unit}/{per}, its limit is {most[i]:.4g}"
+                faults.append(f"'{self.joint_names[i]}' {needs}")
         return faults
 
     def _sampled(self, spline: Spline, points: np.ndarray, duration_s: float) -> JointTrajectory:

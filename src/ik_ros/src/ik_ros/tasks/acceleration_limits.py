@@ -45,8 +45,5 @@ class AccelerationLimits(JointTask):
     def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
         """See `Task`."""
         super().begin(problem, goal, q)
-        known = [self.positions(solution) for solution in problem.previous[-2:]]
-        newest = known[-1] if known else None
-        older = known[0] if known else None
-        ahead = None if newest is None else newest if older is None else 2.0 * newest - older
-        self.keep_near(ahead, self._way)
+        known = self.previous(problem, 2)
+        self.keep_near(2.0 * known[-1] - known[0] if known else None, self._way)

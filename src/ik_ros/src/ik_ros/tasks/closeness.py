@@ -26,5 +26,5 @@ class Closeness(JointTask):
     def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
         """See `Task`."""
         super().begin(problem, goal, q)
-        previous = self.positions(problem.previous[-1]) if problem.previous else None
-        self.bring_to(self.robot.positions(q) if previous is None else previous)
+        last = self.previous(problem, 1)
+        self.bring_to(last[0] if last else self.robot.positions(q))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from custom_ros_tools.errors import UnknownNameError
 from custom_ros_tools.schema import KeyedError
 from rpbi.kinematics.residual import Residual
 
+from ..problem import IKProblem
 from .robot import Robot
 from .task import Rows, Task, TaskConfig
 
@@ -48,10 +49,23 @@ class JointTask(Task):
         """Sets k positions as bounds [rad or m]."""
         self.bounds = goal, goal
 
-    def positions(self, named: Mapping[str, float]) -> np.ndarray | None:
-        """Returns the k positions of a problem's solution [rad or m], None if it lacks one of them."""
+    def previous(self, problem: IKProblem, most: int) -> list[np.ndarray]:
+        """Returns k positions of each of a problem's previous solutions [rad or m], newest last.
+
+        Args:
+            problem: The question.
+            most: How many of the newest to return, if there are so many.
+
+        Raises:
+            KeyedError: If one of them lacks one of the k joints; it names both.
+        """
         names = [self.robot.joint_names[i] for i in self.indices]
-        return np.array([named[name] for name in names]) if all(name in named for name in names) else None
+        solutions = list(enumerate(problem.previous))[-most:]
+        for i, solution in solutions:
+            for name in names:
+                if name not in solution:
+                    raise KeyedError(f"previous[{i}]", f"lacks '{name}', which the task '{self.config.name}' needs")
+        return [np.array([solution[name] for name in names]) for _, solution in solutions]
 
     def rows(self, q: np.ndarray) -> Rows:
         """See `Task`."""

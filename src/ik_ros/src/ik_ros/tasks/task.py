@@ -93,6 +93,7 @@ class Task(ABC):
 
         Raises:
             ValueError: If the goal makes no sense, or there is none.
+            KeyedError: If another field of the problem does not fit; it names the field.
         """
         if goal is not None:
             raise ValueError("this task has no goal")

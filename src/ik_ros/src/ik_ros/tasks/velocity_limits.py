@@ -48,4 +48,5 @@ class VelocityLimits(JointTask):
     def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
         """See `Task`."""
         super().begin(problem, goal, q)
-        self.keep_near(self.positions(problem.previous[-1]) if problem.previous else None, self._way)
+        last = self.previous(problem, 1)
+        self.keep_near(last[0] if last else None, self._way)

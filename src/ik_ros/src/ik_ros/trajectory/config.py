@@ -16,6 +16,8 @@ from ..solvers.kdl import KdlConfig
 
 MOST_INTERVALS = 128
 """Waypoints that follow each other faster than two intervals of the finest spline can hardly all be passed."""
+MOST_WAYPOINTS = MOST_INTERVALS // 2
+"""So there cannot be more, whatever their times."""
 
 
 class TrajectoryConfig(KdlConfig):

@@ -84,24 +84,26 @@ class Program:
         target = casadi.reshape(pose[:9], 3, 3)
         off = casadi.vertcat(target.T @ (position - pose[9:]), rotation_vector(target.T @ rotation))
         to_off = casadi.Function("off", [q, pose], [off])
-        passed = [to_off((basis[i, :] @ points).T, poses[:, i]) for i in range(waypoints)]
+        postures = casadi.MX.sym("postures", joints, waypoints)  # unknowns too, so that the Hessian stays sparse
+        passed = to_off.map(waypoints)(postures, poses)
         self._pairs = len(obstacles.pairs)
         times = np.linspace(0.0, 1.0, SAMPLES * spline.intervals + 1)[1:]
         self._samples = len(times) if self._pairs else 0
         apart = []
         if self._pairs:
             to_distances = casadi.Function("distances", [q], [casadi.vertcat(*obstacles.distances(frames))])
-            sampled = casadi.DM(spline.basis(times)) @ points
-            apart = [to_distances(sampled[i, :].T) for i in range(len(times))]
+            sampled = _sparse(spline.basis(times)) @ points
+            apart = [casadi.vec(to_distances.map(len(times))(sampled.T))]
         constraints = casadi.vertcat(
-            casadi.vec(casadi.DM(spline.to_velocity) @ points),
-            casadi.vec(casadi.DM(spline.to_acceleration) @ points),
-            *passed,
+            casadi.vec(_sparse(spline.to_velocity) @ points),
+            casadi.vec(_sparse(spline.to_acceleration) @ points),
+            casadi.vec(postures - (basis @ points).T),
+            casadi.vec(passed),
             *apart,
         )
-        cost = casadi.sum1(casadi.sum2(points * (casadi.DM(spline.roughness) @ points)))
-        parameters = casadi.vertcat(casadi.vec(poses), casadi.vec(basis))
-        nlp: Any = {"x": casadi.vec(points), "p": parameters, "f": cost, "g": constraints}
+        cost = casadi.sum1(casadi.sum2(points * (_sparse(spline.roughness) @ points)))
+        parameters = casadi.veccat(poses, basis)
+        nlp: Any = {"x": casadi.veccat(points, postures), "p": parameters, "f": cost, "g": constraints}
         self._solve: Any = casadi.nlpsol("trajectory", "ipopt", nlp, OPTIONS)
         self._waypoints = waypoints
 
@@ -115,18 +117,25 @@ class Program:
         change = np.tile(question.max_acceleration, (count - 2, 1))
         tolerance = np.tile(question.tolerance, self._waypoints)
         clearance = np.full(self._samples * self._pairs, question.clearance + SAFETY_M)
-        most = np.concatenate((speed.T.ravel(), change.T.ravel(), tolerance))
+        postures = (question.basis @ question.guess).ravel()
+        free = np.full(len(postures), np.inf)
+        most = np.concatenate((speed.T.ravel(), change.T.ravel(), 0.0 * postures, tolerance))
         answer = self._solve(
-            x0=question.guess.T.ravel(),
+            x0=np.concatenate((question.guess.T.ravel(), postures)),
             p=np.concatenate((question.poses.T.ravel(), question.basis.T.ravel())),
-            lbx=lower.T.ravel(),
-            ubx=upper.T.ravel(),
+            lbx=np.concatenate((lower.T.ravel(), -free)),
+            ubx=np.concatenate((upper.T.ravel(), free)),
             lbg=np.concatenate((-most, clearance)),
             ubg=np.concatenate((most, np.full(len(clearance), np.inf))),
         )
-        points = np.array(answer["x"]).reshape(self._joints, count).T
+        points = np.array(answer["x"])[: count * self._joints].reshape(self._joints, count).T
         status = str(self._solve.stats()["return_status"])
         if not np.isfinite(points).all():
             return np.tile(question.start, (count, 1)), status
         points[-2] = points[-1]
         return np.clip(points, question.lower, question.upper), status
+
+
+def _sparse(matrix: np.ndarray) -> casadi.DM:
+    """Returns a matrix without its zeros, which would count as numbers that derivatives depend on."""
+    return casadi.sparsify(casadi.DM(matrix))

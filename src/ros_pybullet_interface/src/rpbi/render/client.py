@@ -148,6 +148,13 @@ class RenderClient:
         self._waiting.clear()
         self._last.clear()
 
+    def forget_body(self, name: str) -> None:
+        """Takes a body out of these scenes: the next of its name may be quite different."""
+        for scenes in (self._waiting, self._last):
+            for camera, scene in scenes.items():
+                bodies = tuple(body for body in scene.sample.bodies if body.name != name)
+                scenes[camera] = scene._replace(sample=scene.sample._replace(bodies=bodies))
+
     def stop(self) -> None:
         """Ends the process, and waits for that for a moment."""
         if self._channel is not None:

@@ -39,8 +39,11 @@ class BodyContext(NamedTuple):
 
         Raises:
             UnknownNameError: If it has gone.
+            InterfaceError: If it cannot be found out, since the simulation has ended.
         """
         body = self.world.bodies.get(self.name)
+        if body is None:  # it may just be on its way through a reset, which is over when the simulation thread answers
+            body = self.ask(lambda: self.world.bodies.get(self.name))
         if body is None:
             raise UnknownNameError("object", self.name, list(self.world.bodies))
         return body

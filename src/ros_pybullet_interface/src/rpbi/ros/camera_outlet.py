@@ -101,7 +101,8 @@ class CameraOutlet:
         self._renderer.forget_scenes()
 
     def forget(self, name: str) -> None:
-        """Needs nothing: the renderer hears of it by the load log."""
+        """Leaves a body that has gone out of the scenes that are still to be drawn."""
+        self._renderer.forget_body(name)
 
     def facts(self) -> dict[str, str]:
         """Returns what the diagnostics tell of it."""

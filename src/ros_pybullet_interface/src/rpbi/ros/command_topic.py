@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -41,7 +42,7 @@ class _CommandTopic(FastTopic):
     """The topic, which knows its newcomers; whatever is published meanwhile, they want all that came before."""
 
     def __init__(self) -> None:
-        self.newcomers: list[_Reader] = []
+        self.newcomers: deque[_Reader] = deque()
         super().__init__("rpbi/commands", WorldCommands)
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Callable[[Any], None]) -> None:
@@ -51,7 +52,7 @@ class _CommandTopic(FastTopic):
             with self._publisher.impl.publock:
                 peer_publish(message)
 
-        self.newcomers = [*self.newcomers, _Reader(send)]
+        self.newcomers.append(_Reader(send))
 
 
 class CommandOutlet:
@@ -65,29 +66,30 @@ class CommandOutlet:
         self._world = world
         self._topic = _CommandTopic()
         self._all = _Reader(self._topic.publish)
+        self._newcomers: list[_Reader] = []
         self._description = rospy.Publisher("rpbi/world_description", String, queue_size=1, latch=True)
         self._description.publish(describe(world))
         self._resets = world.resets
 
     def spin(self) -> None:
-        """Sends what is new, and to newcomers what is old."""
+        """Sends what is new, to newcomers what is old, and to who was slow the rest."""
         commands, resets = self._world.commands, self._world.resets
-        newcomers = self._topic.newcomers
+        while self._topic.newcomers:
+            self._newcomers.append(self._topic.newcomers.popleft())
         if resets != self._resets:
             self._resets = resets
-            for reader in (self._all, *newcomers):
+            for reader in (self._all, *self._newcomers):
                 reader.next = 0
         if commands.count != self._all.next:
             if self._topic.has_subscribers:
                 self._send(self._all)
             else:
                 self._all.next = commands.count
-        for reader in newcomers:
+        for reader in self._newcomers:
             self._topic.be_patient()
             self._send(reader)
-        if newcomers:
-            done = [reader for reader in newcomers if reader.next >= commands.count]
-            self._topic.newcomers = [reader for reader in self._topic.newcomers if reader not in done]
+        self._newcomers = [reader for reader in self._newcomers if reader.next < commands.count]
+        self._topic.flush()
 
     def _send(self, reader: _Reader) -> None:
         first, commands = self._world.commands.since(reader.next, MOST_IN_A_MESSAGE)

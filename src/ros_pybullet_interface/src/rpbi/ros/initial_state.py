@@ -52,6 +52,9 @@ def with_initial_state(config: ConfigModel, file: str) -> ConfigModel:
         message = rospy.wait_for_message(topic, JointState, TIMEOUT_S)
     except rospy.ROSException:
         raise _problem(file, f"no joint states came on {topic} within {TIMEOUT_S:g} s") from None
+    if len(message.name) != len(message.position):
+        counts = f"{len(message.name)} names, {len(message.position)} positions"
+        raise _problem(file, f"expected a position for each name on {topic}, got {counts}")
     types = joint_types(config.loadURDF.fileName)
     measured = {name: value for name, value in zip(message.name, message.position) if name in types}
     if not measured:

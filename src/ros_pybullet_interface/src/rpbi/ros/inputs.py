@@ -13,12 +13,12 @@ import geometry_msgs.msg
 import rospy
 from sensor_msgs.msg import JointState
 
-from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
+from custom_ros_tools.errors import ConfigError, InterfaceError, PluginError, Problem
 from custom_ros_tools.ros.throttle import ThrottledWarning
 
 from ..inputs import Input, PoseInput
 from ..joint_model import JointTarget, WrongQuantityError
-from ..plugins import full_name
+from ..plugins import cause_of, full_name, is_foreign
 from ..pose import Pose
 from ..twist import Twist
 from ..world import World
@@ -116,7 +116,7 @@ class Inputs:
             if isinstance(taken, PoseInput):
                 self._tf.follow(name, f"{name}/{key}", taken)
             else:
-                subscribers.append(self._subscribe(name, key, topic_input(key, taken)))
+                subscribers.append(self._subscribe(name, key, taken))
 
     def close(self, name: str) -> None:
         """Disconnects the inputs of a body or sensor."""
@@ -128,18 +128,37 @@ class Inputs:
         """Hands the last poses of TF frames to a world that has forgotten them; any thread may call it."""
         self._tf.repeat()
 
-    def _subscribe(self, name: str, key: str, topic_input: TopicInput) -> rospy.Subscriber:
-        topic = rospy.resolve_name(topic_input.topic.format(name=name))
+    def _subscribe(self, name: str, key: str, taken: Input) -> rospy.Subscriber:
+        topic_name, message_type, value, _ = topic_input(key, taken)
+        topic, slot = rospy.resolve_name(topic_name.format(name=name)), f"{name}/{key}"
 
         def take(message: Any) -> None:
             try:
-                self._world.put(f"{name}/{key}", topic_input.value(message))
+                self._world.put(slot, value(message))
             except WrongQuantityError as error:
                 self._warn_seldom(topic, f"message refused: {error}")
-            except (InterfaceError, ValueError) as error:
-                self._warn(topic, f"message refused: {error}")
+            except Exception as error:
+                self._warn(topic, f"message refused: {_refusal(slot, taken, error)}")
 
-        return rospy.Subscriber(topic, topic_input.message_type, take, queue_size=100, tcp_nodelay=True)
+        return rospy.Subscriber(topic, message_type, take, queue_size=100, tcp_nodelay=True)
+
+
+def _refusal(slot: str, taken: Input, error: Exception) -> Exception:
+    """Returns why a value is refused: what its check says, or what went wrong in another package.
+
+    Args:
+        slot: Where the value was to go.
+        taken: The input.
+        error: What was raised.
+
+    Raises:
+        Exception: The error, if it is a bug of this package.
+    """
+    if isinstance(error, (InterfaceError, ValueError)):
+        return error
+    if is_foreign(taken.apply):
+        return PluginError(full_name(taken.apply), f"taking '{slot}'", cause_of(error))
+    raise error
 
 
 class _Followed:
@@ -152,7 +171,7 @@ class _Followed:
     """
 
     def __init__(self, name: str, slot: str, pose_input: PoseInput) -> None:
-        self.name, self.slot = name, slot
+        self.name, self.slot, self.pose_input = name, slot, pose_input
         self.tf_id = pose_input.tf_id
         self.period_s = 1.0 / pose_input.hz
         self.due_s = self.since_s = time.monotonic()
@@ -186,7 +205,7 @@ class _TfFollower:
         """Puts all last poses again."""
         for followed in self._followed:
             if followed.last_pose is not None:
-                with contextlib.suppress(InterfaceError, ValueError):  # a body that has gone meanwhile
+                with contextlib.suppress(Exception):  # gone meanwhile, or refused as it was before
                     self._put(followed.slot, followed.last_pose)
 
     def _run(self, listener: TfListener) -> None:
@@ -211,6 +230,7 @@ class _TfFollower:
             followed.last_pose = pose
             try:
                 self._put(followed.slot, pose)
-            except (InterfaceError, ValueError) as error:
+            except Exception as error:
+                refusal = _refusal(followed.slot, followed.pose_input, error)
                 if followed in self._followed:  # else it has gone meanwhile
-                    self._warn(followed.slot, f"TF refused: {error}")
+                    self._warn(followed.slot, f"TF refused: {refusal}")

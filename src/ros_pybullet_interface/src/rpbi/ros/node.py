@@ -131,7 +131,7 @@ def main() -> None:
         return
     # Without ROS time: the simulator is the source of /clock and must never wait for it.
     rospy.init_node("ros_pybullet_interface", disable_rostime=True, disable_signals=True)
-    attach_logging("rpbi", "custom_ros_tools")
+    attach_logging()
     try:
         node = SimulatorNode()
     except InterfaceError as error:

@@ -40,6 +40,7 @@ class ObjectTraffic:
         self._inputs = Inputs(world)
         self._endpoints = BodyEndpoints(world, simulation, ask)
         self._lock = threading.Lock()
+        self._open_bodies: set[str] = set()
         self._placed_cameras: Mapping[str, RgbdSensor] = {}
         self._place_cameras()
         for name in world.bodies:
@@ -94,13 +95,13 @@ class ObjectTraffic:
         with self._lock:
             for name in self._ask(self._world.changed_names):
                 self._inputs.close(name)
-            changed, topics, error = self._ask(self._start_again)
+            closed, topics, error = self._ask(self._start_again)
             for topic in topics:
                 topic.close()
-            for name in changed:
-                self._endpoints.close(name)
+            for name in closed:
+                self._close(name)
             for name in self._world.bodies:
-                if name in changed:
+                if name not in self._open_bodies:
                     self._open(name)
             self._place_cameras()
             if error is not None:
@@ -120,14 +121,23 @@ class ObjectTraffic:
             raise
 
     def _start_again(self) -> tuple[set[str], list[FastTopic], InterfaceError | None]:
-        """Does the simulation thread's part of a reset; returns what is left to open and close, and what went wrong."""
+        """Does the simulation thread's part of a reset.
+
+        Returns:
+            The bodies that have gone or may be others now, their topics to close, and what went wrong.
+        """
         changed = self._world.changed_names()
-        topics = [topic for name in changed & self._world.bodies.keys() for topic in self._outlets.take_out(name)]
+        for name in changed & self._world.bodies.keys():
+            self._world.remove(name)
+        topics = [topic for name in changed for topic in self._outlets.forget(name)]
+        error = None
         try:
             self._simulation.reset(self._inputs.repeat_poses)
-        except InterfaceError as error:
-            return changed, topics, error
-        return changed, topics, None
+        except InterfaceError as problem:
+            error = problem
+        lost = self._open_bodies - changed - self._world.bodies.keys()
+        topics += [topic for name in lost for topic in self._outlets.forget(name)]
+        return changed | lost, topics, error
 
     def _place_cameras(self) -> None:
         """Follows the TF frames of the cameras that there are now, and no others."""
@@ -143,13 +153,25 @@ class ObjectTraffic:
     def _open(self, name: str) -> None:
         """Opens the topics and services of a body."""
         body = self._world.bodies[name]
+        self._open_bodies.add(name)
         self._inputs.open(name, body.inputs())
         self._outlets.open(name)
         self._endpoints.open(body)
 
+    def _close(self, name: str) -> None:
+        """Closes all that takes something for a body, and its services."""
+        self._open_bodies.discard(name)
+        self._inputs.close(name)
+        self._endpoints.close(name)
+
     def _withdraw(self, name: str) -> None:
         """Takes a body out of the world, and all that belongs to it from ROS; its inputs first."""
         self._inputs.close(name)
-        for topic in self._ask(lambda: self._outlets.take_out(name)):
+        for topic in self._ask(lambda: self._take_out(name)):
             topic.close()
-        self._endpoints.close(name)
+        self._close(name)
+
+    def _take_out(self, name: str) -> list[FastTopic]:
+        """Does the simulation thread's part of it; returns the topics that are left to close."""
+        self._world.remove(name)
+        return self._outlets.forget(name)

@@ -31,11 +31,13 @@ class Requests:
         self._simulation = simulation
 
     def __call__(self, call: Callable[[], T]) -> T:
-        """Returns what the call returns, or raises what it raises.
+        """Returns what the call returns, or raises what it raises; on the simulation thread it is made at once.
 
         Raises:
             InterfaceError: If the simulation has ended, the node shuts down or the loop makes no progress.
         """
+        if self._simulation.is_own_thread:
+            return call()
         return self.wait_for(self._simulation.world.mailbox.request(call))
 
     def wait_for(self, future: Future[T]) -> T:

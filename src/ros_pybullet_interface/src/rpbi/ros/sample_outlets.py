@@ -27,11 +27,12 @@ class SampleOutlets:
     def __init__(self, world: World) -> None:
         self._world = world
         self._topics = {sample_type: SampleOutlet() for sample_type in TOPICS}
-        self._transforms = TransformOutlet()
+        self._fed: dict[str, list[tuple[Outlet, str]]] = {}
+        """The outlets and sensors of each body whose topics are open."""
         self.cameras = CameraOutlet(world)
         self.by_type: dict[type, Outlet] = {
             **self._topics,
-            LinkPoseSample: self._transforms,
+            LinkPoseSample: TransformOutlet(),
             SceneSample: self.cameras,
         }
 
@@ -50,20 +51,19 @@ class SampleOutlets:
 
     def open(self, name: str) -> None:
         """Opens the topics of a body's samples."""
-        for sensor in self._world.sensors_of(name):
+        sensors = self._world.sensors_of(name)
+        self._fed[name] = [(self.by_type[sensor.sample_type], sensor.name) for sensor in sensors]
+        for sensor in sensors:
             topic = sample_topic(sensor)
             if topic is not None:
                 self._topics[sensor.sample_type].open(sensor.name, topic)
 
-    def take_out(self, name: str) -> list[FastTopic]:
-        """Takes a body out of the world and drops what is kept of its samples; for the simulation thread.
+    def forget(self, name: str) -> list[FastTopic]:
+        """Drops what is kept of a body that has gone, and of its sensors; for the simulation thread.
 
         Returns:
             The topics that are left to close, by another thread.
         """
-        sensors = self._world.sensors_of(name) if name in self._world.bodies else []
-        self._world.remove(name)
-        self._transforms.forget(name)
-        outlets = [(self._topics.get(each.sample_type), each.name) for each in sensors]
-        topics = [outlet.forget(sensor) for outlet, sensor in outlets if outlet is not None]
+        self.cameras.forget(name)
+        topics = [outlet.forget(sensor) for outlet, sensor in self._fed.pop(name, [])]
         return [topic for topic in topics if topic is not None]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
@@ -56,7 +57,10 @@ class Simulation:
         self.world = world
         self.running = False
         self._broken = False
+        self._last_words = ""
+        """Why it broke off the last time."""
         self._burst: StepBurst | None = None
+        self._thread: int | None = None
         self.passes = 0
         """Grows as long as the loop is alive."""
         idle_ticks = max(1, round(IDLE_PERIOD_S / world.clock.dt_s))
@@ -68,6 +72,11 @@ class Simulation:
         self._status = StatusOutlet(world.clock, self._pacer, status_hz, real_time_factor, facts)
         self._state = StateOutlet(world, self._pacer, real_time_factor)
         self._commands = CommandOutlet(world)
+
+    @property
+    def is_own_thread(self) -> bool:
+        """Whether the caller is on the thread that runs the loop."""
+        return self._thread == threading.get_ident()
 
     def start(self) -> bool:
         """Lets the world run.
@@ -164,27 +173,34 @@ class Simulation:
         self._state.restart()
 
     def run(self, is_over: Callable[[], bool]) -> None:
-        """Loops until it is over."""
+        """Loops until it is over, on the thread that calls it."""
+        self._thread = threading.get_ident()
+        parts = (self._move, *self._helpers, self._tell)
         while not is_over():
             self.passes += 1
             self.world.mailbox.run_requests()
-            try:
-                if self._burst is not None:
-                    self._advance_burst(self._burst)
-                elif self.running:
-                    self._advance()
-                else:
-                    self._idle()
-            except InterfaceError as error:
-                if self.world.is_connected:  # else the loop is over, and that is why
+            for part in parts:
+                try:
+                    part()
+                except Exception as error:
+                    if not self.world.is_connected:  # the loop is over, and that is why
+                        break
                     self._break_off(error)
-            for help_out in self._helpers:
-                help_out()
-            self._status.spin(self.running, self._burst is not None)
-            self._state.spin(self.running or self._burst is not None)
-            self._commands.spin()
             if self._burst is None:
                 (self._pacer if self.running else self._idle_pacer).wait()
+
+    def _move(self) -> None:
+        if self._burst is not None:
+            self._advance_burst(self._burst)
+        elif self.running:
+            self._advance()
+        else:
+            self._idle()
+
+    def _tell(self) -> None:
+        self._status.spin(self.running, self._burst is not None)
+        self._state.spin(self.running or self._burst is not None)
+        self._commands.spin()
 
     def _advance(self) -> None:
         if self._pacer.is_due():
@@ -235,8 +251,10 @@ class Simulation:
 
     def _break_off(self, error: Exception) -> None:
         """Stands still, and tells no more of a world that is broken; until somebody starts or steps it again."""
-        log.error("simulation stopped: %s", error)
-        self.running, self._broken = False, True
+        if self._broken and str(error) == self._last_words:
+            return  # it goes on telling the same
+        log.error("simulation stopped: %s", error, exc_info=not isinstance(error, InterfaceError))
+        self.running, self._broken, self._last_words = False, True, str(error)
         if self._burst is not None:
             self._end_burst().fail(error)
         self.world.halt("the simulation broke off")

@@ -48,7 +48,7 @@ class TransformOutlet:
         self._last.clear()
 
     def forget(self, name: str) -> None:
-        """Leaves a body out from now on."""
+        """Leaves out what a sensor told, from now on."""
         self._last.pop(name, None)
 
 

@@ -46,7 +46,7 @@ class Sensor(ABC):
         """Acts just before the physics of each tick, due or not; sensors that need nothing leave it."""
 
     def after_step(self, tick: int) -> None:  # noqa: B027
-        """Acts just after the physics of each tick, before sensors are read; called where `before_step` is."""
+        """Acts just after the physics of each tick, before sensors are read."""
 
     def inputs(self) -> Mapping[str, Input]:
         """Returns what the sensor takes while the world runs, by name."""

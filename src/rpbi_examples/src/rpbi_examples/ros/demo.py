@@ -24,6 +24,7 @@ from rpbi.config import load_world
 from rpbi_utils import Recorder, bag_to_dataframes, topic_report
 
 from .. import demo_report
+from ..process_tree import kill_with_children
 from .basic_robot_example import HZ as TARGET_HZ
 
 EXAMPLE = "basic_example_kuka_lwr"
@@ -32,18 +33,31 @@ STATES = "/rpbi/kuka_lwr/joint_states"
 TARGETS = "/rpbi/kuka_lwr/joint_states/target"
 COLOUR, DEPTH = "/rpbi/camera/colour/image", "/rpbi/camera/depth/image"
 START_TIMEOUT_S = 60.0
+STOP_TIMEOUT_S = 30.0
+ENDINGS = (signal.SIGTERM, signal.SIGHUP)
+"""Signals that end the demo as Ctrl-C does, so that no node is left."""
 
 
 def main() -> None:
     """Runs the demo; exits with 1 if it failed or a topic came too seldom."""
     arguments = _arguments()
     logging.basicConfig(format="%(message)s", level=logging.WARNING)
+    for number in ENDINGS:
+        if signal.getsignal(number) == signal.SIG_DFL:  # nohup has one of them ignored
+            signal.signal(number, _leave)
     try:
         sys.exit(_demo(arguments))
-    except InterfaceError as error:
+    except (InterfaceError, OSError) as error:
         sys.exit(f"demo: {error}")
     except KeyboardInterrupt:
         sys.exit(130)
+
+
+def _leave(number: int, _: object) -> None:
+    """Leaves by way of all `with` blocks, which no second signal is to cut short."""
+    for each in ENDINGS:
+        signal.signal(each, signal.SIG_IGN)
+    sys.exit(128 + number)
 
 
 def _arguments() -> argparse.Namespace:
@@ -111,9 +125,9 @@ class _Example:
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGINT)
             try:
-                self._process.wait(30.0)
+                self._process.wait(STOP_TIMEOUT_S)
             except subprocess.TimeoutExpired:
-                os.killpg(self._process.pid, signal.SIGKILL)
+                kill_with_children(self._process)
 
     def _wait_until_moving(self) -> None:
         """Waits until the arm gets targets, by when everything else is up."""

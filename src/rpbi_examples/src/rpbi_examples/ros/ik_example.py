@@ -26,7 +26,7 @@ HOME = {"lwr_arm_1_joint": 0.52, "lwr_arm_3_joint": -1.57, "lwr_arm_5_joint": 1.
 """Where the search begins [rad]; other joints at 0."""
 APPROACH_S = 5.0
 """Time for the way to the figure [s]."""
-WAYPOINTS = 8
+WAYPOINTS = 16
 """How many a round has, where the trajectory is planned as a whole."""
 WHOLE_TRAJECTORIES = "trajectory"
 

@@ -97,16 +97,19 @@ class Recorder:
         """Starts recording and returns when everything that is published from now on will be recorded.
 
         Raises:
-            RecordingError: If there is no master, the recorder ends or cannot write, or does not subscribe
-                in time.
+            RecordingError: If there is no master or it ends, the bag cannot be written, or the recorder ends or
+                does not subscribe in time.
             MissingDependency: If `rosbag record` is not installed.
         """
         if self.is_running:
             raise RecordingError(self.path, "is going on already")
         if not rosgraph.is_master_online():
             raise RecordingError(self.path, f"no ROS master at {rosgraph.get_master_uri()}")
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        self.path.unlink(missing_ok=True)  # so that it cannot be taken for the new one
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self.path.unlink(missing_ok=True)  # so that it cannot be taken for the new one
+        except OSError as error:
+            raise RecordingError(self.path, f"cannot be written: {error}") from None
         self._output = tempfile.TemporaryFile()
         self._process = subprocess.Popen(self._command(), stdout=self._output, stderr=subprocess.STDOUT)
         try:
@@ -156,8 +159,12 @@ class Recorder:
             if not self.is_running:
                 raise RecordingError(self.path, f"the recorder ended at once{self._last_words()}")
             self._raise_if_not_writing()
-            missing = unsubscribed(self._node, self.topics)
-            silent = [] if missing else unconnected(self._node, self.topics)
+            try:
+                missing = unsubscribed(self._node, self.topics)
+                silent = [] if missing else unconnected(self._node, self.topics)
+            except OSError as error:
+                uri = rosgraph.get_master_uri()
+                raise RecordingError(self.path, f"the ROS master at {uri} does not answer any more: {error}") from None
             if not missing and not silent:
                 return
             if time.monotonic() > deadline:

@@ -1,0 +1,94 @@
+"""What fails while a world runs, is reset or changes leaves the node and all of the rest there."""
+
+from __future__ import annotations
+
+import os
+import threading
+from pathlib import Path
+
+from camera_world import CAMERA, box_world
+from mobile_base import mobile_base
+from node_world import Rosout, add, main_config, objects, registrations, remove
+from ros_system import wait_until
+from sensor_msgs.msg import Image, JointState
+from std_srvs.srv import Trigger
+from worlds import box, iiwa
+
+from custom_ros_tools.srv import SetString
+from ros_pybullet_interface.msg import PybulletObject
+from ros_pybullet_interface.srv import RobotInfo
+
+FAULTY = str(Path(__file__).resolve().parents[2] / "sim" / "rpbi")
+
+
+def test_a_body_that_cannot_tell_its_state_stops_the_simulation_and_not_the_node(ros, tmp_path):
+    rosout = Rosout(ros)
+    config = main_config(tmp_path, state_hash_hz=10)
+    config["objects"] = [ros.write_yaml("thing.yaml", {"name": "thing", "type": "faulty_lab:Thing"})]
+    path = os.pathsep.join((os.environ["PYTHONPATH"], FAULTY))
+    process = ros.simulator(config, use_sim_time=True, PYTHONPATH=path)
+    lost = {"name": "lost", "type": "faulty_lab:Thing", "fails": "motion_state"}
+    assert add(ros, PybulletObject.DYNAMIC, lost).success
+    wait_until(lambda: rosout.logs("simulation stopped: lost"), "it stands still and says why")
+    assert set(objects(ros)) == {"thing", "lost"}
+    assert remove(ros, "lost").success
+    assert ros.call("/rpbi/start", Trigger).success
+    assert ros.call("/rpbi/stop", Trigger).success, "it went on"
+    assert process.poll() is None
+    assert len(rosout.logs("simulation stopped: lost")) == 1, "told once, not at every pass"
+
+
+def test_a_name_that_is_used_again_in_a_world_that_stands_still_is_seen_as_what_it_is_now(ros, placed):
+    rosout = Rosout(ros)
+    config = box_world(ros, rgbd_sensor=CAMERA, setAdditionalSearchPath="pybullet_data_path")
+    ros.simulator(config, use_sim_time=True)
+    first = ros.listen("/rpbi/camera/colour/image", Image)
+    assert add(ros, PybulletObject.ROBOT, iiwa("thing")).success
+    seen = len(first.messages)
+    first.wait_for(seen + 3, 60.0)  # the arm is in the last picture
+    assert ros.call("/rpbi/stop", Trigger).success
+    assert remove(ros, "thing").success
+    assert add(ros, PybulletObject.DYNAMIC, box("thing", basePosition=[0.4, 0.0, 0.1])).success
+    second = ros.listen("/rpbi/camera/segmentation", Image)
+    second.wait_for(1, 30.0)
+    assert not rosout.logs("the renderer ended")
+
+
+def test_services_of_a_robot_never_answer_that_it_is_unknown_because_of_a_reset(ros, tmp_path):
+    ros.simulator(main_config(tmp_path, robots=(iiwa(),)), use_sim_time=True)
+    over = threading.Event()
+    answers = []
+
+    def ask():
+        while not over.is_set():
+            answers.append(ros.call("/rpbi/iiwa/set_control_mode", SetString, "POSITION_CONTROL").message)
+
+    asking = threading.Thread(target=ask)
+    asking.start()
+    for _ in range(20):
+        assert ros.call("/rpbi/reset", Trigger).success
+    over.set()
+    asking.join(20.0)
+    assert len(answers) > 20
+    assert not [answer for answer in answers if "unknown" in answer]
+
+
+def test_what_a_reset_could_not_load_is_gone_and_can_be_added_again(ros, tmp_path):
+    config = mobile_base(tmp_path)
+    name, urdf = config["name"], tmp_path / "mobile_base.urdf"
+    ros.simulator(main_config(tmp_path, robots=(config, iiwa())), use_sim_time=True)
+    before = registrations()
+    text = urdf.read_text()
+    urdf.unlink()
+    answer = ros.call("/rpbi/reset", Trigger)
+    assert not answer.success and "mobile_base.urdf" in answer.message
+    assert set(objects(ros)) == {"iiwa"}
+    assert not [each for _, each in registrations() if f"/rpbi/{name}/" in each]
+    urdf.write_text(text)
+    assert ros.call("/rpbi/start", Trigger).success
+    answer = add(ros, PybulletObject.ROBOT, config)
+    assert answer.success, answer.message
+    assert ros.call(f"/rpbi/{name}/robot_info", RobotInfo).robot_name == name
+    ros.listen(f"/rpbi/{name}/joint_states", JointState).wait_for(5)
+    assert ros.call("/rpbi/reset", Trigger).success
+    wait_until(lambda: registrations() == before, "all is as it was")

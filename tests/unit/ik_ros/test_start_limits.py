@@ -1,0 +1,24 @@
+"""Starts outside limits are brought in, and told of once."""
+
+from __future__ import annotations
+
+import logging
+
+from ik_ros.limits import Limits
+from ik_ros.start_limits import StartLimits
+
+
+def test_each_joint_is_told_of_once_however_often_it_comes_back(caplog):
+    starts = StartLimits(("a", "b"), Limits((-1.0, -1.0), (1.0, 1.0), (False, False)))
+    with caplog.at_level(logging.WARNING, "ik_ros"):
+        for start, inside in [
+            ((2.0, 0.0), [1.0, 0.0]),
+            ((0.5, 0.0), [0.5, 0.0]),
+            ((3.0, 0.0), [1.0, 0.0]),
+            ((0.0, -2.0), [0.0, -1.0]),
+            ((2.0, -2.0), [1.0, -1.0]),
+            ((2.0, 0.0), [1.0, 0.0]),
+        ]:
+            assert starts.bring_in(start) == inside
+    told = "the start is outside limits and is brought in: "
+    assert [record.getMessage() for record in caplog.records] == [told + "'a' 2", told + "'b' -2"]
