@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger
 from worlds import box, iiwa
 
 from custom_ros_tools.srv import SetString
-from ros_pybullet_interface.msg import PybulletObject
+from ros_pybullet_interface.msg import PybulletObject, SimulationState
 from ros_pybullet_interface.srv import RobotInfo
 
 FAULTY = str(Path(__file__).resolve().parents[2] / "sim" / "rpbi")
@@ -26,6 +26,7 @@ def test_a_body_that_cannot_tell_its_state_stops_the_simulation_and_not_the_node
     config = main_config(tmp_path, state_hash_hz=10)
     config["objects"] = [ros.write_yaml("thing.yaml", {"name": "thing", "type": "faulty_lab:Thing"})]
     path = os.pathsep.join((os.environ["PYTHONPATH"], FAULTY))
+    ros.listen("/rpbi/state", SimulationState)  # so that somebody wants the hash
     process = ros.simulator(config, use_sim_time=True, PYTHONPATH=path)
     lost = {"name": "lost", "type": "faulty_lab:Thing", "fails": "motion_state"}
     assert add(ros, PybulletObject.DYNAMIC, lost).success
