@@ -352,3 +352,12 @@ def test_talos_keeps_its_balance_when_the_target_is_out_of_reach():
     assert not solution.success
     assert "'reach' is off by" in solution.message and "foot" not in solution.message
     assert "balance" not in solution.message
+
+
+def test_joints_that_do_not_move_are_passed_over_as_joint_states_have_them_too():
+    solver = make("{rpbi_examples}/robots/kuka_lwr.urdf", "costs: [{name: stay, type: closeness}]")
+    assert "base_joint" not in solver.joint_names
+    start = {"lwr_arm_1_joint": 0.3, "base_joint": 0.0}
+    assert solver.solve(IKProblem(start=start, previous=(start | dict.fromkeys(solver.joint_names, 0.1),))).success
+    with pytest.raises(UnknownNameError, match="base_jont"):
+        solver.solve(IKProblem(start={"base_jont": 0.0}))

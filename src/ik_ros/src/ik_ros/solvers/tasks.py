@@ -107,8 +107,7 @@ class TasksSolver(Solver):
     def _begin(self, problem: IKProblem, start: np.ndarray) -> None:
         """Tells all tasks what the problem wants of them."""
         for solution in problem.previous:
-            for name in solution:
-                self.tasks.robot.joint_id(name)
+            self.tasks.robot.moving(solution)
         for name in problem.goals:
             if name not in self.tasks.parts:
                 raise UnknownNameError("task", name, self._names)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -65,6 +65,7 @@ class Robot:
         for name in self.all_joints:
             if types[name] not in ("revolute", "continuous", "prismatic"):
                 raise ConfigError([Problem(urdf_path, name, f"expected a joint of one axis, got a {types[name]} one")])
+        self._still = frozenset(types) - frozenset(self.all_joints)
         self.links = tuple(frame.name for frame in self.model.frames if frame.type == pin.BODY)
         self.joint_names = tuple(joints) or self.all_joints
         ids = [self.joint_id(name) for name in self.joint_names]
@@ -92,6 +93,17 @@ class Robot:
         if name not in self.all_joints:
             raise UnknownNameError("joint", name, self.all_joints)
         return int(self.model.getJointId(name))
+
+    def moving(self, names: Iterable[str]) -> list[str]:
+        """Returns those joints that move; fixed ones, and those that mimic others, do not by themselves.
+
+        Raises:
+            UnknownNameError: If there is no such joint.
+        """
+        known = [name for name in names if name not in self._still]
+        for name in known:
+            self.joint_id(name)
+        return known
 
     def index(self, name: str) -> int:
         """Returns where a joint is among the n.
@@ -135,13 +147,15 @@ class Robot:
     def configuration(self, positions: Mapping[str, float]) -> np.ndarray:
         """Returns the configuration with some joints at given positions, and the others in the middle of their limits.
 
+        Joints that do not move, which joint states may have too, are passed over.
+
         Raises:
             UnknownNameError: If a joint is not known.
         """
         q = pin.neutral(self.model)
         q[self._in_q] = self.limits.middle
-        for name, position in positions.items():
-            q[self.model.joints[self.joint_id(name)].idx_q] = position
+        for name in self.moving(positions):
+            q[self.model.joints[self.joint_id(name)].idx_q] = positions[name]
         return q
 
     def positions(self, q: np.ndarray) -> np.ndarray:
