@@ -154,8 +154,8 @@ class ObjectTraffic:
         """Opens the topics and services of a body."""
         body = self._world.bodies[name]
         self._open_bodies.add(name)
+        self._outlets.open(name)  # first, as it notes what is to be forgotten if one of the others fails
         self._inputs.open(name, body.inputs())
-        self._outlets.open(name)
         self._endpoints.open(body)
 
     def _close(self, name: str) -> None:
