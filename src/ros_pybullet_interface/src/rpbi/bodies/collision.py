@@ -6,7 +6,8 @@ from pydantic import Field
 
 from ..client import Client
 from ..pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ObjectTf
-from ..sensors.contacts_config import ContactsConfig, contact_sensors
+from ..sensors.contact_arrows import contact_sensors
+from ..sensors.contacts_config import ContactsConfig
 from ..sensors.sensor import Sensor
 from .body_config import BodyConfig
 from .shape_object import ShapeObject

@@ -9,7 +9,8 @@ from custom_ros_tools.schema import HzOrOff, Position, Positive, Quat
 from ..client import Client
 from ..pose import Pose
 from ..pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ResetBaseVelocity
-from ..sensors.contacts_config import ContactsConfig, contact_sensors
+from ..sensors.contact_arrows import contact_sensors
+from ..sensors.contacts_config import ContactsConfig
 from ..sensors.link_pose import LinkPoseSensor
 from ..sensors.sensor import Sensor
 from .body_config import BodyConfig

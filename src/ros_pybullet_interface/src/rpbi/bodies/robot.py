@@ -21,7 +21,7 @@ from ..inputs import Input
 from ..joint_model import JointTarget
 from ..limit_reports import LimitReports
 from ..pose import Pose
-from ..sensors.contacts_config import contact_sensors
+from ..sensors.contact_arrows import contact_sensors
 from ..sensors.force_torque import ForceTorqueSensor
 from ..sensors.joint_state import JointStateSensor
 from ..sensors.sensor import Sensor

@@ -17,7 +17,8 @@ from ..pose import Pose
 from ..pybullet_models import LoadURDF
 from ..pybullet_soft_models import AnchorEntry, ChangeVisualShape, CreateSoftBodyAnchor, LoadSoftBody
 from ..samples import BodyState
-from ..sensors.contacts_config import ContactsConfig, contact_sensors
+from ..sensors.contact_arrows import contact_sensors
+from ..sensors.contacts_config import ContactsConfig
 from ..sensors.sensor import Sensor
 from ..sensors.surface import SurfaceSensor
 from ..twist import Twist

@@ -14,7 +14,8 @@ from custom_ros_tools.schema import HzOrOff
 from ..client import Client
 from ..inputs import Input, PoseInput
 from ..pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity
-from ..sensors.contacts_config import ContactsConfig, contact_sensors
+from ..sensors.contact_arrows import contact_sensors
+from ..sensors.contacts_config import ContactsConfig
 from ..sensors.link_pose import LinkPoseSensor
 from ..sensors.sensor import Sensor
 from ..urdf import deformable_meshes

@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, Hz, HzOrOff, Positive, Unit
-
-from .contact_arrows import ContactArrowsSensor
-from .contacts import ContactsSensor
-from .sensor import Sensor
-
-if TYPE_CHECKING:
-    from ..bodies.body import Body
 
 
 class ContactsConfig(ConfigModel):
@@ -24,13 +17,3 @@ class ContactsConfig(ConfigModel):
     arrow_metres_per_newton: Annotated[Positive, Unit("m/N")] = Field(
         0.01, description="Length of an arrow by the force that it stands for."
     )
-
-
-def contact_sensors(body: Body, config: ContactsConfig | None) -> tuple[Sensor, ...]:
-    """Returns the sensors of a body's contacts; none if they are not asked for."""
-    if config is None:
-        return ()
-    contacts = ContactsSensor(body, config.hz)
-    if not config.arrows_hz:
-        return (contacts,)
-    return (contacts, ContactArrowsSensor(contacts, config.arrows_hz, config.arrow_metres_per_newton))
