@@ -11,8 +11,8 @@ from ros_system import wait_until
 from worlds import write_world
 
 from ros_pybullet_interface.msg import WorldCommands
-from rpbi.command_log import WorldCommand
-from rpbi.ros.command_topic import CommandOutlet
+from rpbi.engine.command_log import WorldCommand
+from rpbi.ros.publishers.commands import CommandOutlet
 from rpbi.world import World
 
 

@@ -12,8 +12,8 @@ import pytest
 from worlds import iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, PhysicsError, UnknownNameError
+from rpbi.geometry import Pose
 from rpbi.kinematics import IKProblem, Kinematics
-from rpbi.pose import Pose
 from rpbi.world import World
 
 DATA = Path(pybullet_data.getDataPath())

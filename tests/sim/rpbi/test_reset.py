@@ -10,8 +10,8 @@ import scripted_session as script
 from worlds import FLOOR, ball, iiwa, write_world
 
 from custom_ros_tools.errors import InterfaceError, PhysicsError, UnknownNameError
-from rpbi.actions import TimedGoal
-from rpbi.joint_model import JointTarget
+from rpbi.engine.actions import TimedGoal
+from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
 
 

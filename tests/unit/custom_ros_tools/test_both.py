@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from custom_ros_tools.both import both
-from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.errors import ConfigError, Problem, both
 
 
 def _faulty(name: str) -> None:

@@ -9,8 +9,15 @@ import pytest
 from jsonschema import Draft7Validator
 from pydantic import BeforeValidator, Field
 
-from custom_ros_tools.json_schema import explained, json_schema, schema_text, unit_in, without_required, yaml_text
 from custom_ros_tools.schema import AlsoTakes, ConfigModel, Hz, ListOf, Name, Position, PositiveMetres, Switch
+from custom_ros_tools.schema.json_schema import (
+    explained,
+    json_schema,
+    schema_text,
+    unit_in,
+    without_required,
+    yaml_text,
+)
 
 
 class Inner(ConfigModel):

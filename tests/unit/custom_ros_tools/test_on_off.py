@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from custom_ros_tools.on_off import OnOff
+from custom_ros_tools.toggle import OnOff
 
 
 def test_each_switch_acts_once() -> None:

@@ -6,9 +6,8 @@ import pytest
 
 from custom_ros_tools.errors import UnknownNameError
 from ik_ros.continuity import Continuity, ContinuityConfig
-from ik_ros.problem import IKProblem
+from ik_ros.problem import IKProblem, IKSolution
 from ik_ros.problem_stream import LONGEST_PERIOD_S, ProblemStream
-from ik_ros.solution import IKSolution
 from ik_ros.solver import Solver
 
 JOINTS = ("shoulder", "elbow")

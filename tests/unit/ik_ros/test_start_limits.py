@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from ik_ros.limits import Limits
-from ik_ros.start_limits import StartLimits
+from ik_ros.limits import Limits, StartLimits
 
 
 def test_each_joint_is_told_of_once_however_often_it_comes_back(caplog):

@@ -7,7 +7,7 @@ import yaml
 from worlds import box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.instance import parse_instance
+from rpbi.config.object_entry import parse_instance
 from rpbi.world import World
 
 

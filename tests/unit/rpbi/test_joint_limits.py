@@ -6,9 +6,9 @@ import numpy as np
 import pybullet
 import pytest
 
-from rpbi.joint_model import Joint
 from rpbi.kinematics import IKProblem
 from rpbi.kinematics.joint_limits import JointLimits
+from rpbi.urdf.joints import Joint
 
 TURN = 2.0 * math.pi
 

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from rpbi.mailbox import ClosedError, Mailbox
+from rpbi.engine.mailbox import ClosedError, Mailbox
 
 
 def test_the_newest_value_of_a_slot_wins_and_is_taken_once():

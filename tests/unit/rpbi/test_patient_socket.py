@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from rpbi.ros.patient_socket import PatientSocket
+from rpbi.ros.publishers.buffered_socket import PatientSocket
 
 
 @pytest.fixture

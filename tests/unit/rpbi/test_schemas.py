@@ -15,12 +15,12 @@ import yaml
 from jsonschema import Draft7Validator
 
 from custom_ros_tools.errors import ConfigError
-from custom_ros_tools.json_schema import Schema, explained, json_schema
 from custom_ros_tools.node_configs import NODE_CONFIGS
+from custom_ros_tools.schema.json_schema import Schema, explained, json_schema
 from rpbi.bodies import BODY_TYPES
-from rpbi.config import load_object, load_world, load_world_dict, type_of
-from rpbi.rgbd_config import RgbdSensorConfig
-from rpbi.schemas import kind_of, schemas, sections
+from rpbi.config.loading import load_object, load_world, load_world_dict, type_of
+from rpbi.config.schemas import kind_of, schemas, sections
+from rpbi.config.sensors import RgbdSensorConfig
 
 SRC = Path(__file__).resolve().parents[3] / "src"
 SCHEMAS = schemas()

@@ -8,12 +8,10 @@ import pybullet
 import pytest
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.control.course import checked_courses
-from rpbi.control.tolerances import resolved_tolerances
-from rpbi.control.trajectory import Knot, Trajectory
-from rpbi.control.trajectory_config import JointTrajectoryControllerConfig, trajectory_misfits
-from rpbi.control.trajectory_motion import stopping
-from rpbi.control.trajectory_request import (
+from rpbi.control.trajectories.config import JointTrajectoryControllerConfig, trajectory_misfits
+from rpbi.control.trajectories.course import checked_courses
+from rpbi.control.trajectories.motion import stopping
+from rpbi.control.trajectories.request import (
     ErrorCode,
     GoalTolerances,
     JointTolerance,
@@ -21,7 +19,9 @@ from rpbi.control.trajectory_request import (
     TrajectoryRequest,
     Waypoint,
 )
-from rpbi.joint_model import Joint
+from rpbi.control.trajectories.tolerances import resolved_tolerances
+from rpbi.control.trajectories.trajectory import Knot, Trajectory
+from rpbi.urdf.joints import Joint
 
 INF = math.inf
 

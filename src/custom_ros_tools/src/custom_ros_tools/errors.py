@@ -6,8 +6,9 @@ Each takes data and writes its own sentence, so that the wording lives in one pl
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 
 def closest(name: str, known: Iterable[str]) -> str | None:
@@ -132,3 +133,29 @@ class PhysicsError(InterfaceError):
     def __init__(self, message: str) -> None:
         self.message = message
         super().__init__(message)
+
+
+First = TypeVar("First")
+Second = TypeVar("Second")
+
+
+def both(first: Callable[[], First], second: Callable[[], Second]) -> tuple[First, Second]:
+    """Return what two functions return, after both were called.
+
+    Args:
+        first: Reads one part of a configuration.
+        second: Reads another one.
+
+    Raises:
+        ConfigError: If they raise it; it has the problems of both.
+    """
+    results: list[Any] = []
+    problems: list[Problem] = []
+    for read in (first, second):
+        try:
+            results.append(read())
+        except ConfigError as error:
+            problems += error.problems
+    if problems:
+        raise ConfigError(problems)
+    return results[0], results[1]

@@ -8,8 +8,7 @@ import time
 import numpy as np
 
 from .continuity import Continuity
-from .problem import IKProblem, JointPositions
-from .solution import IKSolution
+from .problem import IKProblem, IKSolution, JointPositions
 from .solver import Solver
 
 LONGEST_PERIOD_S = 0.1

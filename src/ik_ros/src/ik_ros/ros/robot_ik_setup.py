@@ -7,18 +7,17 @@ from sensor_msgs.msg import JointState
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.joint_values import JointValues
-from custom_ros_tools.node_parameters import StartParameters
-from custom_ros_tools.on_off import OnOff
-from custom_ros_tools.ros.parameters import private_config, private_parameters
-from custom_ros_tools.ros.throttle import ThrottledWarning
-from custom_ros_tools.ros.toggle_service import ToggleService
-from custom_ros_tools.ros.wall_timer import WallTimer
+from custom_ros_tools.node_configs import StartParameters
+from custom_ros_tools.ros.lifecycle.parameters import private_config, private_parameters
+from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from custom_ros_tools.ros.lifecycle.wall_timer import WallTimer
+from custom_ros_tools.ros.services import ToggleService
+from custom_ros_tools.toggle import OnOff
+from ik_ros.node_configs import RobotIKConfig, TargetParameters
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
 from ros_pybullet_interface.srv import RobotInfo
 
-from ..robot_ik_config import RobotIKConfig
-from ..setup_parameters import TargetParameters
-from .fresh_tf import FreshTf
+from .tf import FreshTf
 
 TOPICS = "ik/setup/pybullet"
 LISTS = ("lowerLimits", "upperLimits", "jointRanges", "resetPoses", "jointDamping")

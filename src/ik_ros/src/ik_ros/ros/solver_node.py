@@ -13,13 +13,18 @@ from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
-from custom_ros_tools.on_off import OnOff
-from custom_ros_tools.ros.run_node import run_node
-from custom_ros_tools.ros.throttle import ThrottledWarning
-from custom_ros_tools.ros.toggle_service import ToggleService
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from custom_ros_tools.ros.services import ToggleService
+from custom_ros_tools.toggle import OnOff
+from ik_ros.continuity import Continuity
+from ik_ros.lookup import make_solver
 from ik_ros.msg import IKProblem as IKProblemMessage
 from ik_ros.msg import IKSolution as IKSolutionMessage
 from ik_ros.msg import TracIKProblem
+from ik_ros.node_configs import SolverNodeParameters
+from ik_ros.problem import IKProblem, IKSolution
+from ik_ros.problem_stream import ProblemStream
 from ik_ros.srv import (
     JointNames,
     JointNamesResponse,
@@ -31,15 +36,9 @@ from ik_ros.srv import (
     TracIKResponse,
 )
 
-from ..continuity import Continuity
-from ..lookup import make_solver
-from ..problem import IKProblem
-from ..problem_stream import ProblemStream
-from ..solution import IKSolution
-from ..solver_node_parameters import SolverNodeParameters
-from .base_frame import BaseFrame
 from .messages import pose_message, problem_in, problem_in_trac_ik, solution_message, trajectory_message
 from .solver_argument import solver_argument
+from .tf import BaseFrame
 
 QUEUE_SIZE = 10
 PROBLEMS: dict[str, tuple[type[genpy.Message], Callable[[genpy.Message], IKProblem]]] = {

@@ -9,11 +9,10 @@ from collections.abc import Iterator, Sequence
 import PyKDL
 
 from custom_ros_tools.schema import Count
-
-from ..chain_solver import ChainConfig, ChainSolver
-from ..descent import descend
-from ..goal import Goal
-from ..problem import IKProblem
+from ik_ros.chain.descent import descend
+from ik_ros.chain.goal import Goal
+from ik_ros.chain.solver import ChainConfig, ChainSolver
+from ik_ros.problem import IKProblem
 
 ITERATIONS = 60
 """Most iterations from one start; where a solution is, some 20 do."""

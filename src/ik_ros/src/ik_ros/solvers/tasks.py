@@ -10,12 +10,10 @@ import numpy as np
 
 from custom_ros_tools.errors import MissingDependency, UnknownNameError
 from custom_ros_tools.schema import KeyedError
+from ik_ros.limits import StartLimits
+from ik_ros.problem import IKProblem, IKSolution
+from ik_ros.solver import Solver
 from rpbi.kinematics.residual import Residual
-
-from ..problem import IKProblem
-from ..solution import IKSolution
-from ..solver import Solver
-from ..start_limits import StartLimits
 
 try:
     import daqp  # noqa: F401
@@ -23,11 +21,10 @@ try:
 except ImportError as error:
     raise MissingDependency(error.name or "pinocchio", "./rpbi setup ik") from None
 
-from ..tasks.descent import Descent, Tried
-from ..tasks.formulation import Formulation, TaskSet
-from ..tasks.found import Found
-from ..tasks.frame_task import FrameTask
-from ..tasks.placement import from_base, to_se3
+from ik_ros.formulation.descent import Descent, Found, Tried
+from ik_ros.formulation.formulation import Formulation, TaskSet
+from ik_ros.formulation.frame_task import FrameTask
+from ik_ros.formulation.robot import from_base, to_se3
 
 AIM = 0.1
 """What is required is aimed at with a tenth of the tolerance, so that solutions lie well within."""

@@ -12,11 +12,10 @@ from functools import lru_cache
 import numpy as np
 
 from custom_ros_tools.errors import MissingDependency
+from ik_ros.chain.goal import Goal
+from ik_ros.problem import IKProblem, IKSolution, JointTrajectory, Waypoint
 from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
-from ..goal import Goal
-from ..problem import IKProblem, Waypoint
-from ..solution import IKSolution, JointTrajectory
 from .kdl import KdlSolver
 
 try:
@@ -24,12 +23,11 @@ try:
 except ImportError:
     raise MissingDependency("casadi", "./rpbi setup mpc") from None
 
-from ..trajectory.config import MOST_INTERVALS, MOST_WAYPOINTS, TrajectoryConfig
-from ..trajectory.forward_kinematics import ForwardKinematics, rotation_matrix
-from ..trajectory.obstacles import Obstacles
-from ..trajectory.program import Program, Question
-from ..trajectory.rates import largest_rates
-from ..trajectory.spline import Spline
+from ik_ros.trajectory.config import MOST_INTERVALS, MOST_WAYPOINTS, TrajectoryConfig, largest_rates
+from ik_ros.trajectory.forward_kinematics import ForwardKinematics, rotation_matrix
+from ik_ros.trajectory.obstacles import Obstacles
+from ik_ros.trajectory.program import Program, Question
+from ik_ros.trajectory.spline import Spline
 
 MOST_SAMPLES = 100_000
 KEPT_PROGRAMS = 4

@@ -8,10 +8,9 @@ from typing import Literal
 import numpy as np
 
 from custom_ros_tools.schema import ListOf, Position
-
-from ..problem import IKProblem
-from .robot import Robot
-from .task import Rows, Task, TaskConfig
+from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.task import Rows, Task, TaskConfig
+from ik_ros.problem import IKProblem
 
 
 class ComConfig(TaskConfig):

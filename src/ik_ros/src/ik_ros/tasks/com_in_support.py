@@ -9,9 +9,8 @@ from pydantic import Field
 
 from custom_ros_tools.errors import UnknownNameError
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Position
-
-from .robot import Robot
-from .task import Rows, Task, TaskConfig
+from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.task import Rows, Task, TaskConfig
 
 
 class ComInSupportConfig(TaskConfig):

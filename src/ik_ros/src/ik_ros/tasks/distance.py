@@ -7,11 +7,9 @@ from pydantic import Field
 
 from custom_ros_tools.errors import UnknownNameError
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Text
-
-from .clearance import Placed, clearance
-from .robot import Robot
-from .robot_shape import RobotShape
-from .task import Rows, Task, TaskConfig
+from ik_ros.formulation.clearance import Placed, RobotShape, clearance
+from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.task import Rows, Task, TaskConfig
 
 NEAR_M = 0.3
 """What is farther apart than asked by more than this is not looked at in this step [m]."""

@@ -10,11 +10,10 @@ import pinocchio as pin
 
 from custom_ros_tools.errors import UnknownNameError
 from custom_ros_tools.schema import KeyedError, Position, Text, Vec3
+from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.task import Rows, Task, TaskConfig
+from ik_ros.problem import IKProblem
 from rpbi.kinematics.residual import Residual
-
-from ..problem import IKProblem
-from .robot import Robot
-from .task import Rows, Task, TaskConfig
 
 NEAREST_M = 1e-6
 """What is nearer has no direction [m]."""

@@ -9,14 +9,12 @@ from typing import Any, ClassVar
 import pybullet
 
 from custom_ros_tools.errors import PhysicsError
+from rpbi.engine.client import Client
+from rpbi.engine.inputs import Input
+from rpbi.geometry import Pose, Twist, cross, minus, plus
+from rpbi.samples import BodyState
+from rpbi.sensors.sensor import Sensor
 
-from ..client import Client
-from ..inputs import Input
-from ..pose import Pose
-from ..samples import BodyState
-from ..sensors.sensor import Sensor
-from ..twist import Twist
-from ..vectors import cross, minus, plus
 from .body_config import BodyConfig
 
 

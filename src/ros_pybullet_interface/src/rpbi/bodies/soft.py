@@ -10,23 +10,22 @@ from pydantic import Field, model_validator
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, Problem
 from custom_ros_tools.schema import HzOrOff, KeyedError, ListOf
+from rpbi.config.pybullet_models import LoadURDF
+from rpbi.config.pybullet_soft_models import AnchorEntry, ChangeVisualShape, CreateSoftBodyAnchor, LoadSoftBody
+from rpbi.config.sensors import ContactsConfig
+from rpbi.engine.client import Client
+from rpbi.geometry import Pose, Twist
+from rpbi.samples import BodyState
+from rpbi.sensors.contact_arrows import contact_sensors
+from rpbi.sensors.sensor import Sensor
+from rpbi.sensors.surface import SurfaceSensor
+from rpbi.urdf.document import deformable_meshes
+from rpbi.urdf.loading import load_urdf
 
-from ..client import Client
-from ..dynamics import link_index
-from ..pose import Pose
-from ..pybullet_models import LoadURDF
-from ..pybullet_soft_models import AnchorEntry, ChangeVisualShape, CreateSoftBodyAnchor, LoadSoftBody
-from ..samples import BodyState
-from ..sensors.contact_arrows import contact_sensors
-from ..sensors.contacts_config import ContactsConfig
-from ..sensors.sensor import Sensor
-from ..sensors.surface import SurfaceSensor
-from ..twist import Twist
-from ..urdf import deformable_meshes
 from .body import Body
 from .body_config import BodyConfig
-from .soft_mesh_faults import soft_mesh_faults
-from .urdf_loading import load_urdf
+from .dynamics import link_index
+from .mesh_checks import soft_mesh_faults
 
 
 class SoftObjectConfig(BodyConfig):

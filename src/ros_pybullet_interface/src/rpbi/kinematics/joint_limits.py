@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..joint_model import Joint
-from .ik_problem import IKProblem
+from rpbi.urdf.joints import Joint
+
+from .problem import IKProblem
 
 TURN = 2.0 * np.pi
 

@@ -9,15 +9,12 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 import pybullet
 
-from .chain import Chain
-from .damped_least_squares import DampedLeastSquares
-from .ik_problem import IKProblem
+from .chain import Chain, Target
 from .joint_limits import TURN, JointLimits
+from .methods import DampedLeastSquares, SelectivelyDampedLeastSquares, Step
 from .posture import towards_posture
+from .problem import IKProblem
 from .residual import POSITION_TOLERANCE_M, Residual
-from .selectively_damped_least_squares import SelectivelyDampedLeastSquares
-from .step import Step
-from .target import Target
 
 RANDOM_STARTS = 50
 """How many random starts follow those that the problem names."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..camera import depth_in_metres
+from .camera import depth_in_metres
 from .channel import Channel
 from .egl import EglError
 from .frame import NO_DEMAND, Camera, Demand, Frame, Sink

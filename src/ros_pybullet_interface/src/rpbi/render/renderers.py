@@ -10,12 +10,13 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from ..camera import Intrinsics, view_matrix
-from ..client import Client
-from ..pose import Pose
+from rpbi.engine.client import Client
+from rpbi.geometry import Pose
+from rpbi.render.shapes.transparency import GlassyShape
+
+from .camera import Intrinsics, view_matrix
 from .egl import Egl, EglError
 from .frame import Camera
-from .transparency import GlassyShape
 
 log = logging.getLogger(__name__)
 

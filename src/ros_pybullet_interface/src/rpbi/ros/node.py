@@ -11,30 +11,65 @@ from typing import Any
 import pybullet
 import rospy
 
-from custom_ros_tools.errors import InterfaceError, PhysicsError
-from custom_ros_tools.ros.interrupts import leaving_ros_on_interrupt, wait_for_master
-from custom_ros_tools.ros.last_words import log_last_words, log_loss_of_master
-from custom_ros_tools.ros.logging_bridge import attach_logging
-from custom_ros_tools.ros.master_watch import MasterWatch
+from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, Problem
+from custom_ros_tools.ros.lifecycle.fatal_log import log_last_words, log_loss_of_master
+from custom_ros_tools.ros.lifecycle.interrupts import leaving_ros_on_interrupt, wait_for_master
+from custom_ros_tools.ros.lifecycle.kept_parameters import kept_parameters
+from custom_ros_tools.ros.lifecycle.logging_bridge import attach_logging
+from custom_ros_tools.ros.lifecycle.master_watch import MasterWatch
+from rpbi.bodies import BODY_TYPES
+from rpbi.config.asset_files import ROBOT_DESCRIPTION
+from rpbi.config.loading import load_world_dict
+from rpbi.ros.publishers.sample_publishers import SampleOutlets
+from rpbi.ros.publishers.status import FREE_RUNNING_CLOCK_HZ, ClockOutlet
+from rpbi.ros.publishers.world_markers import WorldMarkers
+from rpbi.ros.services.camera_services import CameraServices
+from rpbi.ros.services.dynamics_services import DynamicsServices
+from rpbi.ros.services.node_services import NodeServices
+from rpbi.ros.services.time_services import TimeServices
+from rpbi.ros.window.topics import WindowTopics
+from rpbi.urdf.document import write_description
+from rpbi.world import World
 
-from ..asset_files import ROBOT_DESCRIPTION
-from ..bodies import BODY_TYPES
-from ..config import load_world_dict
-from ..world import World
-from .camera_services import CameraServices
-from .dynamics_services import DynamicsServices
-from .frames import use_prefix
+from .headers import use_prefix
 from .initial_state import start_where_robots_are
-from .node_settings import config_parameter, robot_description_file, uses_simulated_time
-from .object_traffic import ObjectTraffic
+from .object_lifecycle import ObjectTraffic
 from .requests import Requests
-from .sample_outlets import SampleOutlets
-from .services import NodeServices
 from .simulation import Simulation
-from .status import FREE_RUNNING_CLOCK_HZ, ClockOutlet
-from .time_services import TimeServices
-from .window_topics import WindowTopics
-from .world_markers import WorldMarkers
+
+
+def config_parameter() -> dict[str, Any]:
+    """Returns the main configuration, `~config`.
+
+    Raises:
+        ConfigError: If there is none.
+    """
+    config = rospy.get_param("~config", None)
+    if config is None:
+        how = 'load it with <rosparam param="config" file="WORLD.yaml"/> inside the <node>'
+        raise ConfigError([Problem("~config", "", f"missing: expected the main configuration; {how}")])
+    return config
+
+
+def robot_description_file() -> str | None:
+    """Returns a file with the robot description of the parameter server, None if there is none."""
+    text = _parameter_above("robot_description", None)
+    return None if text is None else write_description(text)
+
+
+def uses_simulated_time() -> bool:
+    """Tells whether stamps are to be simulated time."""
+    return bool(_parameter_above("use_sim_time", False))
+
+
+def _parameter_above(name: str, default: Any) -> Any:
+    """Returns a parameter of this namespace or, failing that, of the nearest one around it."""
+    found = rospy.search_param(name)
+    if found is None:
+        return default
+    kept_parameters.keep(found)
+    return rospy.get_param(found)
+
 
 log = logging.getLogger(__name__)
 

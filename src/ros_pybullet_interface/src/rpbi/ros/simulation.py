@@ -9,15 +9,15 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 
 from custom_ros_tools.errors import InterfaceError
+from rpbi.engine.pacer import Pacer
+from rpbi.ros.publishers.commands import CommandOutlet
+from rpbi.ros.publishers.publishers import Outlet
+from rpbi.ros.publishers.state import StateOutlet
+from rpbi.ros.publishers.status import ClockOutlet, StatusOutlet
+from rpbi.ros.publishers.tick_publishers import TickOutlets
+from rpbi.world import World
 
-from ..pacer import Pacer
-from ..world import World
-from .command_topic import CommandOutlet
-from .outlets import Outlet
-from .state_topic import StateOutlet
-from .status import ClockOutlet, StatusOutlet
 from .step_burst import StepBurst
-from .tick_outlets import TickOutlets
 
 log = logging.getLogger(__name__)
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..samples import ContactArrowsSample
-from ..vectors import plus, scaled
+from rpbi.config.sensors import ContactsConfig
+from rpbi.geometry import plus, scaled
+from rpbi.samples import ContactArrowsSample
+
 from .contacts import ContactsSensor
-from .contacts_config import ContactsConfig
 from .sensor import Sensor
 
 if TYPE_CHECKING:
-    from ..bodies.body import Body
+    from rpbi.bodies.body import Body
 
 
 class ContactArrowsSensor(Sensor):
@@ -37,6 +38,7 @@ class ContactArrowsSensor(Sensor):
             for point in self._contacts.points(tick)
         )
         return ContactArrowsSample(self.name, tuple((start, end) for start, end in arrows if start != end))
+
 
 def contact_sensors(body: Body, config: ContactsConfig | None) -> tuple[Sensor, ...]:
     """Returns the sensors of a body's contacts; none if they are not asked for."""

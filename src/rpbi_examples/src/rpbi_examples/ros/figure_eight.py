@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from custom_ros_tools.on_off import OnOff
-from custom_ros_tools.ros.parameters import private_parameters
-from custom_ros_tools.ros.run_node import run_node
-from custom_ros_tools.ros.toggle_service import ToggleService
+from custom_ros_tools.ros.lifecycle.parameters import private_parameters
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.services import ToggleService
+from custom_ros_tools.toggle import OnOff
+from rpbi_examples.figure_eight import FigureEight
 
-from ..figure_eight import FigureEight
 from .moving_frame import NO_ROTATION, move_frame
 
 

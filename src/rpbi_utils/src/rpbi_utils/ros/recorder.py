@@ -21,7 +21,8 @@ from rosgraph.names import get_ros_namespace, resolve_name
 
 from custom_ros_tools.errors import MissingDependency
 from rpbi_utils.errors import RecordingError
-from rpbi_utils.ros.connections import unconnected, unsubscribed
+
+from .connections import unconnected, unsubscribed
 
 _POLL_S = 0.02
 _GRACE_S = 0.2  # for what was published just before the end and is on its way
