@@ -1,4 +1,4 @@
-"""A world is read from all of its files, and all faults of all files are told at once."""
+"""A world is read from all of its files, and all problems of all files are told at once."""
 
 from __future__ import annotations
 

@@ -6,9 +6,9 @@ Each takes data and writes its own sentence, so that the wording lives in one pl
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from typing import Any, TypeVar
 
 
 def closest(name: str, known: Iterable[str]) -> str | None:
@@ -54,7 +54,7 @@ class ConfigError(InterfaceError):
     """The author of the configuration has to change something.
 
     Args:
-        problems: All faults that were found, in the order of the files.
+        problems: All problems that were found, in the order of the files.
     """
 
     def __init__(self, problems: Sequence[Problem]) -> None:
@@ -135,27 +135,25 @@ class PhysicsError(InterfaceError):
         super().__init__(message)
 
 
-First = TypeVar("First")
-Second = TypeVar("Second")
+@contextmanager
+def collecting_problems() -> Iterator[Callable[[], AbstractContextManager[None]]]:
+    """Collects the problems of several parts of a configuration, so that all of them are reported at once.
 
-
-def both(first: Callable[[], First], second: Callable[[], Second]) -> tuple[First, Second]:
-    """Return what two functions return, after both were called.
-
-    Args:
-        first: Reads one part of a configuration.
-        second: Reads another one.
+    Yields:
+        What makes a context for each part: `with collecting_problems() as part`, then `with part(): ...` for each.
 
     Raises:
-        ConfigError: If they raise it; it has the problems of both.
+        ConfigError: At the end, if a part raised one; it has the problems of all.
     """
-    results: list[Any] = []
     problems: list[Problem] = []
-    for read in (first, second):
+
+    @contextmanager
+    def part() -> Iterator[None]:
         try:
-            results.append(read())
+            yield
         except ConfigError as error:
-            problems += error.problems
+            problems.extend(error.problems)
+
+    yield part
     if problems:
         raise ConfigError(problems)
-    return results[0], results[1]

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 
 
-class OnOff:
+class Toggle:
     """Keeps whether something is on, and refuses to switch it to what it is already.
 
     Args:

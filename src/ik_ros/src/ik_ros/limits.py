@@ -32,7 +32,7 @@ class Limits:
             for low, high in zip(lower, upper)
         )
 
-    def bring_in(self, q: Sequence[float], near: Sequence[float]) -> tuple[list[float], bool]:
+    def wrap_to_limits(self, q: Sequence[float], near: Sequence[float]) -> tuple[list[float], bool]:
         """Returns positions within the limits, and whether they are what was given but for whole turns and rounding.
 
         Args:
@@ -89,13 +89,13 @@ class StartLimits:
         self._limits = limits
         self._warned_of: set[str] = set()
 
-    def bring_in(self, start: Sequence[float]) -> list[float]:
+    def wrap_to_limits(self, start: Sequence[float]) -> list[float]:
         """Returns n positions within limits [rad or m].
 
         Args:
             start: n positions [rad or m].
         """
-        inside = self._limits.bring_in(start, start)[0]
+        inside = self._limits.wrap_to_limits(start, start)[0]
         joints = zip(self._joint_names, start, inside)
         outside = {name: asked for name, asked, used in joints if abs(asked - used) > LIMIT_ROUNDING}
         if not outside.keys() <= self._warned_of:

@@ -23,7 +23,7 @@ from custom_ros_tools.schema import (
     Text,
 )
 
-from .continuity import ContinuityConfig
+from .joint_rate_limiter import JointRateLimiterConfig
 
 
 class InteractiveTargetConfig(ConfigModel):
@@ -90,7 +90,9 @@ class SolverNodeParameters(StartParameters):
     """Private parameters of the node itself; all others are the solver's."""
 
     base_frame_id: str = Field("", description="TF frame of the solver's base; empty takes poses as they are.")
-    continuity: ContinuityConfig | None = Field(None, description="Keeps targets within the velocities of the joints.")
+    continuity: JointRateLimiterConfig | None = Field(
+        None, description="Keeps targets within the velocities of the joints."
+    )
 
 
 class TfToFloatArrayConfig(TargetParameters):

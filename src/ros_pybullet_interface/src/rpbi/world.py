@@ -194,12 +194,12 @@ class World:
             UnknownNameError: If there is no such input, or the value names something unknown.
             ValueError: If the value is refused, for instance because it is not finite.
         """
-        era = self.mailbox.era
+        generation = self.mailbox.generation
         inputs = self.inputs
         if slot not in inputs:
             raise UnknownNameError("input", slot, list(inputs))
         taken = inputs[slot]
-        self.mailbox.put(slot, taken.check(value), taken.merge, era)
+        self.mailbox.put(slot, taken.check(value), taken.merge, generation)
 
     @property
     def inputs(self) -> dict[str, Input]:

@@ -27,7 +27,7 @@ PATIENCE = 3
 """... and after so many such iterations the descent ends."""
 
 
-def descend(chain: Chain, goal: Goal, limits: Limits, start: Sequence[float]) -> list[float]:
+def levenberg_marquardt(chain: Chain, goal: Goal, limits: Limits, start: Sequence[float]) -> list[float]:
     """Goes from a start towards a goal, and never beyond limits.
 
     The method of Levenberg and Marquardt for how far the link is off beyond its tolerances. Joints that are at a limit

@@ -104,7 +104,7 @@ class ChainSolver(Solver):
             goal = Goal(problem)
             start = self._start(problem.start)
             finite = (q for q in self.find(problem, goal, start) if all(map(math.isfinite, q)))
-            found = [self.limits.bring_in(q, start)[0] for q in finite] or [start]
+            found = [self.limits.wrap_to_limits(q, start)[0] for q in finite] or [start]
             residuals = [self.residual(goal, q) for q in found]
         return IKSolution(
             success=residuals[0].size <= 1.0,
@@ -135,7 +135,7 @@ class ChainSolver(Solver):
             if name not in self.description.robot_joints:
                 raise UnknownNameError("joint", name, self.joint_names)
         middle = zip(self.joint_names, self.limits.middle)
-        return self._start_limits.bring_in([given.get(name, position) for name, position in middle])
+        return self._start_limits.wrap_to_limits([given.get(name, position) for name, position in middle])
 
     def _in_words(self, problem: IKProblem, goal: Goal, residual: Residual) -> str:
         with_angle = not goal.any_orientation

@@ -14,10 +14,10 @@ from rpbi.kinematics.residual import Residual
 from .formulation import Part
 from .joint_task import JointTask
 from .robot import Robot
-from .task import Rows
+from .task import Linearization
 
 
-class Found(NamedTuple):
+class Candidate(NamedTuple):
     """A configuration.
 
     Attributes:
@@ -57,7 +57,7 @@ SOFT = 8
 UNBOUNDED = 1e30
 
 
-class Tried(NamedTuple):
+class Iterate(NamedTuple):
     """A configuration on the way.
 
     Attributes:
@@ -69,7 +69,7 @@ class Tried(NamedTuple):
     """
 
     q: np.ndarray
-    rows: list[Rows]
+    rows: list[Linearization]
     beyond: list[np.ndarray]
     merit: float
     step: float
@@ -114,7 +114,7 @@ class Descent:
                 self.lower[i] = np.minimum(np.maximum(self.lower[i], lower), self.upper[i])
                 self.upper[i] = np.maximum(np.minimum(self.upper[i], upper), self.lower[i])
 
-    def __call__(self, q: np.ndarray) -> Iterator[Tried]:
+    def __call__(self, q: np.ndarray) -> Iterator[Iterate]:
         """Tells each configuration on the way, also those that turn out to be worse.
 
         Args:
@@ -135,21 +135,21 @@ class Descent:
                 return
             tried = self._at(self._robot.moved(here.q, way, self.lower, self.upper), max(map(abs, way.tolist())))
 
-    def _at(self, q: np.ndarray, step: float) -> Tried:
+    def _at(self, q: np.ndarray, step: float) -> Iterate:
         self._robot.update(q)
         rows = [part.task.rows(q) for part in self._parts]
         beyond = [one.beyond() for one in rows]
         merit = 0.0
         for weight, over in zip(self._weights, beyond):
             merit += weight * float(over @ over)
-        return Tried(q, rows, beyond, merit, step)
+        return Iterate(q, rows, beyond, merit, step)
 
-    def _step(self, here: Tried, damping: float) -> np.ndarray | None:
+    def _step(self, here: Iterate, damping: float) -> np.ndarray | None:
         """Returns the step, None if there is none."""
         hessian = np.zeros((self._count, self._count))
         gradient = np.zeros(self._count)
         off = 0.0
-        hard: list[Rows] = []
+        hard: list[Linearization] = []
         for part, wanted, over in zip(self._parts, here.rows, here.beyond):
             if part.is_hard:
                 if not isinstance(part.task, JointTask):

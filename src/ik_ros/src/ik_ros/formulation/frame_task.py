@@ -16,7 +16,7 @@ from rpbi.geometry import Pose
 from rpbi.kinematics.residual import Residual
 
 from .robot import Robot, to_se3
-from .task import Rows, Task, TaskConfig
+from .task import Linearization, Task, TaskConfig
 
 Axis = Literal["x", "y", "z", "rx", "ry", "rz"]
 AXES: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")
@@ -91,7 +91,7 @@ class FrameTask(Task):
         if problem.target is not None:
             self._set_goal(problem.target, (*problem.position_tolerance, *problem.rotation_tolerance))
 
-    def rows(self, q: np.ndarray) -> Rows:
+    def rows(self, q: np.ndarray) -> Linearization:
         """See `Task`: 3 ways along and the rotation vector about the axes of the goal, for axes that count."""
         off = self._goal.actInv(self.robot.frame(self.link_id))
         rotation = off.rotation
@@ -102,8 +102,8 @@ class FrameTask(Task):
         values = np.empty(6)
         values[:3], values[3:] = off.translation, pin.log3(rotation)
         if self._all_count:
-            return Rows(values, rows, self._lower, self._upper)
-        return Rows(values[self._used], rows[self._used], self._lower, self._upper)
+            return Linearization(values, rows, self._lower, self._upper)
+        return Linearization(values[self._used], rows[self._used], self._lower, self._upper)
 
     def residual(self, beyond: np.ndarray) -> Residual:
         """See `Task`."""

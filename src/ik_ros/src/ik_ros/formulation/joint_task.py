@@ -13,7 +13,7 @@ from ik_ros.problem import IKProblem
 from rpbi.kinematics.residual import Residual
 
 from .robot import Robot
-from .task import Rows, Task, TaskConfig
+from .task import Linearization, Task, TaskConfig
 
 
 class JointTask(Task):
@@ -67,9 +67,9 @@ class JointTask(Task):
                     raise KeyedError(f"previous[{i}]", f"lacks '{name}', which the task '{self.config.name}' needs")
         return [np.array([solution[name] for name in names]) for _, solution in solutions]
 
-    def rows(self, q: np.ndarray) -> Rows:
+    def rows(self, q: np.ndarray) -> Linearization:
         """See `Task`."""
-        return Rows(self.robot.positions(q)[self.indices], self._jacobian, *self.bounds)
+        return Linearization(self.robot.positions(q)[self.indices], self._jacobian, *self.bounds)
 
     def residual(self, beyond: np.ndarray) -> Residual:
         """See `Task`."""

@@ -36,7 +36,7 @@ class TaskConfig(ConfigModel):
     tolerance_rad: Positive = ORIENTATION_TOLERANCE_RAD
 
 
-class Rows(NamedTuple):
+class Linearization(NamedTuple):
     """k numbers that a task wants between bounds, for one configuration.
 
     Attributes:
@@ -99,7 +99,7 @@ class Task(ABC):
             raise ValueError("this task has no goal")
 
     @abstractmethod
-    def rows(self, q: np.ndarray) -> Rows:
+    def rows(self, q: np.ndarray) -> Linearization:
         """Returns what it wants, for one configuration."""
 
     def residual(self, beyond: np.ndarray) -> Residual:

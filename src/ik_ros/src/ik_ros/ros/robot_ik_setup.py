@@ -12,7 +12,7 @@ from custom_ros_tools.ros.lifecycle.parameters import private_config, private_pa
 from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
 from custom_ros_tools.ros.lifecycle.wall_timer import WallTimer
 from custom_ros_tools.ros.services import ToggleService
-from custom_ros_tools.toggle import OnOff
+from custom_ros_tools.toggle import Toggle
 from ik_ros.node_configs import RobotIKConfig, TargetParameters
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
 from ros_pybullet_interface.srv import RobotInfo
@@ -49,7 +49,7 @@ class RobotIKSetup:
             "ik", CalculateInverseKinematicsProblem, queue_size=QUEUE_SIZE, tcp_nodelay=True
         )
         rospy.Subscriber(f"{TOPICS}/currentPosition", JointState, self._take_current, queue_size=1)
-        setup = OnOff("setup", lambda: self._switch(True), lambda: self._switch(False))
+        setup = Toggle("setup", lambda: self._switch(True), lambda: self._switch(False))
         if start_on_init:
             setup.on()
         ToggleService(f"{TOPICS}/toggle", setup.on, setup.off)

@@ -16,7 +16,7 @@ from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
 from custom_ros_tools.ros.lifecycle.wall_timer import WallTimer
 from custom_ros_tools.ros.services import ToggleService
-from custom_ros_tools.toggle import OnOff
+from custom_ros_tools.toggle import Toggle
 from ik_ros.msg import IKProblem as IKProblemMessage
 from ik_ros.node_configs import SetupParameters
 from ik_ros.problem import IKProblem, JointPositions
@@ -61,7 +61,7 @@ class SetupNode:
         self._publisher = rospy.Publisher("ik", IKProblemMessage, queue_size=QUEUE_SIZE, tcp_nodelay=True)
         rospy.set_param("ik_ros/interface", name)
         self._subscribe()
-        setup = OnOff("setup", lambda: self._switch(True), lambda: self._switch(False))
+        setup = Toggle("setup", lambda: self._switch(True), lambda: self._switch(False))
         if config.start_on_init:
             setup.on()
         ToggleService(f"{self._topics}/toggle", setup.on, setup.off)

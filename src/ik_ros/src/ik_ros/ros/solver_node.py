@@ -16,8 +16,8 @@ from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
 from custom_ros_tools.ros.services import ToggleService
-from custom_ros_tools.toggle import OnOff
-from ik_ros.continuity import Continuity
+from custom_ros_tools.toggle import Toggle
+from ik_ros.joint_rate_limiter import JointRateLimiter
 from ik_ros.lookup import make_solver
 from ik_ros.msg import IKProblem as IKProblemMessage
 from ik_ros.msg import IKSolution as IKSolutionMessage
@@ -73,7 +73,7 @@ class SolverNode:
         self._target = rospy.Publisher("joint_states/target", JointState, queue_size=QUEUE_SIZE, tcp_nodelay=True)
         self._solution = rospy.Publisher("ik/solution", IKSolutionMessage, queue_size=QUEUE_SIZE, tcp_nodelay=True)
         self._trajectory = rospy.Publisher("ik/trajectory", JointTrajectory, queue_size=QUEUE_SIZE)
-        solving = OnOff("solving", self._listen, self._listen_no_more)
+        solving = Toggle("solving", self._listen, self._listen_no_more)
         if own.start_on_init:
             solving.on()
         services = f"ik/solver/{name.replace(':', '/').replace('.', '/')}"
@@ -86,7 +86,7 @@ class SolverNode:
         if self._continuity is None:
             return ProblemStream(self._solver)
         try:
-            continuity = Continuity(self._continuity, self._solver.joint_names, self._solver.velocity_limits)
+            continuity = JointRateLimiter(self._continuity, self._solver.joint_names, self._solver.velocity_limits)
         except ValueError as error:
             raise ConfigError([Problem(rospy.get_name(), "", str(error))]) from None
         return ProblemStream(self._solver, continuity)

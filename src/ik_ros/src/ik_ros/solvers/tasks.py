@@ -21,7 +21,7 @@ try:
 except ImportError as error:
     raise MissingDependency(error.name or "pinocchio", "./rpbi setup ik") from None
 
-from ik_ros.formulation.descent import Descent, Found, Tried
+from ik_ros.formulation.descent import Candidate, Descent, Iterate
 from ik_ros.formulation.formulation import Formulation, TaskSet
 from ik_ros.formulation.frame_task import FrameTask
 from ik_ros.formulation.robot import from_base, to_se3
@@ -99,7 +99,7 @@ class TasksSolver(Solver):
         """Returns the configuration where the search starts, within limits."""
         robot = self.tasks.robot
         q = robot.configuration({**self._config.start, **problem.start})
-        return robot.with_positions(q, self._start_limits.bring_in(robot.positions(q).tolist()))
+        return robot.with_positions(q, self._start_limits.wrap_to_limits(robot.positions(q).tolist()))
 
     def _begin(self, problem: IKProblem, start: np.ndarray) -> None:
         """Tells all tasks what the problem wants of them."""
@@ -125,9 +125,9 @@ class TasksSolver(Solver):
                 raise ValueError(f"{key}: {error}") from None
         self._descent.begin()
 
-    def _search(self, problem: IKProblem, start: np.ndarray) -> Found:
+    def _search(self, problem: IKProblem, start: np.ndarray) -> Candidate:
         """Returns what was found from the first start that leads to a solution, else the best of all."""
-        best: Found | None = None
+        best: Candidate | None = None
         for first in self._starts(problem, start):
             found = self._from(self._on_anchor(first))
             if best is None or found.rank < best.rank:
@@ -160,9 +160,9 @@ class TasksSolver(Solver):
         robot.update(q)
         return robot.with_base(q, anchor.goal * robot.frame(anchor.link_id).inverse() * to_se3(self._config.base_start))
 
-    def _from(self, first: np.ndarray) -> Found:
+    def _from(self, first: np.ndarray) -> Candidate:
         """Returns the best that is found from one start."""
-        best: Found | None = None
+        best: Candidate | None = None
         sizes: list[float] = []
         merits: list[float] = []
         for tried in self._descent(first):
@@ -186,13 +186,13 @@ class TasksSolver(Solver):
             return len(sizes) > PATIENCE and merits[-1] > (1.0 - SETTLED) * merits[-1 - PATIENCE]
         return len(sizes) > self._patience and sizes[-1] > 0.5 * sizes[-1 - self._patience]
 
-    def _judged(self, tried: Tried) -> Found:
+    def _judged(self, tried: Iterate) -> Candidate:
         residuals = {name: task.residual(tried.beyond[i]) for i, name, task in self._required}
         sizes = {name: task.size(residuals[name]) for _, name, task in self._required}
         hard = (size for name, size in sizes.items() if self.tasks.parts[name].is_hard)
-        return Found(tried.q, residuals, max(sizes.values(), default=0.0), max(hard, default=0.0))
+        return Candidate(tried.q, residuals, max(sizes.values(), default=0.0), max(hard, default=0.0))
 
-    def _in_words(self, found: Found) -> str:
+    def _in_words(self, found: Candidate) -> str:
         missed = [
             f"'{name}' is off by {_amount(found.residuals[name])}"
             for _, name, task in self._required

@@ -80,7 +80,7 @@ class Body:
         """
         self.halt(reason)
 
-    def tie(self, bodies: Mapping[str, Body]) -> None:
+    def attach(self, bodies: Mapping[str, Body]) -> None:
         """Ties it to other bodies when it comes into their world; most bodies are tied to none.
 
         Args:
@@ -90,8 +90,8 @@ class Body:
             ConfigError: If it cannot be done.
         """
 
-    def untie(self, name: str | None = None) -> None:
-        """Undoes what `tie` did with a body that is about to go, or with all."""
+    def detach(self, name: str | None = None) -> None:
+        """Undoes what `attach` did with a body that is about to go, or with all."""
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:

@@ -68,29 +68,29 @@ def difference(present: LinkDynamics, wanted: LinkDynamics) -> dict[str, Any]:
         ValueError: If a value is not finite, negative, or cannot be changed; it names all such fields.
     """
     changed: dict[str, Any] = {}
-    faults: list[str] = []
+    problems: list[str] = []
     for field in LinkDynamics._fields:
         old, new = _numbers(getattr(present, field)), _numbers(getattr(wanted, field))
         if new in (old, ()):
             continue
         if len(new) != len(old):
-            faults.append(f"{field}: expected {len(old)} numbers or none, got {len(new)}")
+            problems.append(f"{field}: expected {len(old)} numbers or none, got {len(new)}")
         elif not all(map(math.isfinite, new)):
-            faults.append(f"{field}: must be finite, got {_shown(new)}")
+            problems.append(f"{field}: must be finite, got {_shown(new)}")
         elif field not in KEYS:
-            faults.append(f"{field}: cannot be changed, expected {_shown(old)}, got {_shown(new)}")
+            problems.append(f"{field}: cannot be changed, expected {_shown(old)}, got {_shown(new)}")
         elif min(new) < 0:
-            faults.append(f"{field}: must be >= 0, got {_shown(new)}")
+            problems.append(f"{field}: must be >= 0, got {_shown(new)}")
         else:
             changed[KEYS[field]] = getattr(wanted, field)
     pair = {"contact_damping": wanted.contact_damping, "contact_stiffness": wanted.contact_stiffness}
-    if not faults and any(KEYS[field] in changed for field in pair):
+    if not problems and any(KEYS[field] in changed for field in pair):
         for field, value in pair.items():
             if value < 0:
-                faults.append(f"{field}: must be >= 0 when the other is set, got {value:g}")
+                problems.append(f"{field}: must be >= 0 when the other is set, got {value:g}")
             changed[KEYS[field]] = value
-    if faults:
-        raise ValueError("; ".join(faults))
+    if problems:
+        raise ValueError("; ".join(problems))
     return changed
 
 
@@ -158,9 +158,9 @@ def change_dynamics(body: Body, link: str, change: ChangeDynamics) -> None:
     index = link_index(body, link)
     present = LinkDynamics(*body.pb.getDynamicsInfo(body.body_id, index))
     arguments = change.kwargs()
-    faults = _faults(body, index, present, arguments)
-    if faults:
-        raise ValueError("; ".join(faults))
+    problems = _problems(body, index, present, arguments)
+    if problems:
+        raise ValueError("; ".join(problems))
     if "mass" in arguments:
         ratio = arguments["mass"] / present.mass
         arguments.setdefault("localInertiaDiagonal", [ratio * moment for moment in present.local_inertia_diagonal])
@@ -182,21 +182,21 @@ def _renew_contacts(body: Body, index: int) -> None:
                 body.pb.setCollisionFilterPair(body_a, body_b, link_a, link_b, is_enabled)
 
 
-def _faults(body: Body, index: int, present: LinkDynamics, arguments: dict[str, Any]) -> list[str]:
+def _problems(body: Body, index: int, present: LinkDynamics, arguments: dict[str, Any]) -> list[str]:
     """Returns what a link cannot be given."""
-    faults = []
+    problems = []
     what = body.name if index < 0 else f"{body.name}/{body.pb.getJointInfo(body.body_id, index)[12].decode()}"
     for key in ("mass", "localInertiaDiagonal"):
         if key in arguments and not present.mass:
-            faults.append(f"{key}: '{what}' is static, and stays so; add a dynamic object instead")
+            problems.append(f"{key}: '{what}' is static, and stays so; add a dynamic object instead")
     if present.mass and arguments.get("mass") == 0:
-        faults.append("mass: must be > 0 [kg], got 0: what moves cannot be made static")
+        problems.append("mass: must be > 0 [kg], got 0: what moves cannot be made static")
     if present.mass and 0.0 in arguments.get("localInertiaDiagonal", ()):
-        faults.append("localInertiaDiagonal: must be > 0 [kg m^2] each")
+        problems.append("localInertiaDiagonal: must be > 0 [kg m^2] each")
     if arguments.get("contactStiffness") == 0:
-        faults.append("contactStiffness: must be > 0 [N/m], got 0: nothing would keep bodies apart")
+        problems.append("contactStiffness: must be > 0 [N/m], got 0: nothing would keep bodies apart")
     if not body.pb.getCollisionShapeData(body.body_id, index):
-        faults += [f"{key}: '{what}' has no collision shape" for key in arguments if key in _OF_CONTACTS]
+        problems += [f"{key}: '{what}' has no collision shape" for key in arguments if key in _OF_CONTACTS]
     if index < 0 or body.pb.getJointInfo(body.body_id, index)[2] == pybullet.JOINT_FIXED:
-        faults += [f"{key}: '{what}' hangs on no joint that moves" for key in arguments if key in _OF_JOINTS]
-    return faults
+        problems += [f"{key}: '{what}' hangs on no joint that moves" for key in arguments if key in _OF_JOINTS]
+    return problems

@@ -13,18 +13,18 @@ _STL_HEADER = struct.Struct("<80xI")
 _STL_TRIANGLE_SIZE = 50  # bytes
 
 
-def mesh_faults(shape: CreateVisualShape | CreateCollisionShape) -> list[tuple[str, str]]:
+def mesh_problems(shape: CreateVisualShape | CreateCollisionShape) -> list[tuple[str, str]]:
     """Returns key and message of each fault in what a shape says about its mesh."""
-    faults = []
+    problems = []
     if shape.fileName is not None and shape.fileName.lower().endswith(".stl") and not _is_binary_stl(shape.fileName):
-        faults.append(("fileName", f"expected a whole binary STL file, got another kind or a part: {shape.fileName}"))
+        problems.append(("fileName", f"expected a whole binary STL file, got another kind or a part: {shape.fileName}"))
     if shape.indices is not None:
         corners = len(shape.vertices or ())
         if len(shape.indices) % 3:
-            faults.append(("indices", f"expected three for each triangle, got {len(shape.indices)} of them"))
+            problems.append(("indices", f"expected three for each triangle, got {len(shape.indices)} of them"))
         if any(index >= corners for index in shape.indices):
-            faults.append(("indices", f"expected numbers of the {corners} vertices, got {max(shape.indices)}"))
-    return faults
+            problems.append(("indices", f"expected numbers of the {corners} vertices, got {max(shape.indices)}"))
+    return problems
 
 
 def _is_binary_stl(path: str) -> bool:
@@ -38,7 +38,7 @@ def _is_binary_stl(path: str) -> bool:
 SOFT_MESH_FORMATS = (".obj", ".vtk")
 
 
-def soft_mesh_faults(path: str) -> list[str]:
+def soft_mesh_problems(path: str) -> list[str]:
     """Returns what is wrong with the mesh of a soft body, a sentence for each fault.
 
     Args:

@@ -12,7 +12,7 @@ from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Pose
 
 from .body import Body
-from .mesh_checks import mesh_faults
+from .mesh_checks import mesh_problems
 
 
 class ShapeObject(Body):
@@ -63,7 +63,7 @@ def _check_meshes(name: str, **shapes: CreateVisualShape | CreateCollisionShape 
         Problem(name, f"{function}.{key}", message)
         for function, shape in shapes.items()
         if shape is not None
-        for key, message in mesh_faults(shape)
+        for key, message in mesh_problems(shape)
     ]
     if problems:
         raise ConfigError(problems)

@@ -13,7 +13,7 @@ from custom_ros_tools.errors import ConfigError, Problem
 
 from .asset_files import ROBOT_DESCRIPTION, find_file, find_folder
 from .legacy import MAIN
-from .object_entry import Instance, parse_instance
+from .object_entry import ObjectEntry, parse_object_entry
 from .objects import BodyType, ObjectConfig, load_object, name_in, parse_section, sections_of, type_of
 from .sensors import FIRST_TOPIC_NAME, RgbdSensorConfig
 from .world import WorldConfig
@@ -152,16 +152,16 @@ class _Reader:
     def _files(self, section: str) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
         """Yield what each file of a list says, what to call it, and the context of reading it; note its name."""
         search_paths = self._search_paths()
-        for index, instance in _instances(self._data.get(section)):
+        for index, entry in _object_entries(self._data.get(section)):
             key = f"{section}[{index}]"
             try:
-                path = find_file(instance.file, self._path, search_paths)
+                path = find_file(entry.file, self._path, search_paths)
             except ValueError as error:
                 self._problems.append(Problem(self._file, key, str(error)))
                 continue
-            file = f"{instance.file} (changed by {key})" if instance.changes else instance.file
+            file = f"{entry.file} (changed by {key})" if entry.overrides else entry.file
             with self._noting_problems(file):
-                data = instance.apply_changes(load_config(path))
+                data = entry.apply_overrides(load_config(path))
                 self._claim_name(data, file, "name")
                 context = {"file": path, "search_paths": search_paths, ROBOT_DESCRIPTION: self._robot_description}
                 yield data, file, context
@@ -192,11 +192,11 @@ class _Reader:
         return tuple(found)
 
 
-def _instances(given: Any) -> Iterator[tuple[int, Instance]]:
+def _object_entries(given: Any) -> Iterator[tuple[int, ObjectEntry]]:
     """Yield the entries of a list of objects with their indices; others are reported by the model."""
     for index, entry in enumerate(given if isinstance(given, (list, tuple)) else ()):
         with contextlib.suppress(ValueError):
-            yield index, parse_instance(entry)
+            yield index, parse_object_entry(entry)
 
 
 def _texts(given: Any) -> list[tuple[int, str]]:

@@ -14,23 +14,23 @@ from custom_ros_tools.schema.type_names import shown
 FILE = "file"
 
 
-class Instance(NamedTuple):
+class ObjectEntry(NamedTuple):
     """One object: its file, and what is different for it.
 
     Attributes:
         file: The file as the user wrote it.
-        changes: Keys and values that replace those of the file; mappings are merged key by key.
+        overrides: Keys and values that replace those of the file; mappings are merged key by key.
     """
 
     file: str
-    changes: Mapping[str, Any]
+    overrides: Mapping[str, Any]
 
-    def apply_changes(self, data: Mapping[str, Any]) -> dict[str, Any]:
-        """Returns what the file says with the changes in it; neither is altered."""
-        return _merged(data, self.changes)
+    def apply_overrides(self, data: Mapping[str, Any]) -> dict[str, Any]:
+        """Returns what the file says with the overrides in it; neither is altered."""
+        return _merged(data, self.overrides)
 
 
-def parse_instance(entry: Any) -> Instance:
+def parse_object_entry(entry: Any) -> ObjectEntry:
     """Reads one entry of a list of objects.
 
     Args:
@@ -43,13 +43,13 @@ def parse_instance(entry: Any) -> Instance:
     if not isinstance(file, str) or not file:
         expected = f"expected a file name, or a mapping with '{FILE}' and the keys that differ"
         raise ValueError(f"{expected}; got {shown(entry)}")
-    changes = {key: value for key, value in entry.items() if key != FILE} if isinstance(entry, Mapping) else {}
-    return Instance(file, changes)
+    overrides = {key: value for key, value in entry.items() if key != FILE} if isinstance(entry, Mapping) else {}
+    return ObjectEntry(file, overrides)
 
 
-def _merged(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+def _merged(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
     result = copy.deepcopy(dict(data))
-    for key, value in changes.items():
+    for key, value in overrides.items():
         old = result.get(key)
         if isinstance(old, Mapping) and isinstance(value, Mapping):
             result[key] = _merged(old, value)
@@ -59,11 +59,11 @@ def _merged(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
 
 
 def _check(entry: Any) -> Any:
-    parse_instance(entry)
+    parse_object_entry(entry)
     return entry
 
 
-ObjectEntry = Annotated[
+ObjectEntryYaml = Annotated[
     Any,
     AfterValidator(_check),
     WithJsonSchema(

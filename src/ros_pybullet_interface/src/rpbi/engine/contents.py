@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rpbi.world import World
 
 
-def equipment(body: Body, config: BodyConfig) -> tuple[tuple[Sensor, ...], Mapping[str, Input]]:
+def sensors_and_inputs(body: Body, config: BodyConfig) -> tuple[tuple[Sensor, ...], Mapping[str, Input]]:
     """Returns the sensors of a body, those of other packages last, and its inputs by name.
 
     Args:
@@ -96,7 +96,7 @@ class WorldContents:
             self._append(LogEntry(name, "add", (kind, config)))
             body = self.bodies[name]
             try:
-                self._register(name, *equipment(body, config))
+                self._register(name, *sensors_and_inputs(body, config))
             except Exception:
                 self._append(LogEntry(name, "remove"))
                 raise

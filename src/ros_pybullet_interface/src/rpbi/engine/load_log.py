@@ -26,11 +26,11 @@ def refuse_non_finite(body: Body) -> None:
     Raises:
         PhysicsError: If there is one; it names the link.
     """
-    for fault in _faults(body):
+    for fault in _problems(body):
         raise PhysicsError(f"{body.name}: {fault} not finite: is something nan, inf or too large?")
 
 
-def _faults(body: Body) -> Iterator[str]:
+def _problems(body: Body) -> Iterator[str]:
     pb, body_id = body.pb, body.body_id
     links = {index: f"link '{body.link_name(index)}'" for index in (-1, *body.joint_indices)}
     for index, link in links.items():
@@ -96,7 +96,7 @@ def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:
     elif entry.what == "remove":
         body = bodies.pop(entry.name)
         for other in bodies.values():
-            other.untie(entry.name)
+            other.detach(entry.name)
         with blaming(body, f"remove of '{entry.name}'"):
             body.remove()
     elif entry.what == "dynamics":
@@ -109,7 +109,7 @@ def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:
             body = make(pb, config)
             if not body.is_soft:
                 refuse_non_finite(body)
-            body.tie(bodies)
+            body.attach(bodies)
             bodies[entry.name] = body
         except BaseException as error:
             for body_id in _body_ids(pb) - before:

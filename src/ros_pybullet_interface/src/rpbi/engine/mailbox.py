@@ -27,11 +27,11 @@ class Mailbox:
         self._slots: dict[str, Any] = {}
         self._requests: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
         self._closed = False
-        self.era = 0
+        self.generation = 0
         """Grows whenever all values that wait are dropped."""
 
     def put(
-        self, slot: str, value: Any, merge: Callable[[Any, Any], Any] | None = None, era: int | None = None
+        self, slot: str, value: Any, merge: Callable[[Any, Any], Any] | None = None, generation: int | None = None
     ) -> None:
         """Leaves a value in a slot; one that was not taken yet is replaced, or merged with it.
 
@@ -39,10 +39,10 @@ class Mailbox:
             slot: The slot.
             value: The value.
             merge: Joins a value that waits with this one.
-            era: The era that the value is of, if one of an earlier era is to be dropped.
+            generation: The generation that the value is of, if one of an earlier generation is to be dropped.
         """
         with self._lock:
-            if era not in (None, self.era):
+            if generation not in (None, self.generation):
                 return
             if merge is not None and slot in self._slots:
                 value = merge(self._slots[slot], value)
@@ -57,10 +57,10 @@ class Mailbox:
         return taken
 
     def drop(self) -> None:
-        """Empties all slots, and begins a new era."""
+        """Empties all slots, and begins a new generation."""
         with self._lock:
             self._slots = {}
-            self.era += 1
+            self.generation += 1
 
     def request(self, call: Callable[[], T]) -> Future[T]:
         """Asks the simulation thread to make a call.

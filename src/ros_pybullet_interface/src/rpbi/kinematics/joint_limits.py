@@ -55,7 +55,7 @@ class JointLimits:
         limits.lower, limits.upper = self.lower[members], self.upper[members]
         return limits
 
-    def bring_in(self, q: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def wrap_to_limits(self, q: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Returns positions within the limits, and which of them are not what was given plus whole turns.
 
         Args:

@@ -56,7 +56,7 @@ class Search:
         self, chain: Chain, target: Target, limits: JointLimits, problem: IKProblem, current: np.ndarray
     ) -> None:
         self._chain, self._target, self._limits, self._problem = chain, target, limits, problem
-        self._current, _ = limits.bring_in(current, current)
+        self._current, _ = limits.wrap_to_limits(current, current)
         self._rest = self._of_chain(problem.resetPoses)
         self._threshold = min(problem.residualThreshold / POSITION_TOLERANCE_M, 1.0) or THRESHOLD
         damping = _damping(self._of_chain(problem.jointDamping), len(current))
@@ -95,7 +95,7 @@ class Search:
         if not len(self._current):
             return
         if len(self._rest):
-            yield self._asked_step, self._limits.bring_in(self._rest, self._current)[0]
+            yield self._asked_step, self._limits.wrap_to_limits(self._rest, self._current)[0]
         yield self._asked_step, self._current
         generator = np.random.default_rng(SEED)
         beyond_reach = math.dist(self._target.position, self._chain.anchor) > self._chain.reach_m
@@ -116,7 +116,7 @@ class Search:
             moved = step(q, frozen, iterations)
             if not np.isfinite(moved).all():
                 return
-            q, stopped = limits.bring_in(moved, self._current)
+            q, stopped = limits.wrap_to_limits(moved, self._current)
             residual = self._residual(q)
             yield q, residual
             time.sleep(BREAK_S)

@@ -12,7 +12,7 @@ import pybullet
 import rospy
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, Problem
-from custom_ros_tools.ros.lifecycle.fatal_log import log_last_words, log_loss_of_master
+from custom_ros_tools.ros.lifecycle.fatal_log import log_fatal_lines, log_loss_of_master
 from custom_ros_tools.ros.lifecycle.interrupts import leaving_ros_on_interrupt, wait_for_master
 from custom_ros_tools.ros.lifecycle.kept_parameters import kept_parameters
 from custom_ros_tools.ros.lifecycle.logging_bridge import attach_logging
@@ -20,8 +20,8 @@ from custom_ros_tools.ros.lifecycle.master_watch import MasterWatch
 from rpbi.bodies import BODY_TYPES
 from rpbi.config.asset_files import ROBOT_DESCRIPTION
 from rpbi.config.loading import load_world_dict
-from rpbi.ros.publishers.sample_publishers import SampleOutlets
-from rpbi.ros.publishers.status import FREE_RUNNING_CLOCK_HZ, ClockOutlet
+from rpbi.ros.publishers.sample_publishers import SamplePublishers
+from rpbi.ros.publishers.status import FREE_RUNNING_CLOCK_HZ, ClockPublisher
 from rpbi.ros.publishers.world_markers import WorldMarkers
 from rpbi.ros.services.camera_services import CameraServices
 from rpbi.ros.services.dynamics_services import DynamicsServices
@@ -33,7 +33,7 @@ from rpbi.world import World
 
 from .headers import use_prefix
 from .initial_state import start_where_robots_are
-from .object_lifecycle import ObjectTraffic
+from .object_lifecycle import ObjectLifecycle
 from .requests import Requests
 from .simulation import Simulation
 
@@ -103,11 +103,11 @@ class SimulatorNode:
                 config.real_time_factor,
             )
         self._world = World(loaded, simulated)
-        outlets = SampleOutlets(self._world)
+        publishers = SamplePublishers(self._world)
         for name in self._world.bodies:
-            outlets.find_topics(name)
-        self._cameras = outlets.cameras
-        clock = ClockOutlet(self._world.clock, _clock_hz(config)) if simulated else None
+            publishers.find_topics(name)
+        self._cameras = publishers.cameras
+        clock = ClockPublisher(self._world.clock, _clock_hz(config)) if simulated else None
         helpers: list[Callable[[], None]] = []
         if config.markers_hz:
             helpers.append(WorldMarkers(self._world, config.markers_hz).poll)
@@ -115,7 +115,7 @@ class SimulatorNode:
         helpers += (self._cameras.poll, *window.polls)
         self._simulation = Simulation(
             self._world,
-            outlets.by_type,
+            publishers.by_type,
             config.real_time_factor,
             config.status_hz,
             clock,
@@ -124,7 +124,7 @@ class SimulatorNode:
             self._cameras.before_tick,
         )
         ask = Requests(self._simulation)
-        self._objects = ObjectTraffic(self._world, self._simulation, ask, outlets)
+        self._objects = ObjectLifecycle(self._world, self._simulation, ask, publishers)
         context = {"search_paths": config.search_paths(), ROBOT_DESCRIPTION: description}
         NodeServices(self._simulation, ask, self._objects.add, self._objects.remove, context)
         CameraServices(self._objects.add_camera, config.search_paths())
@@ -170,7 +170,7 @@ def main() -> None:
     try:
         node = SimulatorNode()
     except InterfaceError as error:
-        log_last_words(str(error).splitlines())
+        log_fatal_lines(str(error).splitlines())
         sys.exit(1)
     except ConnectionError as error:
         log_loss_of_master(error)
@@ -179,7 +179,7 @@ def main() -> None:
         try:
             node.run()
         except PhysicsError as error:
-            log_last_words([str(error)])
+            log_fatal_lines([str(error)])
             sys.exit(1)
 
 

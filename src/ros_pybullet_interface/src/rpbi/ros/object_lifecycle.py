@@ -8,7 +8,7 @@ from typing import Any
 
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
 from rpbi.config.sensors import RgbdSensorConfig
-from rpbi.ros.publishers.sample_publishers import SampleOutlets
+from rpbi.ros.publishers.sample_publishers import SamplePublishers
 from rpbi.ros.publishers.topics import FastTopic
 from rpbi.ros.services.body_endpoints import BodyEndpoints
 from rpbi.sensors import RgbdSensor
@@ -20,7 +20,7 @@ from .requests import Requests
 from .simulation import Simulation
 
 
-class ObjectTraffic:
+class ObjectLifecycle:
     """Adds, removes and resets, one at a time; any thread but the simulation's may ask for it.
 
     It opens the topics and services of all that is in the world at the start.
@@ -29,14 +29,14 @@ class ObjectTraffic:
         world: The world.
         simulation: What runs it.
         ask: Asks the simulation thread.
-        outlets: Where samples go.
+        publishers: Where samples go.
     """
 
-    def __init__(self, world: World, simulation: Simulation, ask: Requests, outlets: SampleOutlets) -> None:
+    def __init__(self, world: World, simulation: Simulation, ask: Requests, publishers: SamplePublishers) -> None:
         self._world = world
         self._simulation = simulation
         self._ask = ask
-        self._outlets = outlets
+        self._publishers = publishers
         self._inputs = Inputs(world)
         self._endpoints = BodyEndpoints(world, simulation, ask)
         self._lock = threading.Lock()
@@ -115,7 +115,7 @@ class ObjectTraffic:
         """Does the simulation thread's part of adding."""
         self._world.add(kind, config, file)
         try:
-            self._outlets.find_topics(config.name)
+            self._publishers.find_topics(config.name)
         except InterfaceError:
             self._world.remove(config.name)
             raise
@@ -129,14 +129,14 @@ class ObjectTraffic:
         changed = self._world.changed_names()
         for name in changed & self._world.bodies.keys():
             self._world.remove(name)
-        topics = [topic for name in changed for topic in self._outlets.forget(name)]
+        topics = [topic for name in changed for topic in self._publishers.forget(name)]
         error = None
         try:
             self._simulation.reset(self._inputs.repeat_poses)
         except InterfaceError as problem:
             error = problem
         lost = self._open_bodies - changed - self._world.bodies.keys()
-        topics += [topic for name in lost for topic in self._outlets.forget(name)]
+        topics += [topic for name in lost for topic in self._publishers.forget(name)]
         return changed | lost, topics, error
 
     def _place_cameras(self) -> None:
@@ -154,7 +154,7 @@ class ObjectTraffic:
         """Opens the topics and services of a body."""
         body = self._world.bodies[name]
         self._open_bodies.add(name)
-        self._outlets.open(name)  # first, as it notes what is to be forgotten if one of the others fails
+        self._publishers.open(name)  # first, as it notes what is to be forgotten if one of the others fails
         self._inputs.open(name, body.inputs())
         self._endpoints.open(body)
 
@@ -174,4 +174,4 @@ class ObjectTraffic:
     def _take_out(self, name: str) -> list[FastTopic]:
         """Does the simulation thread's part of it; returns the topics that are left to close."""
         self._world.remove(name)
-        return self._outlets.forget(name)
+        return self._publishers.forget(name)

@@ -18,8 +18,8 @@ from .document import resolve_meshes
 MESH_FORMATS = (".obj", ".stl", ".dae", ".cdf")
 
 
-def urdf_faults(path: str) -> list[str]:
-    """Looks for the faults that are most likely in a URDF file that PyBullet has refused.
+def urdf_problems(path: str) -> list[str]:
+    """Looks for the problems that are most likely in a URDF file that PyBullet has refused.
 
     Args:
         path: The file.
@@ -39,13 +39,13 @@ def urdf_faults(path: str) -> list[str]:
         return [f"{path}: expected <robot> at the top, got <{root.tag}>"]
     if root.find("link") is None and root.find("deformable") is None:
         return [f"{path}: the robot has no <link>"]
-    faults = []
+    problems = []
     for mesh in dict.fromkeys(element.get("filename", "") for element in root.iter("mesh")):
         if Path(mesh).suffix.lower() not in MESH_FORMATS:
-            faults.append(f"{path}: mesh '{mesh}' is none of {', '.join(MESH_FORMATS)}")
+            problems.append(f"{path}: mesh '{mesh}' is none of {', '.join(MESH_FORMATS)}")
         elif not any((folder / mesh).is_file() for folder in Path(path).absolute().parents):
-            faults.append(f"{path}: no such mesh: {mesh} (looked for beside it and in all folders above)")
-    return faults
+            problems.append(f"{path}: no such mesh: {mesh} (looked for beside it and in all folders above)")
+    return problems
 
 
 def load_urdf(
@@ -71,5 +71,5 @@ def load_urdf(
     except ConfigError as error:
         messages = [f"{problem.key}: {problem.message}" for problem in error.problems]
     except (pybullet.error, OSError, UnicodeDecodeError) as error:
-        messages = urdf_faults(file) or [f"PyBullet could not load it: {error}"]
+        messages = urdf_problems(file) or [f"PyBullet could not load it: {error}"]
     raise ConfigError([Problem(name, "loadURDF.fileName", message) for message in messages])

@@ -17,7 +17,7 @@ LONGEST_WAIT_S = 2.0
 SENDING_S = 0.2
 
 
-def log_last_words(lines: Iterable[str]) -> None:
+def log_fatal_lines(lines: Iterable[str]) -> None:
     """Logs lines as fatal, on the console and in /rosout.
 
     Args:
@@ -40,7 +40,7 @@ def log_loss_of_master(error: ConnectionError) -> None:
     Args:
         error: What the call to it raised.
     """
-    log_last_words([f"the ROS master at {rosgraph.get_master_uri()} has gone while the node was starting: {error}"])
+    log_fatal_lines([f"the ROS master at {rosgraph.get_master_uri()} has gone while the node was starting: {error}"])
 
 
 def _listeners() -> int:

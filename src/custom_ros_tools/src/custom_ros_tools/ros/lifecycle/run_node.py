@@ -10,7 +10,7 @@ import rospy
 
 from custom_ros_tools.errors import InterfaceError
 
-from .fatal_log import log_last_words, log_loss_of_master
+from .fatal_log import log_fatal_lines, log_loss_of_master
 from .interrupts import leaving_ros_on_interrupt, wait_for_master
 from .logging_bridge import attach_logging
 from .master_watch import MasterWatch
@@ -38,7 +38,7 @@ def run_node(name: str, start: Callable[[], object], anonymous: bool = False) ->
         try:
             _node = start()
         except InterfaceError as error:
-            log_last_words(str(error).splitlines())
+            log_fatal_lines(str(error).splitlines())
             sys.exit(1)
         except ConnectionError as error:
             log_loss_of_master(error)

@@ -11,7 +11,7 @@ from sensor_msgs.msg import JointState
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
 from custom_ros_tools.ros.services import ToggleService
-from custom_ros_tools.toggle import OnOff
+from custom_ros_tools.toggle import Toggle
 
 QUEUE_SIZE = 100
 """Messages kept while the machine is busy: 0.1 s of joint states at 1 kHz."""
@@ -44,7 +44,7 @@ class RemapNode:
         self._warn = ThrottledWarning()
         self._publisher = rospy.Publisher(target, target_type, queue_size=QUEUE_SIZE, tcp_nodelay=True)
         self._subscriber: rospy.Subscriber | None = None
-        remapping = OnOff("remapping", self._listen, self._listen_no_more)
+        remapping = Toggle("remapping", self._listen, self._listen_no_more)
         if start_on_init:
             remapping.on()
         for name in {"remap_joint_state/toggle", f"{executable}/toggle"}:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from custom_ros_tools.errors import both
+from custom_ros_tools.errors import collecting_problems
 from custom_ros_tools.joint_values import JointValues
 from custom_ros_tools.node_configs import FloatArrayConfig, StartParameters
 from custom_ros_tools.ros.lifecycle.parameters import private_config, private_parameters
@@ -24,9 +24,11 @@ class FloatArrayNode(RemapNode):
     """
 
     def __init__(self) -> None:
-        self._config, start = both(
-            lambda: private_config(FloatArrayConfig), lambda: private_parameters(StartParameters)
-        )
+        with collecting_problems() as part:
+            with part():
+                self._config = private_config(FloatArrayConfig)
+            with part():
+                start = private_parameters(StartParameters)
         topics = "joint_states", "joint_states/floatarray"
         super().__init__(NAME, *topics, Float64MultiArray, self._numbers, start.start_on_init)
 

@@ -6,7 +6,7 @@ import sys
 
 import rospy
 
-from custom_ros_tools.errors import both
+from custom_ros_tools.errors import collecting_problems
 from custom_ros_tools.node_configs import RateParameters
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
@@ -27,10 +27,11 @@ class StaticTransformNode:
     """
 
     def __init__(self) -> None:
-        given, rate = both(
-            lambda: StaticTransform.from_arguments(rospy.myargv(sys.argv)[1:]),
-            lambda: private_parameters(RateParameters),
-        )
+        with collecting_problems() as part:
+            with part():
+                given = StaticTransform.from_arguments(rospy.myargv(sys.argv)[1:])
+            with part():
+                rate = private_parameters(RateParameters)
         self._transform = transform_message(given.position, given.quat_xyzw)
         self._topic = TransformTopic(given.parent, given.child)
         rospy.Service("reset_tf", SetTransform, self._reset)

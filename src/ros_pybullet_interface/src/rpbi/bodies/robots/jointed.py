@@ -60,7 +60,7 @@ class JointedBody(Body):
         self.link_indices = tuple(joint.index for joint in self.joints)
         if self.base_joints:
             self.root_link = joints[self.base_joints - 1].link
-        problems = self._misfits()
+        problems = self._problems()
         if problems:
             raise ConfigError(problems)
         for index, position in self.start_positions().items():
@@ -137,7 +137,7 @@ class JointedBody(Body):
             self.kinematics.close()
         super().remove()
 
-    def _misfits(self) -> list[Problem]:
+    def _problems(self) -> list[Problem]:
         """Returns what in the configuration does not fit the robot."""
         problems = self._unknown_joints("initial_joint_position", self.config.initial_joint_position)
         if problems:

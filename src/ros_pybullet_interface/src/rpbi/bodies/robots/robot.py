@@ -14,7 +14,7 @@ from rpbi.control.gravity import GravityModel
 from rpbi.control.limit_reports import LimitReports
 from rpbi.control.motion import JointMotion, Motion
 from rpbi.control.motors import Command, Motors
-from rpbi.control.trajectories.config import trajectory_misfits
+from rpbi.control.trajectories.config import trajectory_problems
 from rpbi.control.trajectories.follower import TrajectoryFollower
 from rpbi.engine.client import Client
 from rpbi.engine.inputs import Input
@@ -201,8 +201,8 @@ class Robot(JointedBody):
         given = {key: getattr(motors, key) for key in ("positionGains", "velocityGains")}
         return {key: gains for key, gains in given.items() if gains is not None}
 
-    def _misfits(self) -> list[Problem]:
-        problems = [*super()._misfits(), *self._trajectory_misfits()]
+    def _problems(self) -> list[Problem]:
+        problems = [*super()._problems(), *self._trajectory_problems()]
         driven = self.model.driven
         for key, gains in self._configured_gains().items():
             path = f"setJointMotorControlArray.{key}"
@@ -212,9 +212,9 @@ class Robot(JointedBody):
                 names = ", ".join(joint.name for joint in driven)
                 message = f"expected 1 number or {len(driven)}, one for each of {names}; got {len(gains)}"
                 problems.append(Problem(self.name, path, message))
-        return [*problems, *self._force_torque_misfits(), *self._gravity_misfits()]
+        return [*problems, *self._force_torque_problems(), *self._gravity_problems()]
 
-    def _gravity_misfits(self) -> list[Problem]:
+    def _gravity_problems(self) -> list[Problem]:
         """PyBullet's inverse dynamics know joints of one axis only."""
         others = [joint.name for joint in self.joints if not (joint.is_driven or joint.is_fixed)]
         if not (self.config.gravity_compensation and others):
@@ -222,11 +222,11 @@ class Robot(JointedBody):
         message = f"works with revolute, prismatic and fixed joints only; there are {', '.join(others)}"
         return [Problem(self.name, "gravity_compensation", message)]
 
-    def _trajectory_misfits(self) -> list[Problem]:
+    def _trajectory_problems(self) -> list[Problem]:
         names = [joint.name for joint in self.model.driven]
-        return trajectory_misfits(self.name, self.config.joint_trajectory_controller, names)
+        return trajectory_problems(self.name, self.config.joint_trajectory_controller, names)
 
-    def _force_torque_misfits(self) -> list[Problem]:
+    def _force_torque_problems(self) -> list[Problem]:
         problems = []
         joints = [each.joint for each in self.config.enabled_joint_force_torque_sensors]
         for index, joint in enumerate(joints):

@@ -63,7 +63,7 @@ class JointTrajectoryControllerConfig(ConfigModel):
     allow_partial_joints_goal: Switch = Field(False, description="Whether a trajectory may leave joints out.")
 
 
-def trajectory_misfits(
+def trajectory_problems(
     name: str, config: JointTrajectoryControllerConfig | None, driven: Iterable[str]
 ) -> list[Problem]:
     """Returns what in the configuration does not fit a robot.

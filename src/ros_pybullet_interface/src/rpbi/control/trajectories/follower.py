@@ -12,7 +12,7 @@ from rpbi.engine.clock import NS_PER_S, Clock, Schedule
 
 from .config import JointTrajectoryControllerConfig
 from .controller_state import ControllerState
-from .course import Course, checked_courses
+from .joint_trajectory import JointTrajectory, validate_trajectory
 from .motion import TrajectoryMotion, stopping
 from .request import ErrorCode, GoalTolerances, TrajectoryRefusedError, TrajectoryRequest
 from .tolerances import Tolerances, resolved_tolerances
@@ -26,12 +26,12 @@ class CheckedRequest(NamedTuple):
     """A trajectory that can be followed, unless the robot's state forbids it.
 
     Attributes:
-        courses: What it asks of each joint that it names; none to stop and hold.
+        joint_trajectories: What it asks of each joint that it names; none to stop and hold.
         stamp_ns: Stamp of its start [ns]; 0 is now.
         tolerances: How well it is to be followed; None is not looked at.
     """
 
-    courses: tuple[Course, ...]
+    joint_trajectories: tuple[JointTrajectory, ...]
     stamp_ns: int
     tolerances: Tolerances | None
 
@@ -66,11 +66,11 @@ class TrajectoryFollower:
         Raises:
             TrajectoryRefusedError: If it cannot be followed.
         """
-        courses = checked_courses(request, self._joints, self.config.allow_partial_joints_goal)
+        joint_trajectories = validate_trajectory(request, self._joints, self.config.allow_partial_joints_goal)
         resolved = None
         if tolerances is not None:
             resolved = resolved_tolerances(tolerances, self.config.constraints, self._joints)
-        return CheckedRequest(courses, request.stamp_ns, resolved)
+        return CheckedRequest(joint_trajectories, request.stamp_ns, resolved)
 
     def follow(
         self, request: CheckedRequest, clock: Clock, feedback: Callable[[ControllerState], None] | None = None
@@ -97,11 +97,11 @@ class TrajectoryFollower:
         running = self._running
         trajectories = {} if running is None else {i: each.since(now_s) for i, each in running.trajectories.items()}
         measured = self._robot.joint_motion()
-        for course in request.courses:
-            index = course.joint.index
+        for joint_trajectory in request.joint_trajectories:
+            index = joint_trajectory.joint.index
             current = trajectories.get(index) or Trajectory([Knot(now_s, measured[index][:1])])
-            trajectories[index] = course.joined(current, start_s, from_s)
-        if not request.courses:
+            trajectories[index] = joint_trajectory.joined(current, start_s, from_s)
+        if not request.joint_trajectories:
             trajectories, from_s = self._stopping(now_s, measured, trajectories or self._by_index), now_s
         motion = TrajectoryMotion(self._by_index, trajectories, from_s, request.tolerances, self._stop_s)
         if feedback is not None:
@@ -190,9 +190,9 @@ class TrajectoryFollower:
 
 
 def _check_time(request: CheckedRequest, start_s: float, from_s: float) -> None:
-    if not request.courses:
+    if not request.joint_trajectories:
         return
-    last_s = request.courses[0].knots[-1].time_s
+    last_s = request.joint_trajectories[0].knots[-1].time_s
     if start_s + last_s > from_s:
         return
     if request.stamp_ns:

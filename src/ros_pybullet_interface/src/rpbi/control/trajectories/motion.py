@@ -64,11 +64,11 @@ class TrajectoryMotion(Motion):
         """Compares where the joints are with where they were to be, and goes on if they are near enough."""
         if self.on_advance is not None:
             self.on_advance(self._time_s, measured)
-        fault = self._path_fault(measured)
+        fault = self._path_problem(measured)
         if fault:
             return self._break_off(ErrorCode.PATH_TOLERANCE_VIOLATED, fault, time_s, measured)
         if self._time_s >= self.end_s:
-            fault = self._goal_fault(measured)
+            fault = self._goal_problem(measured)
             if not fault:
                 self._finish()
             elif self._is_out_of_time(time_s):
@@ -130,13 +130,13 @@ class TrajectoryMotion(Motion):
         tick_s = time_s - self._time_s
         return self._tolerances is not None and self._time_s > self.end_s + self._tolerances.goal_time_s + tick_s / 2.0
 
-    def _path_fault(self, measured: JointMotion) -> str:
+    def _path_problem(self, measured: JointMotion) -> str:
         """Returns what is too far off on the way, nothing if all is well."""
         if self._tolerances is None or not self.from_s <= self._time_s < self.end_s:
             return ""
         return self._fault_in(self._tolerances.path, measured, "its trajectory")
 
-    def _goal_fault(self, measured: JointMotion) -> str:
+    def _goal_problem(self, measured: JointMotion) -> str:
         if self._tolerances is None:
             return ""
         return self._fault_in(self._tolerances.goal, measured, "its goal")

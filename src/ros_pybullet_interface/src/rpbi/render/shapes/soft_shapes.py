@@ -30,7 +30,7 @@ class SoftShapes:
     def still(self, body: Body) -> None:
         """Sees to it that a new body neither pushes nor pulls others in a step."""
         if self._pb.is_deformable:
-            body.untie()
+            body.detach()
             for link in (-1, *body.joint_indices):
                 self._pb.setCollisionFilterGroupMask(body.body_id, link, 0, 0)
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from rpbi.engine.client import Client
 
 
-class GlassyShape(NamedTuple):
+class TransparentShape(NamedTuple):
     """A shape that is neither opaque nor invisible.
 
     Attributes:
@@ -36,8 +36,8 @@ class Transparency:
     def __init__(self, pb: Client) -> None:
         self._pb = pb
         self._stale = {0: len(pb.getVisualShapeData(0))}  # the renderer has drawn a test image
-        self._shapes_of: dict[int, tuple[GlassyShape, ...]] = {}
-        self.shapes: tuple[GlassyShape, ...] = ()
+        self._shapes_of: dict[int, tuple[TransparentShape, ...]] = {}
+        self.shapes: tuple[TransparentShape, ...] = ()
         """All glassy shapes."""
 
     def update(self, body_ids: set[int]) -> None:
@@ -49,12 +49,12 @@ class Transparency:
             self._shapes_of[body_id] = tuple(self._glassy(body_id))
         self.shapes = tuple(shape for shapes in self._shapes_of.values() for shape in shapes)
 
-    def _glassy(self, body_id: int) -> list[GlassyShape]:
+    def _glassy(self, body_id: int) -> list[TransparentShape]:
         found = []
         count: Counter[int] = Counter()
         for data in self._pb.getVisualShapeData(body_id)[self._stale.get(body_id, 0) :]:
             link_index, rgba = data[1], data[7]
             if 0.0 < rgba[3] < 1.0:
-                found.append(GlassyShape(body_id, link_index, count[link_index], rgba))
+                found.append(TransparentShape(body_id, link_index, count[link_index], rgba))
             count[link_index] += 1
         return found

@@ -22,7 +22,7 @@ from rpbi.ros.publishers.topics import StateTopic
 from .messages import camera_info, cloud_message, image_message
 from .topics import CameraTopic, camera_topics
 
-SINK = "rpbi.ros.cameras.image_publisher:ImageSink"
+SINK = "rpbi.ros.cameras.image_publisher:ImagePublisher"
 
 QUEUE_SIZE = 2
 """Images kept for a slow subscriber: a stopped one must not fill the memory."""
@@ -30,7 +30,7 @@ LONGEST_WAIT_S = 5.0
 """How long subscribers are waited for that the master knows of [s]."""
 
 
-class ImageSink:
+class ImagePublisher:
     """Publishes frames on the topics of each camera, and only those that somebody subscribes to."""
 
     def __init__(self) -> None:

@@ -25,7 +25,7 @@ LONGEST_WAIT_S = 20.0
 """How long the world waits for a synchronous camera before it stands still [s] of wall time."""
 
 
-class CameraOutlet:
+class ScenePublisher:
     """Feeds the renderer process, and has cameras read only while somebody looks at their images.
 
     Args:

@@ -7,7 +7,7 @@ from collections import deque
 from typing import Any
 
 
-class PatientSocket:
+class BufferedSocket:
     """A connected socket whose `sendall` never waits: what the other side does not take yet is kept in order.
 
     Args:

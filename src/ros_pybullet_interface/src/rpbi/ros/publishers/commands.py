@@ -55,7 +55,7 @@ class _CommandTopic(FastTopic):
         self.newcomers.append(_Reader(send))
 
 
-class CommandOutlet:
+class CommandPublisher:
     """Publishes what a world was built from, and its commands, a few at each pass of the loop.
 
     Args:
@@ -86,7 +86,7 @@ class CommandOutlet:
             else:
                 self._all.next = commands.count
         for reader in self._newcomers:
-            self._topic.be_patient()
+            self._topic.wrap_connections()
             self._send(reader)
         self._newcomers = [reader for reader in self._newcomers if reader.next < commands.count]
         self._topic.flush()

@@ -1,21 +1,21 @@
-"""The outlets of a world's samples, and which topics a body has among them."""
+"""The publishers of a world's samples, and which topics a body has among them."""
 
 from __future__ import annotations
 
 from rpbi.engine.inputs import PoseInput
-from rpbi.ros.cameras.publisher import CameraOutlet
+from rpbi.ros.cameras.publisher import ScenePublisher
 from rpbi.ros.inputs import topic_input
 from rpbi.samples import LinkPoseSample, SceneSample
 from rpbi.world import World
 
-from .publishers import Outlet, SampleOutlet
 from .sample_topics import TOPICS, sample_topic
+from .topic_publisher import SamplePublisher, TopicPublisher
 from .topics import FastTopic
-from .transforms import TransformOutlet
+from .transforms import TransformPublisher
 
 
-class SampleOutlets:
-    """All outlets of a world.
+class SamplePublishers:
+    """All publishers of a world.
 
     Args:
         world: The world.
@@ -27,13 +27,13 @@ class SampleOutlets:
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self._topics = {sample_type: SampleOutlet() for sample_type in TOPICS}
-        self._fed: dict[str, list[tuple[Outlet, str]]] = {}
-        """The outlets and sensors of each body whose topics are open."""
-        self.cameras = CameraOutlet(world)
-        self.by_type: dict[type, Outlet] = {
+        self._topics = {sample_type: TopicPublisher() for sample_type in TOPICS}
+        self._fed: dict[str, list[tuple[SamplePublisher, str]]] = {}
+        """The publishers and sensors of each body whose topics are open."""
+        self.cameras = ScenePublisher(world)
+        self.by_type: dict[type, SamplePublisher] = {
             **self._topics,
-            LinkPoseSample: TransformOutlet(),
+            LinkPoseSample: TransformPublisher(),
             SceneSample: self.cameras,
         }
 
@@ -45,7 +45,7 @@ class SampleOutlets:
         """
         for sensor in self._world.sensors_of(name):
             if sample_topic(sensor) is not None and sensor.sample_type not in self._topics:
-                self._topics[sensor.sample_type] = self.by_type[sensor.sample_type] = SampleOutlet()
+                self._topics[sensor.sample_type] = self.by_type[sensor.sample_type] = TopicPublisher()
         for key, taken in self._world.bodies[name].inputs().items():
             if not isinstance(taken, PoseInput):
                 topic_input(key, taken)
@@ -66,5 +66,5 @@ class SampleOutlets:
             The topics that are left to close, by another thread.
         """
         self.cameras.forget(name)
-        topics = [outlet.forget(sensor) for outlet, sensor in self._fed.pop(name, [])]
+        topics = [publisher.forget(sensor) for publisher, sensor in self._fed.pop(name, [])]
         return [topic for topic in topics if topic is not None]

@@ -16,7 +16,7 @@ WINDOW_S = 1.0
 """Over how long the real-time factor is measured at least [s] of wall time."""
 
 
-class StateOutlet:
+class StatePublisher:
     """Tells how the simulation is doing, at a rate of the wall clock, and its hash, at a rate of the world's.
 
     Args:

@@ -35,7 +35,7 @@ def _warn_of_rivals() -> None:
         log.warning("/clock is published by %s too: two worlds cannot both be the clock", ", ".join(rivals))
 
 
-class ClockOutlet:
+class ClockPublisher:
     """Simulated time on /clock, of which the simulator is the only source.
 
     Args:
@@ -72,7 +72,7 @@ class ClockOutlet:
         self._publisher.publish(ClockMessage(to_ros_time(self._clock.stamp_ns)))
 
 
-class StatusOutlet:
+class StatusPublisher:
     """Whether the world runs, and how well.
 
     Args:

@@ -9,7 +9,7 @@ from typing import Any
 
 import rospy
 
-from .buffered_socket import PatientSocket
+from .buffered_socket import BufferedSocket
 
 QUEUE_SIZE = 1000
 """Messages kept for a slow subscriber before its oldest are dropped: it never holds physics up."""
@@ -81,22 +81,22 @@ class FastTopic(StateTopic):
 
     def publish(self, message: Any) -> None:
         """Sends a message to all subscribers, or keeps it for those that are slow."""
-        self.be_patient()
+        self.wrap_connections()
         super().publish(message)
 
-    def be_patient(self) -> None:
+    def wrap_connections(self) -> None:
         """Sees to it that sending never waits for anybody, not for those either that have just come."""
         connections = self._publisher.impl.connections  # rospy makes a new list whenever somebody comes or goes
         if connections is not self._connections:
             for connection in connections:
                 if isinstance(connection.socket, socket.socket):
-                    connection.socket = PatientSocket(connection.socket, self._queue_size)
+                    connection.socket = BufferedSocket(connection.socket, self._queue_size)
             self._connections = connections
 
     def flush(self) -> None:
         """Sends what slow subscribers have not taken yet; for a time in which nothing new is published."""
         for connection in self._publisher.impl.connections:
-            if isinstance(connection.socket, PatientSocket):
+            if isinstance(connection.socket, BufferedSocket):
                 try:
                     connection.socket.flush()
                 except OSError:

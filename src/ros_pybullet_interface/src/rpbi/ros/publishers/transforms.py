@@ -11,7 +11,7 @@ from rpbi.samples import LinkPoseSample
 from .topics import FastTopic
 
 
-class TransformOutlet:
+class TransformPublisher:
     """Link poses on TF, all that a tick has in one message."""
 
     def __init__(self) -> None:

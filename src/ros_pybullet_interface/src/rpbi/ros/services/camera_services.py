@@ -11,7 +11,7 @@ from custom_ros_tools.config import load_config, load_configs
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.srv import SetString, SetStringRequest, SetStringResponse
 from rpbi.config.asset_files import find_file
-from rpbi.config.object_entry import FILE, parse_instance
+from rpbi.config.object_entry import FILE, parse_object_entry
 from rpbi.config.sensors import RgbdSensorConfig
 
 from .node_services import NO_FOLDER, NodeService
@@ -52,8 +52,8 @@ class CameraServices:
         if FILE not in data:
             return data, "data"
         try:
-            instance = parse_instance(data)
+            instance = parse_object_entry(data)
             path = find_file(instance.file, NO_FOLDER, self._search_paths)
         except ValueError as error:
             raise InterfaceError(f"{FILE}: {error}") from None
-        return instance.apply_changes(load_config(path)), instance.file
+        return instance.apply_overrides(load_config(path)), instance.file

@@ -8,8 +8,8 @@ import pybullet
 import pytest
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.control.trajectories.config import JointTrajectoryControllerConfig, trajectory_misfits
-from rpbi.control.trajectories.course import checked_courses
+from rpbi.control.trajectories.config import JointTrajectoryControllerConfig, trajectory_problems
+from rpbi.control.trajectories.joint_trajectory import validate_trajectory
 from rpbi.control.trajectories.motion import stopping
 from rpbi.control.trajectories.request import (
     ErrorCode,
@@ -44,8 +44,14 @@ def standing(position: float, time_s: float = 0.0) -> Trajectory:
 
 
 def test_columns_go_to_the_joints_that_are_named():
-    courses = checked_courses(request(Waypoint(1.0, (0.1, 0.2, 0.3)), names=("wheel", "a", "b")), JOINTS, False)
-    assert {course.joint.name: course.trajectory.goal[0] for course in courses} == {"wheel": 0.1, "a": 0.2, "b": 0.3}
+    joint_trajectories = validate_trajectory(
+        request(Waypoint(1.0, (0.1, 0.2, 0.3)), names=("wheel", "a", "b")), JOINTS, False
+    )
+    assert {course.joint.name: course.trajectory.goal[0] for course in joint_trajectories} == {
+        "wheel": 0.1,
+        "a": 0.2,
+        "b": 0.3,
+    }
 
 
 @pytest.mark.parametrize(
@@ -82,14 +88,14 @@ def test_columns_go_to_the_joints_that_are_named():
 )
 def test_what_cannot_be_followed_is_refused_with_its_code(asked, code, message):
     with pytest.raises(TrajectoryRefusedError) as refused:
-        checked_courses(asked, JOINTS, False)
+        validate_trajectory(asked, JOINTS, False)
     assert refused.value.code == code
     assert message in str(refused.value)
 
 
 def test_part_of_the_joints_will_do_where_that_is_allowed():
-    courses = checked_courses(request(Waypoint(1.0, (0.5,)), names=("b",)), JOINTS, True)
-    assert [course.joint.name for course in courses] == ["b"]
+    joint_trajectories = validate_trajectory(request(Waypoint(1.0, (0.5,)), names=("b",)), JOINTS, True)
+    assert [course.joint.name for course in joint_trajectories] == ["b"]
 
 
 def test_planned_motion_at_the_speed_limit_is_not_refused_for_what_its_curve_makes_of_it():
@@ -102,15 +108,15 @@ def test_planned_motion_at_the_speed_limit_is_not_refused_for_what_its_curve_mak
             position = -1.5 + 5.0 * ramp**2 + 3.0 * (t - ramp)
             velocity, acceleration = 10.0 * ramp, 10.0 * (t < 0.3)
             points.append(Waypoint(number * 0.1 + 0.1, (position,), (velocity,), (acceleration,)))
-        checked_courses(request(*points[:10], names=("a",)), {"a": JOINTS["a"]}, False)
+        validate_trajectory(request(*points[:10], names=("a",)), {"a": JOINTS["a"]}, False)
 
 
-def course_of(*points: Waypoint, name: str = "a"):
-    return checked_courses(request(*points, names=(name,)), {name: JOINTS[name]}, False)[0]
+def joint_trajectory_of(*points: Waypoint, name: str = "a"):
+    return validate_trajectory(request(*points, names=(name,)), {name: JOINTS[name]}, False)[0]
 
 
 def test_joined_course_leaves_out_what_is_past_and_goes_straight_to_the_next_point():
-    course = course_of(Waypoint(0.5, (1.0,)), Waypoint(1.5, (0.5,)), Waypoint(2.5, (-0.5,)))
+    course = joint_trajectory_of(Waypoint(0.5, (1.0,)), Waypoint(1.5, (0.5,)), Waypoint(2.5, (-0.5,)))
     joined = course.joined(standing(0.0), start_s=9.0, from_s=10.0)
     assert [joined.sample(t).position[0] for t in (9.0, 10.0, 10.25, 10.5, 11.0, 11.5)] == pytest.approx(
         [0.0, 0.0, 0.25, 0.5, 0.0, -0.5]
@@ -119,7 +125,7 @@ def test_joined_course_leaves_out_what_is_past_and_goes_straight_to_the_next_poi
 
 def test_joined_course_begins_with_the_motion_under_way():
     current = Trajectory([Knot(0.0, (0.0,), (0.0,)), Knot(2.0, (1.0,), (0.0,))])
-    course = course_of(Waypoint(1.0, (-0.5,), (0.0,)))
+    course = joint_trajectory_of(Waypoint(1.0, (-0.5,), (0.0,)))
     joined = course.joined(current, start_s=1.0, from_s=1.0)
     before, after = joined.sample(1.0 - 1e-9), joined.sample(1.0 + 1e-9)
     assert after.position == pytest.approx(before.position, abs=1e-6)
@@ -133,7 +139,7 @@ def test_joined_course_begins_with_the_motion_under_way():
     [(0.0, 1.5 * math.pi, -0.5 * math.pi), (6.0 * math.pi, 0.5, 6.0 * math.pi + 0.5), (0.2, 0.3, 0.3)],
 )
 def test_joint_without_limits_takes_the_short_way_and_keeps_its_turns_from_then_on(now, asked, goes_to):
-    course = course_of(Waypoint(1.0, (asked,)), Waypoint(2.0, (asked + 7.0,)), name="wheel")
+    course = joint_trajectory_of(Waypoint(1.0, (asked,)), Waypoint(2.0, (asked + 7.0,)), name="wheel")
     joined = course.joined(standing(now), 0.0, 0.0)
     assert joined.sample(1.0).position[0] == pytest.approx(goes_to)
     assert joined.goal[0] == pytest.approx(goes_to + 7.0)
@@ -141,11 +147,11 @@ def test_joint_without_limits_takes_the_short_way_and_keeps_its_turns_from_then_
 
 def test_first_point_that_cannot_be_reached_in_time_is_refused():
     with pytest.raises(TrajectoryRefusedError, match="joint 'a' would need 15 rad/s on the way to point 0"):
-        course_of(Waypoint(0.1, (1.5,))).joined(standing(0.0), 0.0, 0.0)
+        joint_trajectory_of(Waypoint(0.1, (1.5,))).joined(standing(0.0), 0.0, 0.0)
 
 
 def test_joint_that_was_pushed_beyond_its_limit_may_come_back():
-    joined = course_of(Waypoint(1.0, (1.0,))).joined(standing(2.3), 0.0, 0.0)
+    joined = joint_trajectory_of(Waypoint(1.0, (1.0,))).joined(standing(2.3), 0.0, 0.0)
     assert joined.goal == (1.0,)
 
 
@@ -209,7 +215,7 @@ def test_bad_configuration_is_named(keys, key, message):
 def test_joints_that_the_robot_lacks_are_named_with_their_keys():
     keys = {"joints": ["a", "elbow", "a"], "constraints": {"whel": {"goal": 0.1}}}
     config = JointTrajectoryControllerConfig.parse(keys, "arm.yaml")
-    problems = {problem.key: problem.message for problem in trajectory_misfits("arm", config, NAMES)}
+    problems = {problem.key: problem.message for problem in trajectory_problems("arm", config, NAMES)}
     assert list(problems) == [
         "joint_trajectory_controller.joints[1]",
         "joint_trajectory_controller.joints[2]",

@@ -13,7 +13,7 @@ from custom_ros_tools.schema import ConfigModel, Positive
 Array = npt.NDArray[np.float64]
 
 
-class ContinuityConfig(ConfigModel):
+class JointRateLimiterConfig(ConfigModel):
     """How targets follow each other."""
 
     max_velocity: Positive | dict[str, Positive] | None = Field(
@@ -23,7 +23,7 @@ class ContinuityConfig(ConfigModel):
     velocity_scale: float = Field(1.0, gt=0.0, le=1.0, description="Share of these velocities that is used.")
 
 
-class Continuity:
+class JointRateLimiter:
     """Keeps the joints between two targets within their velocities.
 
     Where the solution is further away, the target goes as far towards it as the slowest joint allows, all joints in
@@ -39,7 +39,9 @@ class Continuity:
         ValueError: If the configuration names a joint that is not there, or a joint has no limit at all.
     """
 
-    def __init__(self, config: ContinuityConfig, joint_names: Sequence[str], velocity_limits: Sequence[float]) -> None:
+    def __init__(
+        self, config: JointRateLimiterConfig, joint_names: Sequence[str], velocity_limits: Sequence[float]
+    ) -> None:
         limits = dict(zip(joint_names, velocity_limits))
         given = config.max_velocity
         if isinstance(given, dict):

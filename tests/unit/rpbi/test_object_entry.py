@@ -7,16 +7,16 @@ import yaml
 from worlds import box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.config.object_entry import parse_instance
+from rpbi.config.object_entry import parse_object_entry
 from rpbi.world import World
 
 
 def test_changes_replace_values_and_merge_mappings_and_alter_neither():
     data = {"name": "a", "loadURDF": {"fileName": "x.urdf", "useFixedBase": True}, "list": [1, 2]}
     entry = {"file": "a.yaml", "name": "b", "loadURDF": {"basePosition": [1, 0, 0]}, "list": [3]}
-    instance = parse_instance(entry)
+    instance = parse_object_entry(entry)
     assert instance.file == "a.yaml"
-    assert instance.apply_changes(data) == {
+    assert instance.apply_overrides(data) == {
         "name": "b",
         "loadURDF": {"fileName": "x.urdf", "useFixedBase": True, "basePosition": [1, 0, 0]},
         "list": [3],
@@ -28,7 +28,7 @@ def test_changes_replace_values_and_merge_mappings_and_alter_neither():
 @pytest.mark.parametrize("entry", [3, None, "", {}, {"name": "b"}, {"file": 3}, ["a.yaml"]])
 def test_an_entry_without_a_file_is_refused(entry):
     with pytest.raises(ValueError, match="expected a file name, or a mapping with 'file'"):
-        parse_instance(entry)
+        parse_object_entry(entry)
 
 
 def _world(tmp_path, **lists):

@@ -1,4 +1,4 @@
-"""Where samples go: one outlet for each type of samples."""
+"""Where samples go: one publisher for each type of samples."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .sample_topics import SampleTopic
 from .topics import FastTopic
 
 
-class Outlet(Protocol):
+class SamplePublisher(Protocol):
     """Takes one type of samples."""
 
     def publish(self, sample: Any, stamp_ns: int) -> None:
@@ -37,7 +37,7 @@ class _Route(NamedTuple):
     to_message: Callable[[Any, int], Any]
 
 
-class SampleOutlet:
+class TopicPublisher:
     """Samples of one type, each sensor on a topic of its own."""
 
     def __init__(self) -> None:

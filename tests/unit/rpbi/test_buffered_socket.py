@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from rpbi.ros.publishers.buffered_socket import PatientSocket
+from rpbi.ros.publishers.buffered_socket import BufferedSocket
 
 
 @pytest.fixture
@@ -33,13 +33,13 @@ def _message(number):
 
 
 def test_what_is_taken_at_once_goes_at_once(pair):
-    patient = PatientSocket(pair[0], limit=10)
+    patient = BufferedSocket(pair[0], limit=10)
     patient.sendall(b"hello")
     assert _received(pair[1]) == b"hello"
 
 
 def test_a_reader_that_sleeps_holds_nobody_up_and_gets_everything_in_order(pair):
-    patient = PatientSocket(pair[0], limit=1000)
+    patient = BufferedSocket(pair[0], limit=1000)
     for number in range(100):  # far more than the socket's buffer takes
         patient.sendall(_message(number))
     data = _received(pair[1])
@@ -50,7 +50,7 @@ def test_a_reader_that_sleeps_holds_nobody_up_and_gets_everything_in_order(pair)
 
 
 def test_beyond_the_limit_the_oldest_are_dropped_but_never_a_part_of_one(pair):
-    patient = PatientSocket(pair[0], limit=5)
+    patient = BufferedSocket(pair[0], limit=5)
     for number in range(100):
         patient.sendall(_message(number))
     data = _received(pair[1])
@@ -65,11 +65,11 @@ def test_beyond_the_limit_the_oldest_are_dropped_but_never_a_part_of_one(pair):
 
 
 def test_a_reader_that_has_gone_is_an_error(pair):
-    patient = PatientSocket(pair[0], limit=5)
+    patient = BufferedSocket(pair[0], limit=5)
     pair[1].close()
     with pytest.raises(BrokenPipeError):
         patient.sendall(b"x")
 
 
 def test_it_is_otherwise_the_socket(pair):
-    assert PatientSocket(pair[0], limit=5).fileno() == pair[0].fileno()
+    assert BufferedSocket(pair[0], limit=5).fileno() == pair[0].fileno()

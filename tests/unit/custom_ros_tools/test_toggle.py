@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from custom_ros_tools.toggle import OnOff
+from custom_ros_tools.toggle import Toggle
 
 
 def test_each_switch_acts_once() -> None:
     acts: list[str] = []
-    switch = OnOff("remapping", lambda: acts.append("start"), lambda: acts.append("stop"))
+    switch = Toggle("remapping", lambda: acts.append("start"), lambda: acts.append("stop"))
     assert switch.off() == (False, "remapping is already off")
     assert switch.on() == (True, "remapping is on")
     assert switch.on() == (False, "remapping is already on")
@@ -25,7 +25,7 @@ def test_start_that_failed_leaves_it_off() -> None:
         if fault is not None:
             raise fault
 
-    switch = OnOff("remapping", start, lambda: None)
+    switch = Toggle("remapping", start, lambda: None)
     with pytest.raises(OSError):
         switch.on()
     assert switch.on() == (True, "remapping is on")

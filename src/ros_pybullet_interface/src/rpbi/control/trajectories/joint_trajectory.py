@@ -25,7 +25,7 @@ ROUNDING = 1.0 + 1e-6
 TURN = 2.0 * math.pi
 
 
-class Course(NamedTuple):
+class JointTrajectory(NamedTuple):
     """What a trajectory asks of one joint, in times from its start.
 
     Attributes:
@@ -39,14 +39,14 @@ class Course(NamedTuple):
     trajectory: Trajectory
 
     def joined(self, current: Trajectory, start_s: float, from_s: float) -> Trajectory:
-        """Returns what the joint does now until a time, and this course from then on.
+        """Returns what the joint does now until a time, and this trajectory from then on.
 
         Points up to that time are left out: the joint goes straight to the next one. A joint without limits that
         turns takes the short way there.
 
         Args:
             current: What the joint does now.
-            start_s: The world's time at which the course's times begin [s].
+            start_s: The world's time at which the trajectory's times begin [s].
             from_s: When it takes over [s]; there is a point after it.
 
         Raises:
@@ -77,9 +77,9 @@ class Course(NamedTuple):
             raise _swings_out(self.joint, low, high, where)
 
 
-def checked_courses(
+def validate_trajectory(
     request: TrajectoryRequest, joints: Mapping[str, Joint], may_be_partial: bool
-) -> tuple[Course, ...]:
+) -> tuple[JointTrajectory, ...]:
     """Checks a trajectory as far as it can be without knowing where the joints are; any thread may call it.
 
     Args:
@@ -92,7 +92,7 @@ def checked_courses(
     """
     _check_names(request, joints, may_be_partial)
     _check_points(request)
-    courses = []
+    joint_trajectories = []
     for column, name in enumerate(request.joint_names if request.points else ()):
         joint = joints[name]
         for number, point in enumerate(request.points):
@@ -100,8 +100,8 @@ def checked_courses(
         knots = tuple(_knot(point, column) for point in request.points)
         trajectory = Trajectory(knots)
         _check_curves(joint, trajectory)
-        courses.append(Course(joint, knots, trajectory))
-    return tuple(courses)
+        joint_trajectories.append(JointTrajectory(joint, knots, trajectory))
+    return tuple(joint_trajectories)
 
 
 def _knot(point: Waypoint, column: int) -> Knot:
