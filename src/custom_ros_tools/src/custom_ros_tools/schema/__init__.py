@@ -123,7 +123,11 @@ Rgb = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False)]
 ListOf = Annotated[tuple[Item, ...], Field(strict=False)]
 """A list of any length, kept as a tuple: `ListOf[float]`."""
 
-Switch = Annotated[bool, BeforeValidator(_switch), AlsoTakes({"type": "integer", "minimum": 0, "maximum": 1})]
+Switch = Annotated[
+    bool,
+    BeforeValidator(_switch),
+    WithJsonSchema({"type": ["boolean", "integer"], "minimum": 0, "maximum": 1}),
+]
 """True or false, which may be written 1 and 0 as PyBullet's users do."""
 Text = Annotated[str, Field(min_length=1)]
 Name = Annotated[

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, Field, ValidationInfo, WithJsonSchema, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from custom_ros_tools.errors import ConfigError
 from custom_ros_tools.schema import ConfigModel, Expects, InnerProblemsError, KeyedError, ListOf, Name
@@ -35,15 +35,8 @@ def _sensor_config(entry: Any, info: ValidationInfo) -> SensorConfig:
 
 SensorEntry = Annotated[
     Any,
-    AfterValidator(_sensor_config),
+    PlainValidator(_sensor_config, json_schema_input_type=SensorConfig),
     Expects("a list of sensors"),  # said of the list; what is wrong with an entry, the validator says
-    WithJsonSchema(
-        {
-            "type": "object",
-            "properties": SensorConfig.model_json_schema()["properties"],
-            "required": ["type", "name", "hz"],
-        }
-    ),
 ]
 """A sensor of another package: `{type: module:Class, name: NAME, hz: RATE, KEY: VALUE, ...}`."""
 

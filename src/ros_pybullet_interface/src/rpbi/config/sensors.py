@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from custom_ros_tools.schema import (
     AlsoTakes,
@@ -29,6 +29,8 @@ from .pybullet_models import ObjectTf
 
 class SensorConfig(ConfigModel):
     """An entry of a body's `sensors`; a sensor with more keys has a subclass of this as its `Config`."""
+
+    model_config = ConfigDict(json_schema_extra={"additionalProperties": True})  # those of subclasses
 
     type: Text = Field(description="Its class, as `module:Class`.")
     name: Name = Field(description="Its name, by which its body has no other sensor; topics are named after it.")

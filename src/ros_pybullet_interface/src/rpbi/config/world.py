@@ -21,7 +21,7 @@ from custom_ros_tools.schema import (
 )
 
 from .asset_files import find_folder
-from .object_entry import ObjectEntryYaml
+from .object_entry import FileOrOverrides
 from .pybullet_world_models import (
     ConfigureDebugVisualizer,
     Connect,
@@ -108,19 +108,19 @@ class WorldConfig(ConfigModel):
     visualizer_image_width: Pixels = Field(640, description="Columns of that image.")
     visualizer_image_height: Pixels = Field(480, description="Its rows.")
     markers_hz: HzOrOff = Field(10.0, description="How often `rpbi/markers` is looked after, in wall time; 0 is off.")
-    visual_objects: ListOf[ObjectEntryYaml] = Field((), description="Files of objects that are seen and never felt.")
-    collision_objects: ListOf[ObjectEntryYaml] = Field((), description="Files of objects that nothing moves.")
-    dynamic_objects: ListOf[ObjectEntryYaml] = Field((), description="Files of objects that physics moves.")
-    robots: ListOf[ObjectEntryYaml] = Field((), description="Files of robots.")
-    soft_objects: ListOf[ObjectEntryYaml] = Field((), description="Files of soft bodies.")
-    urdfs: ListOf[ObjectEntryYaml] = Field((), description="Files of objects that come from a URDF and have no motors.")
-    objects: ListOf[ObjectEntryYaml] = Field(
+    visual_objects: ListOf[FileOrOverrides] = Field((), description="Files of objects that are seen and never felt.")
+    collision_objects: ListOf[FileOrOverrides] = Field((), description="Files of objects that nothing moves.")
+    dynamic_objects: ListOf[FileOrOverrides] = Field((), description="Files of objects that physics moves.")
+    robots: ListOf[FileOrOverrides] = Field((), description="Files of robots.")
+    soft_objects: ListOf[FileOrOverrides] = Field((), description="Files of soft bodies.")
+    urdfs: ListOf[FileOrOverrides] = Field((), description="Files of objects that come from a URDF and have no motors.")
+    objects: ListOf[FileOrOverrides] = Field(
         (), description="Files of objects of your own types, see docs/extending.md."
     )
     rgbd_sensor: RgbdSensorConfig | None = Field(
         None, description="Camera of colour, depth and segmentation; the first one if there are several."
     )
-    rgbd_sensors: ListOf[ObjectEntryYaml] = Field((), description="Files of further cameras.")
+    rgbd_sensors: ListOf[FileOrOverrides] = Field((), description="Files of further cameras.")
 
     def search_paths(self) -> tuple[str, ...]:
         """Return the folders to look for files in, as absolute paths."""

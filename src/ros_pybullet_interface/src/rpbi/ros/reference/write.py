@@ -7,7 +7,7 @@ from pathlib import Path
 
 from custom_ros_tools.node_configs import NODE_CONFIGS
 from custom_ros_tools.schema.json_schema import Schema, explained, json_schema, schema_text
-from rpbi.config.schemas import schemas
+from rpbi.config.schemas import file_schemas, schemas
 from rpbi.reference.config_page import config_page
 
 from .interface_page import interface_page
@@ -33,7 +33,7 @@ def reference_files(root: Path) -> dict[Path, str]:
     Args:
         root: The workspace.
     """
-    worlds, nodes = schemas(), {node: json_schema(model, node) for node, model in NODE_CONFIGS.items()}
+    nodes = {node: json_schema(model, node) for node, model in NODE_CONFIGS.items()}
     examples = {kind: _example(root / "src/rpbi_examples/configs" / name) for kind, name in EXAMPLES.items()}
     world = reference_world()
     try:
@@ -41,9 +41,9 @@ def reference_files(root: Path) -> dict[Path, str]:
     finally:
         world.close()
     return {
-        **_schema_files(root / "src/ros_pybullet_interface/schema", worlds),
+        **_schema_files(root / "src/ros_pybullet_interface/schema", schemas()),
         **_schema_files(root / "src/custom_ros_tools/schema", nodes),
-        root / "docs/config_reference.md": config_page(worlds, nodes, examples),
+        root / "docs/config_reference.md": config_page(file_schemas(), nodes, examples),
         root / "docs/topics_and_services.md": topics,
     }
 
