@@ -12,24 +12,22 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+import pybullet
+from mobile_base import mobile_base
+from worlds import FLOOR, ball, box, iiwa, write_world
 
-import pybullet  # noqa: E402
-from mobile_base import mobile_base  # noqa: E402
-from worlds import FLOOR, ball, box, iiwa, write_world  # noqa: E402
-
-from rpbi.actions import RecordedTrajectory, TimedGoal  # noqa: E402
-from rpbi.bodies import BODY_TYPES  # noqa: E402
-from rpbi.config import load_object  # noqa: E402
-from rpbi.control.trajectory_request import TrajectoryRequest, Waypoint  # noqa: E402
-from rpbi.joint_model import JointTarget  # noqa: E402
-from rpbi.pose import Pose  # noqa: E402
-from rpbi.pybullet_models import ChangeDynamics  # noqa: E402
-from rpbi.recorded_values import to_text  # noqa: E402
-from rpbi.replay import Checkpoint, RecordedCommand, Recording, Replay  # noqa: E402
-from rpbi.twist import Twist  # noqa: E402
-from rpbi.world import World  # noqa: E402
-from rpbi.world_description import WorldDescription, describe  # noqa: E402
+from rpbi.actions import RecordedTrajectory, TimedGoal
+from rpbi.bodies import BODY_TYPES
+from rpbi.config import load_object
+from rpbi.control.trajectory_request import TrajectoryRequest, Waypoint
+from rpbi.joint_model import JointTarget
+from rpbi.pose import Pose
+from rpbi.pybullet_models import ChangeDynamics
+from rpbi.recorded_values import to_text
+from rpbi.replay import Checkpoint, RecordedCommand, Recording, Replay
+from rpbi.twist import Twist
+from rpbi.world import World
+from rpbi.world_description import WorldDescription, describe
 
 JOINTS = [f"lbr_iiwa_joint_{number}" for number in range(1, 8)]
 MODES = (pybullet.POSITION_CONTROL, pybullet.VELOCITY_CONTROL, pybullet.TORQUE_CONTROL)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -14,6 +15,14 @@ from typing import Any
 import rosgraph
 import rospy
 import yaml
+
+SUPPORT = Path(__file__).resolve().parent
+"""Where the tests' helpers are, and programs that tests start."""
+
+
+def support_on_path() -> dict[str, str]:
+    """Returns the environment in which other processes import the tests' helpers."""
+    return {"PYTHONPATH": os.pathsep.join((os.environ.get("PYTHONPATH", ""), str(SUPPORT)))}
 
 
 def wait_until(condition: Callable[[], Any], what: str, timeout_s: float = 20.0) -> Any:
@@ -117,6 +126,10 @@ class RosSystem:
         process.log_path = path  # type: ignore[attr-defined]
         self.processes.append(process)
         return process
+
+    def start_program(self, name: str, *arguments: str, **environment: str) -> subprocess.Popen:
+        """Starts one of the programs that stand beside this module."""
+        return self.start([sys.executable, str(SUPPORT / name), *arguments], **environment)
 
     def output(self, process: subprocess.Popen) -> str:
         """Returns what a program has printed so far."""
