@@ -13,8 +13,8 @@ from pathlib import Path
 from worlds import FLOOR, ball, box, iiwa, write_world
 
 from rpbi.bodies import BODY_TYPES
-from rpbi.config import load_object
-from rpbi.joint_model import JointTarget
+from rpbi.config.loading import load_object
+from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
 
 TICKS = 3000

@@ -16,18 +16,20 @@ import pybullet
 from mobile_base import mobile_base
 from worlds import FLOOR, ball, box, iiwa, write_world
 
-from rpbi.actions import RecordedTrajectory, TimedGoal
 from rpbi.bodies import BODY_TYPES
-from rpbi.config import load_object
-from rpbi.control.trajectory_request import TrajectoryRequest, Waypoint
-from rpbi.joint_model import JointTarget
-from rpbi.pose import Pose
-from rpbi.pybullet_models import ChangeDynamics
-from rpbi.recorded_values import to_text
-from rpbi.replay import Checkpoint, RecordedCommand, Recording, Replay
-from rpbi.twist import Twist
+from rpbi.config.loading import load_object
+from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.control.trajectories.request import TrajectoryRequest, Waypoint
+from rpbi.engine.actions import RecordedTrajectory, TimedGoal
+from rpbi.geometry import (
+    Pose,
+    Twist,
+)
+from rpbi.replay.recorded_values import to_text
+from rpbi.replay.session import Checkpoint, RecordedCommand, Recording, Replay
+from rpbi.replay.world_description import WorldDescription, describe
+from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
-from rpbi.world_description import WorldDescription, describe
 
 JOINTS = [f"lbr_iiwa_joint_{number}" for number in range(1, 8)]
 MODES = (pybullet.POSITION_CONTROL, pybullet.VELOCITY_CONTROL, pybullet.TORQUE_CONTROL)
