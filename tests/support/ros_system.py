@@ -9,10 +9,12 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import rosgraph
+import roslib.packages
 import rospy
 import yaml
 
@@ -113,6 +115,8 @@ class RosSystem:
 
     def start(self, command: Sequence[str], log: str | None = None, **environment: str) -> subprocess.Popen:
         """Starts a program in a process group of its own; its output goes to `output(process)`."""
+        if command[0] == "rosrun":
+            command = [find_executable(command[1], command[2]), *command[3:]]
         path = self.folder / (log or f"{len(self.processes)}.log")
         with open(path, "w") as file:
             process = subprocess.Popen(
@@ -193,6 +197,12 @@ class RosSystem:
             rospy.delete_param(name)
         if late:
             raise AssertionError("\n".join(late))
+
+
+@cache
+def find_executable(package: str, name: str) -> str:
+    """Returns the path of what `rosrun` would run, without the processes by which `rosrun` finds it."""
+    return str(roslib.packages.find_node(package, name)[0])
 
 
 def _provider(service: str) -> str | None:
