@@ -139,6 +139,7 @@ def test_explanation_ends_with_unit_and_default_also_inside_of_mappings() -> Non
     schema = explained(SCHEMA)
     assert schema["properties"]["hz"]["description"] == "How often. [Hz] Default: 50."
     assert schema["$defs"]["Inner"]["properties"]["range"]["description"] == "Near and far. [m]"
+    assert schema["properties"]["inner"]["anyOf"][0] == {"$ref": "#/$defs/Inner", "description": "What is inside."}
     assert SCHEMA["properties"]["hz"]["description"] == "How often."
 
 

@@ -180,7 +180,10 @@ def unit_in(schema: Schema) -> str | None:
 
 
 def explained(value: Any) -> Any:
-    """Returns a schema whose descriptions end with unit and default, since editors show nothing but these."""
+    """Returns a schema whose descriptions end with unit and default, since editors show nothing but these.
+
+    The description of a key stands beside the reference among its alternatives too: else that of the definition is shown.
+    """
     if isinstance(value, list):
         return [explained(each) for each in value]
     if not isinstance(value, dict):
@@ -189,7 +192,10 @@ def explained(value: Any) -> Any:
     if isinstance(value.get("description"), str) and "deprecated" not in value:
         unit = unit_in(value)
         default = f"Default: {yaml_text(value['default'])}." if "default" in value else ""
-        result["description"] = " ".join(filter(None, (value["description"], f"[{unit}]" if unit else "", default)))
+        text = " ".join(filter(None, (value["description"], f"[{unit}]" if unit else "", default)))
+        result["description"] = text
+        if "anyOf" in value:
+            result["anyOf"] = [{**each, "description": text} if "$ref" in each else each for each in result["anyOf"]]
     return result
 
 

@@ -147,5 +147,6 @@ def _with_old_keys(schema: Schema, section: str) -> Schema:
         else:
             content = resolved(mapping, result)
             mapping.pop("$ref", None)
-            mapping |= {**content, **mapping, "properties": {**content["properties"], inner: old}}
+            mapping |= {**content, **mapping, "description": properties[outer]["description"]}
+            mapping["properties"] = {**content["properties"], inner: old}
     return with_definitions(result, result.get(DEFINITIONS, {}))
