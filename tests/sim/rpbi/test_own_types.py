@@ -152,6 +152,10 @@ def test_a_world_and_what_comes_into_it_can_be_recorded(world):
         ({**BELT, "speed": "fast"}, r"belt.yaml: speed: expected a number \[m/s\], got text 'fast'"),
         (thing(sensors=3), r"thing.yaml: sensors: expected a list of sensors"),
         (thing(sensors=["eye"]), r"thing.yaml: sensors\[0\]: expected a mapping with 'type: module:Class'"),
+        (
+            thing(sensors=[{**EYE, "type": "contacts"}]),
+            r"sensors\[0\].type: expected a name like 'my_package.my_module:",
+        ),
         (thing(sensors=[{**EYE, "type": "nowhere:Eye"}]), r"thing.yaml: sensors\[0\].type: no module 'nowhere'"),
         (
             thing(sensors=[{**EYE, "type": CONVEYOR}]),

@@ -16,8 +16,10 @@ from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError
 from custom_ros_tools.schema import ConfigModel, Hz, Name
-from rpbi.config.loading import LoadedWorld, WorldConfig, load_object, load_world, load_world_dict
+from rpbi.config.loading import LoadedWorld, load_object, load_world, load_world_dict
+from rpbi.config.objects import sections_of
 from rpbi.config.pybullet_models import ChangeDynamics, CreateVisualShape, LoadURDF
+from rpbi.config.world import WorldConfig, main_file_model
 
 
 class BallConfig(ConfigModel):
@@ -166,9 +168,9 @@ def test_all_faults_of_all_files_are_told_at_once(folder: Path) -> None:
     ) == [
         "world.yaml: connect.connection_mode: unknown connection mode 'GIU'; did you mean 'GUI'?",
         "world.yaml: timeStep: expected a number [s], got text '1e-3': YAML reads 1e-3 as text: write 1.0e-3",
-        "world.yaml: visual_objects[4]: expected a file name, or a mapping with 'file' and the keys that differ; got 3",
         "world.yaml: rgbd_sensor.hz: must be > 0 [Hz], got -1",
         "world.yaml: rgbd_sensor.object_tf.tf_id: missing, expected a TF frame",
+        "world.yaml: visual_objects[4]: expected a file name, or a mapping with 'file' and the keys that differ; got 3",
         "world.yaml: setGravty: unknown key 'setGravty'; did you mean 'setGravity'?",
         "ball.yaml: changeDynamics.restitution: must be a finite number, got .nan",
         "ball.yaml: changeDynamics.lateralFrction: unknown key 'lateralFrction'; did you mean 'lateralFriction'?",
@@ -251,7 +253,7 @@ def test_missing_main_file_is_told(tmp_path: Path) -> None:
 def test_main_mapping_is_not_changed(folder: Path) -> None:
     data = {
         "gravity": -9.81,
-        "soft_objects": [],
+        "visual_objects": [],
         "setGravity": {"gravZ": -9.81},
         "robots": [f"{folder}/arm.yaml"],
     }
@@ -292,8 +294,13 @@ def test_unknown_type_of_object_is_named() -> None:
         load_object("robt", ARM, "config", BODY_TYPES)
 
 
+def test_lists_in_what_was_recorded_of_an_older_world_are_ignored() -> None:
+    assert WorldConfig.model_validate({"timeStep": 0.01, "robots": ["arm.yaml"]}) == WorldConfig(timeStep=0.01)
+
+
 def test_every_key_of_the_main_file_has_a_description_and_a_schema() -> None:
-    whole = WorldConfig.model_json_schema()
+    whole = main_file_model(sections_of(BODY_TYPES)).model_json_schema()
+    assert {"robots", "objects", "rgbd_sensors", "timeStep"} <= set(whole["properties"])
     for key, schema in whole["properties"].items():
         model = whole["$defs"].get(schema.get("$ref", "").rsplit("/", 1)[-1], {})
         assert schema.get("description", model.get("description", "")).endswith("."), key

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -84,7 +84,7 @@ def _real_location(details: ErrorDetails, data: Any) -> tuple[str | int, ...]:
     return tuple(kept)
 
 
-@cache
+@lru_cache(maxsize=100)
 def _schema_of(model: type[BaseModel]) -> Schema:
     return json_schema(model, model.__name__)
 

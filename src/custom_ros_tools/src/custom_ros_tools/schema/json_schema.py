@@ -182,7 +182,7 @@ def unit_in(schema: Schema) -> str | None:
 def explained(value: Any) -> Any:
     """Returns a schema whose descriptions end with unit and default, since editors show nothing but these.
 
-    The description of a key stands beside the reference among its alternatives too: else that of the definition is shown.
+    The description of a key stands beside the reference among its alternatives too: else that of the mapping is shown.
     """
     if isinstance(value, list):
         return [explained(each) for each in value]

@@ -11,8 +11,8 @@ from custom_ros_tools.errors import ConfigError
 from custom_ros_tools.schema import ConfigModel, Expects, InnerProblemsError, KeyedError, ListOf, Name
 from custom_ros_tools.schema.type_names import shown
 from rpbi.config.sensors import SensorConfig
-from rpbi.plugins import config_of, find_class
-from rpbi.sensors.body_sensor import BodySensor
+from rpbi.plugins import config_of
+from rpbi.sensors import sensor_class
 
 
 def _sensor_config(entry: Any, info: ValidationInfo) -> SensorConfig:
@@ -23,7 +23,7 @@ def _sensor_config(entry: Any, info: ValidationInfo) -> SensorConfig:
     if not isinstance(kind, str):
         raise ValueError(f"expected a mapping with 'type: module:Class', 'name' and 'hz'; got {shown(entry)}")
     try:
-        model = config_of(find_class(kind, BodySensor), SensorConfig)
+        model = config_of(sensor_class(kind), SensorConfig)
     except ValueError as error:
         raise KeyedError("type", str(error)) from None
     context = info.context or {}

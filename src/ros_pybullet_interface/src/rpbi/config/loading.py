@@ -16,7 +16,7 @@ from .legacy import MAIN
 from .object_entry import ObjectEntry, parse_object_entry
 from .objects import BodyType, ObjectConfig, load_object, name_in, parse_section, sections_of, type_of
 from .sensors import FIRST_TOPIC_NAME, RgbdSensorConfig
-from .world import WorldConfig
+from .world import WorldConfig, main_file_model
 
 __all__ = ["LoadedWorld", "ObjectConfig", "WorldConfig", "load_object", "load_world", "load_world_dict", "type_of"]
 
@@ -119,13 +119,15 @@ class _Reader:
     def read(self) -> LoadedWorld:
         """Return the world, or raise a ConfigError with all problems."""
         try:
-            config = parse_section(MAIN, self._data, self._file, WorldConfig, {"file": self._path})
+            model = main_file_model(sections_of(self._body_types))
+            content = parse_section(MAIN, self._data, self._file, model, {"file": self._path})
         except ConfigError as error:
             self._problems += error.problems
         objects = tuple(self._objects()) if isinstance(self._data, Mapping) else ()
         further = tuple(self._further_cameras()) if isinstance(self._data, Mapping) else ()
         if self._problems:
             raise ConfigError(self._problems)
+        config = WorldConfig.from_main_file(content)
         first = () if config.rgbd_sensor is None else (CameraConfig(config.rgbd_sensor, self._file),)
         if config.step_pybullet_manually:
             log.info("%s: step_pybullet_manually: has no effect: every step is explicit", self._file)

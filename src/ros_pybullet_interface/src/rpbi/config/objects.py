@@ -61,11 +61,13 @@ class ObjectConfig:
     file: str
 
 
-def sections_of(body_types: Mapping[str, BodyType]) -> list[str]:
-    """Return the lists of the main file that name objects, in the order in which they are loaded."""
-    rigid = [body_type.section for body_type in body_types.values() if not body_type.is_soft]
-    soft = [body_type.section for body_type in body_types.values() if body_type.is_soft]
-    return list(dict.fromkeys([*rigid, OWN_TYPES, *soft]))
+def sections_of(body_types: Mapping[str, BodyType]) -> dict[str, type[BodyConfig]]:
+    """Returns the lists of the main file that name objects, in the order of loading, each with its model."""
+    rigid: dict[str, type[BodyConfig]] = {}
+    soft: dict[str, type[BodyConfig]] = {}
+    for body_type in body_types.values():
+        (soft if body_type.is_soft else rigid).setdefault(body_type.section, body_type.Config)
+    return {**rigid, OWN_TYPES: BodyConfig, **soft}
 
 
 def type_of(section: str, data: Any, body_types: Mapping[str, BodyType]) -> str:

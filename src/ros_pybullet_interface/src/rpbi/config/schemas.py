@@ -13,14 +13,14 @@ from custom_ros_tools.schema.json_schema import (
     resolved,
     with_definitions,
 )
-from rpbi.bodies import BODY_TYPES, BodyConfig
+from rpbi.bodies import BODY_TYPES
 
 from .legacy import LEGACY_KEYS, MAIN, old_keys
 from .loading import CAMERAS
 from .object_entry import FILE
-from .objects import OWN_TYPES, TYPE
+from .objects import OWN_TYPES, TYPE, sections_of
 from .sensors import RgbdSensorConfig
-from .world import WorldConfig
+from .world import main_file_model
 
 WORLD = "world"
 """Name of the main file among the kinds of YAML files."""
@@ -31,8 +31,7 @@ _ENTRY = "entry"
 
 def sections() -> dict[str, type[ConfigModel]]:
     """Returns the models of the files that the lists of the main file name, by list."""
-    objects = {body_type.section: body_type.Config for body_type in BODY_TYPES.values()}
-    return {**objects, OWN_TYPES: BodyConfig, CAMERAS: RgbdSensorConfig}
+    return {**sections_of(BODY_TYPES), CAMERAS: RgbdSensorConfig}
 
 
 def kind_of(section: str) -> str:
@@ -46,7 +45,9 @@ def file_schemas() -> dict[str, Schema]:
     What no schema can say, such as that names are unique or files exist, is left to the models: what they take, a
     schema takes.
     """
-    files = json_schemas({WORLD: WorldConfig} | {kind_of(section): model for section, model in sections().items()})
+    files = json_schemas(
+        {WORLD: main_file_model(sections())} | {kind_of(section): model for section, model in sections().items()}
+    )
     for section in sections():
         file = files[kind_of(section)]
         types = [kind for kind, body_type in BODY_TYPES.items() if body_type.section == section]

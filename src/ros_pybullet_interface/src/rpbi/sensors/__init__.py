@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rpbi.config.sensors import SensorConfig
-from rpbi.plugins import ClassTable
+from rpbi.plugins import ClassTable, find_class
 
 from .body_sensor import BodySensor
 from .sensor import Sensor
@@ -22,4 +22,19 @@ SENSOR_TYPES = ClassTable(
     }
 )
 
-__all__ = ["SENSOR_TYPES", "BodySensor", "Sensor", "SensorConfig"]
+
+def sensor_class(kind: str) -> type[BodySensor]:
+    """Returns the class of sensors that a body's YAML asks for.
+
+    Args:
+        kind: A key of SENSOR_TYPES whose class is a BodySensor, or `module:Class` of another package.
+
+    Raises:
+        ValueError: If there is none.
+    """
+    known = SENSOR_TYPES.get(kind, Sensor)
+    found: type[BodySensor] = known if issubclass(known, BodySensor) else find_class(kind, BodySensor)
+    return found
+
+
+__all__ = ["SENSOR_TYPES", "BodySensor", "Sensor", "SensorConfig", "sensor_class"]
