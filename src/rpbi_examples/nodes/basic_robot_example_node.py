@@ -4,6 +4,6 @@
 import signal
 
 signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # before any thread starts
-from rpbi_examples.ros.basic_robot_example import main  # noqa: E402
+from rpbi_examples.ros.moving_robots import basic_robot_example  # noqa: E402
 
-main()
+basic_robot_example()

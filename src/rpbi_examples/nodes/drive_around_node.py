@@ -4,6 +4,6 @@
 import signal
 
 signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # before any thread starts
-from rpbi_examples.ros.drive_around import main  # noqa: E402
+from rpbi_examples.ros.moving_robots import drive_around  # noqa: E402
 
-main()
+drive_around()

@@ -4,6 +4,6 @@
 import signal
 
 signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # before any thread starts
-from rpbi_examples.ros.dual_arm_example import main  # noqa: E402
+from rpbi_examples.ros.moving_robots import dual_arm_example  # noqa: E402
 
-main()
+dual_arm_example()

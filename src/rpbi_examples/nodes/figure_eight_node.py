@@ -4,6 +4,6 @@
 import signal
 
 signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # before any thread starts
-from rpbi_examples.ros.figure_eight import main  # noqa: E402
+from rpbi_examples.ros.moving_frames import figure_eight  # noqa: E402
 
-main()
+figure_eight()

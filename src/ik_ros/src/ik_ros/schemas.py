@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import argparse
 from contextlib import suppress
+from pathlib import Path
 
 from pydantic import create_model
 
 from custom_ros_tools.errors import MissingDependency
-from custom_ros_tools.schema.json_schema import DEFINITIONS, Schema, json_schema, json_schemas, with_definitions
+from custom_ros_tools.schema.json_schema import (
+    DEFINITIONS,
+    Schema,
+    explained,
+    json_schema,
+    json_schemas,
+    schema_text,
+    with_definitions,
+)
 
 from .lookup import solver_class
 from .node_configs import SolverNodeParameters
@@ -49,3 +59,22 @@ def _tasks() -> dict[str, Schema]:
         schema["properties"] = {**schema["properties"], "type": {"enum": [kind]}}
         definitions[kind] = {key: value for key, value in schema.items() if key != "$schema"}
     return definitions
+
+
+def schema_files(root: Path) -> dict[Path, str]:
+    """Returns what the files should have.
+
+    Args:
+        root: The workspace.
+    """
+    folder = root / "src/ik_ros/schema"
+    return {folder / f"{name}.schema.json": schema_text(explained(schema)) for name, schema in schemas().items()}
+
+
+def main() -> None:
+    """Runs the command that writes the schemas anew."""
+    parser = argparse.ArgumentParser(description="Writes schemas anew.")
+    parser.add_argument("root", type=Path, help="the workspace")
+    for path, text in schema_files(parser.parse_args().root).items():
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)

@@ -21,10 +21,6 @@ Schema = dict[str, Any]
 DIALECT = "http://json-schema.org/draft-07/schema#"
 DEFINITIONS = "$defs"
 NULL: Schema = {"type": "null"}
-_LINE = 110
-"""Longest line that is not broken."""
-_FIRST_KEYS = ("$schema", "title", "$ref", "description", "type", "kind", "expects", "unit", "default")
-_MAPPINGS_OF_SCHEMAS = ("properties", DEFINITIONS)
 _FOR_ALL_TYPES = {"anyOf", "enum", "const", "$ref"}
 """Keywords that restrict values of whatever type."""
 
@@ -72,19 +68,6 @@ class EditorSchema(GenerateJsonSchema):
 
     def handle_invalid_for_json_schema(self, schema: Any, error_info: str) -> Schema:
         return {}
-
-    def sort(self, value: Schema, parent_key: str | None = None) -> Schema:
-        return dict(_ordered(value))
-
-
-def _ordered(value: Any, is_schema: bool = True) -> Any:
-    """Puts first what a reader looks for first; the keys of a mapping stay in the order of the model."""
-    if isinstance(value, list):
-        return [_ordered(each) for each in value]
-    if not isinstance(value, dict):
-        return value
-    keys = (*_FIRST_KEYS, *sorted(value)) if is_schema else value
-    return {key: _ordered(value[key], key not in _MAPPINGS_OF_SCHEMAS) for key in keys if key in value}
 
 
 def json_schema(model: type[BaseModel], title: str) -> Schema:
@@ -213,19 +196,5 @@ def yaml_text(value: Any) -> str:
 
 
 def schema_text(schema: Schema) -> str:
-    """Returns a schema as JSON for a file, with all that is short in one line."""
-    return _text(schema, "") + "\n"
-
-
-def _text(value: Any, indent: str) -> str:
-    short = json.dumps(value, ensure_ascii=False)
-    if not isinstance(value, (dict, list)) or len(indent) + len(short) <= _LINE:
-        return short
-    inner = indent + "  "
-    if isinstance(value, dict):
-        items = [f"{json.dumps(key)}: {_text(each, inner)}" for key, each in value.items()]
-        opening, closing = "{", "}"
-    else:
-        items = [_text(each, inner) for each in value]
-        opening, closing = "[", "]"
-    return f"{opening}\n{inner}" + f",\n{inner}".join(items) + f"\n{indent}{closing}"
+    """Returns a schema as JSON for a file."""
+    return json.dumps(schema, ensure_ascii=False, indent=1) + "\n"

@@ -25,7 +25,7 @@ from rpbi_examples import demo_report
 from rpbi_examples.process_tree import kill_with_children
 from rpbi_utils import Recorder, bag_to_dataframes, topic_report
 
-from .basic_robot_example import HZ as TARGET_HZ
+from .moving_robots import HZ as TARGET_HZ
 
 EXAMPLE = "basic_example_kuka_lwr"
 WORLD = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"
