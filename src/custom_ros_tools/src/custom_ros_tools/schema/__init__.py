@@ -28,6 +28,7 @@ from .annotations import Expects as Expects
 from .annotations import InnerProblemsError as InnerProblemsError
 from .annotations import KeyedError as KeyedError
 from .annotations import Unit as Unit
+from .annotations import optional as optional
 from .errors import problems_of
 
 Model = TypeVar("Model", bound="ConfigModel")

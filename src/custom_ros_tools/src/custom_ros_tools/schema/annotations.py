@@ -6,10 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from pydantic import GetJsonSchemaHandler
+from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
 from custom_ros_tools.errors import Problem
+
+
+def optional(description: str) -> Any:
+    """Returns the field of a key that may be left out and then is None."""
+    return Field(None, description=description)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from custom_ros_tools.schema import (
     Seconds,
     Switch,
     Text,
+    optional,
 )
 
 from .asset_files import find_folder
@@ -80,10 +81,8 @@ class WorldConfig(ConfigModel):
     real_time_factor: NonNegative = Field(
         1.0, description="Simulated seconds in a second of wall time; 0 is as fast as it goes."
     )
-    clock_hz: Hz | None = Field(None, description="Most /clock messages in a second of wall time.")
-    tf_prefix: FrameId | None = Field(
-        None, description="What to put before all TF frames, so that two worlds can share one TF tree."
-    )
+    clock_hz: Hz | None = optional("Most /clock messages in a second of wall time.")
+    tf_prefix: FrameId | None = optional("What to put before all TF frames, so that two worlds can share one TF tree.")
     step_pybullet_manually: Switch = Field(
         False, description="Accepted without effect: the interface does every step itself."
     )
@@ -116,8 +115,8 @@ class WorldConfig(ConfigModel):
     objects: ListOf[FileOrOverrides] = Field(
         (), description="Files of objects of your own types, see docs/extending.md."
     )
-    rgbd_sensor: RgbdSensorConfig | None = Field(
-        None, description="Camera of colour, depth and segmentation; the first one if there are several."
+    rgbd_sensor: RgbdSensorConfig | None = optional(
+        "Camera of colour, depth and segmentation; the first one if there are several."
     )
     rgbd_sensors: ListOf[FileOrOverrides] = Field((), description="Files of further cameras.")
 
