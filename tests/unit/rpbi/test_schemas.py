@@ -17,7 +17,6 @@ from jsonschema import Draft7Validator, RefResolver
 from custom_ros_tools.errors import ConfigError
 from custom_ros_tools.node_configs import NODE_CONFIGS
 from custom_ros_tools.schema.json_schema import Schema, explained, json_schema, resolved
-from rpbi.bodies import BODY_TYPES
 from rpbi.config.loading import load_object, load_world, load_world_dict, type_of
 from rpbi.config.schemas import kind_of, schemas, sections
 from rpbi.config.sensors import RgbdSensorConfig
@@ -47,12 +46,12 @@ def problems(kind: str, data: Any) -> list[str]:
 def parse(kind: str, data: Any) -> None:
     """Validates a file of a kind the way a world does."""
     if kind == "world":
-        load_world_dict(data, "world.yaml", BODY_TYPES)
+        load_world_dict(data, "world.yaml")
     elif kind == "rgbd_sensor":
         RgbdSensorConfig.parse(data, "camera.yaml")
     else:
         (section,) = (each for each in sections() if kind_of(each) == kind)
-        load_object(type_of(section, data, BODY_TYPES), data, "object.yaml", BODY_TYPES)
+        load_object(type_of(section, data), data, "object.yaml")
 
 
 @pytest.mark.parametrize("kind", SCHEMAS)
@@ -147,7 +146,7 @@ def test_worlds_of_tests_hold_the_schemas(tmp_path: Path) -> None:
         robots=(worlds.iiwa(),),
         rgbd_sensor=CAMERA,
     )
-    load_world(path, BODY_TYPES)
+    load_world(path)
     main = yaml.safe_load(Path(path).read_text())
     assert problems("world", main) == []
     for section in ("collision_objects", "dynamic_objects", "robots"):

@@ -18,7 +18,7 @@ from rpbi.bodies import BODY_TYPES
 from .legacy import LEGACY_KEYS, MAIN, old_keys
 from .loading import CAMERAS
 from .object_entry import FILE
-from .objects import OWN_TYPES, TYPE, sections_of
+from .objects import OWN_TYPES, TYPE, object_sections
 from .sensors import RgbdSensorConfig
 from .world import main_file_model
 
@@ -31,7 +31,7 @@ _ENTRY = "entry"
 
 def sections() -> dict[str, type[ConfigModel]]:
     """Returns the models of the files that the lists of the main file name, by list."""
-    return {**sections_of(BODY_TYPES), CAMERAS: RgbdSensorConfig}
+    return {**object_sections(), CAMERAS: RgbdSensorConfig}
 
 
 def kind_of(section: str) -> str:

@@ -17,7 +17,6 @@ from custom_ros_tools.ros.lifecycle.interrupts import leaving_ros_on_interrupt, 
 from custom_ros_tools.ros.lifecycle.kept_parameters import kept_parameters
 from custom_ros_tools.ros.lifecycle.logging_bridge import attach_logging
 from custom_ros_tools.ros.lifecycle.master_watch import MasterWatch
-from rpbi.bodies import BODY_TYPES
 from rpbi.config.asset_files import ROBOT_DESCRIPTION
 from rpbi.config.loading import load_world_dict
 from rpbi.ros.publishers.sample_publishers import SamplePublishers
@@ -92,7 +91,7 @@ class SimulatorNode:
     def __init__(self) -> None:
         MasterWatch()
         description = robot_description_file()
-        loaded = load_world_dict(config_parameter(), "~config", BODY_TYPES, description)
+        loaded = load_world_dict(config_parameter(), "~config", description)
         loaded = start_where_robots_are(loaded)
         config = loaded.config
         use_prefix(config.tf_prefix)

@@ -19,7 +19,6 @@ import rosbag
 import rosgraph
 
 from custom_ros_tools.errors import InterfaceError
-from rpbi.bodies import BODY_TYPES
 from rpbi.config.loading import load_world
 from rpbi_examples import demo_report
 from rpbi_examples.process_tree import kill_with_children
@@ -153,7 +152,7 @@ def _is_published(topic: str) -> bool:
 
 def _expected_rates() -> dict[str, float]:
     """Returns the rate of each topic [Hz], from the files that the example is made of."""
-    world = load_world(WORLD, BODY_TYPES)
+    world = load_world(WORLD)
     robot: Any = next(item.config for item in world.objects if item.type == "robot")
     camera = world.config.rgbd_sensor
     assert camera is not None
@@ -178,7 +177,7 @@ def _report(bag: Path, expected_hz: dict[str, float], out: Path) -> dict[str, An
     demo_report.plot_joints(states, targets, out / "joints.png")
     error = demo_report.tracking_error(states, targets)
     demo_report.plot_efforts(states, list(error.index), out / "efforts.png")
-    world = load_world(WORLD, BODY_TYPES)
+    world = load_world(WORLD)
     assert world.config.rgbd_sensor is not None
     demo_report.save_colour(_middle_image(bag, COLOUR, np.uint8, 3), out / "colour.png")
     depth = _middle_image(bag, DEPTH, np.float32, 1)[:, :, 0]

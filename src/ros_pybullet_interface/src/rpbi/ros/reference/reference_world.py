@@ -29,7 +29,7 @@ _CAMERA = {"name": "camera", "pointcloud": True, "object_tf": {"tf_id": FOLLOWED
 def reference_world() -> World:
     """Builds the world, without a window although its configuration asks for one."""
     objects = tuple(
-        ObjectConfig(kind, load_object(kind, {"name": kind, **BODY_TYPES[kind].example}, _FILE, BODY_TYPES), _FILE)
+        ObjectConfig(kind, load_object(kind, {"name": kind, **BODY_TYPES[kind].example}, _FILE), _FILE)
         for kind in BODY_TYPES
     )
     camera = CameraConfig(RgbdSensorConfig.parse(_CAMERA, _FILE), _FILE)

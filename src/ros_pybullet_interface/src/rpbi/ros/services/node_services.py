@@ -21,7 +21,7 @@ from ros_pybullet_interface.srv import (
     ListObjectsRequest,
     ListObjectsResponse,
 )
-from rpbi.bodies import BODY_TYPES, kind_of
+from rpbi.bodies import kind_of
 from rpbi.bodies.collision import CollisionObject
 from rpbi.bodies.dynamic import DynamicObject
 from rpbi.bodies.robots.robot import Robot
@@ -131,8 +131,8 @@ class NodeServices:
                 known = ", ".join(f"{number} ({name})" for number, name in OBJECT_TYPES.items())
                 raise InterfaceError(f"object_type: expected one of {known}; got {asked.object_type}")
             data, file, path = self._read(asked)
-            kind = type_of(section, data, BODY_TYPES)
-            config = load_object(kind, data, file, BODY_TYPES, {**self._context, "file": path})
+            kind = type_of(section, data)
+            config = load_object(kind, data, file, {**self._context, "file": path})
             self._add(kind, config, file)
         except InterfaceError as error:
             return AddPybulletObjectResponse(success=False, message=str(error))
