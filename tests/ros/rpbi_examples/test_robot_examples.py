@@ -25,7 +25,7 @@ def launch(ros, example: str, **arguments: object) -> None:
     """Starts an example without windows and waits until its world runs."""
     given = [f"{key}:={value}" for key, value in arguments.items()]
     process = ros.start(["roslaunch", "rpbi_examples", f"{example}.launch", "headless:=true", *given])
-    wait_until(lambda: process.poll() is not None or _serves("/rpbi/list_objects"), f"{example} is up", 40.0)
+    wait_until(lambda: process.poll() is not None or _serves("/rpbi/list_objects"), f"{example} is up")
     assert process.poll() is None, ros.output(process)
 
 
@@ -108,7 +108,7 @@ def test_panda_swings(ros):
     states = ros.listen("/rpbi/panda/joint_states", JointState)
     first = states.wait_for(1)[0]
     index = first.name.index("panda_joint4")
-    wait_until(lambda: abs(states.messages[-1].position[index] - first.position[index]) > 0.3, "it moves", 30.0)
+    wait_until(lambda: abs(states.messages[-1].position[index] - first.position[index]) > 0.3, "it moves")
 
 
 def test_kuka_holds_still_until_it_is_told_to_move(ros):
