@@ -18,6 +18,8 @@ import roslib.packages
 import rospy
 import yaml
 
+from ros_pybullet_interface.srv import ListObjects
+
 SUPPORT = Path(__file__).resolve().parent
 """Where the tests' helpers are, and programs that tests start."""
 
@@ -159,9 +161,10 @@ class RosSystem:
         if wait:
             wait_until(
                 lambda: process.poll() is not None or _provider(service) not in (None, before),
-                "the node is up",
+                "the node serves",
             )
             assert process.poll() is None, self.output(process)
+            self.call(service, ListObjects)  # its loop answers, and runs when all topics and services are there
         return process
 
     def listen(self, topic: str, message_type: type) -> Listener:
