@@ -132,3 +132,15 @@ def test_still_scene_stands_still_with_the_tool_at_the_whiteboard(ros, position)
     board_x, ball_radius = -0.187, 0.015
     assert position(ball)[0] - board_x == pytest.approx(ball_radius, abs=5e-3)
     assert position(cup) == pytest.approx((0.05, 0.70, 0.501), abs=2e-3)
+
+
+def test_twin_shows_a_metre_beside_what_the_arm_does(ros, position):
+    launch(ros, "visual_robot")
+    arm, twin = "rpbi/kuka_lwr/lwr_arm_7_link", "rpbi/twin/lwr_arm_7_link"
+    start = wait_until(lambda: position(twin), "its frames are on TF")
+
+    def shows_it():
+        here, there = position(arm), position(twin)
+        return math.dist(there, start) > 0.05 and math.dist((here[0], here[1] + 1.0, here[2]), there) < 0.05
+
+    wait_until(shows_it, "the twin moves as the arm does")
