@@ -15,12 +15,12 @@ import PyKDL
 from result import Result, Target
 
 from custom_ros_tools.errors import MissingDependency
-from ik_ros.goal import Goal
+from ik_ros.chain.goal import Goal
 from ik_ros.lookup import make_solver
 from ik_ros.problem import IKProblem
 from ik_ros.solver import Solver
 from ik_ros.solvers.kdl import KdlSolver
-from rpbi.pose import Pose
+from rpbi.geometry import Pose
 
 POSES, QUICK_POSES = 1000, 100
 GLOBAL_PART = 0.05

@@ -22,7 +22,7 @@ BENCHMARKS = ("loop", "many", "load", "camera", "latency", "free_run", "reset", 
 WHEN_NAMED = ("soak",)
 """Those that take too long to run with the others."""
 FIND_RENDERER = """
-from rpbi.camera import Intrinsics
+from rpbi.render.camera import Intrinsics
 from rpbi.render.frame import Camera
 from rpbi.render.renderers import open_renderer
 print("renderer:", open_renderer([Camera("camera", "camera", Intrinsics())]).name)

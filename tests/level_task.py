@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio as pin
 
 from custom_ros_tools.schema import Text
-from ik_ros.tasks.robot import Robot
-from ik_ros.tasks.task import Rows, Task, TaskConfig
+from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.task import Linearization, Task, TaskConfig
 
 
 class LevelConfig(TaskConfig):
@@ -25,8 +25,8 @@ class Level(Task):
         super().__init__(config, robot)
         self._link_id = robot.link_id(config.frame)
 
-    def rows(self, q: np.ndarray) -> Rows:
+    def rows(self, q: np.ndarray) -> Linearization:
         up = self.robot.frame(self._link_id).rotation
         jacobian = -up @ pin.skew(np.array((0.0, 0.0, 1.0))) @ self.robot.jacobian(self._link_id)[3:]
         wanted = np.zeros(2)
-        return Rows(up[:2, 2], jacobian[:2], wanted, wanted)
+        return Linearization(up[:2, 2], jacobian[:2], wanted, wanted)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ik_ros.chain_solver import ChainSolver
+from ik_ros.chain.solver import ChainSolver
 from ik_ros.lookup import make_solver
 
 PLANAR = """<robot name="planar">

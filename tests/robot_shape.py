@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pybullet
 from geometry_msgs.msg import Transform
 
-from rpbi.camera import rotation_matrix
+from rpbi.render.camera import rotation_matrix
 
 Array = npt.NDArray[np.float64]
 

@@ -104,16 +104,16 @@ def test_nodes_only_call_main(package):
 
 def test_only_the_world_and_its_parts_call_pybullet_from_the_simulator_node():
     """Rule 1: nothing in the ROS layer reaches into PyBullet, but the robot's description on request."""
-    for path in (SRC / "ros_pybullet_interface/src/rpbi/ros").glob("*.py"):
+    for path in (SRC / "ros_pybullet_interface/src/rpbi/ros").rglob("*.py"):
         calls = re.findall(r"\bpb\.\w+", path.read_text())
-        assert path.name == "robot_info.py" or calls == [], path
+        assert path.name == "info.py" or calls == [], path
 
 
 FAMILIES = {
     "body": ("rpbi.bodies:BODY_TYPES", "rpbi.bodies.body:Body", "concepts.md"),
     "sensor": ("rpbi.sensors:SENSOR_TYPES", "rpbi.sensors.sensor:Sensor", "concepts.md"),
     "solver": ("ik_ros.solvers:SOLVERS", "ik_ros.solver:Solver", "ik_solvers.md"),
-    "task": ("ik_ros.tasks:TASKS", "ik_ros.tasks.task:Task", "ik_tasks.md"),
+    "task": ("ik_ros.tasks:TASKS", "ik_ros.formulation.task:Task", "ik_tasks.md"),
 }
 """Table, base class and page of each family of plug-ins; their files are where the table is."""
 
@@ -130,7 +130,7 @@ def test_every_plug_in_is_explained(family):
 def test_every_plug_in_has_a_file_of_its_own_and_a_line_in_the_table(family):
     table, base, _ = FAMILIES[family]
     package = table.split(":")[0]
-    for module in pkgutil.iter_modules(importlib.import_module(package).__path__, f"{package}."):
+    for module in pkgutil.walk_packages(importlib.import_module(package).__path__, f"{package}."):
         importlib.import_module(module.name)
     entries = pkgutil.resolve_name(table).values()
     in_table = [pkgutil.resolve_name(entry) if isinstance(entry, str) else entry for entry in entries]

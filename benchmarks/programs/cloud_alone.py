@@ -10,9 +10,9 @@ from io import BytesIO
 import numpy as np
 from std_msgs.msg import Header
 
-from rpbi.camera import Intrinsics, depth_in_metres
-from rpbi.point_cloud import PointCloud
-from rpbi.ros.camera_messages import cloud_message
+from rpbi.render.camera import Intrinsics, depth_in_metres
+from rpbi.render.depth import PointCloud
+from rpbi.ros.cameras.messages import cloud_message
 
 
 def main() -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import time
 
-from rpbi.camera import Intrinsics, depth_in_metres
-from rpbi.pose import Pose
+from rpbi.geometry import Pose
+from rpbi.render.camera import Intrinsics, depth_in_metres
 from rpbi.render.frame import Camera
 from rpbi.render.mirror import Mirror
 from rpbi.render.renderers import open_renderer

@@ -7,7 +7,7 @@ import time
 
 import pybullet
 
-from rpbi.bodies.robot import Robot
+from rpbi.bodies.robots.robot import Robot
 from rpbi.world import World
 
 

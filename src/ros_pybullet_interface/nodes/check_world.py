@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Checks a world without a ROS master."""
 
-from rpbi.ros.check import main
+from rpbi.ros.reference.check import main
 
 main()

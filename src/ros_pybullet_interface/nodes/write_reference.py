@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Writes schemas and reference pages; see rpbi.ros.write_reference."""
+"""Writes schemas and reference pages; see rpbi.ros.reference.write."""
 
-from rpbi.ros.write_reference import main
+from rpbi.ros.reference.write import main
 
 main()

@@ -18,7 +18,7 @@ from sensor_msgs.msg import CameraInfo
 from sensor_msgs.msg import Image as ImageMessage
 from tf2_msgs.msg import TFMessage
 
-from rpbi.camera import back_project
+from rpbi.render.camera import back_project
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "src/rpbi_examples"
 CONFIG_FILE = EXAMPLES / "rviz/basic_example_kuka_lwr.rviz"

@@ -9,8 +9,8 @@ import rospy
 from std_msgs.msg import Empty
 from std_srvs.srv import Trigger, TriggerResponse
 
-from custom_ros_tools.ros.kept_parameters import kept_parameters
-from custom_ros_tools.ros.master_watch import MasterWatch
+from custom_ros_tools.ros.lifecycle.kept_parameters import kept_parameters
+from custom_ros_tools.ros.lifecycle.master_watch import MasterWatch
 
 rospy.init_node("busy")
 MasterWatch()

@@ -8,7 +8,7 @@ signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # before any thread i
 
 import rospy  # noqa: E402
 
-from custom_ros_tools.ros.run_node import run_node  # noqa: E402
+from custom_ros_tools.ros.lifecycle.run_node import run_node  # noqa: E402
 
 
 def _start() -> None:

@@ -9,7 +9,7 @@ import rospy
 from node_world import Rosout
 from std_srvs.srv import SetBool, Trigger, TriggerResponse
 
-from custom_ros_tools.ros import service_proxies
+from custom_ros_tools.ros import services as service_proxies
 from custom_ros_tools.ros_comm import ToggleService, get_srv_handler, get_srv_handlers
 
 

@@ -286,7 +286,7 @@ import time
 from pathlib import Path
 
 from custom_ros_tools.schema import ConfigModel
-from ik_ros.solution import IKSolution
+from ik_ros.problem import IKSolution
 from ik_ros.solver import Solver
 
 

@@ -170,7 +170,7 @@ REFUSED = {
     "not YAML": (DYNAMIC, "name: box\n  baseMass: 1", "", ["config: line 2, column 11"]),
     "no mapping": (DYNAMIC, "- a\n- b", "", ["config: expected a mapping", "list"]),
     "Python in YAML": (DYNAMIC, "name: !!python/object/apply:os.getcwd []", "", ["config: line 1", "python"]),
-    "several faults": (
+    "several problems": (
         DYNAMIC,
         {**box(), "baseMas": 1.0, "basePosition": [0, 0], "createCollisionShape": {"shapeType": "GEOM_BALL"}},
         "",

@@ -11,8 +11,8 @@ from ros_system import wait_until
 from worlds import write_world
 
 from ros_pybullet_interface.msg import WorldCommands
-from rpbi.command_log import WorldCommand
-from rpbi.ros.command_topic import CommandOutlet
+from rpbi.engine.command_log import WorldCommand
+from rpbi.ros.publishers.commands import CommandPublisher
 from rpbi.world import World
 
 
@@ -24,20 +24,20 @@ def world(tmp_path):
 
 
 @pytest.fixture
-def outlet(ros, world):
-    outlet = CommandOutlet(world)
-    yield outlet
-    outlet._topic.close()
-    outlet._description.unregister()
+def publisher(ros, world):
+    publisher = CommandPublisher(world)
+    yield publisher
+    publisher._topic.close()
+    publisher._description.unregister()
 
 
-def test_none_of_many_newcomers_at_once_is_lost(world, outlet):
+def test_none_of_many_newcomers_at_once_is_lost(world, publisher):
     world.commands.note(WorldCommand(0, "", "halt", "a test"))
     told = []
 
     def come(first):
         for number in range(first, first + 1000):  # as rospy's own threads do
-            outlet._topic.peer_subscribe("/rpbi/commands", None, lambda message, number=number: told.append(number))
+            publisher._topic.peer_subscribe("/rpbi/commands", None, lambda message, number=number: told.append(number))
 
     threads = [threading.Thread(target=come, args=(first,)) for first in (0, 1000, 2000, 3000)]
     interval_s = sys.getswitchinterval()
@@ -46,14 +46,14 @@ def test_none_of_many_newcomers_at_once_is_lost(world, outlet):
         for thread in threads:
             thread.start()
         while any(thread.is_alive() for thread in threads):
-            outlet.spin()
+            publisher.spin()
     finally:
         sys.setswitchinterval(interval_s)
-    outlet.spin()
+    publisher.spin()
     assert sorted(told) == list(range(4000))
 
 
-def test_who_was_slow_gets_the_rest_though_nothing_new_comes(world, outlet):
+def test_who_was_slow_gets_the_rest_though_nothing_new_comes(world, publisher):
     reads = threading.Event()
     got = set()
 
@@ -63,13 +63,13 @@ def test_who_was_slow_gets_the_rest_though_nothing_new_comes(world, outlet):
 
     subscriber = rospy.Subscriber("/rpbi/commands", WorldCommands, take)
     try:
-        wait_until(lambda: outlet.spin() or outlet._topic.has_subscribers, "it is connected")
+        wait_until(lambda: publisher.spin() or publisher._topic.has_subscribers, "it is connected")
         for tick in range(200):
             world.commands.note(WorldCommand(tick, "", "halt", "x" * 200_000))  # together more than sockets hold
         for _ in range(20):
-            outlet.spin()
+            publisher.spin()
         reads.set()
-        wait_until(lambda: outlet.spin() or len(got) == 200, "it has all")
+        wait_until(lambda: publisher.spin() or len(got) == 200, "it has all")
     finally:
         reads.set()
         subscriber.unregister()

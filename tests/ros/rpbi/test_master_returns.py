@@ -13,7 +13,7 @@ from node_world import main_config
 from ros_system import wait_until
 from worlds import FLOOR, iiwa
 
-from rpbi.ros.camera_topics import camera_topics
+from rpbi.ros.cameras.topics import camera_topics
 
 NODE = "/ros_pybullet_interface"
 CAMERA_NODE = f"{NODE}_camera"

@@ -15,8 +15,8 @@ from worlds import iiwa
 
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem, PybulletObject
 from ros_pybullet_interface.srv import CalculateInverseKinematics, RobotInfo
+from rpbi.geometry import Pose
 from rpbi.kinematics import Kinematics
-from rpbi.pose import Pose
 
 LINK = "lbr_iiwa_link_7"
 ELBOW = [0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0]

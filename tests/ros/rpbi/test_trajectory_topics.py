@@ -18,7 +18,7 @@ from worlds import iiwa, write_world
 
 from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import JointTrajectoryControllerState, PybulletObject
-from rpbi.pacer import MAX_DEBT_S
+from rpbi.engine.pacer import MAX_DEBT_S
 
 
 def test_without_control_msgs_there_are_topics_and_the_log_tells_what_is_missing(ros, tmp_path):

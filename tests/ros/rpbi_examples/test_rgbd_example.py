@@ -10,8 +10,8 @@ from ros_system import RosSystem, wait_until
 from sensor_msgs.msg import Image, PointCloud2
 from tf2_msgs.msg import TFMessage
 
-from rpbi.camera import rotation_matrix
-from rpbi.pose import Pose
+from rpbi.geometry import Pose
+from rpbi.render.camera import rotation_matrix
 
 SLOW_S = 60.0
 

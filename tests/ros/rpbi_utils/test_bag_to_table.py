@@ -74,14 +74,14 @@ def test_names_that_roslaunch_adds_do_no_harm(bag: Path) -> None:
 def test_every_fault_is_one_line_and_exit_code_1(bag: Path, write_bag: WriteBag, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     (tmp_path / "text.bag").write_text("text")
-    faults = {
+    problems = {
         "there is no such file": [tmp_path / "missing.bag"],
         "not a ROS 1 bag": [tmp_path / "text.bag"],
         "did you mean '/target'?": [bag, "--topics", "/targe"],
         "File exists": [bag, "--out", tmp_path / "file"],
         "'data' is binary and cannot be written as CSV": [bag, "--images", "--format", "csv"],
     }
-    for message, arguments in faults.items():
+    for message, arguments in problems.items():
         done = _run(*arguments, "--quiet")
         assert done.returncode == 1
         assert message in done.stderr

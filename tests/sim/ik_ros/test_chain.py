@@ -10,12 +10,12 @@ import pybullet_data
 import pytest
 
 from custom_ros_tools.errors import UnknownNameError
-from ik_ros.chain import Chain
-from ik_ros.chain_description import read_chain
+from ik_ros.chain.description import read_chain
+from ik_ros.chain.forward_kinematics import Chain
 from ik_ros.conformance import distances
 from ik_ros.limits import Limits
+from rpbi.geometry import Pose
 from rpbi.kinematics import Kinematics
-from rpbi.pose import Pose
 
 DATA = Path(pybullet_data.getDataPath())
 LWR = Path(__file__).resolve().parents[3] / "src/rpbi_examples/robots/kuka_lwr.urdf"

@@ -8,8 +8,7 @@ import pybullet_data
 import pytest
 
 from ik_ros.conformance import SolverConformance
-from ik_ros.problem import IKProblem
-from ik_ros.solution import IKSolution
+from ik_ros.problem import IKProblem, IKSolution
 from ik_ros.solver import Solver
 from ik_ros.solvers.kdl import KdlConfig
 

@@ -15,8 +15,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from worlds import FLOOR, ball, box, iiwa, write_world  # noqa: E402
 
 from rpbi.bodies import BODY_TYPES  # noqa: E402
-from rpbi.config import load_object  # noqa: E402
-from rpbi.joint_model import JointTarget  # noqa: E402
+from rpbi.config.loading import load_object  # noqa: E402
+from rpbi.urdf.joints import JointTarget  # noqa: E402
 from rpbi.world import World  # noqa: E402
 
 TICKS = 3000

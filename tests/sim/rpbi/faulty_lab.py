@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from custom_ros_tools.errors import ConfigError, Problem
 from rpbi.bodies import Body, BodyConfig, DynamicObject
-from rpbi.inputs import Input
+from rpbi.engine.inputs import Input
 from rpbi.sensors import BodySensor
 
 

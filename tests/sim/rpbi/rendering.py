@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from frame_sink import DEMAND_FILE
 
-from rpbi.camera import Intrinsics
-from rpbi.pose import Pose
+from rpbi.geometry import Pose
+from rpbi.render.camera import Intrinsics
 from rpbi.render.client import RenderClient
 from rpbi.render.frame import Camera, Demand
 from rpbi.samples import SceneSample

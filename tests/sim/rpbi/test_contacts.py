@@ -10,8 +10,8 @@ from worlds import FLOOR, ball, box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError
 from rpbi.bodies import BODY_TYPES
-from rpbi.config import load_object
-from rpbi.pose import Pose
+from rpbi.config.loading import load_object
+from rpbi.geometry import Pose
 from rpbi.samples import ContactArrowsSample, ContactsSample
 from rpbi.world import World
 

@@ -10,7 +10,7 @@ import pytest
 from worlds import iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.joint_model import JointTarget, WrongQuantityError
+from rpbi.urdf.joints import JointTarget, WrongQuantityError
 from rpbi.world import World
 
 FIRST, SECOND = "lbr_iiwa_joint_1", "lbr_iiwa_joint_2"

@@ -6,7 +6,7 @@ import sys
 import deterministic_session as session
 import pytest
 
-from rpbi.load_log import replay
+from rpbi.engine.load_log import replay
 
 
 @pytest.mark.parametrize("visitors", [False, True], ids=["same bodies", "bodies come and go"])

@@ -8,11 +8,10 @@ import pytest
 from worlds import FLOOR, box, iiwa, write_world
 
 from custom_ros_tools.errors import UnknownNameError
-from rpbi.client import Client
-from rpbi.dynamics import read_dynamics
-from rpbi.link_dynamics import LinkDynamics, difference
-from rpbi.load_log import replay
-from rpbi.pybullet_models import ChangeDynamics
+from rpbi.bodies.dynamics import LinkDynamics, difference, read_dynamics
+from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.engine.client import Client
+from rpbi.engine.load_log import replay
 from rpbi.render.mirror import Mirror
 from rpbi.world import World
 

@@ -12,15 +12,15 @@ from worlds import FLOOR, box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError
 from rpbi.control.timed_motion import TimedMotion
-from rpbi.control.trajectory_motion import TrajectoryMotion
-from rpbi.control.trajectory_request import (
+from rpbi.control.trajectories.motion import TrajectoryMotion
+from rpbi.control.trajectories.request import (
     ErrorCode,
     GoalTolerances,
     TrajectoryRefusedError,
     TrajectoryRequest,
     Waypoint,
 )
-from rpbi.joint_model import JointTarget
+from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
 
 ARM = tuple(f"lbr_iiwa_joint_{number}" for number in range(1, 8))

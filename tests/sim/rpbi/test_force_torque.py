@@ -10,9 +10,9 @@ from newton_euler import ARM, MOVING, urdf, wrenches
 from worlds import write_world
 
 from custom_ros_tools.errors import ConfigError, PhysicsError
-from rpbi.joint_model import JointTarget
-from rpbi.pybullet_models import ChangeDynamics
+from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.samples import WrenchSample
+from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
 
 JOINTS = [f"{link.name}_joint" for link in ARM]

@@ -12,8 +12,8 @@ import pytest
 from worlds import iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, PhysicsError, UnknownNameError
+from rpbi.geometry import Pose
 from rpbi.kinematics import IKProblem, Kinematics
-from rpbi.pose import Pose
 from rpbi.world import World
 
 DATA = Path(pybullet_data.getDataPath())
@@ -251,7 +251,7 @@ def test_a_smaller_threshold_leaves_a_smaller_residual(iiwa_arm):
 def test_a_threshold_that_cannot_be_met_does_not_lead_away_from_the_near_solution(iiwa_arm):
     link = "lbr_iiwa_link_7"
     for positions in _random_positions(iiwa_arm, 10):
-        near = iiwa_arm.limits.bring_in(positions + 0.05, positions)[0]
+        near = iiwa_arm.limits.wrap_to_limits(positions + 0.05, positions)[0]
         goal = iiwa_arm.forward(positions, link)
         solution = iiwa_arm.solve(IKProblem(link, *goal, currentPosition=near, residualThreshold=1e-15))
         assert solution.success

@@ -10,10 +10,10 @@ from worlds import FLOOR, box, write_world
 
 from custom_ros_tools.errors import ConfigError, PluginError
 from rpbi.bodies import BODY_TYPES, kind_of
-from rpbi.config import load_object
-from rpbi.recorded_values import from_text, to_text
+from rpbi.config.loading import load_object
+from rpbi.replay.recorded_values import from_text, to_text
+from rpbi.replay.world_description import WorldDescription, describe
 from rpbi.world import World
-from rpbi.world_description import WorldDescription, describe
 
 TEMPLATES = Path(__file__).resolve().parents[3] / "templates"
 CONVEYOR, RANGE_FINDER = "my_robot_lab.conveyor:Conveyor", "my_robot_lab.range_finder:RangeFinder"

@@ -11,11 +11,11 @@ import pytest
 from ik_ros.ros.write_schemas import schema_files
 from rpbi.bodies import BODY_TYPES
 from rpbi.reference.markdown import link
-from rpbi.ros.frames import FRAMES
-from rpbi.ros.interface_page import WITH_CONTROL_MSGS
-from rpbi.ros.interface_table import FOLLOWS, endpoints
-from rpbi.ros.reference_world import FOLLOWED, reference_world
-from rpbi.ros.write_reference import reference_files
+from rpbi.ros.headers import FRAMES
+from rpbi.ros.reference.interface_page import WITH_CONTROL_MSGS
+from rpbi.ros.reference.interface_table import FOLLOWS, endpoints
+from rpbi.ros.reference.reference_world import FOLLOWED, reference_world
+from rpbi.ros.reference.write import reference_files
 from rpbi.samples import LinkPoseSample
 from rpbi.world import World
 

@@ -16,9 +16,9 @@ import pytest
 import worlds
 from rendering import ALL, CAMERA, INTRINSICS, Rendering
 
-from rpbi.camera import Intrinsics, back_project, project, rotation_matrix
-from rpbi.depth_noise import DepthNoise
-from rpbi.pose import Pose
+from rpbi.geometry import Pose
+from rpbi.render.camera import Intrinsics, back_project, project, rotation_matrix
+from rpbi.render.depth import DepthNoise
 from rpbi.render.frame import Camera
 from rpbi.world import World
 

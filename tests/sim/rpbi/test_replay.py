@@ -12,13 +12,13 @@ import scripted_session as script
 
 from custom_ros_tools.errors import ConfigError
 from rpbi.bodies import BODY_TYPES
-from rpbi.config import load_world
+from rpbi.config.loading import load_world
+from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.control.motors import Command
-from rpbi.pose import Pose
-from rpbi.pybullet_models import ChangeDynamics
-from rpbi.recorded_values import from_text, to_text
-from rpbi.replay import Replay
-from rpbi.world_description import WorldDescription
+from rpbi.geometry import Pose
+from rpbi.replay.recorded_values import from_text, to_text
+from rpbi.replay.session import Replay
+from rpbi.replay.world_description import WorldDescription
 
 TICKS = 3000
 EXAMPLES = Path(__file__).resolve().parents[3] / "src" / "rpbi_examples" / "configs"

@@ -10,8 +10,8 @@ import scripted_session as script
 from worlds import FLOOR, ball, iiwa, write_world
 
 from custom_ros_tools.errors import InterfaceError, PhysicsError, UnknownNameError
-from rpbi.actions import TimedGoal
-from rpbi.joint_model import JointTarget
+from rpbi.engine.actions import TimedGoal
+from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
 
 
@@ -86,10 +86,10 @@ def test_the_first_target_after_it_is_obeyed_and_none_from_before(arm):
 
 
 def test_a_target_that_was_checked_before_it_and_comes_after_is_dropped(arm):
-    era = arm.mailbox.era
+    generation = arm.mailbox.generation
     checked = arm.inputs["iiwa/target"].check(JointTarget(["lbr_iiwa_joint_1"], [1.0]))
     arm.reset()
-    arm.mailbox.put("iiwa/target", checked, era=era)
+    arm.mailbox.put("iiwa/target", checked, generation=generation)
     arm.step()
     assert arm.bodies["iiwa"].motors.targets[0] == 0.0
 

@@ -7,8 +7,8 @@ import yaml
 from worlds import FLOOR, box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, UnknownNameError
-from rpbi.pose import Pose
-from rpbi.rgbd_config import RgbdSensorConfig
+from rpbi.config.sensors import RgbdSensorConfig
+from rpbi.geometry import Pose
 from rpbi.world import World
 
 CAMERA = {"name": "eye", "hz": 25, "object_tf": {"tf_id": "rpbi/eye"}}

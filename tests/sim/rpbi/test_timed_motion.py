@@ -10,8 +10,8 @@ import pytest
 from worlds import FLOOR, box, iiwa, write_world
 
 from rpbi.control.timed_motion import SETTLING_S, TOLERANCES, TimedMotion
-from rpbi.joint_model import JointTarget
-from rpbi.pose import Pose
+from rpbi.geometry import Pose
+from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
 
 JOINTS = [f"lbr_iiwa_joint_{i}" for i in range(1, 8)]

@@ -11,8 +11,8 @@ from worlds import FLOOR, ball, write_world
 
 from custom_ros_tools.errors import ConfigError
 from rpbi.bodies import UrdfObject
-from rpbi.client import Client
-from rpbi.pose import Pose
+from rpbi.engine.client import Client
+from rpbi.geometry import Pose
 from rpbi.render.mirror import Mirror
 from rpbi.samples import LinkPoseSample
 from rpbi.world import World

@@ -9,8 +9,8 @@ from worlds import ball, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError
 from rpbi.bodies import VisualRobot
-from rpbi.joint_model import JointTarget
-from rpbi.pose import Pose
+from rpbi.geometry import Pose
+from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
 
 JOINT = "lbr_iiwa_joint_2"

@@ -7,10 +7,10 @@ from worlds import FLOOR, ball, box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, PhysicsError, UnknownNameError
 from rpbi.bodies import BODY_TYPES
-from rpbi.config import load_object
-from rpbi.joint_model import JointTarget
-from rpbi.pose import Pose
+from rpbi.config.loading import load_object
+from rpbi.geometry import Pose
 from rpbi.samples import JointStateSample, LinkPoseSample
+from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
 
 

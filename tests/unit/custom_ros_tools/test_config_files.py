@@ -6,13 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from custom_ros_tools.config import (
-    config_to_str,
-    load_config,
-    load_configs,
-    replace_package,
-    ros_package_path,
-)
+from custom_ros_tools.config import config_to_str, load_config, load_configs, replace_package, ros_package_path
 from custom_ros_tools.errors import ConfigError
 
 

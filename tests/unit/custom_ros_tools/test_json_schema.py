@@ -9,8 +9,15 @@ import pytest
 from jsonschema import Draft7Validator
 from pydantic import BeforeValidator, Field
 
-from custom_ros_tools.json_schema import explained, json_schema, schema_text, unit_in, without_required, yaml_text
 from custom_ros_tools.schema import AlsoTakes, ConfigModel, Hz, ListOf, Name, Position, PositiveMetres, Switch
+from custom_ros_tools.schema.json_schema import (
+    explained,
+    json_schema,
+    schema_text,
+    unit_in,
+    without_required,
+    yaml_text,
+)
 
 
 class Inner(ConfigModel):
@@ -37,7 +44,7 @@ class Outer(ConfigModel):
 SCHEMA = json_schema(Outer, "outer")
 
 
-def faults(**data: object) -> list[str]:
+def problems(**data: object) -> list[str]:
     """Returns what the schema finds wrong."""
     return [each.message for each in Draft7Validator(SCHEMA).iter_errors({"name": "a", **data})]
 
@@ -52,7 +59,7 @@ def faults(**data: object) -> list[str]:
 )
 def test_schema_takes_what_the_model_takes(data: dict[str, object]) -> None:
     Outer.parse({"name": "a", **data}, "a.yaml")
-    assert faults(**data) == []
+    assert problems(**data) == []
 
 
 @pytest.mark.parametrize(
@@ -71,7 +78,7 @@ def test_schema_takes_what_the_model_takes(data: dict[str, object]) -> None:
 def test_schema_refuses_what_the_model_refuses(data: dict[str, object]) -> None:
     with pytest.raises(Exception, match=next(iter(data))):
         Outer.parse({"name": "a", **data}, "a.yaml")
-    assert faults(**data)
+    assert problems(**data)
 
 
 def test_schema_has_no_references_so_that_each_key_has_its_explanation() -> None:

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from custom_ros_tools.errors import ConfigError
-from custom_ros_tools.float_array_config import FloatArrayConfig
 from custom_ros_tools.marker_config import MarkerConfig
-from custom_ros_tools.node_parameters import RateParameters, StartParameters
+from custom_ros_tools.node_configs import FloatArrayConfig, RateParameters, StartParameters
 from custom_ros_tools.schema import ConfigModel
 
 MARKER = {"node": {"topic_name": "marker"}, "type": "cube", "scale": [1, 2, 3]}

@@ -1,4 +1,4 @@
-"""Models are strict, tell all faults at once in the user's words, and never touch what they are given."""
+"""Models are strict, tell all problems at once in the user's words, and never touch what they are given."""
 
 from __future__ import annotations
 

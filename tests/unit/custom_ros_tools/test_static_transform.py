@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from custom_ros_tools.errors import ConfigError
-from custom_ros_tools.static_transform import StaticTransform
+from custom_ros_tools.transforms import StaticTransform
 
 
 def test_roll_pitch_yaw_and_quaternion_say_the_same() -> None:

@@ -7,7 +7,7 @@ import math
 import pytest
 from planar_arm import planar_arm
 
-from ik_ros.chain_solver import ChainConfig, ChainSolver
+from ik_ros.chain.solver import ChainConfig, ChainSolver
 from ik_ros.limits import TURN
 from ik_ros.problem import IKProblem
 

@@ -11,11 +11,11 @@ import pytest
 from planar_arm import LIMITED, planar_arm
 
 from custom_ros_tools.errors import ConfigError, UnknownNameError
+from ik_ros.chain.goal import Goal
 from ik_ros.conformance import distances, random_quat
-from ik_ros.goal import Goal
 from ik_ros.lookup import make_solver
 from ik_ros.problem import IKProblem
-from rpbi.pose import Pose
+from rpbi.geometry import Pose
 
 LWR = Path(__file__).resolve().parents[3] / "src/rpbi_examples/robots/kuka_lwr.urdf"
 ELBOW = [0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0]

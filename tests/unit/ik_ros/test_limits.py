@@ -12,24 +12,24 @@ INF = math.inf
 
 def test_a_joint_that_turns_comes_in_by_a_whole_turn_and_one_that_slides_at_the_limit():
     limits = Limits((-3.0, -1.0), (3.0, 1.0), (True, False))
-    q, is_same = limits.bring_in((2.0 + TURN, 0.5), (0.0, 0.0))
+    q, is_same = limits.wrap_to_limits((2.0 + TURN, 0.5), (0.0, 0.0))
     assert (q, is_same) == ([pytest.approx(2.0), 0.5], True)
-    q, is_same = limits.bring_in((2.0 - 3 * TURN, 4.0), (0.0, 0.0))
+    q, is_same = limits.wrap_to_limits((2.0 - 3 * TURN, 4.0), (0.0, 0.0))
     assert (q, is_same) == ([pytest.approx(2.0), 1.0], False)
 
 
 def test_a_position_just_beyond_a_limit_comes_to_that_limit_not_to_the_other():
     limits = Limits((-2.967,), (2.967,), (True,))
     for near in (0.0, 2.5, -2.5):
-        assert limits.bring_in((-2.967 - 1e-8,), (near,)) == ([-2.967], True)
-        assert limits.bring_in((2.967 + 1e-8,), (near,)) == ([2.967], True)
-        assert limits.bring_in((2.967 + 1e-8 + TURN,), (near,)) == ([2.967], True)
-    assert limits.bring_in((-2.967 - 0.1,), (0.0,)) == ([-2.967], False)
+        assert limits.wrap_to_limits((-2.967 - 1e-8,), (near,)) == ([-2.967], True)
+        assert limits.wrap_to_limits((2.967 + 1e-8,), (near,)) == ([2.967], True)
+        assert limits.wrap_to_limits((2.967 + 1e-8 + TURN,), (near,)) == ([2.967], True)
+    assert limits.wrap_to_limits((-2.967 - 0.1,), (0.0,)) == ([-2.967], False)
 
 
 def test_of_several_turns_the_nearest_is_taken():
     limits = Limits((-10.0, -INF), (10.0, INF), (True, True))
-    q, is_same = limits.bring_in((0.5, 0.5), (6.0, 100.0))
+    q, is_same = limits.wrap_to_limits((0.5, 0.5), (6.0, 100.0))
     assert q[0] == pytest.approx(0.5 + TURN) and abs(q[1] - 100.0) <= math.pi
     assert is_same
 
@@ -40,7 +40,7 @@ def test_whatever_comes_in_is_within_limits_and_what_is_said_to_be_the_same_pose
         lower = generator.uniform(-8.0, 4.0)
         limits = Limits((lower,), (lower + generator.choice((0.0, 1.0, 5.0, 12.0)),), (True,))
         position, near = generator.uniform(-30.0, 30.0), generator.uniform(-30.0, 30.0)
-        (inside,), is_same = limits.bring_in((position,), (near,))
+        (inside,), is_same = limits.wrap_to_limits((position,), (near,))
         assert limits.lower[0] <= inside <= limits.upper[0]
         turns = (inside - position) / TURN
         assert is_same == (abs(turns - round(turns)) < 1e-6)

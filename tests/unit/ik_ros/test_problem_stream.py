@@ -5,10 +5,9 @@ from __future__ import annotations
 import pytest
 
 from custom_ros_tools.errors import UnknownNameError
-from ik_ros.continuity import Continuity, ContinuityConfig
-from ik_ros.problem import IKProblem
+from ik_ros.joint_rate_limiter import JointRateLimiter, JointRateLimiterConfig
+from ik_ros.problem import IKProblem, IKSolution
 from ik_ros.problem_stream import LONGEST_PERIOD_S, ProblemStream
-from ik_ros.solution import IKSolution
 from ik_ros.solver import Solver
 
 JOINTS = ("shoulder", "elbow")
@@ -40,7 +39,7 @@ def solver():
 
 @pytest.fixture
 def smooth(solver):
-    return ProblemStream(solver, Continuity(ContinuityConfig(), JOINTS, solver.velocity_limits))
+    return ProblemStream(solver, JointRateLimiter(JointRateLimiterConfig(), JOINTS, solver.velocity_limits))
 
 
 def at(*positions, **start):

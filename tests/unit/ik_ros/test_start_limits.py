@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from ik_ros.limits import Limits
-from ik_ros.start_limits import StartLimits
+from ik_ros.limits import Limits, StartLimits
 
 
 def test_each_joint_is_told_of_once_however_often_it_comes_back(caplog):
@@ -19,6 +18,6 @@ def test_each_joint_is_told_of_once_however_often_it_comes_back(caplog):
             ((2.0, -2.0), [1.0, -1.0]),
             ((2.0, 0.0), [1.0, 0.0]),
         ]:
-            assert starts.bring_in(start) == inside
+            assert starts.wrap_to_limits(start) == inside
     told = "the start is outside limits and is brought in: "
     assert [record.getMessage() for record in caplog.records] == [told + "'a' 2", told + "'b' -2"]

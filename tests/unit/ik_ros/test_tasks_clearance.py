@@ -6,8 +6,8 @@ import numpy as np
 import pybullet
 import pytest
 
+from ik_ros.formulation.clearance import Placed, clearance
 from ik_ros.shape import ShapeConfig
-from ik_ros.tasks.clearance import Placed, clearance
 
 SHAPES = {"sphere": {"sphere": 0.1}, "capsule": {"capsule": [0.1, 0.6]}, "box": {"box": [0.3, 0.5, 0.7]}}
 

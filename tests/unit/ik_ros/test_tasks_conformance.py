@@ -8,7 +8,7 @@ from pathlib import Path
 import pybullet_data
 
 from ik_ros.conformance import SolverConformance
-from rpbi.pose import Pose
+from rpbi.geometry import Pose
 
 IIWA = str(Path(pybullet_data.getDataPath()) / "kuka_iiwa/model.urdf")
 PANDA = str(Path(pybullet_data.getDataPath()) / "franka_panda/panda.urdf")

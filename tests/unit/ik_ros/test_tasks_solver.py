@@ -17,7 +17,7 @@ from custom_ros_tools.errors import ConfigError, MissingDependency, UnknownNameE
 from ik_ros.lookup import make_solver
 from ik_ros.problem import IKProblem
 from ik_ros.solvers.tasks import TasksSolver
-from rpbi.pose import Pose
+from rpbi.geometry import Pose
 
 TALOS = Path(__file__).resolve().parents[3] / "src/rpbi_examples/configs/ik_talos/ik.yaml"
 IIWA_TIP = "lbr_iiwa_link_7"
@@ -280,7 +280,7 @@ def test_targets_need_a_task_that_they_are_for(urdf):
         ("{costs: [{name: a, type: closeness}], shapes: [{name: s}]}", r"shapes\[0\]: expected one of sphere, box"),
         ("costs: [{name: a, type: distance, pairs: [[b, c]]}]", r"costs\[0\].pairs\[0\]: unknown shape 'b'"),
         ("costs: [{name: a, type: 'nobody.knows:It'}]", r"costs\[0\].type: no module 'nobody'"),
-        ("costs: [{name: a, type: 'math:pi'}]", "expected a subclass of ik_ros.tasks.task:Task, got 'math:pi'"),
+        ("costs: [{name: a, type: 'math:pi'}]", "expected a subclass of ik_ros.formulation.task:Task, got 'math:pi'"),
         ("costs: [{name: a, type: frame_position, frame: body, axes: [rx]}]", r"costs\[0\].axes: expected some of"),
         ("costs: [{name: a, type: joint_limits, limits: {left_1: [2.0, 3.0]}}]", r"limits.left_1: leaves 'left_1' no"),
     ],

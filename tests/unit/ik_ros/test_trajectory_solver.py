@@ -17,14 +17,13 @@ from tree_robot import TREE
 
 from custom_ros_tools.errors import ConfigError, UnknownNameError
 from ik_ros.lookup import make_solver
-from ik_ros.problem import IKProblem, Waypoint
-from ik_ros.solution import IKSolution, JointTrajectory
+from ik_ros.problem import IKProblem, IKSolution, JointTrajectory, Waypoint
 from ik_ros.solvers.trajectory import KEPT_PROGRAMS, TrajectorySolver
 from ik_ros.trajectory.forward_kinematics import ForwardKinematics, rotation_vector
 from ik_ros.trajectory.program import Program
 from ik_ros.trajectory.spline import Spline
+from rpbi.geometry import Pose
 from rpbi.kinematics import Kinematics
-from rpbi.pose import Pose
 
 DATA = Path(pybullet_data.getDataPath())
 IIWA = str(DATA / "kuka_iiwa/model.urdf")

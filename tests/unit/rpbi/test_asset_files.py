@@ -7,7 +7,7 @@ from pathlib import Path
 import pybullet_data
 import pytest
 
-from rpbi.asset_files import find_file, find_folder
+from rpbi.config.asset_files import find_file, find_folder
 
 DATA = pybullet_data.getDataPath()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rpbi.button_history import DOWN, PRESSED, RELEASED, ButtonHistory
+from rpbi.window import DOWN, PRESSED, RELEASED, ButtonHistory
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,8 @@ import numpy as np
 import pybullet
 import pytest
 
-from rpbi.camera import (
+from rpbi.geometry import Pose
+from rpbi.render.camera import (
     Intrinsics,
     back_project,
     camera_matrix,
@@ -17,7 +18,6 @@ from rpbi.camera import (
     rotation_matrix,
     view_matrix,
 )
-from rpbi.pose import Pose
 
 INTRINSICS = Intrinsics(width_px=640, height_px=480, fov_deg=40.0, near_m=0.1, far_m=10.0)
 QUAT_XYZW = pybullet.getQuaternionFromEuler([0.3, -1.1, 2.0])

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from rpbi.clock import Clock, Schedule
+from rpbi.engine.clock import Clock, Schedule
 
 
 def test_simulated_stamps_are_exact_and_begin_at_one_tick():

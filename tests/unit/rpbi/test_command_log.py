@@ -1,6 +1,6 @@
 """What is kept of the commands that entered a world."""
 
-from rpbi.command_log import KEPT, CommandLog, WorldCommand
+from rpbi.engine.command_log import KEPT, CommandLog, WorldCommand
 
 
 def _log(count):

@@ -1,4 +1,4 @@
-"""A world is read from all of its files, and all faults of all files are told at once."""
+"""A world is read from all of its files, and all problems of all files are told at once."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError
 from custom_ros_tools.schema import ConfigModel, Hz, Name
-from rpbi.config import LoadedWorld, WorldConfig, load_object, load_world, load_world_dict
-from rpbi.pybullet_models import ChangeDynamics, CreateVisualShape, LoadURDF
+from rpbi.config.loading import LoadedWorld, WorldConfig, load_object, load_world, load_world_dict
+from rpbi.config.pybullet_models import ChangeDynamics, CreateVisualShape, LoadURDF
 
 
 class BallConfig(ConfigModel):

@@ -6,9 +6,9 @@ import numpy as np
 import pybullet
 import pytest
 
-from rpbi.joint_model import Joint
 from rpbi.kinematics import IKProblem
 from rpbi.kinematics.joint_limits import JointLimits
+from rpbi.urdf.joints import Joint
 
 TURN = 2.0 * math.pi
 
@@ -28,20 +28,20 @@ LIMITS = JointLimits(
 
 
 def test_a_revolute_joint_beyond_its_limit_comes_back_by_whole_turns():
-    inside, stopped = LIMITS.bring_in(np.array([4.0, 14.0, 0.0, 0.0]), np.zeros(4))
+    inside, stopped = LIMITS.wrap_to_limits(np.array([4.0, 14.0, 0.0, 0.0]), np.zeros(4))
     assert inside[:2] == pytest.approx([4.0 - TURN, 14.0 - 2 * TURN])
     assert not stopped.any()
 
 
 def test_a_joint_that_fits_in_no_turn_stops_at_its_limit():
-    inside, stopped = LIMITS.bring_in(np.array([3.1, 0.0, 0.0, 0.7]), np.zeros(4))
+    inside, stopped = LIMITS.wrap_to_limits(np.array([3.1, 0.0, 0.0, 0.7]), np.zeros(4))
     assert inside == pytest.approx([3.0, 0.0, 0.0, 0.5])
     assert list(stopped) == [True, False, False, True]
 
 
 def test_of_several_turns_the_nearest_is_taken():
     near = np.array([0.0, 6.0, 20.0, 0.0])
-    inside, _ = LIMITS.bring_in(np.array([0.0, 0.1, 0.3, 0.0]), near)
+    inside, _ = LIMITS.wrap_to_limits(np.array([0.0, 0.1, 0.3, 0.0]), near)
     assert inside[1] == pytest.approx(0.1 + TURN)
     assert inside[2] == pytest.approx(0.3 + 3 * TURN)
 

@@ -6,7 +6,7 @@ import pybullet
 import pytest
 
 from custom_ros_tools.errors import UnknownNameError
-from rpbi.joint_model import Joint, JointModel
+from rpbi.urdf.joints import Joint, JointModel
 
 
 def _joint(index, name, kind=pybullet.JOINT_REVOLUTE, lower=-1.0, upper=1.0, effort=10.0, velocity=2.0):

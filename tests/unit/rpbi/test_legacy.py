@@ -9,8 +9,8 @@ import pytest
 from custom_ros_tools.errors import ConfigError
 from custom_ros_tools.schema import ConfigModel
 from rpbi.bodies import BODY_TYPES
-from rpbi.config import load_object, load_world_dict
-from rpbi.legacy import LEGACY_KEYS
+from rpbi.config.legacy import LEGACY_KEYS
+from rpbi.config.loading import load_object, load_world_dict
 
 ROBOT: dict[str, Any] = {
     "name": "iiwa",

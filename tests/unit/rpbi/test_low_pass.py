@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from rpbi.sensors.low_pass import LowPass
+from rpbi.sensors.filters import LowPass
 
 DT_S = 0.001
 

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from rpbi.mailbox import ClosedError, Mailbox
+from rpbi.engine.mailbox import ClosedError, Mailbox
 
 
 def test_the_newest_value_of_a_slot_wins_and_is_taken_once():
@@ -93,10 +93,10 @@ def test_many_threads_lose_no_request_and_keep_the_newest_value():
 
 def test_what_waits_is_dropped_and_so_is_what_belongs_to_an_earlier_era():
     mailbox = Mailbox()
-    era = mailbox.era
+    generation = mailbox.generation
     mailbox.put("kuka/target", 1)
     mailbox.drop()
-    mailbox.put("kuka/target", 2, era=era)
+    mailbox.put("kuka/target", 2, generation=generation)
     assert dict(mailbox.take()) == {}
-    mailbox.put("kuka/target", 3, era=mailbox.era)
+    mailbox.put("kuka/target", 3, generation=mailbox.generation)
     assert dict(mailbox.take()) == {"kuka/target": 3}

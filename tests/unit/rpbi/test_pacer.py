@@ -2,8 +2,8 @@
 
 import pytest
 
-from rpbi import pacer
-from rpbi.pacer import MAX_DEBT_S, Pacer
+from rpbi.engine import pacer
+from rpbi.engine.pacer import MAX_DEBT_S, Pacer
 
 
 @pytest.fixture

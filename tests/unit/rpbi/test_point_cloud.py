@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rpbi.camera import Intrinsics, back_project
-from rpbi.point_cloud import PointCloud
+from rpbi.render.camera import Intrinsics, back_project
+from rpbi.render.depth import PointCloud
 
 INTRINSICS = Intrinsics(width_px=32, height_px=24, fov_deg=60.0, near_m=0.1, far_m=5.0)
 SHAPE = INTRINSICS.height_px, INTRINSICS.width_px

@@ -9,8 +9,8 @@ import pytest
 
 from custom_ros_tools.errors import ConfigError
 from custom_ros_tools.schema import ConfigModel
-from rpbi import pybullet_args
-from rpbi.pybullet_args import CONNECTION_MODES, SHAPE_TYPES, URDF_FLAGS, Constants
+from rpbi.config import pybullet_args
+from rpbi.config.pybullet_args import CONNECTION_MODES, SHAPE_TYPES, URDF_FLAGS, Constants
 
 FAMILIES = [family for family in vars(pybullet_args).values() if isinstance(family, Constants)]
 

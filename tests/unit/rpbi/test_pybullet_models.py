@@ -12,8 +12,7 @@ import pybullet_data
 import pytest
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.client import Client
-from rpbi.pybullet_models import (
+from rpbi.config.pybullet_models import (
     ChangeDynamics,
     CreateCollisionShape,
     CreateVisualShape,
@@ -23,7 +22,7 @@ from rpbi.pybullet_models import (
     ResetBaseVelocity,
     SetJointMotorControlArray,
 )
-from rpbi.pybullet_world_models import (
+from rpbi.config.pybullet_world_models import (
     ConfigureDebugVisualizer,
     Connect,
     ResetDebugVisualizerCamera,
@@ -31,6 +30,7 @@ from rpbi.pybullet_world_models import (
     SetGravity,
     SetPhysicsEngineParameter,
 )
+from rpbi.engine.client import Client
 
 SAMPLES: dict[type[PybulletModel], dict[str, Any]] = {
     LoadURDF: {"fileName": "plane.urdf", "flags": "URDF_USE_SELF_COLLISION"},

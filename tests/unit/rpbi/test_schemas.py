@@ -15,12 +15,12 @@ import yaml
 from jsonschema import Draft7Validator
 
 from custom_ros_tools.errors import ConfigError
-from custom_ros_tools.json_schema import Schema, explained, json_schema
 from custom_ros_tools.node_configs import NODE_CONFIGS
+from custom_ros_tools.schema.json_schema import Schema, explained, json_schema
 from rpbi.bodies import BODY_TYPES
-from rpbi.config import load_object, load_world, load_world_dict, type_of
-from rpbi.rgbd_config import RgbdSensorConfig
-from rpbi.schemas import kind_of, schemas, sections
+from rpbi.config.loading import load_object, load_world, load_world_dict, type_of
+from rpbi.config.schemas import kind_of, schemas, sections
+from rpbi.config.sensors import RgbdSensorConfig
 
 SRC = Path(__file__).resolve().parents[3] / "src"
 SCHEMAS = schemas()
@@ -32,7 +32,7 @@ URDF = {"fileName": "kuka_iiwa/model.urdf"}
 CLOTH: dict[str, Any] = {"name": "cloth", "loadSoftBody": {"fileName": "cloth_z_up.obj", "useMassSpring": True}}
 
 
-def faults(kind: str, data: Any) -> list[str]:
+def problems(kind: str, data: Any) -> list[str]:
     """Returns what a schema finds wrong with a file of a kind."""
     validator = Draft7Validator(SCHEMAS[kind])
     return [f"{'.'.join(map(str, each.absolute_path))}: {each.message}" for each in validator.iter_errors(data)]
@@ -82,12 +82,12 @@ def test_shipped_files_name_the_schema_of_the_list_that_names_them() -> None:
 def test_files_of_the_template_hold_the_schemas() -> None:
     root = SRC.parent / "templates"
     main = yaml.safe_load((root / "my_robot_lab/configs/lab.yaml").read_text())
-    assert faults("world", main) == []
+    assert problems("world", main) == []
     files = [(section, file) for section in sections() for file in main.get(section, ())]
     assert {"robots", "objects"} <= {section for section, _ in files}
     for section, file in files:
         data = yaml.safe_load((root / file.replace("{my_robot_lab}", "my_robot_lab")).read_text())
-        assert faults(kind_of(section), data) == [], file
+        assert problems(kind_of(section), data) == [], file
 
 
 def test_worlds_of_tests_hold_the_schemas(tmp_path: Path) -> None:
@@ -100,10 +100,10 @@ def test_worlds_of_tests_hold_the_schemas(tmp_path: Path) -> None:
     )
     load_world(path, BODY_TYPES)
     main = yaml.safe_load(Path(path).read_text())
-    assert faults("world", main) == []
+    assert problems("world", main) == []
     for section in ("collision_objects", "dynamic_objects", "robots"):
         for file in main[section]:
-            assert faults(kind_of(section), yaml.safe_load((tmp_path / file).read_text())) == []
+            assert problems(kind_of(section), yaml.safe_load((tmp_path / file).read_text())) == []
 
 
 def without(data: dict[str, Any], key: str) -> dict[str, Any]:
@@ -155,7 +155,7 @@ ACCEPTED: list[tuple[str, Any]] = [
 @pytest.mark.parametrize(("kind", "data"), ACCEPTED, ids=lambda value: value if isinstance(value, str) else "")
 def test_what_a_world_takes_the_schema_takes(kind: str, data: Any) -> None:
     parse(kind, data)
-    assert faults(kind, data) == []
+    assert problems(kind, data) == []
 
 
 BASES: dict[str, dict[str, Any]] = {
@@ -195,7 +195,7 @@ def test_whatever_value_a_world_takes_for_a_key_the_schema_takes(kind: str, capl
             except ConfigError:
                 continue
             taken += 1
-            refused += [(path, value)] if faults(kind, data) else []
+            refused += [(path, value)] if problems(kind, data) else []
     assert refused == []
     assert taken > 20
 
@@ -240,22 +240,22 @@ REFUSED: list[tuple[str, Any, str]] = [
 def test_a_mistake_is_found_by_schema_and_world_alike(kind: str, data: Any, key: str) -> None:
     with pytest.raises(ConfigError, match=key):
         parse(kind, data)
-    assert any(key in fault for fault in faults(kind, data)), faults(kind, data)
+    assert any(key in fault for fault in problems(kind, data)), problems(kind, data)
 
 
 def test_instance_may_have_any_key_of_its_file_and_no_other() -> None:
     arms = [{"file": "iiwa.yaml", "name": "left", "loadURDF": {"basePosition": [0, 0, 1]}}, "iiwa.yaml"]
-    assert faults("world", {"robots": arms}) == []
-    assert faults("world", {"robots": [{"file": "iiwa.yaml", "nmae": "left"}]})
-    assert faults("world", {"robots": [{"file": "iiwa.yaml", "loadURDF": {"basePosition": [0, 1]}}]})
+    assert problems("world", {"robots": arms}) == []
+    assert problems("world", {"robots": [{"file": "iiwa.yaml", "nmae": "left"}]})
+    assert problems("world", {"robots": [{"file": "iiwa.yaml", "loadURDF": {"basePosition": [0, 1]}}]})
 
 
 def test_objects_of_own_types_may_have_keys_that_nobody_here_knows() -> None:
     own = {"type": "my_lab.conveyor:Conveyor", "name": "belt", "speed": 1.0}
-    assert faults("object", own) == []
-    assert faults("world", {"objects": ["belt.yaml", {"file": "belt.yaml", "name": "slow", "speed": 0.1}]}) == []
-    assert faults("object", without(own, "type"))
-    assert faults("object", {**own, "type": "Conveyor"})
+    assert problems("object", own) == []
+    assert problems("world", {"objects": ["belt.yaml", {"file": "belt.yaml", "name": "slow", "speed": 0.1}]}) == []
+    assert problems("object", without(own, "type"))
+    assert problems("object", {**own, "type": "Conveyor"})
 
 
 def test_old_keys_are_marked_and_say_what_to_write() -> None:

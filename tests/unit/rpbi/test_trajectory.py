@@ -7,8 +7,8 @@ import random
 import numpy as np
 import pytest
 
-from rpbi.control.polynomial import derivative, quintic, value_bounds, value_range
-from rpbi.control.trajectory import Knot, State, Trajectory, minimum_jerk
+from rpbi.control.trajectories.polynomial import derivative, quintic, value_bounds, value_range
+from rpbi.control.trajectories.trajectory import Knot, State, Trajectory, minimum_jerk
 
 KINDS = {"line": (), "cubic": ("velocity",), "quintic": ("velocity", "acceleration")}
 

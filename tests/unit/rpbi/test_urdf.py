@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.urdf import description_for_ros, joint_types, resolve_meshes
+from rpbi.urdf.document import description_for_ros, joint_types, resolve_meshes
 
 
 def urdf(folder: Path, inner: str) -> str:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rpbi.camera import rotation_matrix
+from rpbi.render.camera import rotation_matrix
 from rpbi_examples import orbit
 from rpbi_examples.figure_eight import FigureEight
 

@@ -6,7 +6,8 @@ Each takes data and writes its own sentence, so that the wording lives in one pl
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
 
@@ -53,7 +54,7 @@ class ConfigError(InterfaceError):
     """The author of the configuration has to change something.
 
     Args:
-        problems: All faults that were found, in the order of the files.
+        problems: All problems that were found, in the order of the files.
     """
 
     def __init__(self, problems: Sequence[Problem]) -> None:
@@ -132,3 +133,27 @@ class PhysicsError(InterfaceError):
     def __init__(self, message: str) -> None:
         self.message = message
         super().__init__(message)
+
+
+@contextmanager
+def collecting_problems() -> Iterator[Callable[[], AbstractContextManager[None]]]:
+    """Collects the problems of several parts of a configuration, so that all of them are reported at once.
+
+    Yields:
+        What makes a context for each part: `with collecting_problems() as part`, then `with part(): ...` for each.
+
+    Raises:
+        ConfigError: At the end, if a part raised one; it has the problems of all.
+    """
+    problems: list[Problem] = []
+
+    @contextmanager
+    def part() -> Iterator[None]:
+        try:
+            yield
+        except ConfigError as error:
+            problems.extend(error.problems)
+
+    yield part
+    if problems:
+        raise ConfigError(problems)

@@ -1,5 +1,5 @@
 """Keys that are pressed."""
 
-from .ros.key_down_subscriber import KeyDownSubscriber
+from custom_ros_tools.ros.key_down_subscriber import KeyDownSubscriber
 
 __all__ = ["KeyDownSubscriber"]

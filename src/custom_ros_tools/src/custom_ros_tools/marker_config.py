@@ -8,19 +8,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 
 from .errors import hint
-from .schema import (
-    ConfigModel,
-    Expects,
-    FrameId,
-    Hz,
-    KeyedError,
-    ListOf,
-    NonNegative,
-    Position,
-    Rgba,
-    Switch,
-    Text,
-)
+from .schema import ConfigModel, Expects, FrameId, Hz, KeyedError, ListOf, NonNegative, Position, Rgba, Switch, Text
 from .transforms import quat_of
 
 MARKER_TYPES = {

@@ -1,5 +1,5 @@
 """TF in one object."""
 
-from .ros.tf_interface import TfInterface
+from custom_ros_tools.ros.tf_interface import TfInterface
 
 __all__ = ["TfInterface"]

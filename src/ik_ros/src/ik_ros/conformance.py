@@ -16,14 +16,13 @@ from typing import Any, ClassVar
 import pytest
 
 from custom_ros_tools.errors import UnknownNameError
+from rpbi.geometry import Pose, Quaternion
 from rpbi.kinematics import Kinematics
 from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
-from rpbi.pose import Pose, Quaternion
 
 from .limits import Limits
 from .lookup import make_solver
-from .problem import IKProblem
-from .solution import IKSolution
+from .problem import IKProblem, IKSolution
 from .solver import Solver
 
 PROBLEMS = "IK_CONFORMANCE_PROBLEMS"

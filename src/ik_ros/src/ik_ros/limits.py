@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import random
 from collections.abc import Sequence
 
-from rpbi.joint_model import LIMIT_ROUNDING
+from rpbi.urdf.joints import LIMIT_ROUNDING
 
 TURN = 2.0 * math.pi
 
@@ -31,7 +32,7 @@ class Limits:
             for low, high in zip(lower, upper)
         )
 
-    def bring_in(self, q: Sequence[float], near: Sequence[float]) -> tuple[list[float], bool]:
+    def wrap_to_limits(self, q: Sequence[float], near: Sequence[float]) -> tuple[list[float], bool]:
         """Returns positions within the limits, and whether they are what was given but for whole turns and rounding.
 
         Args:
@@ -70,3 +71,35 @@ def _turned(position: float, lower: float, upper: float) -> float:
     if position > upper:
         return position - TURN * math.ceil((position - upper - LIMIT_ROUNDING) / TURN)
     return position + TURN * math.ceil((lower - position - LIMIT_ROUNDING) / TURN)
+
+
+_log = logging.getLogger(__name__)
+
+
+class StartLimits:
+    """Brings starts into limits, and warns of each joint once: a stream asks the same a hundred times a second.
+
+    Args:
+        joint_names: The n joints.
+        limits: Their limits.
+    """
+
+    def __init__(self, joint_names: Sequence[str], limits: Limits) -> None:
+        self._joint_names = tuple(joint_names)
+        self._limits = limits
+        self._warned_of: set[str] = set()
+
+    def wrap_to_limits(self, start: Sequence[float]) -> list[float]:
+        """Returns n positions within limits [rad or m].
+
+        Args:
+            start: n positions [rad or m].
+        """
+        inside = self._limits.wrap_to_limits(start, start)[0]
+        joints = zip(self._joint_names, start, inside)
+        outside = {name: asked for name, asked, used in joints if abs(asked - used) > LIMIT_ROUNDING}
+        if not outside.keys() <= self._warned_of:
+            positions = ", ".join(f"'{name}' {asked:g}" for name, asked in outside.items())
+            _log.warning("the start is outside limits and is brought in: %s", positions)
+            self._warned_of |= outside.keys()
+        return inside

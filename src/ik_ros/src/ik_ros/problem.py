@@ -1,4 +1,4 @@
-"""Questions to inverse kinematics, the same for every solver."""
+"""Questions to inverse kinematics and answers, the same for every solver."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from rpbi.pose import Pose
+from rpbi.geometry import Pose
 
 Vector = tuple[float, float, float]
 JointPositions = Mapping[str, float]
@@ -100,3 +100,46 @@ def _number(what: str, value: float) -> float:
     if not abs(value) <= LARGEST:
         raise ValueError(f"{what}: expected finite numbers, {LARGEST:g} at most; got {value:g}")
     return value
+
+
+@dataclass(frozen=True)
+class JointTrajectory:
+    """Positions of n joints over time.
+
+    Attributes:
+        times_s: m times from the start [s], increasing.
+        positions: For each of them, n positions [rad or m].
+        velocities: For each of them, n velocities [rad/s or m/s].
+    """
+
+    times_s: tuple[float, ...]
+    positions: tuple[tuple[float, ...], ...]
+    velocities: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class IKSolution:
+    """Where a solver got to.
+
+    Attributes:
+        success: Whether all that was asked for is met within the tolerances, and the limits are held.
+        message: How well it went, or why not, in words with numbers.
+        joint_names: The solver's n joints, always in the same order.
+        positions: n positions within limits [rad or m]; without success, the best that were found, and without any
+            of those, where the search started.
+        position_error_m: How far the link is off its target beyond the tolerance [m]; for several, the largest.
+        orientation_error_rad: How far it is turned beyond the tolerance [rad]; for several, the largest.
+        alternatives: Other solutions, the best first, of solvers that look for more than one; n positions each.
+        trajectory: Of solvers of trajectories; `positions` are then its last ones.
+        base_pose: Of robots whose root floats: where it is then in the solver's base frame.
+    """
+
+    success: bool
+    message: str
+    joint_names: tuple[str, ...]
+    positions: tuple[float, ...]
+    position_error_m: float = 0.0
+    orientation_error_rad: float = 0.0
+    alternatives: tuple[tuple[float, ...], ...] = ()
+    trajectory: JointTrajectory | None = None
+    base_pose: Pose | None = None

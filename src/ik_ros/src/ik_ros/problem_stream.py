@@ -7,9 +7,8 @@ import time
 
 import numpy as np
 
-from .continuity import Continuity
-from .problem import IKProblem, JointPositions
-from .solution import IKSolution
+from .joint_rate_limiter import JointRateLimiter
+from .problem import IKProblem, IKSolution, JointPositions
 from .solver import Solver
 
 LONGEST_PERIOD_S = 0.1
@@ -24,7 +23,7 @@ class ProblemStream:
         continuity: Keeps the joints within their velocities; without it, targets are the solutions.
     """
 
-    def __init__(self, solver: Solver, continuity: Continuity | None = None) -> None:
+    def __init__(self, solver: Solver, continuity: JointRateLimiter | None = None) -> None:
         self._solver = solver
         self._continuity = continuity
         self._last: JointPositions = {}

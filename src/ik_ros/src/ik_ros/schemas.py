@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from custom_ros_tools.errors import MissingDependency
-from custom_ros_tools.json_schema import Schema, json_schema
+from custom_ros_tools.schema.json_schema import Schema, json_schema
 
 from .lookup import solver_class
-from .solver_node_parameters import SolverNodeParameters
+from .node_configs import SolverNodeParameters
 from .solvers import SOLVERS
 
 LISTS_OF_TASKS = ("constraints", "costs")
@@ -32,8 +32,9 @@ def schemas() -> dict[str, Schema]:
 def _tasks() -> list[Schema]:
     """Returns the schemas of the types of tasks, and one for types of others."""
     # Their classes need what the solver needs, which is not asked for before it is known to be there
+    from ik_ros.formulation.formulation import task_class
+
     from .tasks import TASKS
-    from .tasks.lookup import task_class
 
     known = []
     for kind in TASKS:

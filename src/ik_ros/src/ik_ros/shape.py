@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import model_validator
 
 from custom_ros_tools.schema import ConfigModel, KeyedError, ListOf, Position, PositiveMetres, Quat, Text
-from rpbi.pose import Pose
+from rpbi.geometry import Pose
 
 
 class Core(NamedTuple):

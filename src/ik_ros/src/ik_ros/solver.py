@@ -7,8 +7,7 @@ from typing import ClassVar
 
 from custom_ros_tools.schema import ConfigModel
 
-from .problem import IKProblem
-from .solution import IKSolution
+from .problem import IKProblem, IKSolution
 
 
 class Solver(ABC):

@@ -1,15 +1,17 @@
-"""What other packages offer: found by names like `module:Class`, which YAML and classes give."""
+"""Classes of other packages, named as `module:Class`, and errors that name them when they fail."""
 
 from __future__ import annotations
 
 import importlib
+import math
 import pkgutil
 import traceback
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
-from custom_ros_tools.errors import UnknownNameError, hint
+from custom_ros_tools.errors import InterfaceError, PluginError, UnknownNameError, hint
 
 _Kind = TypeVar("_Kind")
 
@@ -125,3 +127,62 @@ def _is_missing(module: str) -> str:
         return f"no module '{module}': is its package built, and its workspace sourced?"
     folders = getattr(importlib.import_module(outer), "__path__", ())
     return f"'{outer}' has no module '{inner}'{hint(inner, [each.name for each in pkgutil.iter_modules(folders)])}"
+
+
+def blame(thing: Any, doing: str, error: Exception) -> None:
+    """Raises a PluginError if something of another package failed, unless that said what is wrong in our own way.
+
+    Errors of this package's own classes are left alone: they are bugs, of which all should be seen.
+
+    Args:
+        thing: What failed: a class, a function, or an object of such a class.
+        doing: What it was doing.
+        error: What it raised.
+
+    Raises:
+        PluginError: In that case.
+    """
+    if is_foreign(thing) and not isinstance(error, InterfaceError):
+        raise PluginError(full_name(thing), doing, cause_of(error)) from error
+
+
+@contextmanager
+def blaming(thing: Any, doing: str) -> Iterator[None]:
+    """Blames something for all that goes wrong meanwhile, see `blame`."""
+    try:
+        yield
+    except Exception as error:
+        blame(thing, doing, error)
+        raise
+
+
+def check_sample(sample: Any, sample_type: Any, name: str) -> None:
+    """Checks what a sensor has read.
+
+    Args:
+        sample: The sample.
+        sample_type: What it should be.
+        name: Name of the sensor, which the sample should have too.
+
+    Raises:
+        TypeError: If it is something else.
+        ValueError: If it has another name, or a number in it is not finite.
+    """
+    if type(sample) is not sample_type:
+        raise TypeError(f"expected a {sample_type.__qualname__}, as sample_type says; got {sample!r}")
+    if sample.name != name:
+        raise ValueError(f"expected the sensor's name '{name}' in the sample, got '{sample.name}'")
+    if not _is_finite(sample if isinstance(sample, tuple) else vars(sample)):
+        raise ValueError(f"the sample has a number that is not finite: {sample!r}")
+
+
+def _is_finite(value: Any) -> bool:
+    if isinstance(value, float):
+        return math.isfinite(value)
+    if isinstance(value, Mapping):
+        return all(map(_is_finite, value.values()))
+    if isinstance(value, (tuple, list)):
+        return all(map(_is_finite, value))
+    if hasattr(value, "dtype"):
+        return value.dtype.kind != "f" or math.isfinite(value.sum())
+    return True

@@ -1,5 +1,5 @@
 """rospy in one object."""
 
-from .ros.ros_node import RosNode
+from rpbi.ros.ros_node import RosNode
 
 __all__ = ["RosNode"]

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .pose import Pose, Quaternion, Vector
-from .twist import Twist
-from .vectors import plus, scaled
+from .geometry import Pose, Quaternion, Twist, Vector, plus, scaled
 
 
 class JointStateSample(NamedTuple):

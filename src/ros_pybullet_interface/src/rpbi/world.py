@@ -9,25 +9,24 @@ from typing import Any
 import pybullet
 
 from custom_ros_tools.errors import UnknownNameError
+from rpbi.bodies.dynamics import LinkDynamics, read_dynamics
+from rpbi.config.loading import LoadedWorld, load_world
+from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.config.sensors import RgbdSensorConfig
+from rpbi.engine.actions import ACTIONS
+from rpbi.engine.client import Client
+from rpbi.engine.clock import Clock
+from rpbi.engine.command_log import CommandLog, WorldCommand
+from rpbi.engine.contents import WorldContents
+from rpbi.engine.inputs import Input
+from rpbi.engine.mailbox import Mailbox
+from rpbi.engine.state_hash import state_hash
+from rpbi.sensors.sensor import Sensor
 
-from .actions import ACTIONS
 from .bodies import BODY_TYPES, Body, BodyConfig
-from .client import Client
-from .clock import Clock
-from .command_log import CommandLog, WorldCommand
-from .config import LoadedWorld, load_world
-from .dynamics import read_dynamics
-from .inputs import Input
-from .link_dynamics import LinkDynamics
-from .mailbox import Mailbox
-from .plugin_faults import blame, blaming
-from .pybullet_models import ChangeDynamics
-from .rgbd_config import RgbdSensorConfig
+from .plugins import blame, blaming
 from .sensors import RgbdSensor
-from .sensors.sensor import Sensor
-from .state_hash import state_hash
 from .window import Window, check_recording
-from .world_contents import WorldContents
 
 log = logging.getLogger(__name__)
 
@@ -195,12 +194,12 @@ class World:
             UnknownNameError: If there is no such input, or the value names something unknown.
             ValueError: If the value is refused, for instance because it is not finite.
         """
-        era = self.mailbox.era
+        generation = self.mailbox.generation
         inputs = self.inputs
         if slot not in inputs:
             raise UnknownNameError("input", slot, list(inputs))
         taken = inputs[slot]
-        self.mailbox.put(slot, taken.check(value), taken.merge, era)
+        self.mailbox.put(slot, taken.check(value), taken.merge, generation)
 
     @property
     def inputs(self) -> dict[str, Input]:

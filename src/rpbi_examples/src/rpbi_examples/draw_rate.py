@@ -9,8 +9,8 @@ import sys
 import time
 
 from custom_ros_tools.errors import InterfaceError
-from rpbi.camera import Intrinsics, depth_in_metres
-from rpbi.pose import Pose
+from rpbi.geometry import Pose
+from rpbi.render.camera import Intrinsics, depth_in_metres
 from rpbi.render.frame import Camera
 from rpbi.render.mirror import Mirror
 from rpbi.render.renderers import TinyRenderer, open_renderer

@@ -6,7 +6,7 @@ import math
 
 from pydantic import Field
 
-from custom_ros_tools.node_parameters import StartParameters
+from custom_ros_tools.node_configs import StartParameters
 from custom_ros_tools.schema import Hz, NonNegative, Seconds
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rpbi_utils.layout import BYTES, NUMBER_DTYPES, Leaf
+from .layout import BYTES, NUMBER_DTYPES, Leaf
 
 Array = NDArray[Any]
 

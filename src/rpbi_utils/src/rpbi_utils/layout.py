@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rpbi_utils.message_type import BYTE_TYPES, SCALAR, VARIABLE, MessageType
+from .message_type import BYTE_TYPES, SCALAR, VARIABLE, MessageType
 
 MAX_ARRAY_COLUMNS = 1000
 BYTES = "bytes"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
-from rpbi_utils.layout import MAX_ARRAY_COLUMNS, Layout, Leaf, lay_out
-from rpbi_utils.message_type import MessageType
+from .layout import MAX_ARRAY_COLUMNS, Layout, Leaf, lay_out
+from .message_type import MessageType
 
 STAMP = "header/stamp"
 INDEX = "time"

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from rpbi_utils.columns import Array, Pieces, read_leaf
-from rpbi_utils.layout import BYTES
-from rpbi_utils.message_type import MessageType
-from rpbi_utils.row_plan import INDEX, RECORD_TIME, STAMP, Columns, plan_rows
+from .columns import Array, Pieces, read_leaf
+from .layout import BYTES
+from .message_type import MessageType
+from .row_plan import INDEX, RECORD_TIME, STAMP, Columns, plan_rows
 
 BATCH_MESSAGES = 16_384
 BATCH_BYTES = 32 * 1024 * 1024

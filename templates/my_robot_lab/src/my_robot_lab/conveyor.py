@@ -7,9 +7,9 @@ from pydantic import Field
 
 from custom_ros_tools.schema import NonNegative, Position, Unit, Vec3
 from rpbi.bodies import Body, BodyConfig
-from rpbi.client import Client
-from rpbi.inputs import Input
-from rpbi.pose import Pose
+from rpbi.engine.client import Client
+from rpbi.engine.inputs import Input
+from rpbi.geometry import Pose
 
 FASTEST = 5.0
 """What the belt takes for a speed at most [m/s]."""

@@ -6,9 +6,8 @@ from pydantic import AfterValidator, Field
 
 from custom_ros_tools.schema import Position, PositiveMetres, Vec3
 from rpbi.bodies import Body
-from rpbi.pose import Pose, Vector
+from rpbi.geometry import Pose, Vector, plus, scaled
 from rpbi.sensors import BodySensor, SensorConfig
-from rpbi.vectors import plus, scaled
 
 
 def _some_direction(direction: Vector) -> Vector:

@@ -1,14 +1,18 @@
-"""Joint states as messages, in the order that is asked for."""
+"""Joint states as messages: in the order that is asked for, published, kept."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 
+import numpy as np
 import rospy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from ..joint_values import JointValues
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.joint_values import JointValues
+from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from custom_ros_tools.transforms import Array
 
 
 def values_in(message: JointState) -> JointValues:
@@ -64,3 +68,97 @@ def get_joint_state(
     """
     message = rospy.wait_for_message(topic, JointState, timeout)
     return message if joint_names is None else resolve_joint_order(message, joint_names, ns)
+
+
+class JointStatePublisher:
+    """Publishes joint states of a fixed list of joints.
+
+    Args:
+        topic: The topic.
+        joint_names: The n joints.
+        queue_size: Messages kept for a slow subscriber.
+    """
+
+    def __init__(self, topic: str, joint_names: Sequence[str], queue_size: int = 1) -> None:
+        self._names = tuple(joint_names)
+        self._publisher = rospy.Publisher(topic, JointState, queue_size=queue_size)
+
+    def publish(
+        self,
+        q: Iterable[float] | None = None,
+        qd: Iterable[float] | None = None,
+        eff: Iterable[float] | None = None,
+    ) -> None:
+        """Publishes values with the present stamp.
+
+        Args:
+            q: n positions [rad or m].
+            qd: n velocities [rad/s or m/s].
+            eff: n torques or forces [N m or N].
+
+        Raises:
+            ValueError: If there are more or fewer than n, or a value is not finite.
+        """
+        values = JointValues.of(self._names, q, qd, eff)
+        self._publisher.publish(joint_state(values, Header(stamp=rospy.Time.now())))
+
+
+class JointStateSubscriber:
+    """Keeps the newest joint state of a topic, its joints in the order of a list.
+
+    Messages that lack joints or are faulty are refused and named now and then; the one before stays.
+
+    Args:
+        topic: The topic.
+        joint_names: The n joints.
+        ns: What their names in messages begin with, as `ns` in `ns/joint`.
+        callback: Called with each joint state, its joints in order.
+    """
+
+    def __init__(
+        self,
+        topic: str,
+        joint_names: Sequence[str],
+        ns: str = "",
+        callback: Callable[[JointState], None] | None = None,
+    ) -> None:
+        self._names, self._ns, self._callback = tuple(joint_names), ns, callback
+        self._topic, self._warn = rospy.resolve_name(topic), ThrottledWarning()
+        self._newest: JointState | None = None
+        self._subscriber = rospy.Subscriber(self._topic, JointState, self._take, queue_size=1, tcp_nodelay=True)
+
+    def received(self) -> bool:
+        """Tells whether there is a joint state."""
+        return self._newest is not None
+
+    recieved = received  # as the release spells it
+
+    def get(self) -> JointState | None:
+        """Returns the newest joint state, None if there is none yet."""
+        return self._newest
+
+    def get_position(self) -> Array | None:
+        """Returns n positions [rad or m]; none if the message has none, None if there is no message yet."""
+        return self._values("position")
+
+    def get_velocity(self) -> Array | None:
+        """Returns n velocities [rad/s or m/s]; none if the message has none, None if there is no message yet."""
+        return self._values("velocity")
+
+    def get_effort(self) -> Array | None:
+        """Returns n efforts [N m or N]; none if the message has none, None if there is no message yet."""
+        return self._values("effort")
+
+    def _values(self, quantity: str) -> Array | None:
+        newest = self._newest
+        return None if newest is None else np.array(getattr(newest, quantity), dtype=float)
+
+    def _take(self, message: JointState) -> None:
+        try:
+            ordered = resolve_joint_order(message, self._names, self._ns)
+        except (InterfaceError, ValueError) as error:
+            self._warn(self._topic, f"message refused: {error}")
+            return
+        self._newest = ordered
+        if self._callback is not None:
+            self._callback(ordered)

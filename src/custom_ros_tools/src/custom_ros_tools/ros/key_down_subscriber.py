@@ -8,7 +8,7 @@ from typing import Any
 
 import rospy
 
-from ..errors import MissingDependency
+from custom_ros_tools.errors import MissingDependency
 
 
 class KeyDownSubscriber:

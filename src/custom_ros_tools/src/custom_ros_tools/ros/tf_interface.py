@@ -10,7 +10,8 @@ import tf2_ros
 from geometry_msgs.msg import Transform, TransformStamped
 from numpy.typing import ArrayLike
 
-from ..transforms import Array, matrix_of, pose_of, rpy_of
+from custom_ros_tools.transforms import Array, matrix_of, pose_of, rpy_of
+
 from .transform_messages import position_in, quat_in, transform_message
 
 NO_ROTATION = (0.0, 0.0, 0.0, 1.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from geometry_msgs.msg import Point, Pose, Quaternion, Transform, Vector3
 from numpy.typing import ArrayLike
 
-from ..transforms import Array, finite_vector, quat_of, unit_quat
+from custom_ros_tools.transforms import Array, finite_vector, quat_of, unit_quat
 
 
 def transform_message(position: ArrayLike, orientation: ArrayLike, in_deg: bool = False) -> Transform:

@@ -7,15 +7,15 @@ import math
 from interactive_markers.interactive_marker_server import InteractiveMarkerServer
 from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, InteractiveMarkerFeedback
 
-from custom_ros_tools.ros.parameters import private_parameters
-from custom_ros_tools.ros.run_node import run_node
-from custom_ros_tools.ros.throttle import ThrottledWarning
+from custom_ros_tools.ros.lifecycle.parameters import private_parameters
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from custom_ros_tools.ros.lifecycle.wall_timer import WallTimer
 from custom_ros_tools.ros.transform_messages import transform_message
 from custom_ros_tools.ros.transform_topic import TransformTopic
-from custom_ros_tools.ros.wall_timer import WallTimer
-from rpbi.pose import Pose
+from ik_ros.node_configs import InteractiveTargetConfig
+from rpbi.geometry import Pose
 
-from ..interactive_target_config import InteractiveTargetConfig
 from .messages import pose_in, pose_message
 
 NAMESPACE = "ik_target"

@@ -13,11 +13,9 @@ from custom_ros_tools.joint_values import JointValues
 from ik_ros.msg import IKProblem as IKProblemMessage
 from ik_ros.msg import TaskGoal, TracIKProblem
 from ik_ros.msg import Waypoint as WaypointMessage
-from rpbi.pose import Pose
-
-from ..problem import IKProblem, JointPositions, Vector, Waypoint
-from ..solution import IKSolution
-from ..solution import JointTrajectory as Trajectory
+from ik_ros.problem import IKProblem, IKSolution, JointPositions, Vector, Waypoint
+from ik_ros.problem import JointTrajectory as Trajectory
+from rpbi.geometry import Pose
 
 
 def problem_in(message: IKProblemMessage) -> IKProblem:

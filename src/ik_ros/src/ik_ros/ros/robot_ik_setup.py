@@ -7,18 +7,17 @@ from sensor_msgs.msg import JointState
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.joint_values import JointValues
-from custom_ros_tools.node_parameters import StartParameters
-from custom_ros_tools.on_off import OnOff
-from custom_ros_tools.ros.parameters import private_config, private_parameters
-from custom_ros_tools.ros.throttle import ThrottledWarning
-from custom_ros_tools.ros.toggle_service import ToggleService
-from custom_ros_tools.ros.wall_timer import WallTimer
+from custom_ros_tools.node_configs import StartParameters
+from custom_ros_tools.ros.lifecycle.parameters import private_config, private_parameters
+from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from custom_ros_tools.ros.lifecycle.wall_timer import WallTimer
+from custom_ros_tools.ros.services import ToggleService
+from custom_ros_tools.toggle import Toggle
+from ik_ros.node_configs import RobotIKConfig, TargetParameters
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
 from ros_pybullet_interface.srv import RobotInfo
 
-from ..robot_ik_config import RobotIKConfig
-from ..setup_parameters import TargetParameters
-from .fresh_tf import FreshTf
+from .tf import FreshTf
 
 TOPICS = "ik/setup/pybullet"
 LISTS = ("lowerLimits", "upperLimits", "jointRanges", "resetPoses", "jointDamping")
@@ -50,7 +49,7 @@ class RobotIKSetup:
             "ik", CalculateInverseKinematicsProblem, queue_size=QUEUE_SIZE, tcp_nodelay=True
         )
         rospy.Subscriber(f"{TOPICS}/currentPosition", JointState, self._take_current, queue_size=1)
-        setup = OnOff("setup", lambda: self._switch(True), lambda: self._switch(False))
+        setup = Toggle("setup", lambda: self._switch(True), lambda: self._switch(False))
         if start_on_init:
             setup.on()
         ToggleService(f"{TOPICS}/toggle", setup.on, setup.off)

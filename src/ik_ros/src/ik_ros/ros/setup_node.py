@@ -11,21 +11,21 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray, Header
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
-from custom_ros_tools.on_off import OnOff
-from custom_ros_tools.ros.parameters import private_parameters
-from custom_ros_tools.ros.run_node import run_node
-from custom_ros_tools.ros.throttle import ThrottledWarning
-from custom_ros_tools.ros.toggle_service import ToggleService
-from custom_ros_tools.ros.wall_timer import WallTimer
+from custom_ros_tools.ros.lifecycle.parameters import private_parameters
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from custom_ros_tools.ros.lifecycle.wall_timer import WallTimer
+from custom_ros_tools.ros.services import ToggleService
+from custom_ros_tools.toggle import Toggle
 from ik_ros.msg import IKProblem as IKProblemMessage
-from rpbi.pose import Pose
+from ik_ros.node_configs import SetupParameters
+from ik_ros.problem import IKProblem, JointPositions
+from rpbi.geometry import Pose
 
-from ..problem import IKProblem, JointPositions
-from ..setup_parameters import SetupParameters
-from .fresh_tf import FreshTf
 from .messages import positions_in, problem_message
 from .robot_ik_setup import RobotIKSetup
 from .solver_argument import solver_argument
+from .tf import FreshTf
 
 QUEUE_SIZE = 10
 START_TOPICS = ("qinit", "start_state", "currentPosition")
@@ -61,7 +61,7 @@ class SetupNode:
         self._publisher = rospy.Publisher("ik", IKProblemMessage, queue_size=QUEUE_SIZE, tcp_nodelay=True)
         rospy.set_param("ik_ros/interface", name)
         self._subscribe()
-        setup = OnOff("setup", lambda: self._switch(True), lambda: self._switch(False))
+        setup = Toggle("setup", lambda: self._switch(True), lambda: self._switch(False))
         if config.start_on_init:
             setup.on()
         ToggleService(f"{self._topics}/toggle", setup.on, setup.off)

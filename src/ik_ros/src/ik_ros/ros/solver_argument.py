@@ -6,7 +6,7 @@ import sys
 
 import rospy
 
-from ..solvers import SOLVERS
+from ik_ros.solvers import SOLVERS
 
 
 def solver_argument(node: str) -> str:

@@ -13,13 +13,18 @@ from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
-from custom_ros_tools.on_off import OnOff
-from custom_ros_tools.ros.run_node import run_node
-from custom_ros_tools.ros.throttle import ThrottledWarning
-from custom_ros_tools.ros.toggle_service import ToggleService
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from custom_ros_tools.ros.services import ToggleService
+from custom_ros_tools.toggle import Toggle
+from ik_ros.joint_rate_limiter import JointRateLimiter
+from ik_ros.lookup import make_solver
 from ik_ros.msg import IKProblem as IKProblemMessage
 from ik_ros.msg import IKSolution as IKSolutionMessage
 from ik_ros.msg import TracIKProblem
+from ik_ros.node_configs import SolverNodeParameters
+from ik_ros.problem import IKProblem, IKSolution
+from ik_ros.problem_stream import ProblemStream
 from ik_ros.srv import (
     JointNames,
     JointNamesResponse,
@@ -31,15 +36,9 @@ from ik_ros.srv import (
     TracIKResponse,
 )
 
-from ..continuity import Continuity
-from ..lookup import make_solver
-from ..problem import IKProblem
-from ..problem_stream import ProblemStream
-from ..solution import IKSolution
-from ..solver_node_parameters import SolverNodeParameters
-from .base_frame import BaseFrame
 from .messages import pose_message, problem_in, problem_in_trac_ik, solution_message, trajectory_message
 from .solver_argument import solver_argument
+from .tf import BaseFrame
 
 QUEUE_SIZE = 10
 PROBLEMS: dict[str, tuple[type[genpy.Message], Callable[[genpy.Message], IKProblem]]] = {
@@ -74,7 +73,7 @@ class SolverNode:
         self._target = rospy.Publisher("joint_states/target", JointState, queue_size=QUEUE_SIZE, tcp_nodelay=True)
         self._solution = rospy.Publisher("ik/solution", IKSolutionMessage, queue_size=QUEUE_SIZE, tcp_nodelay=True)
         self._trajectory = rospy.Publisher("ik/trajectory", JointTrajectory, queue_size=QUEUE_SIZE)
-        solving = OnOff("solving", self._listen, self._listen_no_more)
+        solving = Toggle("solving", self._listen, self._listen_no_more)
         if own.start_on_init:
             solving.on()
         services = f"ik/solver/{name.replace(':', '/').replace('.', '/')}"
@@ -87,7 +86,7 @@ class SolverNode:
         if self._continuity is None:
             return ProblemStream(self._solver)
         try:
-            continuity = Continuity(self._continuity, self._solver.joint_names, self._solver.velocity_limits)
+            continuity = JointRateLimiter(self._continuity, self._solver.joint_names, self._solver.velocity_limits)
         except ValueError as error:
             raise ConfigError([Problem(rospy.get_name(), "", str(error))]) from None
         return ProblemStream(self._solver, continuity)

@@ -6,14 +6,14 @@ import rospy
 from std_msgs.msg import Float64MultiArray
 
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.ros.parameters import private_parameters
-from custom_ros_tools.ros.run_node import run_node
-from custom_ros_tools.ros.throttle import ThrottledWarning
-from custom_ros_tools.ros.wall_timer import WallTimer
+from custom_ros_tools.ros.lifecycle.parameters import private_parameters
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from custom_ros_tools.ros.lifecycle.wall_timer import WallTimer
 from custom_ros_tools.transforms import rpy_of
+from ik_ros.node_configs import TfToFloatArrayConfig
 
-from ..tf_to_float_array_config import TfToFloatArrayConfig
-from .fresh_tf import FreshTf
+from .tf import FreshTf
 
 QUEUE_SIZE = 10
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from custom_ros_tools.json_schema import explained, schema_text
-
-from ..schemas import schemas
+from custom_ros_tools.schema.json_schema import explained, schema_text
+from ik_ros.schemas import schemas
 
 
 def schema_files(root: Path) -> dict[Path, str]:

@@ -9,11 +9,10 @@ from collections.abc import Iterator, Sequence
 import PyKDL
 
 from custom_ros_tools.schema import Count
-
-from ..chain_solver import ChainConfig, ChainSolver
-from ..descent import descend
-from ..goal import Goal
-from ..problem import IKProblem
+from ik_ros.chain.descent import levenberg_marquardt
+from ik_ros.chain.goal import Goal
+from ik_ros.chain.solver import ChainConfig, ChainSolver
+from ik_ros.problem import IKProblem
 
 ITERATIONS = 60
 """Most iterations from one start; where a solution is, some 20 do."""
@@ -83,7 +82,7 @@ class KdlSolver(ChainSolver):
         """
         if not (goal.is_point and self.chain.is_plain):
             for first in self._starts(problem, start, min(restarts, MOST_DESCENTS)):
-                yield descend(self.chain, goal, self.limits, first)
+                yield levenberg_marquardt(self.chain, goal, self.limits, first)
             return
         way = self.residual(goal, start)
         is_near = way.position_m < NEAR_M and way.orientation_rad < NEAR_RAD
@@ -92,14 +91,14 @@ class KdlSolver(ChainSolver):
             q, arrived = self._nearest(goal, first, start)
             yield q
             if first is start and is_near:
-                yield descend(self.chain, goal, self.limits, start)
+                yield levenberg_marquardt(self.chain, goal, self.limits, start)
             has_arrived |= arrived
             if count == GIVE_UP_AFTER and not has_arrived:
                 return
 
     def mended(self, goal: Goal, q: list[float]) -> list[float]:
         """Returns positions as near to the goal as a descent within limits gets from these [rad or m]."""
-        return descend(self.chain, goal, self.limits, q)
+        return levenberg_marquardt(self.chain, goal, self.limits, q)
 
     def _starts(self, problem: IKProblem, start: list[float], restarts: int) -> Iterator[list[float]]:
         """Tells where to start: where it was asked for, and then at random."""
@@ -114,4 +113,4 @@ class KdlSolver(ChainSolver):
             self._from[i] = position
         status = self._kdl.CartToJnt(self._from, goal.frame, self._to)
         q = [self._to[i] for i in range(len(first))]
-        return self.limits.bring_in(q if all(map(math.isfinite, q)) else first, near)[0], status == 0
+        return self.limits.wrap_to_limits(q if all(map(math.isfinite, q)) else first, near)[0], status == 0

@@ -8,14 +8,13 @@ from typing import Any, Literal
 from pydantic import model_validator
 
 from custom_ros_tools.schema import Count, KeyedError, ListOf, NonNegative
+from ik_ros.chain.description import read_chain
+from ik_ros.chain.goal import Goal, refuse_boxes
+from ik_ros.chain.solver import ChainConfig, ChainSolver, refuse_mimics
+from ik_ros.problem import IKProblem
 from rpbi.kinematics import IKProblem as PybulletProblem
 from rpbi.kinematics import Kinematics
-from rpbi.urdf import write_description
-
-from ..chain_description import read_chain
-from ..chain_solver import ChainConfig, ChainSolver, refuse_mimics
-from ..goal import Goal, refuse_boxes
-from ..problem import IKProblem
+from rpbi.urdf.document import write_description
 
 
 class PybulletConfig(ChainConfig):

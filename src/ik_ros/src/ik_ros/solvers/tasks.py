@@ -10,12 +10,10 @@ import numpy as np
 
 from custom_ros_tools.errors import MissingDependency, UnknownNameError
 from custom_ros_tools.schema import KeyedError
+from ik_ros.limits import StartLimits
+from ik_ros.problem import IKProblem, IKSolution
+from ik_ros.solver import Solver
 from rpbi.kinematics.residual import Residual
-
-from ..problem import IKProblem
-from ..solution import IKSolution
-from ..solver import Solver
-from ..start_limits import StartLimits
 
 try:
     import daqp  # noqa: F401
@@ -23,11 +21,10 @@ try:
 except ImportError as error:
     raise MissingDependency(error.name or "pinocchio", "./rpbi setup ik") from None
 
-from ..tasks.descent import Descent, Tried
-from ..tasks.formulation import Formulation, TaskSet
-from ..tasks.found import Found
-from ..tasks.frame_task import FrameTask
-from ..tasks.placement import from_base, to_se3
+from ik_ros.formulation.descent import Candidate, Descent, Iterate
+from ik_ros.formulation.formulation import Formulation, TaskSet
+from ik_ros.formulation.frame_task import FrameTask
+from ik_ros.formulation.robot import from_base, to_se3
 
 AIM = 0.1
 """What is required is aimed at with a tenth of the tolerance, so that solutions lie well within."""
@@ -102,7 +99,7 @@ class TasksSolver(Solver):
         """Returns the configuration where the search starts, within limits."""
         robot = self.tasks.robot
         q = robot.configuration({**self._config.start, **problem.start})
-        return robot.with_positions(q, self._start_limits.bring_in(robot.positions(q).tolist()))
+        return robot.with_positions(q, self._start_limits.wrap_to_limits(robot.positions(q).tolist()))
 
     def _begin(self, problem: IKProblem, start: np.ndarray) -> None:
         """Tells all tasks what the problem wants of them."""
@@ -128,9 +125,9 @@ class TasksSolver(Solver):
                 raise ValueError(f"{key}: {error}") from None
         self._descent.begin()
 
-    def _search(self, problem: IKProblem, start: np.ndarray) -> Found:
+    def _search(self, problem: IKProblem, start: np.ndarray) -> Candidate:
         """Returns what was found from the first start that leads to a solution, else the best of all."""
-        best: Found | None = None
+        best: Candidate | None = None
         for first in self._starts(problem, start):
             found = self._from(self._on_anchor(first))
             if best is None or found.rank < best.rank:
@@ -163,9 +160,9 @@ class TasksSolver(Solver):
         robot.update(q)
         return robot.with_base(q, anchor.goal * robot.frame(anchor.link_id).inverse() * to_se3(self._config.base_start))
 
-    def _from(self, first: np.ndarray) -> Found:
+    def _from(self, first: np.ndarray) -> Candidate:
         """Returns the best that is found from one start."""
-        best: Found | None = None
+        best: Candidate | None = None
         sizes: list[float] = []
         merits: list[float] = []
         for tried in self._descent(first):
@@ -189,13 +186,13 @@ class TasksSolver(Solver):
             return len(sizes) > PATIENCE and merits[-1] > (1.0 - SETTLED) * merits[-1 - PATIENCE]
         return len(sizes) > self._patience and sizes[-1] > 0.5 * sizes[-1 - self._patience]
 
-    def _judged(self, tried: Tried) -> Found:
+    def _judged(self, tried: Iterate) -> Candidate:
         residuals = {name: task.residual(tried.beyond[i]) for i, name, task in self._required}
         sizes = {name: task.size(residuals[name]) for _, name, task in self._required}
         hard = (size for name, size in sizes.items() if self.tasks.parts[name].is_hard)
-        return Found(tried.q, residuals, max(sizes.values(), default=0.0), max(hard, default=0.0))
+        return Candidate(tried.q, residuals, max(sizes.values(), default=0.0), max(hard, default=0.0))
 
-    def _in_words(self, found: Found) -> str:
+    def _in_words(self, found: Candidate) -> str:
         missed = [
             f"'{name}' is off by {_amount(found.residuals[name])}"
             for _, name, task in self._required

@@ -11,10 +11,9 @@ from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, MissingDependency, Problem
 from custom_ros_tools.schema import Count, Positive, Unit
-
-from ..chain_solver import ChainConfig, ChainSolver, refuse_mimics
-from ..goal import Goal, refuse_boxes
-from ..problem import IKProblem
+from ik_ros.chain.goal import Goal, refuse_boxes
+from ik_ros.chain.solver import ChainConfig, ChainSolver, refuse_mimics
+from ik_ros.problem import IKProblem
 
 try:
     import pytracik

@@ -12,11 +12,10 @@ from functools import lru_cache
 import numpy as np
 
 from custom_ros_tools.errors import MissingDependency
+from ik_ros.chain.goal import Goal
+from ik_ros.problem import IKProblem, IKSolution, JointTrajectory, Waypoint
 from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
-from ..goal import Goal
-from ..problem import IKProblem, Waypoint
-from ..solution import IKSolution, JointTrajectory
 from .kdl import KdlSolver
 
 try:
@@ -24,12 +23,11 @@ try:
 except ImportError:
     raise MissingDependency("casadi", "./rpbi setup mpc") from None
 
-from ..trajectory.config import MOST_INTERVALS, MOST_WAYPOINTS, TrajectoryConfig
-from ..trajectory.forward_kinematics import ForwardKinematics, rotation_matrix
-from ..trajectory.obstacles import Obstacles
-from ..trajectory.program import Program, Question
-from ..trajectory.rates import largest_rates
-from ..trajectory.spline import Spline
+from ik_ros.trajectory.config import MOST_INTERVALS, MOST_WAYPOINTS, TrajectoryConfig, largest_rates
+from ik_ros.trajectory.forward_kinematics import ForwardKinematics, rotation_matrix
+from ik_ros.trajectory.obstacles import Obstacles
+from ik_ros.trajectory.program import Program, Question
+from ik_ros.trajectory.spline import Spline
 
 MOST_SAMPLES = 100_000
 KEPT_PROGRAMS = 4
@@ -166,25 +164,25 @@ class TrajectorySolver(KdlSolver):
         passed = spline.basis(times_s[1:] / duration_s) @ points
         with self._lock:
             residuals = [self.residual(goal, q.tolist()) for goal, q in zip(goals, passed)]
-        faults = [
+        problems = [
             f"the waypoint at {waypoint.time_s:g} s is missed by {_in_words(residual)}"
             for waypoint, residual in zip(waypoints, residuals)
             if residual.size > 1.0
         ]
-        faults += self._too_fast(spline, points, duration_s)
+        problems += self._too_fast(spline, points, duration_s)
         if nearest < self._config.clearance:
-            faults.append(f"a sphere comes as near as {nearest * 1e3:.4g} mm to an obstacle")
+            problems.append(f"a sphere comes as near as {nearest * 1e3:.4g} mm to an obstacle")
         worst = max(residuals, key=lambda residual: residual.size)
         apart = f", {nearest * 1e3:.4g} mm at least from obstacles" if math.isfinite(nearest) else ""
         passes = f"passes {len(waypoints)} waypoints within {_in_words(worst)}{apart}"
         return IKSolution(
-            success=not faults,
-            message=f"{'; '.join(faults)} (Ipopt: {status})" if faults else passes,
+            success=not problems,
+            message=f"{'; '.join(problems)} (Ipopt: {status})" if problems else passes,
             joint_names=self.joint_names,
             positions=tuple(points[-1].tolist()),
             position_error_m=max(residual.position_m for residual in residuals),
             orientation_error_rad=max(residual.orientation_rad for residual in residuals),
-            trajectory=None if faults else self._sampled(spline, points, duration_s),
+            trajectory=None if problems else self._sampled(spline, points, duration_s),
         )
 
     def _program(self, times_s: np.ndarray) -> tuple[Spline, Program]:
@@ -206,15 +204,15 @@ class TrajectorySolver(KdlSolver):
 
     def _too_fast(self, spline: Spline, points: np.ndarray, duration_s: float) -> list[str]:
         """Tells where speeds or accelerations are beyond their limits, checked closely."""
-        faults = []
+        problems = []
         for order, most, per in ((1, self._max_velocity, "s"), (2, self._max_acceleration, "s^2")):
             values = np.abs(spline.basis(_checks(spline), order) @ points).max(axis=0) / duration_s**order
             i = int((values / most).argmax())
             if values[i] > most[i]:
                 unit = "rad" if self.description.is_revolute[i] else "m"
                 needs = f"needs {values[i]:.4g} {unit}/{per}, its limit is {most[i]:.4g}"
-                faults.append(f"'{self.joint_names[i]}' {needs}")
-        return faults
+                problems.append(f"'{self.joint_names[i]}' {needs}")
+        return problems
 
     def _sampled(self, spline: Spline, points: np.ndarray, duration_s: float) -> JointTrajectory:
         times = np.linspace(0.0, 1.0, max(1, math.ceil(duration_s / self._config.sample_s)) + 1)

@@ -8,10 +8,9 @@ from typing import Literal
 import numpy as np
 
 from custom_ros_tools.schema import ListOf, Position
-
-from ..problem import IKProblem
-from .robot import Robot
-from .task import Rows, Task, TaskConfig
+from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.task import Linearization, Task, TaskConfig
+from ik_ros.problem import IKProblem
 
 
 class ComConfig(TaskConfig):
@@ -51,7 +50,7 @@ class Com(Task):
             raise ValueError(f"expected a position (x, y, z), got {list(position)}")
         self._goal = np.array(position)[self._used]
 
-    def rows(self, q: np.ndarray) -> Rows:
+    def rows(self, q: np.ndarray) -> Linearization:
         """See `Task`."""
         com, jacobian = self.robot.com(q)
-        return Rows(com[self._used], jacobian[self._used], self._goal, self._goal)
+        return Linearization(com[self._used], jacobian[self._used], self._goal, self._goal)

@@ -9,9 +9,8 @@ from pydantic import Field
 
 from custom_ros_tools.errors import UnknownNameError
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Position
-
-from .robot import Robot
-from .task import Rows, Task, TaskConfig
+from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.task import Linearization, Task, TaskConfig
 
 
 class ComInSupportConfig(TaskConfig):
@@ -49,7 +48,7 @@ class ComInSupport(Task):
         if sum(len(points) for _, points in self._contacts) < 3:
             raise KeyedError("support", "expected 3 points at least")
 
-    def rows(self, q: np.ndarray) -> Rows:
+    def rows(self, q: np.ndarray) -> Linearization:
         """See `Task`: how far the centre of mass is outside of each edge; negative inside [m]."""
         com, jacobian = self.robot.com(q)
         corners = self.polygon()
@@ -59,7 +58,7 @@ class ComInSupport(Task):
         outward = np.stack((edges[kept, 1], -edges[kept, 0]), axis=1) / lengths[kept, None]
         values = np.einsum("ij,ij->i", outward, com[:2] - corners[kept])
         upper = np.full(len(values), -self._margin)
-        return Rows(values, outward @ jacobian[:2], np.full(len(values), -np.inf), upper)
+        return Linearization(values, outward @ jacobian[:2], np.full(len(values), -np.inf), upper)
 
     def polygon(self) -> np.ndarray:
         """Returns the corners of the support polygon in the base, k x 2, counter-clockwise [m]."""

@@ -7,11 +7,9 @@ from pydantic import Field
 
 from custom_ros_tools.errors import UnknownNameError
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Text
-
-from .clearance import Placed, clearance
-from .robot import Robot
-from .robot_shape import RobotShape
-from .task import Rows, Task, TaskConfig
+from ik_ros.formulation.clearance import Placed, RobotShape, clearance
+from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.task import Linearization, Task, TaskConfig
 
 NEAR_M = 0.3
 """What is farther apart than asked by more than this is not looked at in this step [m]."""
@@ -57,7 +55,7 @@ class Distance(Task):
                 raise KeyedError(key, "both are boxes; give one as a capsule or some spheres")
             self._pairs.append((first, second))
 
-    def rows(self, q: np.ndarray) -> Rows:
+    def rows(self, q: np.ndarray) -> Linearization:
         """See `Task`: the distance of each pair that is near [m]."""
         values, rows = [], []
         for first, second in self._pairs:
@@ -68,7 +66,7 @@ class Distance(Task):
                 rows.append(self._along(second, found.second, way) - self._along(first, found.first, way))
         count = len(values)
         jacobian = np.array(rows) if rows else np.zeros((0, len(self.robot.free)))
-        return Rows(np.array(values), jacobian, np.full(count, self._at_least), np.full(count, np.inf))
+        return Linearization(np.array(values), jacobian, np.full(count, self._at_least), np.full(count, np.inf))
 
     def _placed(self, shape: RobotShape) -> Placed:
         placement = shape.placement

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rpbi.pose import Pose
-
-from .frame_task import FrameTask
+from ik_ros.formulation.frame_task import FrameTask
+from rpbi.geometry import Pose
 
 
 class FrameOrientation(FrameTask):

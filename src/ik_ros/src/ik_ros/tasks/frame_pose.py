@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .frame_task import FrameTask
+from ik_ros.formulation.frame_task import FrameTask
 
 
 class FramePose(FrameTask):

@@ -5,10 +5,9 @@ from __future__ import annotations
 from pydantic import Field
 
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Positive
-
-from .joint_task import JointTask
-from .robot import Robot
-from .task import TaskConfig
+from ik_ros.formulation.joint_task import JointTask
+from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.task import TaskConfig
 
 
 class JointLimitsConfig(TaskConfig):

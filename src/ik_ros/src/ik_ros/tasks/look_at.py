@@ -10,11 +10,10 @@ import pinocchio as pin
 
 from custom_ros_tools.errors import UnknownNameError
 from custom_ros_tools.schema import KeyedError, Position, Text, Vec3
+from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.task import Linearization, Task, TaskConfig
+from ik_ros.problem import IKProblem
 from rpbi.kinematics.residual import Residual
-
-from ..problem import IKProblem
-from .robot import Robot
-from .task import Rows, Task, TaskConfig
 
 NEAREST_M = 1e-6
 """What is nearer has no direction [m]."""
@@ -71,7 +70,7 @@ class LookAt(Task):
             raise ValueError(f"expected a point (x, y, z), got {list(point)}")
         self._goal = np.array(point)
 
-    def rows(self, q: np.ndarray) -> Rows:
+    def rows(self, q: np.ndarray) -> Linearization:
         """See `Task`: the angle to the point, as two components across the axis [rad]."""
         point = self.robot.frame(self._link_id).actInv(self._goal)  # in the link
         jacobian = self.robot.jacobian(self._link_id)
@@ -79,7 +78,7 @@ class LookAt(Task):
         across, ahead = self._across @ point, float(self._axis @ point)
         distance2 = float(point @ point)
         if distance2 < NEAREST_M**2:
-            return Rows(ZERO, np.zeros((2, jacobian.shape[1])), ZERO, ZERO)
+            return Linearization(ZERO, np.zeros((2, jacobian.shape[1])), ZERO, ZERO)
         aside = float(np.linalg.norm(across))
         if aside < 1e-9:
             across, aside = np.array((1e-9, 0.0)), 1e-9
@@ -92,7 +91,7 @@ class LookAt(Task):
         change_aside = across @ change_across / aside
         change_ratio = by_aside * change_aside + by_ahead * (self._axis @ change)
         rows = ratio * change_across + np.outer(across, change_ratio)
-        return Rows(ratio * across, rows, ZERO, ZERO)
+        return Linearization(ratio * across, rows, ZERO, ZERO)
 
     def residual(self, beyond: np.ndarray) -> Residual:
         """See `Task`."""

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from pydantic import Field
 
-from ..problem import IKProblem
-from .joint_task import JointTask
-from .robot import Robot
-from .task import TaskConfig
+from ik_ros.formulation.joint_task import JointTask
+from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.task import TaskConfig
+from ik_ros.problem import IKProblem
 
 
 class PostureConfig(TaskConfig):

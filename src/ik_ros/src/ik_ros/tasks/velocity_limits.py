@@ -8,11 +8,10 @@ import numpy as np
 from pydantic import Field
 
 from custom_ros_tools.schema import Positive, Seconds
-
-from ..problem import IKProblem
-from .joint_task import JointTask
-from .robot import Robot
-from .task import TaskConfig
+from ik_ros.formulation.joint_task import JointTask
+from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.task import TaskConfig
+from ik_ros.problem import IKProblem
 
 
 class VelocityLimitsConfig(TaskConfig):

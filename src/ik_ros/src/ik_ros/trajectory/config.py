@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from custom_ros_tools.errors import UnknownNameError
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Positive, Seconds
-
-from ..chain_description import read_chain
-from ..chain_solver import refuse_mimics
-from ..shape import ShapeConfig
-from ..solvers.kdl import KdlConfig
+from ik_ros.chain.description import ChainDescription, read_chain
+from ik_ros.chain.solver import refuse_mimics
+from ik_ros.shape import ShapeConfig
+from ik_ros.solvers.kdl import KdlConfig
 
 MOST_INTERVALS = 128
 """Waypoints that follow each other faster than two intervals of the finest spline can hardly all be passed."""
@@ -58,3 +59,15 @@ class TrajectoryConfig(KdlConfig):
             if shape.link is not None and shape.sphere is None:
                 raise KeyedError(f"shapes[{i}]", "shapes on links must be spheres; several can stand for one link")
         return self
+
+
+def largest_rates(config: TrajectoryConfig, description: ChainDescription) -> tuple[np.ndarray, np.ndarray]:
+    """Returns n largest speeds [rad/s or m/s] and accelerations [rad/s^2 or m/s^2], inf where there is no limit.
+
+    Args:
+        config: Options, which go before the URDF.
+        description: The chain, with the URDF's speeds of its n joints.
+    """
+    speeds = dict(zip(description.joint_names, description.velocity_limits)) | config.velocity_limits
+    accelerations = dict.fromkeys(description.joint_names, math.inf) | config.acceleration_limits
+    return np.array(list(speeds.values())), np.array(list(accelerations.values()))

@@ -8,10 +8,9 @@ from typing import Any
 import casadi
 import numpy as np
 
-from rpbi.pose import Pose
-
-from ..chain_description import ChainDescription
-from ..chain_joint import ChainJoint
+from ik_ros.chain.description import ChainDescription
+from ik_ros.chain.joint import ChainJoint
+from rpbi.geometry import Pose
 
 
 class ForwardKinematics:

@@ -8,7 +8,8 @@ from typing import Any
 import casadi
 import numpy as np
 
-from ..shape import ShapeConfig
+from ik_ros.shape import ShapeConfig
+
 from .forward_kinematics import rotation_matrix
 
 SMALL = 1e-12

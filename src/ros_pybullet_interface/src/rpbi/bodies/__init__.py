@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from ..plugins import find_class, full_name
+from rpbi.bodies.robots.mobile_robot import MobileRobot
+from rpbi.bodies.robots.robot import Robot
+from rpbi.bodies.robots.visual_robot import VisualRobot
+from rpbi.plugins import find_class, full_name
+
 from .body import Body
 from .body_config import BodyConfig
 from .collision import CollisionObject
 from .dynamic import DynamicObject
-from .mobile_robot import MobileRobot
-from .robot import Robot
 from .soft import SoftObject
 from .urdf_object import UrdfObject
 from .visual import VisualObject
-from .visual_robot import VisualRobot
 
 BODY_TYPES: dict[str, type[Body]] = {
     "visual": VisualObject,

@@ -9,14 +9,12 @@ from typing import Any, ClassVar
 import pybullet
 
 from custom_ros_tools.errors import PhysicsError
+from rpbi.engine.client import Client
+from rpbi.engine.inputs import Input
+from rpbi.geometry import Pose, Twist, cross, minus, plus
+from rpbi.samples import BodyState
+from rpbi.sensors.sensor import Sensor
 
-from ..client import Client
-from ..inputs import Input
-from ..pose import Pose
-from ..samples import BodyState
-from ..sensors.sensor import Sensor
-from ..twist import Twist
-from ..vectors import cross, minus, plus
 from .body_config import BodyConfig
 
 
@@ -82,7 +80,7 @@ class Body:
         """
         self.halt(reason)
 
-    def tie(self, bodies: Mapping[str, Body]) -> None:
+    def attach(self, bodies: Mapping[str, Body]) -> None:
         """Ties it to other bodies when it comes into their world; most bodies are tied to none.
 
         Args:
@@ -92,8 +90,8 @@ class Body:
             ConfigError: If it cannot be done.
         """
 
-    def untie(self, name: str | None = None) -> None:
-        """Undoes what `tie` did with a body that is about to go, or with all."""
+    def detach(self, name: str | None = None) -> None:
+        """Undoes what `attach` did with a body that is about to go, or with all."""
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:

@@ -9,11 +9,10 @@ from pydantic import AfterValidator, Field, ValidationInfo, WithJsonSchema, mode
 
 from custom_ros_tools.errors import ConfigError
 from custom_ros_tools.schema import ConfigModel, Expects, InnerProblemsError, KeyedError, ListOf, Name
-from custom_ros_tools.schema_words import shown
-
-from ..plugins import config_of, find_class
-from ..sensors.body_sensor import BodySensor
-from ..sensors.sensor_config import SensorConfig
+from custom_ros_tools.schema.type_names import shown
+from rpbi.config.sensors import SensorConfig
+from rpbi.plugins import config_of, find_class
+from rpbi.sensors.body_sensor import BodySensor
 
 
 def _sensor_config(entry: Any, info: ValidationInfo) -> SensorConfig:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from ..client import Client
-from ..pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ObjectTf
-from ..sensors.contacts_config import ContactsConfig, contact_sensors
-from ..sensors.sensor import Sensor
+from rpbi.config.pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ObjectTf
+from rpbi.config.sensors import ContactsConfig
+from rpbi.engine.client import Client
+from rpbi.sensors.contact_arrows import contact_sensors
+from rpbi.sensors.sensor import Sensor
+
 from .body_config import BodyConfig
 from .shape_object import ShapeObject
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from pydantic import Field
 
 from custom_ros_tools.schema import HzOrOff, Position, Positive, Quat
+from rpbi.config.pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ResetBaseVelocity
+from rpbi.config.sensors import ContactsConfig
+from rpbi.engine.client import Client
+from rpbi.geometry import Pose
+from rpbi.sensors.contact_arrows import contact_sensors
+from rpbi.sensors.link_pose import LinkPoseSensor
+from rpbi.sensors.sensor import Sensor
 
-from ..client import Client
-from ..pose import Pose
-from ..pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ResetBaseVelocity
-from ..sensors.contacts_config import ContactsConfig, contact_sensors
-from ..sensors.link_pose import LinkPoseSensor
-from ..sensors.sensor import Sensor
 from .body_config import BodyConfig
 from .shape_object import ShapeObject
 

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from custom_ros_tools.errors import ConfigError, Problem
+from rpbi.config.pybullet_models import CreateCollisionShape, CreateVisualShape, ObjectTf
+from rpbi.engine.client import Client
+from rpbi.engine.inputs import Input, PoseInput
+from rpbi.geometry import Pose
 
-from ..client import Client
-from ..inputs import Input, PoseInput
-from ..pose import Pose
-from ..pybullet_models import CreateCollisionShape, CreateVisualShape, ObjectTf
 from .body import Body
-from .mesh_faults import mesh_faults
+from .mesh_checks import mesh_problems
 
 
 class ShapeObject(Body):
@@ -63,7 +63,7 @@ def _check_meshes(name: str, **shapes: CreateVisualShape | CreateCollisionShape 
         Problem(name, f"{function}.{key}", message)
         for function, shape in shapes.items()
         if shape is not None
-        for key, message in mesh_faults(shape)
+        for key, message in mesh_problems(shape)
     ]
     if problems:
         raise ConfigError(problems)

@@ -10,22 +10,22 @@ from pydantic import Field, model_validator
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, Problem
 from custom_ros_tools.schema import HzOrOff, KeyedError, ListOf
+from rpbi.config.pybullet_models import LoadURDF
+from rpbi.config.pybullet_soft_models import AnchorEntry, ChangeVisualShape, CreateSoftBodyAnchor, LoadSoftBody
+from rpbi.config.sensors import ContactsConfig
+from rpbi.engine.client import Client
+from rpbi.geometry import Pose, Twist
+from rpbi.samples import BodyState
+from rpbi.sensors.contact_arrows import contact_sensors
+from rpbi.sensors.sensor import Sensor
+from rpbi.sensors.surface import SurfaceSensor
+from rpbi.urdf.document import deformable_meshes
+from rpbi.urdf.loading import load_urdf
 
-from ..client import Client
-from ..dynamics import link_index
-from ..pose import Pose
-from ..pybullet_models import LoadURDF
-from ..pybullet_soft_models import AnchorEntry, ChangeVisualShape, CreateSoftBodyAnchor, LoadSoftBody
-from ..samples import BodyState
-from ..sensors.contacts_config import ContactsConfig, contact_sensors
-from ..sensors.sensor import Sensor
-from ..sensors.surface import SurfaceSensor
-from ..twist import Twist
-from ..urdf import deformable_meshes
 from .body import Body
 from .body_config import BodyConfig
-from .soft_mesh_faults import soft_mesh_faults
-from .urdf_loading import load_urdf
+from .dynamics import link_index
+from .mesh_checks import soft_mesh_problems
 
 
 class SoftObjectConfig(BodyConfig):
@@ -76,7 +76,7 @@ class SoftObject(Body):
         if config.changeVisualShape is not None:
             pb.changeVisualShape(self.body_id, -1, **config.changeVisualShape.kwargs())
 
-    def tie(self, bodies: Mapping[str, Body]) -> None:
+    def attach(self, bodies: Mapping[str, Body]) -> None:
         """Makes its anchors.
 
         Raises:
@@ -89,10 +89,10 @@ class SoftObject(Body):
             except (InterfaceError, ValueError, pybullet.error) as error:
                 problems.append(Problem(self.name, f"createSoftBodyAnchor[{index}]", str(error)))
         if problems:
-            self.untie()
+            self.detach()
             raise ConfigError(problems)
 
-    def untie(self, name: str | None = None) -> None:
+    def detach(self, name: str | None = None) -> None:
         """Removes the anchors to a body, or all."""
         for body, anchor_id in self._anchors:
             if name is None or body == name:
@@ -124,7 +124,7 @@ class SoftObject(Body):
 
     def remove(self) -> None:
         """Takes it out of the world, its anchors first."""
-        self.untie()
+        self.detach()
         super().remove()
 
     def _anchor(self, anchor: CreateSoftBodyAnchor, bodies: Mapping[str, Body]) -> int:
@@ -153,7 +153,7 @@ def _load(pb: Client, config: SoftObjectConfig) -> int:
         meshes = {"loadSoftBody.fileName": load.fileName}
         if load.simFileName is not None:
             meshes["loadSoftBody.simFileName"] = load.simFileName
-        _refuse_faults(config.name, [(key, soft_mesh_faults(path)) for key, path in meshes.items()])
+        _refuse_problems(config.name, [(key, soft_mesh_problems(path)) for key, path in meshes.items()])
         if load.useNeoHookean and Path(load.simFileName or load.fileName).suffix.lower() != ".vtk":
             message = "a solid needs tetrahedra (.vtk); for a surface use useMassSpring"
             raise ConfigError([Problem(config.name, "loadSoftBody.useNeoHookean", message)])
@@ -163,14 +163,14 @@ def _load(pb: Client, config: SoftObjectConfig) -> int:
             raise ConfigError([Problem(config.name, "loadSoftBody", f"PyBullet could not load it: {error}")]) from None
     assert config.loadURDF is not None  # the model demands one of both
     urdf = config.loadURDF.fileName
-    faults = [fault for mesh in deformable_meshes(urdf) for fault in soft_mesh_faults(mesh)]
+    problems = [fault for mesh in deformable_meshes(urdf) for fault in soft_mesh_problems(mesh)]
     if not deformable_meshes(urdf):
-        faults = [f"{urdf}: expected a <deformable> with a mesh; rigid objects belong to the list `urdfs`"]
-    _refuse_faults(config.name, [("loadURDF.fileName", faults)])
+        problems = [f"{urdf}: expected a <deformable> with a mesh; rigid objects belong to the list `urdfs`"]
+    _refuse_problems(config.name, [("loadURDF.fileName", problems)])
     return load_urdf(pb, config.name, config.loadURDF.kwargs())
 
 
-def _refuse_faults(name: str, faults: list[tuple[str, list[str]]]) -> None:
-    problems = [Problem(name, key, message) for key, messages in faults for message in messages]
-    if problems:
-        raise ConfigError(problems)
+def _refuse_problems(name: str, problems: list[tuple[str, list[str]]]) -> None:
+    found = [Problem(name, key, message) for key, messages in problems for message in messages]
+    if found:
+        raise ConfigError(found)

@@ -10,17 +10,18 @@ from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import HzOrOff
+from rpbi.config.pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity
+from rpbi.config.sensors import ContactsConfig
+from rpbi.engine.client import Client
+from rpbi.engine.inputs import Input, PoseInput
+from rpbi.sensors.contact_arrows import contact_sensors
+from rpbi.sensors.link_pose import LinkPoseSensor
+from rpbi.sensors.sensor import Sensor
+from rpbi.urdf.document import deformable_meshes
+from rpbi.urdf.loading import load_urdf
 
-from ..client import Client
-from ..inputs import Input, PoseInput
-from ..pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity
-from ..sensors.contacts_config import ContactsConfig, contact_sensors
-from ..sensors.link_pose import LinkPoseSensor
-from ..sensors.sensor import Sensor
-from ..urdf import deformable_meshes
 from .body import Body
 from .body_config import BodyConfig
-from .urdf_loading import load_urdf
 
 log = logging.getLogger(__name__)
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from ..client import Client
-from ..pybullet_models import CreateCollisionShape, CreateVisualShape, ObjectTf
+from rpbi.config.pybullet_models import CreateCollisionShape, CreateVisualShape, ObjectTf
+from rpbi.engine.client import Client
+
 from .body_config import BodyConfig
 from .shape_object import ShapeObject
 

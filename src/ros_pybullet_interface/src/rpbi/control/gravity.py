@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..client import Client
-from ..pose import Vector
-from ..urdf import resolve_meshes
+from rpbi.engine.client import Client
+from rpbi.geometry import Vector
+from rpbi.urdf.document import resolve_meshes
 
 if TYPE_CHECKING:
-    from ..bodies.jointed import JointedBody
+    from rpbi.bodies.robots.jointed import JointedBody
 
 
 class GravityModel:

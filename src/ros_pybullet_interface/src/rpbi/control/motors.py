@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 
 import pybullet
 
-from ..client import Client
-from ..joint_model import Joint, JointModel, JointTarget
-from ..limit_reports import LimitReports
+from rpbi.engine.client import Client
+from rpbi.urdf.joints import Joint, JointModel, JointTarget
+
+from .limit_reports import LimitReports
 
 QUANTITIES = {
     pybullet.POSITION_CONTROL: "position",

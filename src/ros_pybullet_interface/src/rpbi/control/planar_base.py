@@ -3,16 +3,41 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import pybullet
+from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.schema import ConfigModel, Positive, Seconds, Unit
+from rpbi.engine.client import Client
+from rpbi.geometry import Pose
+from rpbi.urdf.planar_joints import PLANAR_JOINTS
 
-from ..client import Client
-from ..pose import Pose
-from .planar_base_config import PlanarBaseConfig
-from .planar_joints import PLANAR_JOINTS
 from .planar_velocity import PlanarVelocity
+
+
+class PlanarBaseConfig(ConfigModel):
+    """How a base drives over the ground; all in the base frame."""
+
+    max_linear_velocity: Annotated[Positive, Unit("m/s")] = Field(1.0, description="Largest speed in any direction.")
+    max_angular_velocity: Annotated[Positive, Unit("rad/s")] = Field(1.5, description="Fastest rotation.")
+    max_linear_acceleration: Annotated[Positive, Unit("m/s^2")] = Field(
+        1.0, description="Largest change of the velocity, when it brakes as well."
+    )
+    max_angular_acceleration: Annotated[Positive, Unit("rad/s^2")] = Field(
+        3.0, description="Largest change of the rotation."
+    )
+    max_force: Annotated[Positive, Unit("N")] | None = Field(
+        None, description="Largest push along each axis of the plane; without it, the weight of the robot."
+    )
+    max_torque: Annotated[Positive, Unit("N m")] | None = Field(
+        None, description="Largest torque about the vertical; without it, the weight at the radius of gyration."
+    )
+    cmd_vel_timeout_s: Seconds = Field(
+        0.5, description="Age at which a velocity expires and the base brakes, in the world's time."
+    )
+
 
 GRAVITY = 9.81
 """What the default force limits count with [m/s^2], whatever the world's gravity is."""

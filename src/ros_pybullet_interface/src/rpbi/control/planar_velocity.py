@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ..twist import Twist
+from rpbi.geometry import Twist
 
 ROUNDING = 1e-6
 """Components out of the plane up to this count as zero [m/s, rad/s]."""

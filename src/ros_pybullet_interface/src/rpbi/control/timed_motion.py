@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..joint_model import JointModel
+from rpbi.control.trajectories.trajectory import Trajectory, minimum_jerk
+from rpbi.urdf.joints import JointModel
+
 from .motion import JointMotion, Motion
-from .trajectory import Trajectory, minimum_jerk
 
 TOLERANCES = {"rad": 0.01, "m": 0.001}
 """How far a joint may be from its goal at the end of a motion that succeeded, by unit."""

@@ -1,7 +1,6 @@
 """Forward and inverse kinematics of a robot, in a private PyBullet client."""
 
-from .ik_problem import IKProblem
-from .ik_solution import IKSolution
 from .kinematics import Kinematics
+from .problem import IKProblem, IKSolution
 
 __all__ = ["IKProblem", "IKSolution", "Kinematics"]

@@ -4,15 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from ..client import Client
-from ..joint_model import Joint
-from ..pose import Pose, Vector
-from ..urdf import write_description
+from rpbi.engine.client import Client
+from rpbi.geometry import Pose, Quaternion, Vector
+from rpbi.urdf.document import write_description
+from rpbi.urdf.joints import Joint
+
 from .residual import Residual
-from .target import Target
+
+
+class Target(NamedTuple):
+    """Where a link shall be.
+
+    Attributes:
+        position: x, y, z in the base [m].
+        quat_xyzw: Its orientation in the base, a unit quaternion; None: any.
+    """
+
+    position: Vector
+    quat_xyzw: Quaternion | None
 
 
 class Chain:

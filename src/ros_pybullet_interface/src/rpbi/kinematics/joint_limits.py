@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..joint_model import Joint
-from .ik_problem import IKProblem
+from rpbi.urdf.joints import Joint
+
+from .problem import IKProblem
 
 TURN = 2.0 * np.pi
 
@@ -54,7 +55,7 @@ class JointLimits:
         limits.lower, limits.upper = self.lower[members], self.upper[members]
         return limits
 
-    def bring_in(self, q: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def wrap_to_limits(self, q: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Returns positions within the limits, and which of them are not what was given plus whole turns.
 
         Args:

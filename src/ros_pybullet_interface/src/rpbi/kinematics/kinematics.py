@@ -12,19 +12,17 @@ import numpy as np
 import pybullet
 
 from custom_ros_tools.errors import PhysicsError, UnknownNameError
+from rpbi.engine.client import Client
+from rpbi.geometry import Pose
+from rpbi.urdf.document import write_description
+from rpbi.urdf.joints import Joint
+from rpbi.urdf.skeleton import Skeleton
 
-from ..client import Client
-from ..joint_model import Joint
-from ..pose import Pose
-from ..urdf import write_description
-from .chain import Chain
-from .ik_problem import IKProblem
-from .ik_solution import IKSolution
+from .chain import Chain, Target
 from .joint_limits import JointLimits
+from .problem import IKProblem, IKSolution
 from .residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 from .search import Search
-from .skeleton import Skeleton
-from .target import Target
 
 
 class Kinematics:

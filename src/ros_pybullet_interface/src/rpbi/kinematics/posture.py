@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .chain import Chain
+from .chain import Chain, Target
 from .joint_limits import JointLimits
-from .target import Target
 
 MAX_STEPS = 60
 LARGEST_STEP = 0.2

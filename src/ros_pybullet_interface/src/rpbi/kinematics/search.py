@@ -9,15 +9,12 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 import pybullet
 
-from .chain import Chain
-from .damped_least_squares import DampedLeastSquares
-from .ik_problem import IKProblem
+from .chain import Chain, Target
 from .joint_limits import TURN, JointLimits
+from .methods import DampedLeastSquares, SelectivelyDampedLeastSquares, Step
 from .posture import towards_posture
+from .problem import IKProblem
 from .residual import POSITION_TOLERANCE_M, Residual
-from .selectively_damped_least_squares import SelectivelyDampedLeastSquares
-from .step import Step
-from .target import Target
 
 RANDOM_STARTS = 50
 """How many random starts follow those that the problem names."""
@@ -59,7 +56,7 @@ class Search:
         self, chain: Chain, target: Target, limits: JointLimits, problem: IKProblem, current: np.ndarray
     ) -> None:
         self._chain, self._target, self._limits, self._problem = chain, target, limits, problem
-        self._current, _ = limits.bring_in(current, current)
+        self._current, _ = limits.wrap_to_limits(current, current)
         self._rest = self._of_chain(problem.resetPoses)
         self._threshold = min(problem.residualThreshold / POSITION_TOLERANCE_M, 1.0) or THRESHOLD
         damping = _damping(self._of_chain(problem.jointDamping), len(current))
@@ -98,7 +95,7 @@ class Search:
         if not len(self._current):
             return
         if len(self._rest):
-            yield self._asked_step, self._limits.bring_in(self._rest, self._current)[0]
+            yield self._asked_step, self._limits.wrap_to_limits(self._rest, self._current)[0]
         yield self._asked_step, self._current
         generator = np.random.default_rng(SEED)
         beyond_reach = math.dist(self._target.position, self._chain.anchor) > self._chain.reach_m
@@ -119,7 +116,7 @@ class Search:
             moved = step(q, frozen, iterations)
             if not np.isfinite(moved).all():
                 return
-            q, stopped = limits.bring_in(moved, self._current)
+            q, stopped = limits.wrap_to_limits(moved, self._current)
             residual = self._residual(q)
             yield q, residual
             time.sleep(BREAK_S)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from custom_ros_tools.json_schema import Schema, yaml_text
+from custom_ros_tools.schema.json_schema import Schema, yaml_text
+from rpbi.config.schemas import WORLD, kind_of, sections
 
-from ..schemas import WORLD, kind_of, sections
 from .mappings import Mappings, is_list_of_files
 from .markdown import WRITTEN_BY, block, code, link, page, table
 from .type_words import constants_in, heading_of, mapping_in, type_in_words

@@ -6,7 +6,7 @@ import json
 from collections.abc import Container, Iterator, Mapping
 from typing import NamedTuple
 
-from custom_ros_tools.json_schema import Schema
+from custom_ros_tools.schema.json_schema import Schema
 
 from .type_words import mapping_in
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from custom_ros_tools.json_schema import Schema, unit_in
+from custom_ros_tools.schema.json_schema import Schema, unit_in
 
 from .markdown import code, link
 

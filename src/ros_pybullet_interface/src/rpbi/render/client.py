@@ -12,8 +12,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ..load_log import LogEntry
-from ..samples import SceneSample
+from rpbi.engine.load_log import LogEntry
+from rpbi.samples import SceneSample
+
 from .channel import Channel
 from .frame import NO_DEMAND, Camera, Demand
 from .messages import CameraAdded, CameraRemoved, Demanded, Ready, Report, Scene, SetUp, Shown, Taken, WorldChanged

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from ..camera import Intrinsics
-from ..depth_noise import DepthNoise
+from .camera import Intrinsics
+from .depth import DepthNoise
 
 
 class Camera(NamedTuple):

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from ..load_log import LogEntry
-from ..samples import SceneSample
+from rpbi.engine.load_log import LogEntry
+from rpbi.samples import SceneSample
+
 from .frame import Camera, Demand
 
 

@@ -8,13 +8,13 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from ..bodies import Body
-from ..client import Client
-from ..load_log import LogEntry, apply
-from ..samples import BodyState
-from .fine_shapes import FineShapes
-from .soft_shapes import SoftShapes
-from .transparency import GlassyShape, Transparency
+from rpbi.bodies import Body
+from rpbi.engine.client import Client
+from rpbi.engine.load_log import LogEntry, apply
+from rpbi.render.shapes.soft_shapes import SoftShapes
+from rpbi.render.shapes.tessellation import FineShapes
+from rpbi.render.shapes.transparency import Transparency, TransparentShape
+from rpbi.samples import BodyState
 
 log = logging.getLogger(__name__)
 
@@ -35,7 +35,7 @@ class Mirror:
         self._soft_shapes = SoftShapes(pb)
 
     @property
-    def glassy(self) -> tuple[GlassyShape, ...]:
+    def glassy(self) -> tuple[TransparentShape, ...]:
         """The shapes that can be seen through."""
         return self._transparency.shapes
 

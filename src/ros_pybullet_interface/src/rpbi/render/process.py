@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..camera import depth_in_metres
+from .camera import depth_in_metres
 from .channel import Channel
 from .egl import EglError
 from .frame import NO_DEMAND, Camera, Demand, Frame, Sink
@@ -64,7 +64,7 @@ class RenderProcess:
                 faulthandler.dump_traceback_later(STUCK_AFTER_S, exit=True)
                 for message in self._channel.receive():
                     self._do[type(message)](message)
-                self._tell_demands()
+                self._send_demands()
                 self._channel.flush()
                 self._channel.wait(DEMAND_PERIOD_S)
         finally:
@@ -141,7 +141,7 @@ class RenderProcess:
             images["segmentation"] = self._mirror.to_simulator_ids(drawing.body_ids, scene.body_ids)
         return images
 
-    def _tell_demands(self) -> None:
+    def _send_demands(self) -> None:
         now_s = time.monotonic()
         if self._sink is None or now_s - self._looked_s < DEMAND_PERIOD_S:
             return

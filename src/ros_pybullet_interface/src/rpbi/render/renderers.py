@@ -10,12 +10,13 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from ..camera import Intrinsics, view_matrix
-from ..client import Client
-from ..pose import Pose
+from rpbi.engine.client import Client
+from rpbi.geometry import Pose
+from rpbi.render.shapes.transparency import TransparentShape
+
+from .camera import Intrinsics, view_matrix
 from .egl import Egl, EglError
 from .frame import Camera
-from .transparency import GlassyShape
 
 log = logging.getLogger(__name__)
 
@@ -56,7 +57,7 @@ class Renderer(Protocol):
         """Prepares for a camera that is new."""
 
     def draw(
-        self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, glassy: Sequence[GlassyShape] = ()
+        self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, glassy: Sequence[TransparentShape] = ()
     ) -> Drawing:
         """Draws what a camera sees.
 
@@ -85,7 +86,7 @@ class TinyRenderer:
         """Needs nothing."""
 
     def draw(
-        self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, glassy: Sequence[GlassyShape] = ()
+        self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, glassy: Sequence[TransparentShape] = ()
     ) -> Drawing:
         """Draws what a camera sees; segmentation is free here.
 
@@ -112,7 +113,7 @@ class TinyRenderer:
         body_ids = np.where(nothing, -1, drawing.body_ids & ((1 << _LINK_SHIFT) - 1)).astype(np.int32)
         return Drawing(rgba, drawing.depth_buffer, body_ids)
 
-    def _set_opacity(self, glassy: Sequence[GlassyShape], opacity: float | None = None) -> None:
+    def _set_opacity(self, glassy: Sequence[TransparentShape], opacity: float | None = None) -> None:
         for body_id, link_index, shape_index, rgba in glassy:
             colour = [*rgba[:3], rgba[3] if opacity is None else opacity]
             self.pb.changeVisualShape(body_id, link_index, shape_index, rgbaColor=colour)
@@ -159,7 +160,7 @@ class EglRenderer:
             self._width_px, self._height_px = width_px, height_px
 
     def draw(
-        self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, glassy: Sequence[GlassyShape] = ()
+        self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, glassy: Sequence[TransparentShape] = ()
     ) -> Drawing:
         """Draws what a camera sees.
 

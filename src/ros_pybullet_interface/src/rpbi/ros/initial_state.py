@@ -10,10 +10,9 @@ from sensor_msgs.msg import JointState
 
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import ConfigModel
-
-from ..bodies.robot_config import RobotConfig
-from ..config import LoadedWorld
-from ..urdf import joint_types
+from rpbi.bodies.robots.robot_config import RobotConfig
+from rpbi.config.loading import LoadedWorld
+from rpbi.urdf.document import joint_types
 
 TIMEOUT_S = 5.0
 """How long to wait for joint states [s] of wall time."""

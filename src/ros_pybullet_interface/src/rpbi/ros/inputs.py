@@ -14,16 +14,15 @@ import rospy
 from sensor_msgs.msg import JointState
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, PluginError, Problem
-from custom_ros_tools.ros.throttle import ThrottledWarning
+from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from rpbi.engine.inputs import Input, PoseInput
+from rpbi.geometry import Pose, Twist
+from rpbi.plugins import cause_of, full_name, is_foreign
+from rpbi.ros.publishers.sample_topics import find_topic
+from rpbi.urdf.joints import JointTarget, WrongQuantityError
+from rpbi.world import World
 
-from ..inputs import Input, PoseInput
-from ..joint_model import JointTarget, WrongQuantityError
-from ..plugins import cause_of, full_name, is_foreign
-from ..pose import Pose
-from ..twist import Twist
-from ..world import World
-from .frames import world_frame
-from .plugin_topics import find_topic
+from .headers import world_frame
 from .tf_listener import TfListener
 
 log = logging.getLogger(__name__)

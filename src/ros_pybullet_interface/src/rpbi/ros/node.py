@@ -11,30 +11,65 @@ from typing import Any
 import pybullet
 import rospy
 
-from custom_ros_tools.errors import InterfaceError, PhysicsError
-from custom_ros_tools.ros.interrupts import leaving_ros_on_interrupt, wait_for_master
-from custom_ros_tools.ros.last_words import log_last_words, log_loss_of_master
-from custom_ros_tools.ros.logging_bridge import attach_logging
-from custom_ros_tools.ros.master_watch import MasterWatch
+from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, Problem
+from custom_ros_tools.ros.lifecycle.fatal_log import log_fatal_lines, log_loss_of_master
+from custom_ros_tools.ros.lifecycle.interrupts import leaving_ros_on_interrupt, wait_for_master
+from custom_ros_tools.ros.lifecycle.kept_parameters import kept_parameters
+from custom_ros_tools.ros.lifecycle.logging_bridge import attach_logging
+from custom_ros_tools.ros.lifecycle.master_watch import MasterWatch
+from rpbi.bodies import BODY_TYPES
+from rpbi.config.asset_files import ROBOT_DESCRIPTION
+from rpbi.config.loading import load_world_dict
+from rpbi.ros.publishers.sample_publishers import SamplePublishers
+from rpbi.ros.publishers.status import FREE_RUNNING_CLOCK_HZ, ClockPublisher
+from rpbi.ros.publishers.world_markers import WorldMarkers
+from rpbi.ros.services.camera_services import CameraServices
+from rpbi.ros.services.dynamics_services import DynamicsServices
+from rpbi.ros.services.node_services import NodeServices
+from rpbi.ros.services.time_services import TimeServices
+from rpbi.ros.window.topics import WindowTopics
+from rpbi.urdf.document import write_description
+from rpbi.world import World
 
-from ..asset_files import ROBOT_DESCRIPTION
-from ..bodies import BODY_TYPES
-from ..config import load_world_dict
-from ..world import World
-from .camera_services import CameraServices
-from .dynamics_services import DynamicsServices
-from .frames import use_prefix
+from .headers import use_prefix
 from .initial_state import start_where_robots_are
-from .node_settings import config_parameter, robot_description_file, uses_simulated_time
-from .object_traffic import ObjectTraffic
+from .object_lifecycle import ObjectLifecycle
 from .requests import Requests
-from .sample_outlets import SampleOutlets
-from .services import NodeServices
 from .simulation import Simulation
-from .status import FREE_RUNNING_CLOCK_HZ, ClockOutlet
-from .time_services import TimeServices
-from .window_topics import WindowTopics
-from .world_markers import WorldMarkers
+
+
+def config_parameter() -> dict[str, Any]:
+    """Returns the main configuration, `~config`.
+
+    Raises:
+        ConfigError: If there is none.
+    """
+    config = rospy.get_param("~config", None)
+    if config is None:
+        how = 'load it with <rosparam param="config" file="WORLD.yaml"/> inside the <node>'
+        raise ConfigError([Problem("~config", "", f"missing: expected the main configuration; {how}")])
+    return config
+
+
+def robot_description_file() -> str | None:
+    """Returns a file with the robot description of the parameter server, None if there is none."""
+    text = _parameter_above("robot_description", None)
+    return None if text is None else write_description(text)
+
+
+def uses_simulated_time() -> bool:
+    """Tells whether stamps are to be simulated time."""
+    return bool(_parameter_above("use_sim_time", False))
+
+
+def _parameter_above(name: str, default: Any) -> Any:
+    """Returns a parameter of this namespace or, failing that, of the nearest one around it."""
+    found = rospy.search_param(name)
+    if found is None:
+        return default
+    kept_parameters.keep(found)
+    return rospy.get_param(found)
+
 
 log = logging.getLogger(__name__)
 
@@ -68,11 +103,11 @@ class SimulatorNode:
                 config.real_time_factor,
             )
         self._world = World(loaded, simulated)
-        outlets = SampleOutlets(self._world)
+        publishers = SamplePublishers(self._world)
         for name in self._world.bodies:
-            outlets.find_topics(name)
-        self._cameras = outlets.cameras
-        clock = ClockOutlet(self._world.clock, _clock_hz(config)) if simulated else None
+            publishers.find_topics(name)
+        self._cameras = publishers.cameras
+        clock = ClockPublisher(self._world.clock, _clock_hz(config)) if simulated else None
         helpers: list[Callable[[], None]] = []
         if config.markers_hz:
             helpers.append(WorldMarkers(self._world, config.markers_hz).poll)
@@ -80,7 +115,7 @@ class SimulatorNode:
         helpers += (self._cameras.poll, *window.polls)
         self._simulation = Simulation(
             self._world,
-            outlets.by_type,
+            publishers.by_type,
             config.real_time_factor,
             config.status_hz,
             clock,
@@ -89,7 +124,7 @@ class SimulatorNode:
             self._cameras.before_tick,
         )
         ask = Requests(self._simulation)
-        self._objects = ObjectTraffic(self._world, self._simulation, ask, outlets)
+        self._objects = ObjectLifecycle(self._world, self._simulation, ask, publishers)
         context = {"search_paths": config.search_paths(), ROBOT_DESCRIPTION: description}
         NodeServices(self._simulation, ask, self._objects.add, self._objects.remove, context)
         CameraServices(self._objects.add_camera, config.search_paths())
@@ -135,7 +170,7 @@ def main() -> None:
     try:
         node = SimulatorNode()
     except InterfaceError as error:
-        log_last_words(str(error).splitlines())
+        log_fatal_lines(str(error).splitlines())
         sys.exit(1)
     except ConnectionError as error:
         log_loss_of_master(error)
@@ -144,7 +179,7 @@ def main() -> None:
         try:
             node.run()
         except PhysicsError as error:
-            log_last_words([str(error)])
+            log_fatal_lines([str(error)])
             sys.exit(1)
 
 

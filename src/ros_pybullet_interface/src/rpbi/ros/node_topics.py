@@ -10,8 +10,7 @@ from std_msgs.msg import Int64, String
 from visualization_msgs.msg import MarkerArray
 
 from ros_pybullet_interface.msg import SimulationState, WorldCommands
-
-from .world_markers import MARKERS_TOPIC
+from rpbi.ros.publishers.world_markers import MARKERS_TOPIC
 
 
 class NodeTopic(NamedTuple):

@@ -10,8 +10,8 @@ from typing import TypeVar
 import rospy
 
 from custom_ros_tools.errors import InterfaceError
+from rpbi.engine.mailbox import ClosedError
 
-from ..mailbox import ClosedError
 from .simulation import Simulation
 
 T = TypeVar("T")

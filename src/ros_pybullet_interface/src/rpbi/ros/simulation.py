@@ -9,15 +9,15 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 
 from custom_ros_tools.errors import InterfaceError
+from rpbi.engine.pacer import Pacer
+from rpbi.ros.publishers.commands import CommandPublisher
+from rpbi.ros.publishers.state import StatePublisher
+from rpbi.ros.publishers.status import ClockPublisher, StatusPublisher
+from rpbi.ros.publishers.tick_publishers import TickPublisher
+from rpbi.ros.publishers.topic_publisher import SamplePublisher
+from rpbi.world import World
 
-from ..pacer import Pacer
-from ..world import World
-from .command_topic import CommandOutlet
-from .outlets import Outlet
-from .state_topic import StateOutlet
-from .status import ClockOutlet, StatusOutlet
 from .step_burst import StepBurst
-from .tick_outlets import TickOutlets
 
 log = logging.getLogger(__name__)
 
@@ -34,7 +34,7 @@ class Simulation:
 
     Args:
         world: The world.
-        outlets: Where samples go, one for each type of sample; there may be more later.
+        publishers: Where samples go, one for each type of sample; there may be more later.
         real_time_factor: Simulated seconds per wall second; 0 is as fast as it goes.
         status_hz: Rate of the status [Hz].
         clock: Publishes /clock if stamps are simulated time.
@@ -46,10 +46,10 @@ class Simulation:
     def __init__(
         self,
         world: World,
-        outlets: Mapping[type, Outlet],
+        publishers: Mapping[type, SamplePublisher],
         real_time_factor: float,
         status_hz: float,
-        clock: ClockOutlet | None = None,
+        clock: ClockPublisher | None = None,
         helpers: Sequence[Callable[[], None]] = (),
         facts: Callable[[], Mapping[str, str]] = dict,
         before_tick: Callable[[], None] = lambda: None,
@@ -57,21 +57,21 @@ class Simulation:
         self.world = world
         self.running = False
         self._broken = False
-        self._last_words = ""
+        self._log_fatal_lines = ""
         """Why it broke off the last time."""
         self._burst: StepBurst | None = None
         self._thread: int | None = None
         self.passes = 0
         """Grows as long as the loop is alive."""
         idle_ticks = max(1, round(IDLE_PERIOD_S / world.clock.dt_s))
-        self._outlets = TickOutlets(world, outlets, clock, idle_ticks)
+        self._publishers = TickPublisher(world, publishers, clock, idle_ticks)
         self._helpers = helpers
         self._before_tick = before_tick
         self._pacer = Pacer(world.clock.dt_s, real_time_factor)
         self._idle_pacer = Pacer(max(world.clock.dt_s, IDLE_PERIOD_S))
-        self._status = StatusOutlet(world.clock, self._pacer, status_hz, real_time_factor, facts)
-        self._state = StateOutlet(world, self._pacer, real_time_factor)
-        self._commands = CommandOutlet(world)
+        self._status = StatusPublisher(world.clock, self._pacer, status_hz, real_time_factor, facts)
+        self._state = StatePublisher(world, self._pacer, real_time_factor)
+        self._commands = CommandPublisher(world)
 
     @property
     def is_own_thread(self) -> bool:
@@ -169,13 +169,13 @@ class Simulation:
         refill()
         self.world.take_inputs()
         self._pacer.restart()
-        self._outlets.restart()
+        self._publishers.restart()
         self._state.restart()
 
     def run(self, is_over: Callable[[], bool]) -> None:
         """Loops until it is over, on the thread that calls it."""
         self._thread = threading.get_ident()
-        parts = (self._move, *self._helpers, self._tell)
+        parts = (self._move, *self._helpers, self._publish)
         while not is_over():
             self.passes += 1
             self.world.mailbox.run_requests()
@@ -197,7 +197,7 @@ class Simulation:
         else:
             self._idle()
 
-    def _tell(self) -> None:
+    def _publish(self) -> None:
         self._status.spin(self.running, self._burst is not None)
         self._state.spin(self.running or self._burst is not None)
         self._commands.spin()
@@ -208,13 +208,13 @@ class Simulation:
 
     def _take_tick(self) -> None:
         self._before_tick()
-        self._outlets.tell(self.world.step())
+        self._publishers.publish_tick(self.world.step())
         self._state.take_tick()
 
     def _take_last_tick(self) -> None:
         """Goes one tick on before standing still: all of it is told, whatever is due."""
         self._before_tick()
-        self._outlets.tell_all(self.world.step())
+        self._publishers.publish_all(self.world.step())
         self._state.take_tick()
 
     def _advance_burst(self, burst: StepBurst) -> None:
@@ -251,26 +251,26 @@ class Simulation:
 
     def _break_off(self, error: Exception) -> None:
         """Stands still, and tells no more of a world that is broken; until somebody starts or steps it again."""
-        if self._broken and str(error) == self._last_words:
+        if self._broken and str(error) == self._log_fatal_lines:
             return  # it goes on telling the same
         log.error("simulation stopped: %s", error, exc_info=not isinstance(error, InterfaceError))
-        self.running, self._broken, self._last_words = False, True, str(error)
+        self.running, self._broken, self._log_fatal_lines = False, True, str(error)
         if self._burst is not None:
             self._end_burst().fail(error)
         self.world.halt("the simulation broke off")
-        self._outlets.tell_end()
+        self._publishers.publish_last_time()
         self._status.publish(False)
 
     def _halt(self) -> None:
         self.running = False
         self.world.pause("the simulation was stopped")
-        self._outlets.tell_all([])
+        self._publishers.publish_all([])
         self._status.publish(False)
 
     def _idle(self) -> None:
         if not self._idle_pacer.is_due():
             return
-        self._outlets.tell_time_again()
+        self._publishers.repeat_time()
         if not self._broken:
             self.world.take_inputs()
-            self._outlets.tell_idle()
+            self._publishers.publish_idle()

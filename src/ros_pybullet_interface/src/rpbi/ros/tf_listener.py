@@ -10,9 +10,8 @@ import tf2_ros
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
-from custom_ros_tools.ros.throttle import ThrottledWarning
-
-from ..pose import Pose
+from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from rpbi.geometry import Pose
 
 QUEUE_SIZE = 100
 NORM_TOLERANCE = 0.01

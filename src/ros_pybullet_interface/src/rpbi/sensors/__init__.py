@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from rpbi.config.sensors import SensorConfig
+
 from .base_state import BaseStateSensor
 from .body_sensor import BodySensor
 from .contact_arrows import ContactArrowsSensor
@@ -11,7 +13,6 @@ from .joint_state import JointStateSensor
 from .link_pose import LinkPoseSensor
 from .rgbd import RgbdSensor
 from .sensor import Sensor
-from .sensor_config import SensorConfig
 from .surface import SurfaceSensor
 from .trajectory_state import TrajectoryStateSensor
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from rpbi.config.sensors import SensorConfig
+
 from .sensor import Sensor
-from .sensor_config import SensorConfig
 
 if TYPE_CHECKING:
-    from ..bodies.body import Body
+    from rpbi.bodies.body import Body
 
 
 class BodySensor(Sensor):

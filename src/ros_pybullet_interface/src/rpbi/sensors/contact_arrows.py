@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-from ..samples import ContactArrowsSample
-from ..vectors import plus, scaled
+from typing import TYPE_CHECKING
+
+from rpbi.config.sensors import ContactsConfig
+from rpbi.geometry import plus, scaled
+from rpbi.samples import ContactArrowsSample
+
 from .contacts import ContactsSensor
 from .sensor import Sensor
+
+if TYPE_CHECKING:
+    from rpbi.bodies.body import Body
 
 
 class ContactArrowsSensor(Sensor):
@@ -31,3 +38,13 @@ class ContactArrowsSensor(Sensor):
             for point in self._contacts.points(tick)
         )
         return ContactArrowsSample(self.name, tuple((start, end) for start, end in arrows if start != end))
+
+
+def contact_sensors(body: Body, config: ContactsConfig | None) -> tuple[Sensor, ...]:
+    """Returns the sensors of a body's contacts; none if they are not asked for."""
+    if config is None:
+        return ()
+    contacts = ContactsSensor(body, config.hz)
+    if not config.arrows_hz:
+        return (contacts,)
+    return (contacts, ContactArrowsSensor(contacts, config.arrows_hz, config.arrow_metres_per_newton))

@@ -10,20 +10,17 @@ import numpy as np
 import numpy.typing as npt
 
 from custom_ros_tools.errors import PhysicsError
+from rpbi.config.sensors import ForceTorqueConfig
+from rpbi.geometry import Vector, cross, minus, plus, rotated_back, scaled
+from rpbi.samples import WrenchSample
+from rpbi.urdf.joints import Joint
+from rpbi.urdf.subtree import LinkStates, Subtree
 
-from ..joint_model import Joint
-from ..pose import Vector
-from ..samples import WrenchSample
-from ..subtree import LinkStates, Subtree
-from ..vectors import cross, minus, plus, rotated_back, scaled
-from .force_torque_config import ForceTorqueConfig
-from .low_pass import LowPass
-from .seeded_noise import SeededNoise
+from .filters import LowPass, SeededNoise, Zeroing
 from .sensor import Sensor
-from .zeroing import Zeroing
 
 if TYPE_CHECKING:
-    from ..bodies.jointed import JointedBody
+    from rpbi.bodies.robots.jointed import JointedBody
 
 
 class ForceTorqueSensor(Sensor):

@@ -6,12 +6,12 @@ import math
 from typing import TYPE_CHECKING
 
 from custom_ros_tools.errors import PhysicsError
+from rpbi.samples import JointStateSample
 
-from ..samples import JointStateSample
 from .sensor import Sensor
 
 if TYPE_CHECKING:
-    from ..bodies.jointed import JointedBody
+    from rpbi.bodies.robots.jointed import JointedBody
 
 
 class JointStateSensor(Sensor):

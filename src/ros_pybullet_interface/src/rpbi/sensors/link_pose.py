@@ -6,13 +6,13 @@ import math
 from typing import TYPE_CHECKING
 
 from custom_ros_tools.errors import PhysicsError
+from rpbi.geometry import Pose
+from rpbi.samples import LinkPoseSample
 
-from ..pose import Pose
-from ..samples import LinkPoseSample
 from .sensor import Sensor
 
 if TYPE_CHECKING:
-    from ..bodies.body import Body
+    from rpbi.bodies.body import Body
 
 
 class LinkPoseSensor(Sensor):

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from ..clock import Clock
-from ..inputs import Input, PoseInput
-from ..pose import Pose
-from ..rgbd_config import RgbdSensorConfig
-from ..samples import SceneSample
+from rpbi.config.sensors import RgbdSensorConfig
+from rpbi.engine.clock import Clock
+from rpbi.engine.inputs import Input, PoseInput
+from rpbi.geometry import Pose
+from rpbi.samples import SceneSample
+
 from .sensor import Sensor
 
 if TYPE_CHECKING:
-    from ..bodies.body import Body
+    from rpbi.bodies.body import Body
 
 
 class RgbdSensor(Sensor):

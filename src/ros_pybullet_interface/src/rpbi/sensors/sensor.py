@@ -6,10 +6,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from ..inputs import Input
+from rpbi.engine.inputs import Input
 
 if TYPE_CHECKING:
-    from ..world import World
+    from rpbi.world import World
 
 
 class Sensor(ABC):

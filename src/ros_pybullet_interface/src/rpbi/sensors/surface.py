@@ -6,12 +6,12 @@ import math
 from typing import TYPE_CHECKING
 
 from custom_ros_tools.errors import PhysicsError
+from rpbi.samples import SurfaceSample
 
-from ..samples import SurfaceSample
 from .sensor import Sensor
 
 if TYPE_CHECKING:
-    from ..bodies.body import Body
+    from rpbi.bodies.body import Body
 
 
 class SurfaceSensor(Sensor):

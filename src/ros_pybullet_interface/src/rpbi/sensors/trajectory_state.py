@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..control.controller_state import ControllerState
+from rpbi.control.trajectories.controller_state import ControllerState
+
 from .sensor import Sensor
 
 if TYPE_CHECKING:
-    from ..bodies.robot import Robot
-    from ..control.follower import TrajectoryFollower
+    from rpbi.bodies.robots.robot import Robot
+    from rpbi.control.trajectories.follower import TrajectoryFollower
 
 
 class TrajectoryStateSensor(Sensor):

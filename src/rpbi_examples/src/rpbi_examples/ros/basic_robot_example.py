@@ -6,11 +6,11 @@ import rospy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Int64
 
-from custom_ros_tools.ros.run_node import run_node
+from custom_ros_tools.ros.lifecycle.run_node import run_node
 from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import RobotInfo, RobotInfoResponse
+from rpbi_examples.swing import Swing
 
-from ..swing import Swing
 from .arguments import robot_name
 
 HZ = 50.0

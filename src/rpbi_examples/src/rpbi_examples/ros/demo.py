@@ -21,13 +21,13 @@ import rosgraph
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.transform_messages import position_in, quat_in
 from rpbi.bodies import BODY_TYPES
-from rpbi.config import load_world
-from rpbi.pose import Pose
+from rpbi.config.loading import load_world
+from rpbi.geometry import Pose
+from rpbi_examples import demo_report
+from rpbi_examples.draw_rate import draw_rate_hz
+from rpbi_examples.process_tree import kill_with_children
 from rpbi_utils import Recorder, bag_to_dataframes, topic_report
 
-from .. import demo_report
-from ..draw_rate import draw_rate_hz
-from ..process_tree import kill_with_children
 from .basic_robot_example import HZ as TARGET_HZ
 
 EXAMPLE = "basic_example_kuka_lwr"

@@ -8,9 +8,9 @@ import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
-from custom_ros_tools.ros.run_node import run_node
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from rpbi_examples.route import PlanarPose, Route
 
-from ..route import PlanarPose, Route
 from .arguments import robot_name
 
 

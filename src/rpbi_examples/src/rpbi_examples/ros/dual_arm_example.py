@@ -7,11 +7,10 @@ import sys
 import rospy
 
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.ros.run_node import run_node
+from custom_ros_tools.ros.lifecycle.run_node import run_node
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
 from ros_pybullet_interface.srv import ResetEffState
-
-from ..circles import POINTING_DOWN, hand_position
+from rpbi_examples.circles import POINTING_DOWN, hand_position
 
 HZ = 50.0
 LINK = "lbr_iiwa_link_7"

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from custom_ros_tools.on_off import OnOff
-from custom_ros_tools.ros.parameters import private_parameters
-from custom_ros_tools.ros.run_node import run_node
-from custom_ros_tools.ros.toggle_service import ToggleService
+from custom_ros_tools.ros.lifecycle.parameters import private_parameters
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.services import ToggleService
+from custom_ros_tools.toggle import Toggle
+from rpbi_examples.figure_eight import FigureEight
 
-from ..figure_eight import FigureEight
 from .moving_frame import NO_ROTATION, move_frame
 
 
@@ -21,7 +21,7 @@ class FigureEightNode:
     def __init__(self) -> None:
         figure = private_parameters(FigureEight)
         self._time_s, self._last_s, self._moves = 0.0, 0.0, False
-        moving = OnOff("figure eight", lambda: self._switch(True), lambda: self._switch(False))
+        moving = Toggle("figure eight", lambda: self._switch(True), lambda: self._switch(False))
         if figure.start_on_init:
             moving.on()
         ToggleService("toggle_figure_eight", moving.on, moving.off)

@@ -12,15 +12,14 @@ from std_srvs.srv import SetBool
 from trajectory_msgs.msg import JointTrajectory
 
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.ros.run_node import run_node
+from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.ros.transform_messages import as_pose
 from custom_ros_tools.transforms import pose_of
 from ik_ros.msg import IKProblem, Waypoint
 from ik_ros.srv import SolveIK
 from ros_pybullet_interface.srv import ResetJointState
-
-from ..figure_eight import FigureEight
+from rpbi_examples.figure_eight import FigureEight
 
 HOME = {"lwr_arm_1_joint": 0.52, "lwr_arm_3_joint": -1.57, "lwr_arm_5_joint": 1.05}
 """Where the search begins [rad]; other joints at 0."""

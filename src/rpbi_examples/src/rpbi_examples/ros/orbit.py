@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import rospy
 
-from custom_ros_tools.ros.run_node import run_node
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from rpbi_examples.orbit import camera_pose
 
-from ..orbit import camera_pose
 from .moving_frame import move_frame
 
 

@@ -13,8 +13,9 @@ import rospy
 
 from custom_ros_tools.errors import InterfaceError
 from rpbi_utils.errors import BagError
-from rpbi_utils.ros.bags import bag_to_dataframes
 from rpbi_utils.table_files import FORMATS, file_stems, write_table
+
+from .bags import bag_to_dataframes
 
 _NAME = "bag_to_table"
 

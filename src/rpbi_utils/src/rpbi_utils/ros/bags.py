@@ -9,8 +9,9 @@ from pathlib import Path
 import pandas as pd
 from tqdm import tqdm
 
-from rpbi_utils.ros.bag_reader import BagMessage, BagReader
 from rpbi_utils.tables import TableBuilder
+
+from .bag_reader import BagMessage, BagReader
 
 Progress = Callable[[int, int], None]
 _REPORT_EVERY = 1000  # messages

@@ -9,7 +9,7 @@ from xmlrpc.client import Error, ServerProxy
 
 import rosgraph
 
-from custom_ros_tools.ros.timed_transport import TimedTransport
+from custom_ros_tools.ros.lifecycle.timed_master import TimedTransport
 
 _CALLER = "/rpbi_utils"
 _TIMEOUT_S = 1.0

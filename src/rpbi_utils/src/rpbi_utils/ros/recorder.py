@@ -21,7 +21,8 @@ from rosgraph.names import get_ros_namespace, resolve_name
 
 from custom_ros_tools.errors import MissingDependency
 from rpbi_utils.errors import RecordingError
-from rpbi_utils.ros.connections import unconnected, unsubscribed
+
+from .connections import unconnected, unsubscribed
 
 _POLL_S = 0.02
 _GRACE_S = 0.2  # for what was published just before the end and is on its way
@@ -132,11 +133,11 @@ class Recorder:
         active = self.path.with_name(self.path.name + ".active")
         self._raise_if_not_writing()
         if died:
-            raise RecordingError(self.path, f"the recorder ended early{self._last_words()}{_what_is_left(active)}")
+            raise RecordingError(self.path, f"the recorder ended early{self._log_fatal_lines()}{_what_is_left(active)}")
         if not active.exists() and not self.path.exists():
             raise RecordingError(self.path, "no bag was begun; with use_sim_time the recorder waits for /clock")
         if not closed or active.exists():
-            raise RecordingError(self.path, f"the bag was not closed{self._last_words()}{_what_is_left(active)}")
+            raise RecordingError(self.path, f"the bag was not closed{self._log_fatal_lines()}{_what_is_left(active)}")
         return self.path
 
     def _command(self) -> list[str]:
@@ -157,7 +158,7 @@ class Recorder:
         deadline = time.monotonic() + self._timeout_s
         while True:
             if not self.is_running:
-                raise RecordingError(self.path, f"the recorder ended at once{self._last_words()}")
+                raise RecordingError(self.path, f"the recorder ended at once{self._log_fatal_lines()}")
             self._raise_if_not_writing()
             try:
                 missing = unsubscribed(self._node, self.topics)
@@ -192,7 +193,7 @@ class Recorder:
                 free = shutil.disk_usage(self.path.parent).free / 1e9
                 raise RecordingError(self.path, f"the recorder does not write ({free:.1f} GB free): {line}")
 
-    def _last_words(self) -> str:
+    def _log_fatal_lines(self) -> str:
         lines = self._lines()
         return f": {lines[-1]}" if lines else ""
 

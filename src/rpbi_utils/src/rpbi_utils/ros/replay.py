@@ -15,10 +15,11 @@ from tqdm import tqdm
 
 from custom_ros_tools.errors import InterfaceError
 from ros_pybullet_interface.msg import SimulationState, WorldCommands
-from rpbi.replay import Checkpoint, RecordedCommand, Recording, Replay, ReplayResult
-from rpbi.world_description import WorldDescription
+from rpbi.replay.session import Checkpoint, RecordedCommand, Recording, Replay, ReplayResult
+from rpbi.replay.world_description import WorldDescription
 from rpbi_utils.errors import BagError
-from rpbi_utils.ros.bag_reader import BagReader
+
+from .bag_reader import BagReader
 
 _NAME = "replay"
 _TYPES: dict[str, Any] = {

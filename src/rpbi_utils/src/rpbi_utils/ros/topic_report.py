@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rpbi_utils.ros.bag_reader import BagMessage, BagReader
+from .bag_reader import BagMessage, BagReader
 
 _STAMP = struct.Struct("<4xII")  # behind the `seq` of a header
 _COLUMNS = ("type", "messages", "bytes", "rate_hz", "max_gap_s", "first", "last")

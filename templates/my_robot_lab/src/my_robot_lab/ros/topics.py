@@ -5,10 +5,9 @@ import math
 from sensor_msgs.msg import Range
 from std_msgs.msg import Float64
 
-from rpbi.ros.frames import prefixed
+from rpbi.ros.headers import prefixed, to_ros_time
 from rpbi.ros.inputs import TopicInput
-from rpbi.ros.sample_topics import SampleTopic
-from rpbi.ros.stamps import to_ros_time
+from rpbi.ros.publishers.sample_topics import SampleTopic
 
 from ..range_finder import RangeSample
 

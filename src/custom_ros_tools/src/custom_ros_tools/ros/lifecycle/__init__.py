@@ -1,0 +1,1 @@
+"""The life of a node: start, interrupts, log, the master, end."""

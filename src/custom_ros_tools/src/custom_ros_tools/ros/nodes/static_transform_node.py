@@ -1,0 +1,50 @@
+"""The node `resettable_static_transform_publisher`: a fixed transform that a service replaces."""
+
+from __future__ import annotations
+
+import sys
+
+import rospy
+
+from custom_ros_tools.errors import collecting_problems
+from custom_ros_tools.node_configs import RateParameters
+from custom_ros_tools.ros.lifecycle.parameters import private_parameters
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.lifecycle.wall_timer import WallTimer
+from custom_ros_tools.ros.transform_messages import checked, transform_message
+from custom_ros_tools.ros.transform_topic import TransformTopic
+from custom_ros_tools.srv import SetTransform, SetTransformRequest, SetTransformResponse
+from custom_ros_tools.transforms import StaticTransform
+
+NAME = "resettable_static_transform_publisher"
+
+
+class StaticTransformNode:
+    """Repeats a transform on /tf; `reset_tf` sets another one.
+
+    Raises:
+        ConfigError: If arguments or parameters are wrong.
+    """
+
+    def __init__(self) -> None:
+        with collecting_problems() as part:
+            with part():
+                given = StaticTransform.from_arguments(rospy.myargv(sys.argv)[1:])
+            with part():
+                rate = private_parameters(RateParameters)
+        self._transform = transform_message(given.position, given.quat_xyzw)
+        self._topic = TransformTopic(given.parent, given.child)
+        rospy.Service("reset_tf", SetTransform, self._reset)
+        WallTimer(rate.hz, lambda: self._topic.send(self._transform))
+
+    def _reset(self, request: SetTransformRequest) -> SetTransformResponse:
+        try:
+            self._transform = checked(request.transform)
+        except ValueError as error:
+            return SetTransformResponse(False, f"transform refused: {error}")
+        return SetTransformResponse(True, "transform set")
+
+
+def main() -> None:
+    """Runs the node."""
+    run_node(NAME, StaticTransformNode)

@@ -1,0 +1,69 @@
+"""Services: one that switches on and off, and proxies that wait for theirs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import rospy
+from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
+
+PATIENCE_S = 5.0
+"""After how long of waiting it is said what is waited for [s]."""
+
+
+def get_srv_handler(
+    name: str, srv_type: type, persistent: bool = False, headers: dict[str, str] | None = None
+) -> rospy.ServiceProxy:
+    """Waits until a service is there, for ever if need be, and returns what calls it.
+
+    Args:
+        name: The service.
+        srv_type: Its type.
+        persistent: Whether to keep one connection open, which is faster and ends with the server.
+        headers: What else to tell the server when connecting.
+
+    Raises:
+        rospy.ROSInterruptException: If ROS shuts down meanwhile.
+    """
+    try:
+        rospy.wait_for_service(name, timeout=PATIENCE_S)
+    except rospy.ROSInterruptException:
+        raise
+    except rospy.ROSException:
+        rospy.logwarn("still waiting for service %s", rospy.resolve_name(name))
+        rospy.wait_for_service(name)
+    return rospy.ServiceProxy(name, srv_type, persistent=persistent, headers=headers)
+
+
+def get_srv_handlers(services: Mapping[str, type], persistent: bool = False) -> dict[str, rospy.ServiceProxy]:
+    """Does the same for several services.
+
+    Args:
+        services: Their types by name.
+        persistent: As for one.
+
+    Returns:
+        What calls them, by name.
+    """
+    return {name: get_srv_handler(name, srv_type, persistent) for name, srv_type in services.items()}
+
+
+Handler = Callable[[], tuple[bool, str]]
+
+
+class ToggleService:
+    """A std_srvs/SetBool service: true switches on, false off.
+
+    Args:
+        name: Its name.
+        on: Called for true; returns success and a message.
+        off: Called for false; returns success and a message.
+    """
+
+    def __init__(self, name: str, on: Handler, off: Handler) -> None:
+        self._on, self._off = on, off
+        self._service = rospy.Service(name, SetBool, self._handle)
+
+    def _handle(self, request: SetBoolRequest) -> SetBoolResponse:
+        success, message = self._on() if request.data else self._off()
+        return SetBoolResponse(success, message)

@@ -1,0 +1,138 @@
+"""Strict configuration models: one base class, and the number and text types that YAML files are made of.
+
+A model states its keys, units and limits once; validation, error messages and the JSON Schema follow from it.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+import re
+from collections.abc import Mapping
+from typing import Annotated, Any, TypeVar
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    WithJsonSchema,
+)
+
+from custom_ros_tools.errors import ConfigError, Problem
+
+from .annotations import AlsoTakes as AlsoTakes
+from .annotations import Expects as Expects
+from .annotations import InnerProblemsError as InnerProblemsError
+from .annotations import KeyedError as KeyedError
+from .annotations import Unit as Unit
+from .errors import problems_of
+
+Model = TypeVar("Model", bound="ConfigModel")
+Item = TypeVar("Item")
+
+_NAME = r"[A-Za-z0-9_]+"
+_FRAME_ID = r"[^\s/](\S*[^\s/])?"
+
+
+class ConfigModel(BaseModel):
+    """Base of all configuration: immutable, picklable, no unknown keys, no silent conversion.
+
+    A whole number is accepted for a number and a list for a tuple; nothing else is converted.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True)
+
+    @classmethod
+    def parse(cls: type[Model], data: Mapping[str, Any], file: str, context: Mapping[str, Any] | None = None) -> Model:
+        """Validate what was read from a file.
+
+        Args:
+            data: The mapping; it is not changed and not kept.
+            file: Name of the file, for messages; `"~config"` when it came from the parameter server.
+            context: What validators find in `info.context` beside `file`, such as the folders to search.
+
+        Raises:
+            ConfigError: with one `Problem` for each fault.
+        """
+        if not isinstance(data, Mapping):
+            got = "nothing" if data is None else type(data).__name__
+            raise ConfigError([Problem(file, "", f"expected a mapping of keys to values, got {got}")])
+        plain = copy.deepcopy(dict(data))
+        try:
+            return cls.model_validate(plain, context={"file": file, **(context or {})})
+        except ValidationError as error:
+            raise ConfigError(problems_of(error, cls, plain, file)) from None
+
+
+def _unit_quaternion(value: tuple[float, ...]) -> tuple[float, ...]:
+    norm = math.sqrt(sum(v * v for v in value))
+    if norm < 1e-6:
+        raise ValueError("a quaternion cannot be all zeros; no rotation is [0, 0, 0, 1]")
+    if abs(norm - 1.0) < 1e-12:
+        return value  # so that what was normalised once stays as it is, to the last bit
+    return tuple(v / norm for v in value)
+
+
+def _direction(value: tuple[float, ...]) -> tuple[float, ...]:
+    if math.hypot(*value) < 1e-6:
+        raise ValueError("a direction cannot be all zeros")
+    return value
+
+
+def _switch(value: Any) -> Any:
+    return bool(value) if type(value) is int and value in (0, 1) else value
+
+
+def _name(value: str) -> str:
+    if not re.fullmatch(_NAME, value):
+        raise ValueError(f"use letters, digits and '_' only (topics and frames are named after it), got {value!r}")
+    return value
+
+
+def _frame_id(value: str) -> str:
+    if not re.fullmatch(_FRAME_ID, value):
+        raise ValueError(f"a TF frame has no spaces and neither starts nor ends with '/', got {value!r}")
+    return value
+
+
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+Count = Annotated[int, Field(ge=0)]
+Hz = Annotated[float, Field(gt=0), Unit("Hz")]
+HzOrOff = Annotated[float, Field(ge=0), Unit("Hz")]
+"""A rate, where 0 switches off."""
+Seconds = Annotated[float, Field(gt=0), Unit("s")]
+Pixels = Annotated[int, Field(gt=0, le=8192), Unit("px")]
+Metres = Annotated[float, Unit("m")]
+PositiveMetres = Annotated[float, Field(gt=0), Unit("m")]
+Kilograms = Annotated[float, Field(ge=0), Unit("kg")]
+Degrees = Annotated[float, Unit("deg")]
+
+Vec3 = Annotated[tuple[float, float, float], Field(strict=False)]
+Position = Annotated[Vec3, Unit("m")]
+Direction = Annotated[Vec3, AfterValidator(_direction)]
+"""A direction of any length but zero."""
+Quat = Annotated[tuple[float, float, float, float], Field(strict=False), AfterValidator(_unit_quaternion)]
+"""A rotation as x, y, z, w; any length but zero, normalised."""
+Rgba = Annotated[tuple[Fraction, Fraction, Fraction, Fraction], Field(strict=False)]
+Rgb = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False)]
+ListOf = Annotated[tuple[Item, ...], Field(strict=False)]
+"""A list of any length, kept as a tuple: `ListOf[float]`."""
+
+Switch = Annotated[bool, BeforeValidator(_switch), AlsoTakes({"type": "integer", "minimum": 0, "maximum": 1})]
+"""True or false, which may be written 1 and 0 as PyBullet's users do."""
+Text = Annotated[str, Field(min_length=1)]
+Name = Annotated[
+    str, AfterValidator(_name), WithJsonSchema({"type": "string", "pattern": f"^{_NAME}$"}), Expects("a name")
+]
+"""Name of an object: letters, digits and '_'."""
+FrameId = Annotated[
+    str,
+    AfterValidator(_frame_id),
+    WithJsonSchema({"type": "string", "pattern": f"^{_FRAME_ID}$"}),
+    Expects("a TF frame"),
+]

@@ -1,0 +1,1 @@
+"""Chains of joints between two links, and how solvers find their positions."""

@@ -1,0 +1,160 @@
+"""What solvers of one link's pose have in common."""
+
+from __future__ import annotations
+
+import math
+import threading
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from pydantic import ValidationInfo, model_validator
+
+from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
+from custom_ros_tools.schema import ConfigModel, KeyedError, Text
+from ik_ros.limits import Limits, StartLimits
+from ik_ros.problem import IKProblem, IKSolution
+from ik_ros.solver import Solver
+from rpbi.config.asset_files import ExistingFile
+from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
+
+from .description import ChainDescription, read_chain
+from .forward_kinematics import Chain
+from .goal import Goal
+
+
+class ChainConfig(ConfigModel):
+    """What every solver of one link's pose is told.
+
+    Attributes:
+        urdf_filename: The robot; `{package}/path` and `package://` are resolved.
+        base_link: The link that targets are expressed in; above the tip.
+        tip_link: The link that goes to the target.
+    """
+
+    urdf_filename: ExistingFile
+    base_link: Text
+    tip_link: Text
+
+    @model_validator(mode="after")
+    def _chain_can_be_solved_for(self, info: ValidationInfo) -> ChainConfig:
+        try:
+            read_chain(self.urdf_filename, self.base_link, self.tip_link)
+        except UnknownNameError as error:
+            key = "base_link" if error.name == self.base_link else "tip_link"
+            raise KeyedError(key, str(error)) from None
+        except ValueError as error:
+            raise KeyedError("tip_link", f"{self.urdf_filename}: {error}") from None
+        return self
+
+
+class ChainSolver(Solver):
+    """Brings the tip of a chain of joints to a target.
+
+    Any thread may call it; a lock inside lets one in at a time. A subclass only looks for positions: here they are
+    brought into limits, put into the chain and judged, so that success is told only where it is true.
+
+    Args:
+        config: Its options.
+
+    Attributes:
+        description: The chain as the URDF has it.
+        chain: Its kinematics.
+        limits: Limits of its joints.
+    """
+
+    Config: ClassVar[type[ChainConfig]] = ChainConfig
+
+    def __init__(self, config: ChainConfig) -> None:
+        self.description: ChainDescription = read_chain(config.urdf_filename, config.base_link, config.tip_link)
+        self.chain = Chain(self.description)
+        self.joint_names = self.description.joint_names
+        self.base_frame = self.description.base
+        self.velocity_limits = self.description.velocity_limits
+        self.use_limits(self.description.lower, self.description.upper)
+        self._lock = threading.Lock()
+
+    def use_limits(self, lower: Sequence[float], upper: Sequence[float]) -> None:
+        """Sets the n limits of the joints [rad or m], -inf and inf where there are none."""
+        self.lower, self.upper = tuple(lower), tuple(upper)
+        self.limits = Limits(lower, upper, self.description.is_revolute)
+        self._start_limits = StartLimits(self.joint_names, self.limits)
+
+    @abstractmethod
+    def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
+        """Looks for joint positions.
+
+        Args:
+            problem: The question.
+            goal: Its target with tolerances.
+            start: n positions within limits [rad or m].
+
+        Returns:
+            n positions each, the best first; none if nothing was found.
+        """
+
+    def solve(self, problem: IKProblem) -> IKSolution:
+        """Looks for joint positions that bring the tip to the target.
+
+        Raises:
+            ValueError: If the problem has no target, or asks for what the solver cannot do.
+            UnknownNameError: If the robot has no joint of a name in `start`.
+        """
+        with self._lock:
+            goal = Goal(problem)
+            start = self._start(problem.start)
+            finite = (q for q in self.find(problem, goal, start) if all(map(math.isfinite, q)))
+            found = [self.limits.wrap_to_limits(q, start)[0] for q in finite] or [start]
+            residuals = [self.residual(goal, q) for q in found]
+        return IKSolution(
+            success=residuals[0].size <= 1.0,
+            message=self._in_words(problem, goal, residuals[0]),
+            joint_names=self.joint_names,
+            positions=tuple(found[0]),
+            position_error_m=residuals[0].position_m,
+            orientation_error_rad=residuals[0].orientation_rad,
+            alternatives=tuple(tuple(q) for q, residual in zip(found[1:], residuals[1:]) if residual.size <= 1.0),
+        )
+
+    def residual(self, goal: Goal, q: Sequence[float]) -> Residual:
+        """Returns how far the tip is off its goal beyond the tolerances.
+
+        Args:
+            goal: Where it shall be.
+            q: n positions [rad or m].
+        """
+        return goal.residual(self.chain.frame(q))
+
+    def is_beyond_reach(self, problem: IKProblem) -> bool:
+        """Tells whether the target is farther away than the chain is long."""
+        return problem.target is not None and not self.chain.may_reach(problem.target, problem.position_tolerance)
+
+    def _start(self, given: Mapping[str, float]) -> list[float]:
+        """Returns n positions within limits [rad or m]."""
+        for name in given:
+            if name not in self.description.robot_joints:
+                raise UnknownNameError("joint", name, self.joint_names)
+        middle = zip(self.joint_names, self.limits.middle)
+        return self._start_limits.wrap_to_limits([given.get(name, position) for name, position in middle])
+
+    def _in_words(self, problem: IKProblem, goal: Goal, residual: Residual) -> str:
+        with_angle = not goal.any_orientation
+        angle = f" and {residual.orientation_rad:.3g} rad" if with_angle else ""
+        tip, target = self.description.tip, "its target" if goal.is_point else "the tolerances of its target"
+        if residual.size <= 1.0:
+            return f"'{tip}' is within {residual.position_m * 1e3:.3g} mm{angle} of {target}"
+        enough = f"{POSITION_TOLERANCE_M * 1e3:g} mm"
+        enough += f" and {ORIENTATION_TOLERANCE_RAD:g} rad" if with_angle else ""
+        far = "; it is farther away than the chain is long" if self.is_beyond_reach(problem) else ""
+        return f"'{tip}' misses {target} by {residual.position_m * 1e3:.4g} mm{angle}; {enough} would do{far}"
+
+
+def refuse_mimics(description: ChainDescription, config: ChainConfig, solver: str) -> None:
+    """Refuses chains with joints that mimic others.
+
+    Raises:
+        ConfigError: If there are some; it names them.
+    """
+    if mimics := description.mimics:
+        message = f"{', '.join(mimics)}: '{solver}' cannot solve for joints that mimic others; 'kdl' can"
+        raise ConfigError([Problem(config.urdf_filename, "", message)])

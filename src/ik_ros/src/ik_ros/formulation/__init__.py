@@ -1,0 +1,1 @@
+"""What a formulation of the solver `tasks` stands on."""

@@ -1,0 +1,125 @@
+"""Tasks about the pose of a link."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+import pinocchio as pin
+
+from custom_ros_tools.errors import UnknownNameError
+from custom_ros_tools.schema import KeyedError, ListOf, Text
+from ik_ros.problem import IKProblem
+from rpbi.geometry import Pose
+from rpbi.kinematics.residual import Residual
+
+from .robot import Robot, to_se3
+from .task import Linearization, Task, TaskConfig
+
+Axis = Literal["x", "y", "z", "rx", "ry", "rz"]
+AXES: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")
+
+
+class FrameTaskConfig(TaskConfig):
+    """What tasks about a link are told.
+
+    Attributes:
+        frame: The link.
+        goal: What it is to reach, in the base; None: each problem says.
+        axes: Which axes count: `x`, `y`, `z` along, and `rx`, `ry`, `rz` about, the axes of the goal.
+    """
+
+    frame: Text
+    goal: ListOf[float] | None = None
+    axes: ListOf[Axis] = AXES
+
+
+class FrameTask(Task):
+    """Brings a link to a pose, or near it, along and about some or all axes of the goal.
+
+    Args:
+        config: Its options.
+        robot: The robot.
+    """
+
+    Config = FrameTaskConfig
+    available: ClassVar[tuple[str, ...]] = AXES
+    """Axes that may be chosen."""
+    goal_words: ClassVar[str] = "a pose (x, y, z, qx, qy, qz, qw)"
+
+    def __init__(self, config: FrameTaskConfig, robot: Robot) -> None:
+        super().__init__(config, robot)
+        try:
+            self.link_id = robot.link_id(config.frame)
+        except UnknownNameError as error:
+            raise KeyedError("frame", str(error)) from None
+        axes = config.axes if "axes" in config.model_fields_set else self.available
+        if not set(axes) <= set(self.available):
+            raise KeyedError("axes", f"expected some of {', '.join(self.available)}, got {', '.join(axes)}")
+        self.is_complete = len(set(axes)) == len(AXES)
+        self._counts = np.array([axis in axes for axis in AXES])
+        try:
+            self._default = None if config.goal is None else self.pose_of(config.goal)
+        except ValueError as error:
+            raise KeyedError("goal", str(error)) from None
+        self._set_goal(self._default or Pose(), (0.0,) * 6)
+
+    def pose_of(self, values: Sequence[float]) -> Pose:
+        """Returns the goal that numbers stand for.
+
+        Raises:
+            ValueError: If there are more or fewer than expected.
+        """
+        if len(values) != 7 or math.hypot(*values[3:]) < 1e-6:
+            raise ValueError(f"expected {self.goal_words}, got {list(values)}")
+        x, y, z, *quaternion = values
+        norm = math.hypot(*quaternion)
+        qx, qy, qz, qw = (component / norm for component in quaternion)
+        return Pose((x, y, z), (qx, qy, qz, qw))
+
+    def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
+        """See `Task`."""
+        pose = self._default if goal is None else self.pose_of(goal)
+        if pose is None:
+            raise ValueError("missing, neither the problem nor the formulation has one")
+        self._set_goal(pose, (0.0,) * 6)
+
+    def aim(self, problem: IKProblem) -> None:
+        """Takes over the target of a problem, with its tolerances, as the goal."""
+        if problem.target is not None:
+            self._set_goal(problem.target, (*problem.position_tolerance, *problem.rotation_tolerance))
+
+    def rows(self, q: np.ndarray) -> Linearization:
+        """See `Task`: 3 ways along and the rotation vector about the axes of the goal, for axes that count."""
+        off = self._goal.actInv(self.robot.frame(self.link_id))
+        rotation = off.rotation
+        jacobian = self.robot.jacobian(self.link_id)
+        rows = np.empty_like(jacobian)
+        np.matmul(rotation, jacobian[:3], out=rows[:3])
+        np.matmul(pin.Jlog3(rotation), jacobian[3:], out=rows[3:])
+        values = np.empty(6)
+        values[:3], values[3:] = off.translation, pin.log3(rotation)
+        if self._all_count:
+            return Linearization(values, rows, self._lower, self._upper)
+        return Linearization(values[self._used], rows[self._used], self._lower, self._upper)
+
+    def residual(self, beyond: np.ndarray) -> Residual:
+        """See `Task`."""
+        off = beyond.tolist()
+        return Residual(math.hypot(*off[: self._lengths]), math.hypot(*off[self._lengths :]))
+
+    @property
+    def goal(self) -> Any:
+        """Where the link shall be, a `pinocchio.SE3`."""
+        return self._goal
+
+    def _set_goal(self, pose: Pose, tolerance: Sequence[float]) -> None:
+        self._goal = to_se3(pose)
+        wide = np.array(tolerance)
+        self._used = self._counts & ~((np.arange(6) >= 3) & (wide >= np.pi))
+        self._all_count = bool(self._used.all())
+        self._lengths = int(self._used[:3].sum())
+        self._upper = wide[self._used]
+        self._lower = -self._upper if wide.any() else self._upper

@@ -1,0 +1,76 @@
+"""Tasks about positions of joints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from custom_ros_tools.errors import UnknownNameError
+from custom_ros_tools.schema import KeyedError
+from ik_ros.problem import IKProblem
+from rpbi.kinematics.residual import Residual
+
+from .robot import Robot
+from .task import Linearization, Task, TaskConfig
+
+
+class JointTask(Task):
+    """Wants positions of some joints within bounds.
+
+    Args:
+        config: Its options.
+        robot: The robot.
+        joints: Names of the k joints.
+        key: The option that names them, for messages.
+
+    Attributes:
+        indices: Where the k joints are among those of the robot.
+        bounds: k lower and k upper bounds [rad or m]; infinite at first.
+    """
+
+    def __init__(self, config: TaskConfig, robot: Robot, joints: Sequence[str], key: str) -> None:
+        super().__init__(config, robot)
+        try:
+            self.indices = [robot.index(name) for name in joints]
+        except UnknownNameError as error:
+            raise KeyedError(key, str(error)) from None
+        self._jacobian = robot.joint_rows(self.indices)
+        self.keep_near(None, 0.0)
+
+    def keep_near(self, middle: np.ndarray | None, distance: np.ndarray | float) -> None:
+        """Sets bounds a distance away from k positions [rad or m]; without positions, the joints are free."""
+        if middle is None:
+            middle, distance = np.zeros(len(self.indices)), np.inf
+        self.bounds = middle - distance, middle + distance
+
+    def bring_to(self, goal: np.ndarray) -> None:
+        """Sets k positions as bounds [rad or m]."""
+        self.bounds = goal, goal
+
+    def previous(self, problem: IKProblem, most: int) -> list[np.ndarray]:
+        """Returns k positions of each of a problem's previous solutions [rad or m], newest last.
+
+        Args:
+            problem: The question.
+            most: How many of the newest to return, if there are so many.
+
+        Raises:
+            KeyedError: If one of them lacks one of the k joints; it names both.
+        """
+        names = [self.robot.joint_names[i] for i in self.indices]
+        solutions = list(enumerate(problem.previous))[-most:]
+        for i, solution in solutions:
+            for name in names:
+                if name not in solution:
+                    raise KeyedError(f"previous[{i}]", f"lacks '{name}', which the task '{self.config.name}' needs")
+        return [np.array([solution[name] for name in names]) for _, solution in solutions]
+
+    def rows(self, q: np.ndarray) -> Linearization:
+        """See `Task`."""
+        return Linearization(self.robot.positions(q)[self.indices], self._jacobian, *self.bounds)
+
+    def residual(self, beyond: np.ndarray) -> Residual:
+        """See `Task`."""
+        return Residual(0.0, math.hypot(*beyond.tolist()))

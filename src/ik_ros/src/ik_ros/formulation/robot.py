@@ -1,0 +1,287 @@
+"""A robot as Pinocchio sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+
+from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
+from ik_ros.limits import Limits
+from ik_ros.shape import ShapeConfig
+from rpbi.geometry import Pose
+from rpbi.urdf.document import read_urdf
+
+from .clearance import RobotShape
+
+
+def read_plain(urdf_path: str) -> tuple[str, dict[str, str]]:
+    """Reads a robot description in which every joint with one axis shall have one number in Pinocchio.
+
+    Args:
+        urdf_path: The description.
+
+    Returns:
+        Its text, with limits, which mean none, for joints that turn without end; and the type of each joint by name.
+
+    Raises:
+        ConfigError: If it cannot be read.
+    """
+    try:
+        root = ElementTree.fromstring(read_urdf(urdf_path))
+    except ElementTree.ParseError as error:
+        raise ConfigError([Problem(urdf_path, "", f"is not XML: {error}")]) from None
+    except OSError as error:
+        raise ConfigError([Problem(urdf_path, "", (error.strerror or str(error)).lower())]) from None
+    types = {joint.get("name", ""): _make_plain(joint) for joint in root.findall("joint")}
+    return ElementTree.tostring(root, encoding="unicode"), types
+
+
+def _make_plain(joint: ElementTree.Element) -> str:
+    """Makes a joint that turns without end one with limits, which has one number in Pinocchio; returns its type."""
+    kind = joint.get("type", "")
+    if kind == "continuous":
+        joint.set("type", "revolute")
+        limit = joint.find("limit")
+        if limit is None:
+            limit = ElementTree.SubElement(joint, "limit", effort="0", velocity="0")
+        limit.set("lower", "0")
+        limit.set("upper", "0")
+    return kind
+
+
+def to_se3(pose: Pose) -> Any:
+    """Returns a pose as Pinocchio has it."""
+    return pin.XYZQUATToSE3(np.array((*pose.position, *pose.quat_xyzw)))
+
+
+def from_base(q: np.ndarray) -> Pose:
+    """Returns the pose of a floating root in a configuration."""
+    x, y, z, qx, qy, qz, qw = q[:7].tolist()
+    return Pose((x, y, z), (qx, qy, qz, qw))
+
+
+FREE = 6
+"""Ways in which a floating base moves."""
+
+
+class Robot:
+    """Joints, limits and kinematics of one robot, a tree of links whose root may float.
+
+    A configuration q has one number for each joint, and before them 7 of the root if that floats: x, y, z [m] and a
+    quaternion x, y, z, w. A velocity has one for each joint, and 6 of the root before them.
+
+    Args:
+        urdf_path: The robot's description; the meshes it names need not be there.
+        floating: Whether the root floats.
+        joints: The n joints to find positions for; without any, all that move.
+        base: The link that poses are expressed in, which no joint moves; None: the root, or what it floats in.
+
+    Attributes:
+        model: Pinocchio's model.
+        data: Its working memory, as `update` left it.
+        joint_names: The n joints.
+        lower: Their n lower limits [rad or m], -inf where there is none.
+        upper: Their n upper limits [rad or m], inf where there is none.
+        limits: The same, to bring positions in.
+        is_revolute: Which of the n joints turn.
+        max_velocity: Their n largest speeds [rad/s or m/s], inf where the URDF has none.
+        free: Where what may change is in a velocity: the root's m - n, and the n joints.
+        all_joints: All joints that move.
+        links: All links.
+
+    Raises:
+        ConfigError: If the description cannot be read, or has joints of more than one axis.
+        UnknownNameError: If a joint or the base is not known.
+    """
+
+    def __init__(
+        self, urdf_path: str, floating: bool = False, joints: Sequence[str] = (), base: str | None = None
+    ) -> None:
+        urdf, types = read_plain(urdf_path)
+        try:
+            self.model = pin.buildModelFromXML(urdf, *([pin.JointModelFreeFlyer()] if floating else []))
+        except ValueError as error:
+            raise ConfigError([Problem(urdf_path, "", f"Pinocchio cannot load it: {error}")]) from None
+        self.data = self.model.createData()
+        self.is_floating = floating
+        base_joints = 2 if floating else 1  # the world, and the root's own
+        self.all_joints = tuple(self.model.names)[base_joints:]
+        for name in self.all_joints:
+            if types[name] not in ("revolute", "continuous", "prismatic"):
+                raise ConfigError([Problem(urdf_path, name, f"expected a joint of one axis, got a {types[name]} one")])
+        self._still = frozenset(types) - frozenset(self.all_joints)
+        self.links = tuple(frame.name for frame in self.model.frames if frame.type == pin.BODY)
+        self.joint_names = tuple(joints) or self.all_joints
+        ids = [self.joint_id(name) for name in self.joint_names]
+        self._in_q = np.array([self.model.joints[i].idx_q for i in ids], dtype=int)
+        in_v = [self.model.joints[i].idx_v for i in ids]
+        self.free = np.array([*range(FREE if floating else 0), *in_v], dtype=int)
+        self._all_free = self.free.tolist() == list(range(self.model.nv))
+        lower, upper = self.model.lowerPositionLimit[self._in_q], self.model.upperPositionLimit[self._in_q]
+        limited = (lower < upper) & [types[name] != "continuous" for name in self.joint_names]  # as in PyBullet
+        self.lower, self.upper = np.where(limited, lower, -np.inf), np.where(limited, upper, np.inf)
+        self.is_revolute = [types[name] != "prismatic" for name in self.joint_names]
+        self.limits = Limits(self.lower.tolist(), self.upper.tolist(), self.is_revolute)
+        speed = self.model.velocityLimit[in_v]
+        self.max_velocity = np.where(speed > 0.0, speed, np.inf)
+        self._shapes: dict[str, RobotShape] = {}
+        if base is not None:
+            self._express_in(base)
+
+    def joint_id(self, name: str) -> int:
+        """Returns Pinocchio's number of a joint.
+
+        Raises:
+            UnknownNameError: If there is no such joint that moves.
+        """
+        if name not in self.all_joints:
+            raise UnknownNameError("joint", name, self.all_joints)
+        return int(self.model.getJointId(name))
+
+    def moving(self, names: Iterable[str]) -> list[str]:
+        """Returns those joints that move; fixed ones, and those that mimic others, do not by themselves.
+
+        Raises:
+            UnknownNameError: If there is no such joint.
+        """
+        known = [name for name in names if name not in self._still]
+        for name in known:
+            self.joint_id(name)
+        return known
+
+    def index(self, name: str) -> int:
+        """Returns where a joint is among the n.
+
+        Raises:
+            UnknownNameError: If it is none of them.
+        """
+        if name not in self.joint_names:
+            raise UnknownNameError("joint", name, self.joint_names)
+        return self.joint_names.index(name)
+
+    def link_id(self, name: str) -> int:
+        """Returns Pinocchio's number of a link.
+
+        Raises:
+            UnknownNameError: If there is no such link.
+        """
+        if name not in self.links:
+            raise UnknownNameError("link", name, self.links)
+        return int(self.model.getFrameId(name, pin.BODY))
+
+    def add_shape(self, config: ShapeConfig) -> None:
+        """Adds a shape.
+
+        Raises:
+            UnknownNameError: If its link is not known.
+        """
+        link_id = None if config.link is None else self.link_id(config.link)
+        self._shapes[config.name] = RobotShape(config.core, link_id, to_se3(config.pose))
+
+    def shape(self, name: str) -> RobotShape:
+        """Returns one of the shapes.
+
+        Raises:
+            UnknownNameError: If there is no such shape.
+        """
+        if name not in self._shapes:
+            raise UnknownNameError("shape", name, self._shapes)
+        return self._shapes[name]
+
+    def configuration(self, positions: Mapping[str, float]) -> np.ndarray:
+        """Returns the configuration with some joints at given positions, and the others in the middle of their limits.
+
+        Joints that do not move, which joint states may have too, are passed over.
+
+        Raises:
+            UnknownNameError: If a joint is not known.
+        """
+        q = pin.neutral(self.model)
+        q[self._in_q] = self.limits.middle
+        for name in self.moving(positions):
+            q[self.model.joints[self.joint_id(name)].idx_q] = positions[name]
+        return q
+
+    def positions(self, q: np.ndarray) -> np.ndarray:
+        """Returns the positions of the n joints [rad or m]."""
+        return q[self._in_q]
+
+    def with_positions(self, q: np.ndarray, positions: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Returns a configuration with the n joints at other positions [rad or m]."""
+        changed = q.copy()
+        changed[self._in_q] = positions
+        return changed
+
+    def with_base(self, q: np.ndarray, pose: Any) -> np.ndarray:
+        """Returns a configuration with a floating root elsewhere, at a `pinocchio.SE3`."""
+        changed = q.copy()
+        changed[:7] = pin.SE3ToXYZQUAT(pose)
+        return changed
+
+    def moved(self, q: np.ndarray, step: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+        """Returns the configuration after a step of what is free [rad or m].
+
+        Args:
+            q: The configuration before.
+            step: The step.
+            lower: n lower limits, which are kept.
+            upper: n upper limits.
+        """
+        if not self.is_floating:
+            positions = q[self._in_q] + step
+        else:
+            velocity = np.zeros(self.model.nv)
+            velocity[:FREE] = step[:FREE]
+            q = pin.integrate(self.model, q, velocity)
+            positions = q[self._in_q] + step[FREE:]
+        return self.with_positions(q, np.minimum(np.maximum(positions, lower), upper))
+
+    def update(self, q: np.ndarray) -> None:
+        """Puts the robot into a configuration, for all that is asked below."""
+        pin.computeJointJacobians(self.model, self.data, q)
+
+    def frame(self, link_id: int) -> Any:
+        """Returns the pose of a link, a `pinocchio.SE3`."""
+        return pin.updateFramePlacement(self.model, self.data, link_id)
+
+    def jacobian(self, link_id: int) -> np.ndarray:
+        """Returns how a link moves in itself with what is free, 6 x m: linear above angular."""
+        return self._of_free(pin.getFrameJacobian(self.model, self.data, link_id, pin.LOCAL))
+
+    def com(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the centre of mass [m], and how it moves with what is free, 3 x m."""
+        jacobian = self._of_free(pin.jacobianCenterOfMass(self.model, self.data, q))
+        com, moving, still = self.data.com[0].copy(), self.data.mass[0], self.model.inertias[0]
+        if still.mass:  # Pinocchio leaves out what no joint moves
+            part = moving / (moving + still.mass)
+            return part * com + (1.0 - part) * still.lever, part * jacobian
+        return com, jacobian
+
+    def joint_rows(self, indices: Sequence[int]) -> np.ndarray:
+        """Returns the Jacobian of the positions of some of the n joints: a 1 in each row."""
+        rows = np.zeros((len(indices), len(self.free)))
+        rows[np.arange(len(indices)), len(self.free) - len(self.joint_names) + np.asarray(indices, dtype=int)] = 1.0
+        return rows
+
+    def _express_in(self, base: str) -> None:
+        """Moves the origin from the root into another link that stands still."""
+        here = self.model.frames[self.link_id(base)]
+        if here.parent:
+            still = [frame.name for frame in self.model.frames if frame.type == pin.BODY and not frame.parent]
+            raise UnknownNameError("link that no joint moves", base, still)
+        to_base = here.placement.inverse()
+        for i in range(1, self.model.njoints):
+            if self.model.parents[i] == 0:
+                self.model.jointPlacements[i] = to_base * self.model.jointPlacements[i]
+        for frame in self.model.frames:
+            if not frame.parent:
+                frame.placement = to_base * frame.placement
+        self.model.inertias[0] = to_base.act(self.model.inertias[0])
+        self.data = self.model.createData()
+
+    def _of_free(self, jacobian: np.ndarray) -> np.ndarray:
+        return jacobian if self._all_free else jacobian[:, self.free]

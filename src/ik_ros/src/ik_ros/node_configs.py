@@ -1,0 +1,106 @@
+"""Private parameters of the nodes."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from custom_ros_tools.node_configs import StartParameters
+from custom_ros_tools.schema import (
+    ConfigModel,
+    Count,
+    FrameId,
+    Hz,
+    KeyedError,
+    ListOf,
+    Name,
+    NonNegative,
+    Position,
+    PositiveMetres,
+    Quat,
+    Seconds,
+    Text,
+)
+
+from .joint_rate_limiter import JointRateLimiterConfig
+
+
+class InteractiveTargetConfig(ConfigModel):
+    """A TF frame that is dragged in RViz."""
+
+    parent_frame_id: FrameId = Field(description="The frame that it is in.")
+    child_frame_id: FrameId = Field(description="Its name.")
+    position: Position = Field((0.0, 0.0, 0.0), description="Where it is at first.")
+    quat_xyzw: Quat = Field((0.0, 0.0, 0.0, 1.0), description="How it is turned at first.")
+    size_m: PositiveMetres = Field(0.2, description="Size of the handles.")
+    hz: Hz = Field(50.0, description="How often it is broadcast, in wall time.")
+
+
+class RobotIKConfig(ConfigModel):
+    """What the robot's own inverse kinematics is asked; the keys are those of its message."""
+
+    robot_name: Name = Field(description="The robot; its YAML has `start_ik_callback: true`.")
+    link_name: Text = Field(description="The link that goes to the target.")
+    parent_frame_id: FrameId = Field(description="TF frame of the world.")
+    child_frame_id: FrameId = Field(description="TF frame that is the target.")
+    lowerLimits: ListOf[float] = Field((), description="Of each joint that a motor can move, as the next three.")
+    upperLimits: ListOf[float] = Field((), description="These four go together [rad or m].")
+    jointRanges: ListOf[float] = Field((), description="How far each may be from its rest posture, in proportion.")
+    resetPoses: ListOf[float] = Field((), description="Rest posture.")
+    jointDamping: ListOf[NonNegative] = Field((), description="How unwilling each joint is to move.")
+    solver: Literal[0, 1] = Field(0, description="0 damped least squares, 1 selectively damped least squares.")
+    maxNumIterations: Count = Field(0, description="Most iterations from one start; 0 is up to the robot.")
+    residualThreshold: NonNegative = Field(0.0, description="Distance at which the search stops [m].")
+
+
+class TargetParameters(ConfigModel):
+    """How often a target is told, and for how long it counts."""
+
+    hz: Hz = Field(50.0, description="How often it is told, in wall time.")
+    tf_timeout_s: Seconds = Field(0.5, description="How long it lasts when its TF stops; then nothing is told.")
+
+
+class SetupParameters(StartParameters, TargetParameters):
+    """What problems are made of."""
+
+    parent_frame_id: FrameId | None = Field(None, description="TF frame that the target is in: the solver's base.")
+    child_frame_id: FrameId | None = Field(None, description="TF frame that is the target.")
+    init_bx: NonNegative = Field(0.0, description="How far off the target along its x axis will do, both ways [m].")
+    init_by: NonNegative = Field(0.0, description="The same along y [m].")
+    init_bz: NonNegative = Field(0.0, description="The same along z [m].")
+    init_brx: NonNegative = Field(0.0, description="How far turned about its x axis will do, both ways [rad].")
+    init_bry: NonNegative = Field(0.0, description="The same about y [rad].")
+    init_brz: NonNegative = Field(0.0, description="The same about z [rad].")
+    goals: dict[Text, ListOf[float]] = Field({}, description="First goals of tasks that change, by task.")
+    max_num_prev_solutions: Count = Field(1, description="How many previous solutions a problem tells.")
+    seed: Count = Field(0, description="Of whatever is random in the solver.")
+
+    @model_validator(mode="after")
+    def _frames_go_together(self) -> SetupParameters:
+        if (self.parent_frame_id is None) != (self.child_frame_id is None):
+            missing = "parent_frame_id" if self.parent_frame_id is None else "child_frame_id"
+            raise KeyedError(missing, "missing; parent_frame_id and child_frame_id go together")
+        if self.child_frame_id is None and not self.goals:
+            raise KeyedError("child_frame_id", "missing; a problem has a target frame, or goals of tasks")
+        return self
+
+
+class SolverNodeParameters(StartParameters):
+    """Private parameters of the node itself; all others are the solver's."""
+
+    base_frame_id: str = Field("", description="TF frame of the solver's base; empty takes poses as they are.")
+    continuity: JointRateLimiterConfig | None = Field(
+        None, description="Keeps targets within the velocities of the joints."
+    )
+
+
+class TfToFloatArrayConfig(TargetParameters):
+    """Which transform becomes numbers, and which numbers."""
+
+    parent_frame_id: FrameId = Field(description="The frame that the pose is in.")
+    child_frame_id: FrameId = Field(description="The frame whose pose it is.")
+    mode: Literal["pos", "pos+quat", "pos+eul"] = Field(
+        "pos+quat",
+        description="x, y, z [m]; and then a quaternion x, y, z, w, or roll, pitch, yaw [rad], or nothing.",
+    )

@@ -1,0 +1,202 @@
+"""How bodies and links behave in contact and motion: reading it, and changing it while the world runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import pybullet
+
+from custom_ros_tools.errors import PhysicsError, UnknownNameError
+from rpbi.config.pybullet_models import ChangeDynamics
+
+if TYPE_CHECKING:
+    from .body import Body
+
+
+class LinkDynamics(NamedTuple):
+    """What PyBullet's `getDynamicsInfo` tells of a link, under the names of the message ObjectDynamics.
+
+    Attributes:
+        mass: Mass [kg], 0 for what never moves.
+        lateral_friction: Coulomb friction coefficient.
+        local_inertia_diagonal: Principal moments of inertia [kg m^2].
+        local_inertia_pos: Centre of mass in the link's frame [m].
+        local_inertia_orn: Principal axes in the link's frame, x, y, z, w.
+        restitution: Bounciness.
+        rolling_friction: Friction against rolling.
+        spinning_friction: Friction about the contact normal.
+        contact_damping: Damping of contacts [N s/m], -1 as long as it is not set.
+        contact_stiffness: Stiffness of contacts [N/m], -1 as long as it is not set.
+        body_type: PyBullet's: 1 rigid, 2 multi, 3 soft.
+        collision_margin: Margin around the shape [m].
+    """
+
+    mass: float
+    lateral_friction: float
+    local_inertia_diagonal: Sequence[float]
+    local_inertia_pos: Sequence[float]
+    local_inertia_orn: Sequence[float]
+    restitution: float
+    rolling_friction: float
+    spinning_friction: float
+    contact_damping: float
+    contact_stiffness: float
+    body_type: int
+    collision_margin: float
+
+
+KEYS = {
+    "mass": "mass",
+    "lateral_friction": "lateralFriction",
+    "local_inertia_diagonal": "localInertiaDiagonal",
+    "restitution": "restitution",
+    "rolling_friction": "rollingFriction",
+    "spinning_friction": "spinningFriction",
+    "contact_damping": "contactDamping",
+    "contact_stiffness": "contactStiffness",
+    "collision_margin": "collisionMargin",
+}
+"""PyBullet's argument for each field of LinkDynamics that can be changed."""
+
+
+def difference(present: LinkDynamics, wanted: LinkDynamics) -> dict[str, Any]:
+    """Returns what has to be changed, by PyBullet's name; empty lists ask for nothing.
+
+    Raises:
+        ValueError: If a value is not finite, negative, or cannot be changed; it names all such fields.
+    """
+    changed: dict[str, Any] = {}
+    problems: list[str] = []
+    for field in LinkDynamics._fields:
+        old, new = _numbers(getattr(present, field)), _numbers(getattr(wanted, field))
+        if new in (old, ()):
+            continue
+        if len(new) != len(old):
+            problems.append(f"{field}: expected {len(old)} numbers or none, got {len(new)}")
+        elif not all(map(math.isfinite, new)):
+            problems.append(f"{field}: must be finite, got {_shown(new)}")
+        elif field not in KEYS:
+            problems.append(f"{field}: cannot be changed, expected {_shown(old)}, got {_shown(new)}")
+        elif min(new) < 0:
+            problems.append(f"{field}: must be >= 0, got {_shown(new)}")
+        else:
+            changed[KEYS[field]] = getattr(wanted, field)
+    pair = {"contact_damping": wanted.contact_damping, "contact_stiffness": wanted.contact_stiffness}
+    if not problems and any(KEYS[field] in changed for field in pair):
+        for field, value in pair.items():
+            if value < 0:
+                problems.append(f"{field}: must be >= 0 when the other is set, got {value:g}")
+            changed[KEYS[field]] = value
+    if problems:
+        raise ValueError("; ".join(problems))
+    return changed
+
+
+def _numbers(value: float | Sequence[float]) -> tuple[float, ...]:
+    return tuple(value) if isinstance(value, Sequence) else (value,)
+
+
+def _shown(values: tuple[float, ...]) -> str:
+    return f"{values[0]:g}" if len(values) == 1 else str(list(values))
+
+
+_OF_CONTACTS = (
+    *("lateralFriction", "spinningFriction", "rollingFriction", "restitution", "contactStiffness", "contactDamping"),
+    *("frictionAnchor", "ccdSweptSphereRadius", "contactProcessingThreshold", "anisotropicFriction", "collisionMargin"),
+)
+_OF_JOINTS = ("jointDamping", "maxJointVelocity", "jointLowerLimit", "jointUpperLimit", "jointLimitForce")
+
+
+def link_index(body: Body, link: str) -> int:
+    """Returns PyBullet's index of a link.
+
+    Args:
+        body: The body.
+        link: Name of the link; empty for the root link.
+
+    Raises:
+        UnknownNameError: If the body has no such link.
+        ValueError: If the body is soft.
+    """
+    if body.is_soft:
+        raise ValueError(f"'{body.name}' is soft: what it is made of stands in its file and does not change")
+    links = {body.pb.getJointInfo(body.body_id, index)[12].decode(): index for index in body.joint_indices}
+    known = [body.root_link, *(name for name, index in links.items() if index in body.link_indices)]
+    wanted = link or body.root_link
+    if wanted not in known:
+        raise UnknownNameError(f"link of {body.name}", wanted, known)
+    return links.get(wanted, -1)
+
+
+def read_dynamics(body: Body, link: str) -> LinkDynamics:
+    """Returns how a link behaves now.
+
+    Raises:
+        UnknownNameError: If the body has no such link.
+    """
+    return LinkDynamics(*body.pb.getDynamicsInfo(body.body_id, link_index(body, link)))
+
+
+def change_dynamics(body: Body, link: str, change: ChangeDynamics) -> None:
+    """Changes how a link behaves; when it raises, nothing has changed.
+
+    With the mass, moments of inertia change in proportion, unless they are given: PyBullet's own way, those of the
+    collision shape, would forget the URDF's.
+
+    Args:
+        body: The body.
+        link: Name of the link; empty for the root link.
+        change: What to change.
+
+    Raises:
+        UnknownNameError: If the body has no such link.
+        ValueError: If it makes no sense for this link; it names all such keys.
+        PhysicsError: If PyBullet refuses.
+    """
+    index = link_index(body, link)
+    present = LinkDynamics(*body.pb.getDynamicsInfo(body.body_id, index))
+    arguments = change.kwargs()
+    problems = _problems(body, index, present, arguments)
+    if problems:
+        raise ValueError("; ".join(problems))
+    if "mass" in arguments:
+        ratio = arguments["mass"] / present.mass
+        arguments.setdefault("localInertiaDiagonal", [ratio * moment for moment in present.local_inertia_diagonal])
+    try:
+        body.pb.changeDynamics(body.body_id, index, **arguments)
+    except pybullet.error as error:
+        raise PhysicsError(f"{body.name}: {error}") from error
+    if arguments.keys() & _OF_CONTACTS:
+        _renew_contacts(body, index)
+    body.dynamics_changes += 1
+
+
+def _renew_contacts(body: Body, index: int) -> None:
+    """Has PyBullet make the contacts of a link anew: those that last keep the friction that they began with."""
+    ends = {((touch[1], touch[3]), (touch[2], touch[4])) for touch in body.pb.getContactPoints(body.body_id)}
+    for (body_a, link_a), (body_b, link_b) in sorted(ends):
+        if (body.body_id, index) in ((body_a, link_a), (body_b, link_b)):
+            for is_enabled in (0, 1):
+                body.pb.setCollisionFilterPair(body_a, body_b, link_a, link_b, is_enabled)
+
+
+def _problems(body: Body, index: int, present: LinkDynamics, arguments: dict[str, Any]) -> list[str]:
+    """Returns what a link cannot be given."""
+    problems = []
+    what = body.name if index < 0 else f"{body.name}/{body.pb.getJointInfo(body.body_id, index)[12].decode()}"
+    for key in ("mass", "localInertiaDiagonal"):
+        if key in arguments and not present.mass:
+            problems.append(f"{key}: '{what}' is static, and stays so; add a dynamic object instead")
+    if present.mass and arguments.get("mass") == 0:
+        problems.append("mass: must be > 0 [kg], got 0: what moves cannot be made static")
+    if present.mass and 0.0 in arguments.get("localInertiaDiagonal", ()):
+        problems.append("localInertiaDiagonal: must be > 0 [kg m^2] each")
+    if arguments.get("contactStiffness") == 0:
+        problems.append("contactStiffness: must be > 0 [N/m], got 0: nothing would keep bodies apart")
+    if not body.pb.getCollisionShapeData(body.body_id, index):
+        problems += [f"{key}: '{what}' has no collision shape" for key in arguments if key in _OF_CONTACTS]
+    if index < 0 or body.pb.getJointInfo(body.body_id, index)[2] == pybullet.JOINT_FIXED:
+        problems += [f"{key}: '{what}' hangs on no joint that moves" for key in arguments if key in _OF_JOINTS]
+    return problems

@@ -1,0 +1,94 @@
+"""What is wrong with meshes that PyBullet would take without a word."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+
+from rpbi.config.pybullet_models import CreateCollisionShape, CreateVisualShape
+
+_STL_HEADER = struct.Struct("<80xI")
+_STL_TRIANGLE_SIZE = 50  # bytes
+
+
+def mesh_problems(shape: CreateVisualShape | CreateCollisionShape) -> list[tuple[str, str]]:
+    """Returns key and message of each fault in what a shape says about its mesh."""
+    problems = []
+    if shape.fileName is not None and shape.fileName.lower().endswith(".stl") and not _is_binary_stl(shape.fileName):
+        problems.append(("fileName", f"expected a whole binary STL file, got another kind or a part: {shape.fileName}"))
+    if shape.indices is not None:
+        corners = len(shape.vertices or ())
+        if len(shape.indices) % 3:
+            problems.append(("indices", f"expected three for each triangle, got {len(shape.indices)} of them"))
+        if any(index >= corners for index in shape.indices):
+            problems.append(("indices", f"expected numbers of the {corners} vertices, got {max(shape.indices)}"))
+    return problems
+
+
+def _is_binary_stl(path: str) -> bool:
+    data = Path(path).read_bytes()
+    if len(data) <= _STL_HEADER.size:
+        return False
+    (triangles,) = _STL_HEADER.unpack_from(data)
+    return len(data) == _STL_HEADER.size + triangles * _STL_TRIANGLE_SIZE
+
+
+SOFT_MESH_FORMATS = (".obj", ".vtk")
+
+
+def soft_mesh_problems(path: str) -> list[str]:
+    """Returns what is wrong with the mesh of a soft body, a sentence for each fault.
+
+    Args:
+        path: The file, which exists.
+    """
+    kind = Path(path).suffix.lower()
+    if kind not in SOFT_MESH_FORMATS:
+        return [f"expected one of {', '.join(SOFT_MESH_FORMATS)}, got {path}"]
+    try:
+        lines = [line.split() for line in Path(path).read_text(encoding="utf-8").splitlines()]
+        return [] if (_check_vtk if kind == ".vtk" else _check_obj)(lines) else [f"{path} is empty"]
+    except UnicodeDecodeError:
+        return [f"{path} is not text"]
+    except (ValueError, IndexError, StopIteration) as error:
+        return [f"{path} is no mesh that PyBullet can simulate: {str(error) or 'it ends too early'}"]
+
+
+def _check_obj(lines: list[list[str]]) -> bool:
+    """Returns whether the mesh has faces; raises ValueError if a number is none or names no corner."""
+    corners = sum(1 for words in lines if words[:1] == ["v"] and _finite(words[1:4]))
+    faces = [words[1:] for words in lines if words[:1] == ["f"]]
+    for face in faces:
+        for corner in face:
+            number = int(corner.split("/")[0])
+            if not 1 <= abs(number) <= corners:
+                raise ValueError(f"a face names corner {number} of {corners}")
+    return bool(faces)
+
+
+def _check_vtk(lines: list[list[str]]) -> bool:
+    """Returns whether the mesh has tetrahedra; raises ValueError if a number is none or names no corner."""
+    rest = iter(lines)
+    points = int(_after(rest, "POINTS")[1])
+    for number in range(points):
+        if not _finite(next(rest)):
+            raise ValueError(f"point {number} is not three numbers on a line")
+    cells = int(_after(rest, "CELLS")[1])
+    for number in range(cells):
+        corners = [int(word) for word in next(rest)]
+        if len(corners) != 5 or corners[0] != 4 or not all(0 <= corner < points for corner in corners[1:]):
+            raise ValueError(f"cell {number} is not a tetrahedron of the {points} points on a line: {corners}")
+    return cells > 0
+
+
+def _after(lines: Iterator[list[str]], word: str) -> list[str]:
+    for words in lines:
+        if words[:1] == [word]:
+            return words
+    raise ValueError(f"it has no {word}")
+
+
+def _finite(words: list[str]) -> bool:
+    return len(words) == 3 and all(math.isfinite(float(word)) for word in words)

@@ -1,0 +1,1 @@
+"""Bodies with joints that are driven."""

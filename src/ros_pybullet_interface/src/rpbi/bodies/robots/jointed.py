@@ -1,0 +1,164 @@
+"""What robots that move and robots that are only shown have in common."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from typing import ClassVar
+
+from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
+from rpbi.bodies.body import Body
+from rpbi.engine.client import Client
+from rpbi.engine.inputs import Input, PoseInput
+from rpbi.kinematics import Kinematics
+from rpbi.sensors.base_state import BaseStateSensor
+from rpbi.sensors.force_torque import ForceTorqueSensor
+from rpbi.sensors.link_pose import LinkPoseSensor
+from rpbi.sensors.sensor import Sensor
+from rpbi.urdf.document import resolve_meshes
+from rpbi.urdf.joints import Joint, JointModel, JointTarget
+from rpbi.urdf.loading import load_urdf
+
+from .robot_config import RobotConfig
+
+DEFAULT_BASE_STATE_HZ = 50.0
+"""Rate of the state of a base that physics moves [Hz]."""
+
+
+class JointedBody(Body):
+    """A body that comes from a URDF and stands at its start position.
+
+    Args:
+        pb: The client to create it in.
+        config: Its configuration.
+        fixed_base: Whether its base is fixed, whatever the configuration says.
+
+    Raises:
+        ConfigError: If the configuration does not fit the robot.
+        PhysicsError: If PyBullet cannot load it.
+    """
+
+    Config = RobotConfig
+    section = "robots"
+    force_torque_sensors: tuple[ForceTorqueSensor, ...] = ()
+    base_joints: ClassVar[int] = 0
+    """How many joints `prepare_urdf` puts between the world and the root link."""
+    prepare_urdf = staticmethod(resolve_meshes)
+    """Returns a URDF file that PyBullet can load in place of the configured one."""
+
+    def __init__(self, pb: Client, config: RobotConfig, fixed_base: bool = False) -> None:
+        arguments = config.loadURDF.kwargs()
+        if fixed_base or self.base_joints:
+            arguments["useFixedBase"] = True
+        self.has_fixed_base = bool(arguments.get("useFixedBase", False)) and not self.base_joints
+        super().__init__(pb, config.name, load_urdf(pb, config.name, arguments, self.prepare_urdf))
+        self.config = config
+        joints = [Joint.from_info(pb.getJointInfo(self.body_id, i)) for i in self.joint_indices]
+        self.model = JointModel(joints, self.base_joints)
+        self.joints = self.model.own
+        self.link_indices = tuple(joint.index for joint in self.joints)
+        if self.base_joints:
+            self.root_link = joints[self.base_joints - 1].link
+        problems = self._problems()
+        if problems:
+            raise ConfigError(problems)
+        for index, position in self.start_positions().items():
+            pb.resetJointState(self.body_id, index, position)
+        if config.color_alpha is not None:
+            self._set_alpha(config.color_alpha)
+
+    def sensors(self) -> tuple[Sensor, ...]:
+        """Link poses, or that of the root link alone, if they are to be broadcast, and the state of the base."""
+        config = self.config
+        sensors: list[Sensor] = []
+        if config.broadcast_link_states:
+            sensors.append(LinkPoseSensor(self, config.broadcast_link_states_hz))
+        elif config.broadcast_root_tf_hz:
+            sensors.append(LinkPoseSensor(self, config.broadcast_root_tf_hz, links=False))
+        base_state_hz = config.base_state_hz
+        if base_state_hz is None:
+            base_state_hz = 0.0 if self.has_fixed_base else DEFAULT_BASE_STATE_HZ
+        if base_state_hz:
+            sensors.append(BaseStateSensor(self, base_state_hz))
+        return tuple(sensors)
+
+    def inputs(self) -> Mapping[str, Input]:
+        """Takes `pose`, the pose of the TF frame that its base follows, if it follows one."""
+        if self.config.object_tf is None or not self.has_fixed_base:
+            return {}
+        return {"pose": PoseInput.following(self.config.object_tf, self.set_base_pose)}
+
+    @cached_property
+    def kinematics(self) -> Kinematics:
+        """Its kinematics in a client of their own, for any thread; made when first asked for."""
+        load = self.config.loadURDF
+        return Kinematics(load.fileName, load.globalScaling or 1.0, load.flags or 0)
+
+    def start_positions(self) -> dict[int, float]:
+        """Returns the start position [rad or m] of each driven joint by index."""
+        configured: dict[str, float] = {}
+        for name, value in self.config.initial_joint_position.items():
+            in_degrees = self.config.initial_revolute_joint_positions_are_deg and self.model[name].is_revolute
+            configured[name] = math.radians(value) if in_degrees else value
+        return {joint.index: configured.get(joint.name, 0.0) for joint in self.model.driven}
+
+    def joint_positions(self) -> dict[int, float]:
+        """Returns the measured position [rad or m] of each driven joint by index."""
+        indices = [joint.index for joint in self.model.driven]
+        states = self.pb.getJointStates(self.body_id, indices) if indices else ()
+        return {index: state[0] for index, state in zip(indices, states)}
+
+    def efforts(self, reported: tuple[float, ...]) -> tuple[float, ...]:
+        """Returns the motors' efforts [N m or N] of all joints, of which PyBullet reported some."""
+        return reported
+
+    def set_joint_state(self, target: JointTarget) -> None:
+        """Puts joints at positions [rad or m] with velocities [rad/s or m/s], 0 where none is given, at once.
+
+        Raises:
+            UnknownNameError: If the robot lacks one of the joints.
+            ValueError: If a number is missing, not finite or outside the joint's limits.
+        """
+        positions = self.model.resolve_driven(target.names, target.position)
+        velocities = self.model.resolve(target.names, target.velocity) if target.velocity else {}
+        self.model.check_limits(positions)
+        for index, velocity in velocities.items():
+            joint = self.model.joints[index]
+            if abs(velocity) > joint.max_velocity:
+                limit = f"{joint.max_velocity:g} {joint.unit}/s"
+                raise ValueError(f"velocity of joint '{joint.name}' must be within +-{limit}, got {velocity:g}")
+        for index, position in positions.items():
+            self.pb.resetJointState(self.body_id, index, position, velocities.get(index, 0.0))
+
+    def remove(self) -> None:
+        """Takes it out of the world, and its kinematics with it."""
+        if "kinematics" in vars(self):
+            self.kinematics.close()
+        super().remove()
+
+    def _problems(self) -> list[Problem]:
+        """Returns what in the configuration does not fit the robot."""
+        problems = self._unknown_joints("initial_joint_position", self.config.initial_joint_position)
+        if problems:
+            return problems
+        starts = ((self.model.joints[index], position) for index, position in self.start_positions().items())
+        return [
+            Problem(self.name, f"initial_joint_position.{joint.name}", joint.limit_violation(position))
+            for joint, position in starts
+            if joint.name in self.config.initial_joint_position and not joint.allows(position)
+        ]
+
+    def _unknown_joints(self, key: str, names: Iterable[str]) -> list[Problem]:
+        problems = []
+        for name in names:
+            try:
+                self.model[name]
+            except UnknownNameError as error:
+                problems.append(Problem(self.name, f"{key}.{name}", str(error)))
+        return problems
+
+    def _set_alpha(self, alpha: float) -> None:
+        """Makes every visual shape as opaque as asked."""
+        for shape in self.pb.getVisualShapeData(self.body_id):
+            self.pb.changeVisualShape(self.body_id, shape[1], rgbaColor=(*shape[7][:3], alpha))

@@ -1,0 +1,67 @@
+"""Mobile robots: robots whose base drives over the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rpbi.control.planar_base import PlanarBase
+from rpbi.control.planar_velocity import PlanarVelocity
+from rpbi.engine.client import Client
+from rpbi.engine.inputs import Input
+from rpbi.geometry import Pose, Twist, rotated
+from rpbi.urdf.planar_joints import PLANAR_JOINTS, with_planar_joints
+
+from .robot import Robot
+from .robot_config import RobotConfig
+
+
+class MobileRobot(Robot):
+    """A robot whose base stays in a plane, the one that is x-y of its start pose, and drives there by velocity.
+
+    Joints between the world and the root link move it. They are none of the robot's own: neither its joint states nor
+    its targets know them.
+
+    Raises:
+        ConfigError: If the configuration does not fit the robot.
+        PhysicsError: If PyBullet cannot load it.
+    """
+
+    base_joints = len(PLANAR_JOINTS)
+    prepare_urdf = staticmethod(with_planar_joints)
+
+    def __init__(self, pb: Client, config: RobotConfig) -> None:
+        super().__init__(pb, config)
+        assert config.planar_base is not None  # `claims` has seen it
+        self.planar_base = PlanarBase(pb, self.body_id, config.planar_base, self.dt_s)
+
+    @classmethod
+    def claims(cls, data: Mapping[str, Any]) -> bool:
+        """Tells whether a YAML of the section `robots` is that of a robot whose base drives."""
+        return data.get("planar_base") is not None
+
+    def inputs(self) -> Mapping[str, Input]:
+        """Takes `cmd_vel`, a Twist in the base frame, beside what every robot takes."""
+        return {**super().inputs(), "cmd_vel": Input(PlanarVelocity.checked, self.planar_base.follow)}
+
+    def before_step(self, tick: int) -> None:
+        """Drives the base, beside what every robot does."""
+        super().before_step(tick)
+        self.planar_base.before_step(tick)
+
+    def base_pose(self) -> Pose:
+        """Returns the pose of the root link's URDF frame in the world."""
+        return super().base_pose() @ self.planar_base.pose_in_plane()
+
+    def base_twist(self) -> Twist:
+        """Returns the twist of the root link's URDF frame in the world."""
+        plane = super().base_pose().quat_xyzw
+        x, y, yaw = self.planar_base.velocity_in_plane()
+        return Twist(rotated(plane, (x, y, 0.0)), rotated(plane, (0.0, 0.0, yaw)))
+
+    def set_base_pose(self, pose: Pose) -> None:
+        """Puts the root link's URDF frame at a pose in the world, at rest; from then on it stays in that x-y plane."""
+        super().set_base_pose(pose)
+        for index in PLANAR_JOINTS:
+            self.pb.resetJointState(self.body_id, index, 0.0)
+        self.planar_base.rest()

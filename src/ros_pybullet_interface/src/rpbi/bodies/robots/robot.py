@@ -1,0 +1,243 @@
+"""Robots: jointed bodies whose motors hold and follow targets."""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import pybullet
+
+from custom_ros_tools.errors import Problem, UnknownNameError
+from rpbi.control.gravity import GravityModel
+from rpbi.control.limit_reports import LimitReports
+from rpbi.control.motion import JointMotion, Motion
+from rpbi.control.motors import Command, Motors
+from rpbi.control.trajectories.config import trajectory_problems
+from rpbi.control.trajectories.follower import TrajectoryFollower
+from rpbi.engine.client import Client
+from rpbi.engine.inputs import Input
+from rpbi.geometry import Pose
+from rpbi.sensors.contact_arrows import contact_sensors
+from rpbi.sensors.force_torque import ForceTorqueSensor
+from rpbi.sensors.joint_state import JointStateSensor
+from rpbi.sensors.sensor import Sensor
+from rpbi.sensors.trajectory_state import TrajectoryStateSensor
+from rpbi.urdf.joints import JointTarget
+
+from .jointed import JointedBody
+from .robot_config import RobotConfig
+
+log = logging.getLogger(__name__)
+
+
+class Robot(JointedBody):
+    """A robot with motors, within the effort and velocity limits of its URDF.
+
+    It holds its start position until the first target. Targets of joints that a motion drives are refused until it
+    ends.
+
+    Raises:
+        ConfigError: If the configuration does not fit the robot.
+        PhysicsError: If PyBullet cannot load it.
+    """
+
+    def __init__(self, pb: Client, config: RobotConfig) -> None:
+        super().__init__(pb, config)
+        assert config.setJointMotorControlArray is not None  # the model demands it
+        mode = config.setJointMotorControlArray.controlMode
+        self.dt_s: float = pb.getPhysicsEngineParameters()["fixedTimeStep"]
+        self.motors = Motors(
+            pb,
+            self.body_id,
+            self.model,
+            mode,
+            self._gains(),
+            LimitReports(self.name),
+            config.enforce_effort_limits,
+            config.target_timeout_s,
+            self.dt_s,
+        )
+        self.force_torque_sensors = tuple(
+            ForceTorqueSensor(self, self.model[each.joint], each, config.joint_state_publisher_hz)
+            for each in config.enabled_joint_force_torque_sensors
+        )
+        self.motion: Motion | None = None
+        follower = config.joint_trajectory_controller
+        self.follower = None if follower is None else TrajectoryFollower(self, follower)
+        self._has_begun = False
+        self._gravity = GravityModel(self) if config.gravity_compensation else None
+        if config.resetBaseVelocity is not None and self.has_fixed_base:
+            log.warning("%s: resetBaseVelocity: has no effect: the base is fixed (useFixedBase is set)", self.name)
+        elif config.resetBaseVelocity is not None:
+            pb.resetBaseVelocity(self.body_id, **config.resetBaseVelocity.kwargs())
+        if config.object_tf is not None and not self.has_fixed_base:
+            log.warning("%s: object_tf: has no effect: physics moves a base that is not fixed", self.name)
+
+    @classmethod
+    def claims(cls, data: Mapping[str, Any]) -> bool:
+        """Tells whether a YAML of the section `robots` is that of a robot with motors whose base does not drive."""
+        return data.get("is_visual_robot") not in (True, 1) and data.get("planar_base") is None
+
+    def sensors(self) -> tuple[Sensor, ...]:
+        """Joint states, force-torque sensors, the follower's state and contacts, beside link poses."""
+        joint_states = JointStateSensor(self, self.config.joint_state_publisher_hz)
+        trajectory = () if self.follower is None else (TrajectoryStateSensor(self, self.follower),)
+        contacts = contact_sensors(self, self.config.contacts)
+        return (joint_states, *self.force_torque_sensors, *trajectory, *contacts, *super().sensors())
+
+    def inputs(self) -> Mapping[str, Input]:
+        """Takes `target`, a JointTarget of what the control mode asks for, beside the pose of its base."""
+        target = Input(self._check_target, self.motors.follow, merge=Command.merged)
+        return {**super().inputs(), "target": target}
+
+    def before_step(self, tick: int) -> None:
+        """Follows the motion, lets targets expire and applies efforts."""
+        if self.motion is not None:
+            self._advance(self.motion, tick)
+        if self._gravity is not None and self.motors.mode == pybullet.TORQUE_CONTROL:
+            self.motors.set_feed_forward(self._gravity.efforts())
+        self.motors.before_step(tick)
+
+    def run(self, motion: Motion) -> None:
+        """Starts a motion; one that runs is ended with a reason.
+
+        Raises:
+            ValueError: If the robot is under torque control.
+        """
+        if self.motors.mode == pybullet.TORQUE_CONTROL:
+            raise ValueError("the robot is under TORQUE_CONTROL, where nothing holds it to a position")
+        self.halt("a newer motion replaced it")
+        self.motion, self._has_begun = motion, False
+
+    def halt(self, reason: str) -> None:
+        """Ends the motion that runs, if any; its joints hold where they are."""
+        if self.motion is not None:
+            measured = self.joint_motion()
+            self.motion.halt(reason, measured)
+            for index in self.motion.joints:
+                self.motors.track(index, measured[index][0], 0.0)
+            self._end_motion(self.motion)
+
+    def pause(self, reason: str) -> None:
+        """Ends the motion that runs, unless it can wait until the world runs again."""
+        if self.motion is not None and not self.motion.can_wait:
+            self.halt(reason)
+
+    def switch_mode(self, mode: int) -> None:
+        """Changes PyBullet's control mode, if it is another one; a motion that runs is ended."""
+        if mode != self.motors.mode:
+            self.halt("the control mode was changed")
+            self.motors.switch(mode)
+
+    def set_joint_state(self, target: JointTarget) -> None:
+        """Puts joints somewhere at once, where the motors then hold them; a motion that runs is ended."""
+        super().set_joint_state(target)
+        self.halt("its joints were put elsewhere")
+        self.motors.rest(self.model.resolve(target.names, target.position))
+
+    def teleport(self, pose: Pose) -> None:
+        """Puts the base link's URDF frame at a pose in the world, at rest; a motion that runs is ended."""
+        self.halt("the robot was put elsewhere")
+        super().teleport(pose)
+
+    def efforts(self, reported: tuple[float, ...]) -> tuple[float, ...]:
+        """Returns the motors' efforts [N m or N] of all joints; PyBullet does not report those of torque control."""
+        if self.motors.mode != pybullet.TORQUE_CONTROL:
+            return reported
+        return tuple(self.motors.applied_efforts.get(joint.index, 0.0) for joint in self.joints)
+
+    def joint_motion(self) -> JointMotion:
+        """Returns measured position [rad or m] and velocity [rad/s or m/s] of each driven joint by index."""
+        indices = [joint.index for joint in self.model.driven]
+        states = self.pb.getJointStates(self.body_id, indices) if indices else ()
+        return {index: (state[0], state[1]) for index, state in zip(indices, states)}
+
+    def remove(self) -> None:
+        """Takes the robot out of the world; a motion that runs is ended."""
+        self.halt("the robot was removed")
+        if self._gravity is not None:
+            self._gravity.close()
+        super().remove()
+
+    def _advance(self, motion: Motion, tick: int) -> None:
+        measured = self.joint_motion()
+        if not self._has_begun:
+            motion.begin(tick * self.dt_s, measured)
+            self._has_begun = True
+        for index, (position, velocity) in motion.advance((tick + 1) * self.dt_s, measured).items():
+            self.motors.track(index, position, velocity)
+        if motion.is_over:
+            self._end_motion(motion)
+
+    def _end_motion(self, motion: Motion) -> None:
+        self.motion = None
+        self.motors.release(motion.joints)
+
+    def _check_target(self, target: JointTarget) -> Command:
+        command = self.motors.check(target)
+        motion = self.motion
+        driven = [] if motion is None else [self.model.joints[i].name for i in command.values if i in motion.joints]
+        if driven:
+            raise ValueError(f"a motion drives {', '.join(driven)} until it ends")
+        return command
+
+    def _gains(self) -> dict[int, dict[str, float]]:
+        """Returns PyBullet's gains by joint index; what does not fit was found before."""
+        gains: dict[int, dict[str, float]] = {}
+        for key, given in self._configured_gains().items():
+            argument = key.removesuffix("s")
+            if isinstance(given, Mapping):
+                by_index = {self.model[name].index: gain for name, gain in given.items()}
+            else:
+                by_index = {joint.index: given[i % len(given)] for i, joint in enumerate(self.model.driven)}
+            for index, gain in by_index.items():
+                gains.setdefault(index, {})[argument] = gain
+        return gains
+
+    def _configured_gains(self) -> dict[str, tuple[float, ...] | dict[str, float]]:
+        motors = self.config.setJointMotorControlArray
+        given = {key: getattr(motors, key) for key in ("positionGains", "velocityGains")}
+        return {key: gains for key, gains in given.items() if gains is not None}
+
+    def _problems(self) -> list[Problem]:
+        problems = [*super()._problems(), *self._trajectory_problems()]
+        driven = self.model.driven
+        for key, gains in self._configured_gains().items():
+            path = f"setJointMotorControlArray.{key}"
+            if isinstance(gains, Mapping):
+                problems += self._unknown_joints(path, gains)
+            elif len(gains) not in (1, len(driven)):
+                names = ", ".join(joint.name for joint in driven)
+                message = f"expected 1 number or {len(driven)}, one for each of {names}; got {len(gains)}"
+                problems.append(Problem(self.name, path, message))
+        return [*problems, *self._force_torque_problems(), *self._gravity_problems()]
+
+    def _gravity_problems(self) -> list[Problem]:
+        """PyBullet's inverse dynamics know joints of one axis only."""
+        others = [joint.name for joint in self.joints if not (joint.is_driven or joint.is_fixed)]
+        if not (self.config.gravity_compensation and others):
+            return []
+        message = f"works with revolute, prismatic and fixed joints only; there are {', '.join(others)}"
+        return [Problem(self.name, "gravity_compensation", message)]
+
+    def _trajectory_problems(self) -> list[Problem]:
+        names = [joint.name for joint in self.model.driven]
+        return trajectory_problems(self.name, self.config.joint_trajectory_controller, names)
+
+    def _force_torque_problems(self) -> list[Problem]:
+        problems = []
+        joints = [each.joint for each in self.config.enabled_joint_force_torque_sensors]
+        for index, joint in enumerate(joints):
+            key = f"enabled_joint_force_torque_sensors[{index}]"
+            if joint in joints[:index]:
+                problems.append(Problem(self.name, key, f"joint '{joint}' has a sensor already; one joint has one"))
+            if not re.fullmatch(r"\w+", joint, re.ASCII):
+                message = f"topics are named after joint '{joint}', which only letters, digits and '_' allow"
+                problems.append(Problem(self.name, key, message))
+            try:
+                self.model[joint]
+            except UnknownNameError as error:
+                problems.append(Problem(self.name, key, str(error)))
+        return problems

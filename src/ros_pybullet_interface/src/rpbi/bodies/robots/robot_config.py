@@ -1,0 +1,104 @@
+"""What the YAML file of a robot may say."""
+
+from __future__ import annotations
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from custom_ros_tools.schema import Hz, HzOrOff, KeyedError, ListOf, Seconds, Switch
+from rpbi.bodies.body_config import BodyConfig
+from rpbi.config.pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity, SetJointMotorControlArray
+from rpbi.config.sensors import ContactsConfig, ForceTorqueEntry
+from rpbi.control.planar_base import PlanarBaseConfig
+from rpbi.control.trajectories.config import JointTrajectoryControllerConfig
+
+
+class RobotConfig(BodyConfig):
+    """A robot, simulated or only shown."""
+
+    loadURDF: LoadURDF = Field(description="Its description and where its base is.")
+    is_visual_robot: Switch = Field(
+        False, description="Whether it is only shown: it follows joint targets and TF, and nothing can touch it."
+    )
+    setJointMotorControlArray: SetJointMotorControlArray | None = Field(
+        None, description="How its motors follow targets; required unless it is a visual robot."
+    )
+    initial_joint_position: dict[str, float] = Field(
+        {}, description="Start position by joint; those not named start at 0.", json_schema_extra={"unit": "deg or m"}
+    )
+    initial_revolute_joint_positions_are_deg: Switch = Field(
+        True, description="Whether start positions of revolute joints are in degrees, else in radians."
+    )
+    initial_joint_state_topic: str | None = Field(
+        None, description="Joint states, for instance of the real robot, to start at instead; waited for 5 s."
+    )
+    move_to_initial_joint_state_on_startup: Switch = Field(
+        False, description="Accepted without effect: a robot starts there and its motors hold it."
+    )
+    target_timeout_s: Seconds = Field(
+        0.5, description="Age at which velocity and torque targets expire, in the world's time; positions never do."
+    )
+    enforce_effort_limits: Switch = Field(True, description="Whether motors are held to the efforts of the URDF.")
+    gravity_compensation: Switch = Field(
+        False, description="Whether torque targets come on top of the torques that hold the robot against gravity."
+    )
+    joint_state_publisher_hz: Hz = Field(50.0, description="Rate of the joint states.")
+    broadcast_link_states: Switch = Field(False, description="Whether the poses of all links are on TF.")
+    broadcast_link_states_hz: Hz = Field(50.0, description="Rate of the links' poses on TF.")
+    broadcast_root_tf_hz: HzOrOff = Field(
+        0.0, description="Rate of the root link's pose on TF if those of all links are not; 0 is off."
+    )
+    base_state_hz: HzOrOff | None = Field(
+        None, description="Rate of the state of the base; 0 is off. By default 50 where physics moves it, else off."
+    )
+    planar_base: PlanarBaseConfig | None = Field(
+        None, description="Makes the base drive over the ground by `cmd_vel`, with these limits."
+    )
+    enabled_joint_force_torque_sensors: ListOf[ForceTorqueEntry] = Field(
+        (), description="Joints with a force-torque sensor: names, or mappings with all of its keys."
+    )
+    joint_trajectory_controller: JointTrajectoryControllerConfig | None = Field(
+        None, description="Follower of trajectories, for planners; {} has the usual settings."
+    )
+    object_tf: ObjectTf | None = Field(None, description="TF frame that a fixed or visual base follows.")
+    resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity of a floating base.")
+    do_log_joint_limit_violations: Switch = Field(
+        True, description="Whether a visual robot that is beyond its joints' limits is reported."
+    )
+    log_joint_limit_violations_hz: Hz = Field(50.0, description="Accepted without effect: each violation is told once.")
+    start_ik_callback: Switch = Field(
+        False, description="Whether it moves to what inverse kinematics finds for problems on the topic `ik`."
+    )
+    contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
+    color_alpha: float | None = Field(None, ge=0.0, le=1.0, description="Opacity of the whole robot, 0 to 1.")
+
+    @field_validator("setJointMotorControlArray")
+    @classmethod
+    def _has_motors_unless_visual(
+        cls, value: SetJointMotorControlArray | None, info: ValidationInfo
+    ) -> SetJointMotorControlArray | None:
+        if value is None and not info.data.get("is_visual_robot"):
+            raise KeyedError("setJointMotorControlArray", "missing; only a visual robot does without")
+        return value
+
+    @model_validator(mode="after")
+    def _follows_only_with_motors(self) -> RobotConfig:
+        if self.joint_trajectory_controller is not None and self.is_visual_robot:
+            raise KeyedError("joint_trajectory_controller", "a visual robot has no motors that could follow")
+        return self
+
+    @model_validator(mode="after")
+    def _touches_only_if_felt(self) -> RobotConfig:
+        if self.contacts is not None and self.is_visual_robot:
+            raise KeyedError("contacts", "a visual robot touches nothing")
+        return self
+
+    @model_validator(mode="after")
+    def _base_moves_one_way_only(self) -> RobotConfig:
+        if self.planar_base is not None:
+            if self.is_visual_robot:
+                raise KeyedError("planar_base", "a visual robot has no physics; its base follows object_tf")
+            if self.resetBaseVelocity is not None:
+                raise KeyedError("resetBaseVelocity", "a planar base starts at rest; remove this or planar_base")
+            if self.loadURDF.useMaximalCoordinates:
+                raise KeyedError("loadURDF.useMaximalCoordinates", "does not go with planar_base; remove one")
+        return self

@@ -1,0 +1,49 @@
+"""Visual robots: shown where joint targets and TF say, felt by nobody."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rpbi.control.limit_reports import LimitReports
+from rpbi.engine.client import Client
+from rpbi.engine.inputs import Input
+from rpbi.urdf.joints import JointTarget
+
+from .jointed import JointedBody
+from .robot_config import RobotConfig
+
+
+class VisualRobot(JointedBody):
+    """A robot without physics: it is put where it shall be, pushes nothing and is pushed by nothing.
+
+    Raises:
+        ConfigError: If the configuration does not fit the robot.
+        PhysicsError: If PyBullet cannot load it.
+    """
+
+    def __init__(self, pb: Client, config: RobotConfig) -> None:
+        super().__init__(pb, config, fixed_base=True)
+        self._limit_reports = LimitReports(self.name)
+        for link in (-1, *self.joint_indices):
+            pb.setCollisionFilterGroupMask(self.body_id, link, 0, 0)
+            # What has no mass does not fall; without inertia, though, spherical joints would not be finite.
+            pb.changeDynamics(self.body_id, link, mass=0.0, localInertiaDiagonal=(1.0, 1.0, 1.0))
+
+    @classmethod
+    def claims(cls, data: Mapping[str, Any]) -> bool:
+        """Tells whether a YAML of the section `robots` is that of a visual robot."""
+        return data.get("is_visual_robot") in (True, 1)
+
+    def inputs(self) -> Mapping[str, Input]:
+        """Takes `target`, a JointTarget of positions [rad or m], beside the pose of its base."""
+        return {**super().inputs(), "target": Input(self._check_target, self._show, merge=dict.__or__)}
+
+    def _check_target(self, target: JointTarget) -> dict[int, float]:
+        return self.model.resolve(target.names, target.values_of("position", "a visual robot shows positions"))
+
+    def _show(self, positions: dict[int, float]) -> None:
+        for index, position in positions.items():
+            self.pb.resetJointState(self.body_id, index, position)
+            if self.config.do_log_joint_limit_violations:
+                self._limit_reports.take(self.joints[index], position, "it is shown there")

@@ -1,0 +1,170 @@
+"""What of bodies can be seen, and where."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import pybullet
+
+from rpbi.engine.inputs import PoseInput
+from rpbi.geometry import Pose, Quaternion, Vector
+from rpbi.sensors.link_pose import LinkPoseSensor
+from rpbi.sensors.sensor import Sensor
+
+from . import Body
+from .shape_object import ShapeObject
+
+PLANE_SIZE_M = 40.0
+PLANE_THICKNESS_M = 0.001
+"""What is shown of a plane, which has no end: so much of it, just below its surface."""
+
+
+class ShapeKind(enum.Enum):
+    """What a shape is."""
+
+    BOX = enum.auto()
+    SPHERE = enum.auto()
+    CYLINDER = enum.auto()
+    MESH = enum.auto()
+    TRIANGLES = enum.auto()
+
+
+class BodyShape(NamedTuple):
+    """One visual shape of a link.
+
+    Attributes:
+        link_index: PyBullet's index of the link, -1 for the root.
+        link: Its name.
+        kind: What it is; a cylinder stands along z.
+        size: Extents along x, y and z [m]; factors on what MESH and TRIANGLES have.
+        pose_in_link: Its pose in the link's URDF frame.
+        rgba: Colour and opacity, each from 0 to 1.
+        mesh_file: File of a MESH.
+        is_textured: Whether a MESH has a picture on it, which its colour is multiplied with.
+        corners: Corners of TRIANGLES, three for each [m].
+    """
+
+    link_index: int
+    link: str
+    kind: ShapeKind
+    size: Vector
+    pose_in_link: Pose
+    rgba: tuple[float, float, float, float]
+    mesh_file: str = ""
+    is_textured: bool = False
+    corners: tuple[Vector, ...] = ()
+
+
+def body_shapes(body: Body) -> list[BodyShape]:
+    """Returns the visual shapes of a body; a capsule is a cylinder and two spheres, a soft body has none that stays.
+
+    PyBullet gives their poses in the URDF frames of the links, unlike those of the links themselves.
+
+    Args:
+        body: The body; only the simulation thread may ask.
+    """
+    if body.is_soft:
+        return []  # it tells its surface itself
+    found = body.pb.getVisualShapeData(body.body_id, pybullet.VISUAL_SHAPE_DATA_TEXTURE_UNIQUE_IDS)
+    return [part for data in found for part in _parts(body, data)]
+
+
+def link_pose(body: Body, link_index: int) -> Pose:
+    """Returns the pose of a link's URDF frame in the world.
+
+    Args:
+        body: The body; only the simulation thread may ask.
+        link_index: PyBullet's index of the link, -1 for the root.
+    """
+    if link_index == -1:
+        return body.base_pose()
+    return Pose(*body.pb.getLinkState(body.body_id, link_index, computeForwardKinematics=1)[4:6])
+
+
+def _parts(body: Body, data: Sequence[Any]) -> list[BodyShape]:
+    """Returns what a row of PyBullet's visual shapes consists of."""
+    _, index, kind, size, file, position, quat, rgba, texture = data
+    link = body.root_link if index == -1 else body.pb.getJointInfo(body.body_id, index)[12].decode()
+    frame = Pose(position, quat)
+
+    def shape(kind: ShapeKind, size: Vector, pose: Pose = frame, **more: Any) -> BodyShape:
+        return BodyShape(index, link, kind, size, pose, rgba, **more)
+
+    if kind == pybullet.GEOM_BOX:
+        return [shape(ShapeKind.BOX, size)]
+    if kind == pybullet.GEOM_SPHERE:
+        return [shape(ShapeKind.SPHERE, _cube(2 * size[0]))]
+    if kind in (pybullet.GEOM_CYLINDER, pybullet.GEOM_CAPSULE):
+        length, diameter = size[0], 2 * size[1]
+        cylinder = shape(ShapeKind.CYLINDER, (diameter, diameter, length))
+        if kind == pybullet.GEOM_CYLINDER:
+            return [cylinder]
+        ends = [frame @ Pose((0.0, 0.0, z)) for z in (length / 2, -length / 2)]
+        return [cylinder, *(shape(ShapeKind.SPHERE, _cube(diameter), end) for end in ends)]
+    if kind == pybullet.GEOM_PLANE:
+        surface = frame @ Pose(quat_xyzw=_turned_to(_plane_normal(body)))
+        middle = surface @ Pose((0.0, 0.0, -PLANE_THICKNESS_M / 2))
+        return [shape(ShapeKind.BOX, (PLANE_SIZE_M, PLANE_SIZE_M, PLANE_THICKNESS_M), middle)]
+    if file:
+        return [shape(ShapeKind.MESH, size, mesh_file=file.decode(), is_textured=texture >= 0)]
+    corners = _corners(body)
+    return [shape(ShapeKind.TRIANGLES, size, corners=corners)] if corners else []
+
+
+def _cube(edge_m: float) -> Vector:
+    return edge_m, edge_m, edge_m
+
+
+def _plane_normal(body: Body) -> Vector:
+    """Returns the normal of a plane, which PyBullet does not tell; that of a URDF is taken to be z."""
+    normal = body.visual.planeNormal if isinstance(body, ShapeObject) else None
+    return normal or (0.0, 0.0, 1.0)
+
+
+def _turned_to(normal: Vector) -> Quaternion:
+    """Returns the shortest rotation that turns z to a direction: about their cross product, `1 + cos` as its w."""
+    length = math.hypot(*normal)
+    x, y, z = (component / length for component in normal)
+    if z < -1.0 + 1e-9:
+        return 1.0, 0.0, 0.0, 0.0
+    norm = math.hypot(x, y, 1.0 + z)
+    return -y / norm, x / norm, 0.0, (1.0 + z) / norm
+
+
+def _corners(body: Body) -> tuple[Vector, ...]:
+    """Returns the corners of a mesh that stands in the object's file itself."""
+    visual = body.visual if isinstance(body, ShapeObject) else None
+    if visual is None or visual.vertices is None:
+        return ()
+    return tuple(visual.vertices[index] for index in visual.indices or ())
+
+
+def link_frame(body: Body, sensors: Iterable[Sensor], link: str) -> str | None:
+    """Returns the frame of ours, such as `rpbi/NAME/LINK`, that TF has of a link; None if it has none.
+
+    A robot of which the root link alone is told leaves the others to robot_state_publisher: they are taken to be there.
+
+    Args:
+        body: The body.
+        sensors: Its sensors.
+        link: Name of the link.
+    """
+    for sensor in sensors:
+        if isinstance(sensor, LinkPoseSensor):
+            if link == body.root_link:
+                return sensor.root_frame
+            if sensor.root_frame == f"rpbi/{body.name}/{body.root_link}":
+                return f"rpbi/{body.name}/{link}"
+    return None
+
+
+def followed_frame(body: Body) -> str | None:
+    """Returns the frame that the whole body follows, None if it follows none or has joints that move by themselves."""
+    if isinstance(body, ShapeObject):
+        for taken in body.inputs().values():
+            if isinstance(taken, PoseInput):
+                return taken.tf_id
+    return None

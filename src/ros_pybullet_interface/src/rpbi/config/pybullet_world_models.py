@@ -1,0 +1,166 @@
+"""What YAML may hand to PyBullet's functions about the world; each model is named after the function."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import pybullet
+from pydantic import BeforeValidator, Field, model_validator
+
+from custom_ros_tools.schema import (
+    AlsoTakes,
+    Count,
+    Degrees,
+    KeyedError,
+    ListOf,
+    NonNegative,
+    Position,
+    PositiveMetres,
+    Rgb,
+    Switch,
+    Text,
+    Unit,
+)
+
+from .pybullet_args import CONNECTION_MODES, JOINT_FEEDBACK_MODES, RESET_FLAGS, SOLVER_TYPES, VISUALIZER_FLAGS
+from .pybullet_models import PybulletModel
+
+Acceleration = Annotated[float, Unit("m/s^2")]
+Iterations = Annotated[int, Field(ge=1)]
+
+
+class Connect(PybulletModel):
+    """How to reach PyBullet."""
+
+    connection_mode: Annotated[int, CONNECTION_MODES] = Field(
+        pybullet.GUI,
+        description="GUI opens PyBullet's window, DIRECT needs no screen.",
+        json_schema_extra={"default": "GUI"},
+    )
+    options: Text | None = Field(None, description="Further options, such as `--mp4=FILE` to record the window.")
+    key: Count | None = Field(None, description="Key of the shared memory.")
+    hostName: Text | None = Field(None, description="Host of a server to connect to.")
+    port: Annotated[int, Field(ge=1, le=65535)] | None = Field(None, description="Port of that server.")
+
+    @model_validator(mode="after")
+    def _one_way_to_connect(self) -> Connect:
+        if self.key is not None and (self.hostName or self.port):
+            raise KeyedError("key", "is for shared memory, hostName and port for a server: give one of both")
+        return self
+
+    def kwargs(self) -> dict[str, Any]:
+        """Return the arguments that the user wrote, and `connection_mode` in any case."""
+        return {"connection_mode": self.connection_mode, **super().kwargs()}
+
+
+class ResetSimulation(PybulletModel):
+    """What kind of world it is."""
+
+    flags: Annotated[int, RESET_FLAGS] | None = Field(None, description="RESET_USE_... flags.")
+
+
+class SetGravity(PybulletModel):
+    """Gravity; there is none unless given."""
+
+    gravX: Acceleration = Field(0.0, description="Acceleration along x.")
+    gravY: Acceleration = Field(0.0, description="Acceleration along y.")
+    gravZ: Acceleration = Field(0.0, description="Acceleration along z, -9.81 on Earth.")
+
+    def kwargs(self) -> dict[str, Any]:
+        """Return all three, as PyBullet wants them."""
+        return self.model_dump()
+
+
+class SetPhysicsEngineParameter(PybulletModel):
+    """How contacts and joints are solved; without `fixedTimeStep`, since `timeStep` says that."""
+
+    numSolverIterations: Iterations | None = Field(None, description="Most iterations of the solver.")
+    useSplitImpulse: Switch | None = Field(None, description="Whether penetration is solved apart from velocity.")
+    splitImpulsePenetrationThreshold: Annotated[float, Unit("m")] | None = Field(
+        None, description="Penetration from which it is solved apart."
+    )
+    numSubSteps: Count | None = Field(None, description="Parts that each step is divided into.")
+    collisionFilterMode: Count | None = Field(None, description="0: both masks must match, 1: one of them.")
+    contactBreakingThreshold: Annotated[NonNegative, Unit("m")] | None = Field(
+        None, description="Distance at which contacts end."
+    )
+    maxNumCmdPer1ms: int | None = Field(None, description="Most commands in a millisecond.")
+    enableFileCaching: Switch | None = Field(None, description="Whether files are read once only.")
+    restitutionVelocityThreshold: Annotated[NonNegative, Unit("m/s")] | None = Field(
+        None, description="Velocity below which nothing bounces."
+    )
+    erp: NonNegative | None = Field(None, description="Share of a joint's error mended in a step.")
+    contactERP: NonNegative | None = Field(None, description="Share of a contact's error mended in a step.")
+    frictionERP: NonNegative | None = Field(None, description="The same for friction, if anchored.")
+    enableConeFriction: Switch | None = Field(None, description="Whether friction is a cone, else a pyramid.")
+    deterministicOverlappingPairs: Switch | None = Field(None, description="Whether contacts are sorted.")
+    allowedCcdPenetration: Annotated[NonNegative, Unit("m")] | None = Field(
+        None, description="Penetration allowed to continuous collision detection."
+    )
+    jointFeedbackMode: Annotated[int, JOINT_FEEDBACK_MODES] | None = Field(
+        None, description="JOINT_FEEDBACK_... flags: where force and torque of a joint are told."
+    )
+    solverResidualThreshold: NonNegative | None = Field(None, description="Residual at which the solver stops.")
+    contactSlop: Annotated[NonNegative, Unit("m")] | None = Field(None, description="Penetration left alone.")
+    enableSAT: Switch | None = Field(None, description="Whether the separating axis test is used.")
+    constraintSolverType: Annotated[int, SOLVER_TYPES] | None = Field(
+        None, description="CONSTRAINT_SOLVER_LCP_... constant."
+    )
+    globalCFM: NonNegative | None = Field(None, description="Softness of all constraints.")
+    minimumSolverIslandSize: Count | None = Field(None, description="Fewest constraints solved together.")
+    reportSolverAnalytics: Switch | None = Field(None, description="Whether the solver tells what it did.")
+    warmStartingFactor: NonNegative | None = Field(None, description="Share of the last step's solution reused.")
+    sparseSdfVoxelSize: PositiveMetres | None = Field(None, description="Voxel size for soft bodies.")
+    numNonContactInnerIterations: Iterations | None = Field(
+        None, description="Iterations on joints in each of the solver's."
+    )
+
+
+def _as_list(given: Any) -> Any:
+    """Split `A|B`; anything that is no list is a list of one."""
+    if isinstance(given, str):
+        return given.split("|")
+    return given if isinstance(given, (list, tuple)) else [given]
+
+
+class ConfigureDebugVisualizer(PybulletModel):
+    """What PyBullet's window shows."""
+
+    flag: Annotated[
+        ListOf[Annotated[int, VISUALIZER_FLAGS]],
+        BeforeValidator(_as_list),
+        AlsoTakes(VISUALIZER_FLAGS.one_or_several_schema()),
+    ] = Field(
+        (pybullet.COV_ENABLE_GUI,),
+        description="COV_... constants to switch.",
+        json_schema_extra={"default": "COV_ENABLE_GUI"},
+    )
+    enable: Switch = Field(False, description="Whether they are switched on.")
+    lightPosition: Position | None = Field(None, description="Where the light is.")
+    shadowMapResolution: Count | None = Field(
+        None, description="Resolution of shadows.", json_schema_extra={"unit": "px"}
+    )
+    shadowMapWorldSize: Count | None = Field(None, description="Extent of shadows.", json_schema_extra={"unit": "m"})
+    remoteSyncTransformInterval: NonNegative | None = Field(
+        None, description="Time between updates of a remote window.", json_schema_extra={"unit": "s"}
+    )
+    shadowMapIntensity: NonNegative | None = Field(None, description="Darkness of shadows, 0 to 1.")
+    rgbBackground: Rgb | None = Field(None, description="Colour of the background, each from 0 to 1.")
+
+    def calls(self) -> list[dict[str, Any]]:
+        """Return the arguments of one call for each flag; PyBullet's constants cannot be or-ed."""
+        others = {"enable": self.enable, **self.kwargs()}
+        return [{**others, "flag": flag} for flag in self.flag]
+
+
+class ResetDebugVisualizerCamera(PybulletModel):
+    """Where PyBullet's window looks from."""
+
+    cameraDistance: PositiveMetres = Field(1.0, description="Distance from the target.")
+    cameraYaw: Degrees = Field(0.0, description="Angle about the vertical.")
+    cameraPitch: Degrees = Field(1.0, description="Angle above the horizontal, negative looks down.")
+    cameraTargetPosition: Position = Field((0.0, 0.0, 0.0), description="What it looks at.")
+
+    def kwargs(self) -> dict[str, Any]:
+        """Return all four, as PyBullet wants them."""
+        return self.model_dump()

@@ -1,0 +1,1 @@
+"""Following trajectories of joints."""

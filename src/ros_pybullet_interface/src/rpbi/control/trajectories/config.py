@@ -1,0 +1,92 @@
+"""What a robot's YAML may say about following trajectories; names as in ros_controllers' JointTrajectoryController."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field, model_validator
+
+from custom_ros_tools.errors import Problem, hint
+from custom_ros_tools.schema import ConfigModel, Hz, KeyedError, ListOf, Switch, Text, Unit
+
+SecondsOrNone = Annotated[float, Field(ge=0), Unit("s")]
+Tolerance = Annotated[float, Field(ge=0), Unit("rad or m")]
+SpeedTolerance = Annotated[float, Field(ge=0), Unit("rad/s or m/s")]
+
+
+class JointConstraints(ConfigModel):
+    """How far one joint may be off."""
+
+    trajectory: Tolerance = Field(0.0, description="Largest distance from the trajectory on the way; 0 is no limit.")
+    goal: Tolerance = Field(0.0, description="Largest distance from the goal at the end; 0 is no limit.")
+
+
+class TrajectoryConstraints(ConfigModel):
+    """How far joints may be off, where a goal does not say so itself; further keys are names of joints."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, JointConstraints]
+
+    goal_time: SecondsOrNone = Field(0.0, description="How long after the end the goal may be reached.")
+    stopped_velocity_tolerance: SpeedTolerance = Field(
+        0.01, description="Largest speed of a joint that has stopped at its goal; 0 is no limit."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _joints_have_mappings(cls, data: Any) -> Any:
+        """Tells that a number under an unknown key is a key misspelt rather than a joint without its mapping."""
+        for key, value in data.items() if isinstance(data, dict) else ():
+            if key not in cls.model_fields and not isinstance(value, (dict, JointConstraints)):
+                raise KeyedError(key, f"unknown key '{key}'{hint(key, cls.model_fields)}; joints have mappings")
+        return data
+
+    @property
+    def by_joint(self) -> dict[str, JointConstraints]:
+        """The constraints of single joints by name."""
+        return self.__pydantic_extra__
+
+
+class JointTrajectoryControllerConfig(ConfigModel):
+    """The follower of trajectories of a robot."""
+
+    joints: ListOf[Text] | None = Field(
+        None, min_length=1, description="Joints that it drives; without it, all that can be driven."
+    )
+    constraints: TrajectoryConstraints = Field(TrajectoryConstraints(), description="How far joints may be off.")
+    stop_trajectory_duration: SecondsOrNone = Field(
+        0.0, description="How long joints take to stop when a trajectory is cancelled or broken off; 0 is at once."
+    )
+    state_publish_rate: Hz = Field(50.0, description="Rate of the state topic.")
+    action_monitor_rate: Hz = Field(20.0, description="Rate of the action's feedback.")
+    allow_partial_joints_goal: Switch = Field(False, description="Whether a trajectory may leave joints out.")
+
+
+def trajectory_problems(
+    name: str, config: JointTrajectoryControllerConfig | None, driven: Iterable[str]
+) -> list[Problem]:
+    """Returns what in the configuration does not fit a robot.
+
+    Args:
+        name: The robot.
+        config: What its YAML says, if anything.
+        driven: Names of the joints that can be driven.
+    """
+    if config is None:
+        return []
+    known = set(driven)
+    if not known:
+        return [Problem(name, "joint_trajectory_controller", "the robot has no joint that can be driven")]
+    problems = []
+    for index, joint in enumerate(config.joints or ()):
+        key = f"joint_trajectory_controller.joints[{index}]"
+        if joint not in known:
+            problems.append(Problem(name, key, f"no joint '{joint}' that can be driven{hint(joint, known)}"))
+        elif joint in (config.joints or ())[:index]:
+            problems.append(Problem(name, key, f"joint '{joint}' is named twice"))
+    for joint in config.constraints.by_joint:
+        if joint not in known:
+            key = f"joint_trajectory_controller.constraints.{joint}"
+            problems.append(Problem(name, key, f"no joint '{joint}' that can be driven{hint(joint, known)}"))
+    return problems

@@ -1,0 +1,202 @@
+"""The follower of a robot's trajectories."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import pybullet
+
+from rpbi.control.motion import JointMotion
+from rpbi.engine.clock import NS_PER_S, Clock, Schedule
+
+from .config import JointTrajectoryControllerConfig
+from .controller_state import ControllerState
+from .joint_trajectory import JointTrajectory, validate_trajectory
+from .motion import TrajectoryMotion, stopping
+from .request import ErrorCode, GoalTolerances, TrajectoryRefusedError, TrajectoryRequest
+from .tolerances import Tolerances, resolved_tolerances
+from .trajectory import Knot, State, Trajectory
+
+if TYPE_CHECKING:
+    from rpbi.bodies.robots.robot import Robot
+
+
+class CheckedRequest(NamedTuple):
+    """A trajectory that can be followed, unless the robot's state forbids it.
+
+    Attributes:
+        joint_trajectories: What it asks of each joint that it names; none to stop and hold.
+        stamp_ns: Stamp of its start [ns]; 0 is now.
+        tolerances: How well it is to be followed; None is not looked at.
+    """
+
+    joint_trajectories: tuple[JointTrajectory, ...]
+    stamp_ns: int
+    tolerances: Tolerances | None
+
+
+class TrajectoryFollower:
+    """Has a robot follow trajectories, one after the other or spliced into each other.
+
+    Args:
+        robot: The robot.
+        config: Which joints, and how far they may be off.
+    """
+
+    def __init__(self, robot: Robot, config: JointTrajectoryControllerConfig) -> None:
+        self.config = config
+        self._robot = robot
+        driven = {joint.name: joint for joint in robot.model.driven}
+        self._joints = driven if config.joints is None else {name: driven[name] for name in config.joints}
+        self._by_index = {joint.index: joint for joint in self._joints.values()}
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints that it drives."""
+        return tuple(self._joints)
+
+    def check(self, request: TrajectoryRequest, tolerances: GoalTolerances | None = None) -> CheckedRequest:
+        """Checks a trajectory as far as it can be without looking at the robot; any thread may call it.
+
+        Args:
+            request: The trajectory.
+            tolerances: How well it is to be followed; without them it is not looked at.
+
+        Raises:
+            TrajectoryRefusedError: If it cannot be followed.
+        """
+        joint_trajectories = validate_trajectory(request, self._joints, self.config.allow_partial_joints_goal)
+        resolved = None
+        if tolerances is not None:
+            resolved = resolved_tolerances(tolerances, self.config.constraints, self._joints)
+        return CheckedRequest(joint_trajectories, request.stamp_ns, resolved)
+
+    def follow(
+        self, request: CheckedRequest, clock: Clock, feedback: Callable[[ControllerState], None] | None = None
+    ) -> TrajectoryMotion:
+        """Starts to follow a trajectory, or goes over to it when its time has come; the one before is preempted.
+
+        Joints that it leaves out go on with theirs.
+
+        Args:
+            request: What `check` returned.
+            clock: The world's clock.
+            feedback: Takes the state at `action_monitor_rate` while the motion lasts.
+
+        Returns:
+            The motion, which tells how it ended.
+
+        Raises:
+            TrajectoryRefusedError: If its time has passed, the joints cannot get to it, or the control mode forbids it.
+        """
+        now_s = clock.time_s
+        start_s = now_s + (request.stamp_ns - clock.stamp_ns) / NS_PER_S if request.stamp_ns else now_s
+        from_s = max(now_s, start_s)
+        _check_time(request, start_s, from_s)
+        running = self._running
+        trajectories = {} if running is None else {i: each.since(now_s) for i, each in running.trajectories.items()}
+        measured = self._robot.joint_motion()
+        for joint_trajectory in request.joint_trajectories:
+            index = joint_trajectory.joint.index
+            current = trajectories.get(index) or Trajectory([Knot(now_s, measured[index][:1])])
+            trajectories[index] = joint_trajectory.joined(current, start_s, from_s)
+        if not request.joint_trajectories:
+            trajectories, from_s = self._stopping(now_s, measured, trajectories or self._by_index), now_s
+        motion = TrajectoryMotion(self._by_index, trajectories, from_s, request.tolerances, self._stop_s)
+        if feedback is not None:
+            motion.on_advance = self._feeding(feedback, clock)
+        self._run(motion, "a newer trajectory replaced it")
+        return motion
+
+    def cancel(self, reason: str, clock: Clock, motion: TrajectoryMotion | None = None) -> None:
+        """Stops following; the joints stop and hold where they are.
+
+        Args:
+            reason: Why, for whoever waits for it.
+            clock: The world's clock.
+            motion: What to stop; if it is not being followed any more, nothing happens. Without it, whatever it is.
+        """
+        running = self._running
+        if running is None or motion not in (None, running):
+            return
+        trajectories = self._stopping(clock.time_s, self._robot.joint_motion(), running.joints)
+        self._run(TrajectoryMotion(self._by_index, trajectories, clock.time_s), reason)
+
+    def state(self, time_s: float) -> ControllerState:
+        """Returns where the joints are to be and where they are, at the world's time now [s]."""
+        return self._state(time_s, self._robot.joint_motion())
+
+    def _state(self, time_s: float, measured: JointMotion) -> ControllerState:
+        running = self._running
+        return ControllerState(
+            self._robot.name,
+            self.joint_names,
+            self.desired(time_s),
+            tuple(measured[index][0] for index in self._by_index),
+            tuple(measured[index][1] for index in self._by_index),
+            0.0 if running is None else max(0.0, time_s - running.from_s),
+        )
+
+    def desired(self, time_s: float) -> State:
+        """Returns where the joints are to be at a time of the world's [s], as far as it is known now."""
+        running = self._running
+        trajectories = {} if running is None else running.trajectories
+        held: Mapping[int, float] = self._robot.motors.targets
+        if self._robot.motors.mode != pybullet.POSITION_CONTROL:
+            held = {index: position for index, (position, _) in self._robot.joint_motion().items()}
+        states = [
+            trajectories[index].sample(time_s) if index in trajectories else State((held[index],), (0.0,), (0.0,))
+            for index in self._by_index
+        ]
+        return State(*(tuple(state[kind][0] for state in states) for kind in range(len(State._fields))))
+
+    @property
+    def _running(self) -> TrajectoryMotion | None:
+        motion = self._robot.motion
+        return motion if isinstance(motion, TrajectoryMotion) else None
+
+    @property
+    def _stop_s(self) -> float:
+        return self.config.stop_trajectory_duration
+
+    def _feeding(
+        self, feedback: Callable[[ControllerState], None], clock: Clock
+    ) -> Callable[[float, JointMotion], None]:
+        schedule = Schedule(self.config.action_monitor_rate, clock.dt_ns)
+
+        def on_advance(time_s: float, measured: JointMotion) -> None:
+            if schedule.is_due(round(time_s / clock.dt_s)):
+                feedback(self._state(time_s, measured))
+
+        return on_advance
+
+    def _stopping(self, now_s: float, measured: JointMotion, indices: Iterable[int]) -> dict[int, Trajectory]:
+        return {index: stopping(self._by_index[index], measured[index], now_s, self._stop_s) for index in indices}
+
+    def _run(self, motion: TrajectoryMotion, reason: str) -> None:
+        """Starts a motion; the reason is for whoever waits for the one before.
+
+        Raises:
+            TrajectoryRefusedError: If the control mode forbids it.
+        """
+        running = self._running
+        if running is not None:
+            running.preempt(reason)
+        try:
+            self._robot.run(motion)
+        except ValueError as error:
+            raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, str(error)) from None
+
+
+def _check_time(request: CheckedRequest, start_s: float, from_s: float) -> None:
+    if not request.joint_trajectories:
+        return
+    last_s = request.joint_trajectories[0].knots[-1].time_s
+    if start_s + last_s > from_s:
+        return
+    if request.stamp_ns:
+        message = f"all points are in the past, the last one by {from_s - start_s - last_s:.6g} s"
+        raise TrajectoryRefusedError(ErrorCode.OLD_HEADER_TIMESTAMP, message)
+    message = f"expected a point after the start, the last one is at {last_s:g} s"
+    raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, message)

@@ -1,0 +1,192 @@
+"""What a trajectory asks of single joints: checked against the robot, and joined to what the joints do already."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from custom_ros_tools.errors import UnknownNameError
+from rpbi.urdf.joints import Joint
+
+from .polynomial import Polynomial, derivative, value_bounds, value_range
+from .request import ErrorCode, TrajectoryRefusedError, TrajectoryRequest, Waypoint
+from .trajectory import Knot, Trajectory
+
+CURVE_SPEED_SLACK = 1.05
+"""How much faster than a joint's limit a curve may be between two points that are not.
+
+A curve through points that a planner has sampled, a tenth of a second apart, from a motion at the limit swings beyond
+it by 1 or 2 %. The motors hold the limit in any case.
+"""
+CURVE_POSITION_SLACK = 1e-3
+"""How far beyond a joint's limits [rad or m] a curve may swing between two points that are within."""
+ROUNDING = 1.0 + 1e-6
+TURN = 2.0 * math.pi
+
+
+class JointTrajectory(NamedTuple):
+    """What a trajectory asks of one joint, in times from its start.
+
+    Attributes:
+        joint: The joint.
+        knots: Its points.
+        trajectory: The trajectory through them.
+    """
+
+    joint: Joint
+    knots: tuple[Knot, ...]
+    trajectory: Trajectory
+
+    def joined(self, current: Trajectory, start_s: float, from_s: float) -> Trajectory:
+        """Returns what the joint does now until a time, and this trajectory from then on.
+
+        Points up to that time are left out: the joint goes straight to the next one. A joint without limits that
+        turns takes the short way there.
+
+        Args:
+            current: What the joint does now.
+            start_s: The world's time at which the trajectory's times begin [s].
+            from_s: When it takes over [s]; there is a point after it.
+
+        Raises:
+            TrajectoryRefusedError: If the next point cannot be reached in time.
+        """
+        before = current.sample(from_s)
+        number = next(i for i, knot in enumerate(self.knots) if start_s + knot.time_s > from_s)
+        knot = self.knots[number]
+        offset = 0.0
+        if self.joint.is_revolute and math.isinf(self.joint.upper):
+            offset = TURN * round((before.position[0] - knot.position[0]) / TURN)
+        shifted = self.trajectory.shifted(start_s, (offset,))
+        next_knot = knot._replace(time_s=start_s + knot.time_s, position=(knot.position[0] + offset,))
+        bridge = Trajectory([Knot(from_s, *before), next_knot])
+        self._check_bridge(bridge, number, abs(before.velocity[0]))
+        return current.spliced(bridge.spliced(shifted, next_knot.time_s), from_s)
+
+    def _check_bridge(self, bridge: Trajectory, number: int, speed_now: float) -> None:
+        polynomial, duration_s = bridge.segments[0].polynomials[0], bridge.end_s - bridge.start_s
+        where = f"on the way to point {number}, which is {duration_s:.3g} s ahead"
+        speed = max(map(abs, value_range(derivative(polynomial), duration_s)))
+        if speed > max(self.joint.max_velocity * CURVE_SPEED_SLACK, speed_now * ROUNDING):
+            raise _too_fast(self.joint, speed, where)
+        low, high = value_range(polynomial, duration_s)
+        start = polynomial[0]  # which may be beyond the limits, if something has pushed the joint there
+        slack = CURVE_POSITION_SLACK
+        if low < min(self.joint.lower, start) - slack or high > max(self.joint.upper, start) + slack:
+            raise _swings_out(self.joint, low, high, where)
+
+
+def validate_trajectory(
+    request: TrajectoryRequest, joints: Mapping[str, Joint], may_be_partial: bool
+) -> tuple[JointTrajectory, ...]:
+    """Checks a trajectory as far as it can be without knowing where the joints are; any thread may call it.
+
+    Args:
+        request: The trajectory.
+        joints: The joints that may be driven, by name.
+        may_be_partial: Whether joints may be left out.
+
+    Raises:
+        TrajectoryRefusedError: If it cannot be followed.
+    """
+    _check_names(request, joints, may_be_partial)
+    _check_points(request)
+    joint_trajectories = []
+    for column, name in enumerate(request.joint_names if request.points else ()):
+        joint = joints[name]
+        for number, point in enumerate(request.points):
+            _check_limits(joint, number, point, column)
+        knots = tuple(_knot(point, column) for point in request.points)
+        trajectory = Trajectory(knots)
+        _check_curves(joint, trajectory)
+        joint_trajectories.append(JointTrajectory(joint, knots, trajectory))
+    return tuple(joint_trajectories)
+
+
+def _knot(point: Waypoint, column: int) -> Knot:
+    return Knot(
+        point.time_s,
+        (point.positions[column],),
+        (point.velocities[column],) if point.velocities else None,
+        (point.accelerations[column],) if point.accelerations else None,
+    )
+
+
+def _check_names(request: TrajectoryRequest, joints: Mapping[str, Joint], may_be_partial: bool) -> None:
+    names = request.joint_names
+    for name in names:
+        if name not in joints:
+            raise TrajectoryRefusedError(ErrorCode.INVALID_JOINTS, str(UnknownNameError("joint", name, joints)))
+    if len(set(names)) != len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise TrajectoryRefusedError(ErrorCode.INVALID_JOINTS, f"joint '{twice}' is named more than once")
+    missing = [name for name in joints if name not in names]
+    if request.points and (missing and not may_be_partial or not names):
+        message = f"expected all joints, since allow_partial_joints_goal is off; missing: {', '.join(missing)}"
+        raise TrajectoryRefusedError(ErrorCode.INVALID_JOINTS, message)
+
+
+def _check_points(request: TrajectoryRequest) -> None:
+    count, previous_s = len(request.joint_names), -math.inf
+    for number, point in enumerate(request.points):
+        if not previous_s < point.time_s:
+            message = f"point {number}: times must increase strictly, got {point.time_s:g} s after {previous_s:g} s"
+            raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, message)
+        previous_s = point.time_s
+        if point.accelerations and not point.velocities:
+            message = f"point {number}: accelerations need velocities, got none"
+            raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, message)
+        for kind, values in zip(point._fields[1:], point[1:]):
+            if len(values) != count and (values or kind == "positions"):
+                message = f"point {number}: expected {kind} of {count} joints, got {len(values)}"
+                raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, message)
+            for name, value in zip(request.joint_names, values):
+                if not math.isfinite(value):
+                    message = f"point {number}: {kind} must be finite, got {value} for joint '{name}'"
+                    raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, message)
+
+
+def _check_limits(joint: Joint, number: int, point: Waypoint, column: int) -> None:
+    position = point.positions[column]
+    if not joint.allows(position):
+        raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, f"point {number}: {joint.limit_violation(position)}")
+    speed = abs(point.velocities[column]) if point.velocities else 0.0
+    if speed > joint.max_velocity * ROUNDING:
+        raise _too_fast(joint, speed, f"at point {number}")
+
+
+def _check_curves(joint: Joint, trajectory: Trajectory) -> None:
+    """Checks what happens between the points."""
+    spans = trajectory.spans()
+    positions = [segment.polynomials[0] for segment, _ in spans]
+    velocities = [derivative(polynomial) for polynomial in positions]
+    durations_s = [end_s - segment.start_s for segment, end_s in spans]
+    for number in _beyond(velocities, durations_s, -joint.max_velocity, joint.max_velocity):
+        where = f"between points {number} and {number + 1}"
+        slack = CURVE_SPEED_SLACK if any(positions[number][2:]) else ROUNDING
+        speed = max(map(abs, value_range(velocities[number], durations_s[number])))
+        if speed > joint.max_velocity * slack:
+            raise _too_fast(joint, speed, where)
+    for number in _beyond(positions, durations_s, joint.lower, joint.upper):
+        low, high = value_range(positions[number], durations_s[number])
+        if low < joint.lower - CURVE_POSITION_SLACK or high > joint.upper + CURVE_POSITION_SLACK:
+            raise _swings_out(joint, low, high, f"between points {number} and {number + 1}")
+
+
+def _beyond(polynomials: Sequence[Polynomial], durations_s: Sequence[float], lower: float, upper: float) -> list[int]:
+    """Returns which of many polynomials may leave a range; to find out, each has to be looked at."""
+    low, high = value_bounds(polynomials, durations_s)
+    return [int(number) for number in ((low < lower) | (high > upper)).nonzero()[0]]
+
+
+def _too_fast(joint: Joint, speed: float, where: str) -> TrajectoryRefusedError:
+    limit = f"its limit is {joint.max_velocity:.6g} {joint.unit}/s"
+    return TrajectoryRefusedError(
+        ErrorCode.INVALID_GOAL, f"joint '{joint.name}' would need {speed:.6g} {joint.unit}/s {where}; {limit}"
+    )
+
+
+def _swings_out(joint: Joint, low: float, high: float, where: str) -> TrajectoryRefusedError:
+    message = joint.limit_violation(low if low < joint.lower else high)
+    return TrajectoryRefusedError(ErrorCode.INVALID_GOAL, f"{message}, where the curve swings {where}")

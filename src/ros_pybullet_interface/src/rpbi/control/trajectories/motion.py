@@ -1,0 +1,172 @@
+"""Following trajectories tick by tick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from rpbi.control.motion import JointMotion, Motion
+from rpbi.urdf.joints import Joint
+
+from .request import ErrorCode, JointTolerance
+from .tolerances import Tolerances
+from .trajectory import Knot, State, Trajectory
+
+
+class TrajectoryMotion(Motion):
+    """Follows a trajectory of each of some joints.
+
+    With tolerances it succeeds when the joints are at their goals, and is broken off when one is too far off: then the
+    joints stop where they are. Without tolerances it just ends.
+
+    Args:
+        joints: The joints by index.
+        trajectories: Their trajectories, each of one joint, by joint index, in the world's time.
+        from_s: From when on tolerances hold [s].
+        tolerances: How far the joints may be off.
+        stop_s: How long joints take to stop when it is broken off [s].
+
+    Attributes:
+        code: How it ended.
+        preempted: Whether it ended because whoever gives the trajectories wanted something else.
+        desired: Set points at the end of the last tick, by joint index.
+        on_advance: Called at each tick with the world's time [s] and the state of the joints then.
+    """
+
+    can_wait = True
+
+    def __init__(
+        self,
+        joints: Mapping[int, Joint],
+        trajectories: Mapping[int, Trajectory],
+        from_s: float,
+        tolerances: Tolerances | None = None,
+        stop_s: float = 0.0,
+    ) -> None:
+        super().__init__(frozenset(trajectories))
+        self.trajectories = dict(trajectories)
+        self.from_s = from_s
+        self.end_s = max(trajectory.end_s for trajectory in trajectories.values())
+        self.code = ErrorCode.INVALID_GOAL  # unless it ends in a way that has a number of its own
+        self.preempted = False
+        self.desired: dict[int, State] = {}
+        self.on_advance: Callable[[float, JointMotion], None] | None = None
+        self._joints = joints
+        self._tolerances = tolerances
+        self._stop_s = stop_s
+        self._time_s = 0.0
+        self._fault = ""
+
+    def begin(self, time_s: float, measured: JointMotion) -> None:
+        """Notes when it begins; the trajectories are in the world's time already."""
+        self._sample(time_s)
+
+    def advance(self, time_s: float, measured: JointMotion) -> JointMotion:
+        """Compares where the joints are with where they were to be, and goes on if they are near enough."""
+        if self.on_advance is not None:
+            self.on_advance(self._time_s, measured)
+        fault = self._path_problem(measured)
+        if fault:
+            return self._break_off(ErrorCode.PATH_TOLERANCE_VIOLATED, fault, time_s, measured)
+        if self._time_s >= self.end_s:
+            fault = self._goal_problem(measured)
+            if not fault:
+                self._finish()
+            elif self._is_out_of_time(time_s):
+                return self._break_off(ErrorCode.GOAL_TOLERANCE_VIOLATED, fault, time_s, measured)
+        return self._go_on(time_s)
+
+    def preempt(self, reason: str) -> None:
+        """Ends because something else is wanted; the joints are left as they are."""
+        if not self._fault:
+            self.preempted, self.code = True, ErrorCode.SUCCESSFUL  # as in ros_controllers: nothing went wrong
+        self.end(False, self._fault or reason)
+
+    def halt(self, reason: str, measured: JointMotion) -> None:
+        """Ends because of something from outside; the result tells the reason and where the joints are."""
+        state = ", ".join(f"{self._joints[i].name}={measured[i][0]:.6g}" for i in sorted(self.joints))
+        self.end(False, self._fault or f"{reason}; state reached: {state}")
+
+    def _sample(self, time_s: float) -> None:
+        self._time_s = time_s
+        self.desired = {index: trajectory.sample(time_s) for index, trajectory in self.trajectories.items()}
+
+    def _go_on(self, time_s: float) -> JointMotion:
+        """Returns set points with which the joints are at the end of the tick where they are to be then.
+
+        PyBullet's position motor moves by the target velocity, and beyond that takes away a share of the difference
+        between target and position before the step. So the target is where the joint is to be before the step, and the
+        velocity the one that leads to where it is to be after it.
+        """
+        before, duration_s = self.desired, time_s - self._time_s
+        self._sample(time_s)
+        return {
+            index: (before[index].position[0], (state.position[0] - before[index].position[0]) / duration_s)
+            for index, state in self.desired.items()
+        }
+
+    def _finish(self) -> None:
+        if self._fault:
+            self.end(False, self._fault)
+        else:
+            self.code = ErrorCode.SUCCESSFUL
+            self.end(True, "reached the end" if self._tolerances is None else "reached the goal within its tolerances")
+
+    def _break_off(self, code: ErrorCode, fault: str, time_s: float, measured: JointMotion) -> JointMotion:
+        """Stops the joints where they are; with no time to stop in, it ends at once."""
+        self.code, self._fault = code, f"{fault}; the joints stop and hold where they are"
+        self.trajectories = {i: stopping(self._joints[i], measured[i], self._time_s, self._stop_s) for i in self.joints}
+        self.end_s, self._tolerances = self._time_s + self._stop_s, None
+        if not self._stop_s:
+            self._finish()
+        self._sample(self._time_s)
+        return self._go_on(time_s)
+
+    def _is_out_of_time(self, time_s: float) -> bool:
+        """Tells whether the goal is not to be waited for any longer.
+
+        It is for one tick at least: a trajectory of positions alone arrives with a velocity, which the motors are only
+        then told to stop.
+        """
+        tick_s = time_s - self._time_s
+        return self._tolerances is not None and self._time_s > self.end_s + self._tolerances.goal_time_s + tick_s / 2.0
+
+    def _path_problem(self, measured: JointMotion) -> str:
+        """Returns what is too far off on the way, nothing if all is well."""
+        if self._tolerances is None or not self.from_s <= self._time_s < self.end_s:
+            return ""
+        return self._fault_in(self._tolerances.path, measured, "its trajectory")
+
+    def _goal_problem(self, measured: JointMotion) -> str:
+        if self._tolerances is None:
+            return ""
+        return self._fault_in(self._tolerances.goal, measured, "its goal")
+
+    def _fault_in(self, tolerances: Mapping[int, JointTolerance], measured: JointMotion, what: str) -> str:
+        for index, tolerance in tolerances.items():
+            if index not in self.joints:
+                continue
+            joint, desired, late_s = self._joints[index], self.desired[index], self._time_s - self.end_s
+            when = f"{late_s:.3g} s after the end" if late_s >= 0.0 else f"{-late_s:.3g} s before the end"
+            limits = zip(measured[index], (desired.position[0], desired.velocity[0]), tolerance)
+            for (value, wanted, limit), (unit, of) in zip(limits, (("", ""), ("/s", "the velocity of "))):
+                if abs(value - wanted) > limit:
+                    off = f"{abs(value - wanted):.6g} {joint.unit}{unit} off {of}{what}"
+                    return f"joint '{joint.name}' is {off}, {when}; allowed are {limit:g}"
+        return ""
+
+
+def stopping(joint: Joint, measured: tuple[float, float], time_s: float, duration_s: float) -> Trajectory:
+    """Returns how a joint comes to a stop with constant deceleration, within its limits.
+
+    Args:
+        joint: The joint.
+        measured: Its position [rad or m] and velocity [rad/s or m/s].
+        time_s: Now [s].
+        duration_s: How long it may take [s]; 0 is at once.
+    """
+    position, velocity = measured
+    if not duration_s:
+        return Trajectory([Knot(time_s, (position,))])
+    end = position + velocity * duration_s / 2.0
+    end = min(max(end, min(joint.lower, position)), max(joint.upper, position))
+    return Trajectory([Knot(time_s, (position,), (velocity,)), Knot(time_s + duration_s, (end,), (0.0,))])

@@ -1,0 +1,92 @@
+"""What can be done to a body beside its inputs; a replay does the same from the record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from rpbi.control.motion import Motion
+from rpbi.control.timed_motion import TimedMotion
+from rpbi.control.trajectories.request import GoalTolerances, TrajectoryRequest
+from rpbi.geometry import Pose
+from rpbi.urdf.joints import JointTarget
+
+from .clock import Clock
+
+
+class TimedGoal(NamedTuple):
+    """Where joints are to be, and when.
+
+    Attributes:
+        positions: Positions [rad or m] by joint index.
+        duration_s: In what time [s].
+    """
+
+    positions: Mapping[int, float]
+    duration_s: float
+
+
+class RecordedTrajectory(NamedTuple):
+    """A trajectory that a robot was asked to follow.
+
+    Attributes:
+        request: The trajectory, its stamp counted from the stamp of the tick [ns]; 0 is at once.
+        tolerances: How well it was to be followed, None if that was not looked at.
+    """
+
+    request: TrajectoryRequest
+    tolerances: GoalTolerances | None
+
+    @classmethod
+    def of(cls, request: TrajectoryRequest, tolerances: GoalTolerances | None, clock: Clock) -> RecordedTrajectory:
+        """Returns the record of a request at the clock's present tick."""
+        offset_ns = request.stamp_ns - clock.stamp_ns if request.stamp_ns else 0
+        return cls(request._replace(stamp_ns=offset_ns), tolerances)
+
+
+def _teleport(body: Any, _: Clock, pose: Pose) -> None:
+    body.teleport(pose)
+
+
+def _set_joint_state(body: Any, _: Clock, target: JointTarget) -> None:
+    body.set_joint_state(target)
+
+
+def _switch_mode(body: Any, _: Clock, mode: int) -> None:
+    body.switch_mode(mode)
+
+
+def _stop_motion(body: Any, _: Clock, reason: str) -> bool:
+    was_moving = body.motion is not None
+    body.halt(reason)
+    return was_moving
+
+
+def _move(body: Any, _: Clock, goal: TimedGoal) -> Motion:
+    motion = TimedMotion(body.model, goal.positions, goal.duration_s)
+    body.run(motion)
+    return motion
+
+
+def _follow(body: Any, clock: Clock, recorded: RecordedTrajectory) -> Motion:
+    request, tolerances = recorded
+    if request.stamp_ns:
+        request = request._replace(stamp_ns=clock.stamp_ns + request.stamp_ns)
+    motion: Motion = body.follower.follow(body.follower.check(request, tolerances), clock)
+    return motion
+
+
+def _cancel(body: Any, clock: Clock, reason: str) -> None:
+    body.follower.cancel(reason, clock)
+
+
+ACTIONS: dict[str, Callable[[Any, Clock, Any], Any]] = {
+    "teleport": _teleport,
+    "set_joint_state": _set_joint_state,
+    "switch_mode": _switch_mode,
+    "stop_motion": _stop_motion,
+    "move": _move,
+    "follow": _follow,
+    "cancel": _cancel,
+}
+"""Each does something to a body, with the world's clock and a value."""

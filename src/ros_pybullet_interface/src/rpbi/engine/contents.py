@@ -1,0 +1,213 @@
+"""What is in a world, and how it came there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from custom_ros_tools.errors import ConfigError, PhysicsError, PluginError, Problem, UnknownNameError
+from rpbi.bodies import Body, BodyConfig
+from rpbi.config.loading import LoadedWorld
+from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.config.sensors import FIRST_TOPIC_NAME, RgbdSensorConfig
+from rpbi.plugins import blaming, find_class
+from rpbi.sensors import BodySensor, RgbdSensor
+from rpbi.sensors.contacts import ContactReader
+from rpbi.sensors.sensor import Sensor
+
+from .client import Client
+from .clock import Clock
+from .inputs import Input
+from .load_log import LogEntry, apply
+from .sensor_schedule import SensorSchedule
+
+if TYPE_CHECKING:
+    from rpbi.world import World
+
+
+def sensors_and_inputs(body: Body, config: BodyConfig) -> tuple[tuple[Sensor, ...], Mapping[str, Input]]:
+    """Returns the sensors of a body, those of other packages last, and its inputs by name.
+
+    Args:
+        body: The body.
+        config: Its configuration.
+
+    Raises:
+        PluginError: If a class of another package fails.
+    """
+    with blaming(body, f"sensors and inputs of '{body.name}'"):
+        sensors, inputs = body.sensors(), body.inputs()
+    return (*sensors, *(_make(body, each) for each in config.sensors)), inputs
+
+
+def _make(body: Body, config: Any) -> Sensor:
+    sensor_class = find_class(config.type, BodySensor)
+    with blaming(sensor_class, f"making '{body.name}/{config.name}'"):
+        return sensor_class(body, config)
+
+
+class WorldContents:
+    """The bodies and cameras of a world with their sensors and inputs, and the log from which it can be rebuilt.
+
+    Args:
+        pb: The client.
+        clock: The world's clock.
+        world: What sensors get to know.
+
+    Attributes:
+        bodies: By name.
+        stepping: The bodies that act before each tick.
+        cameras: By name; a new dictionary whenever one comes or goes.
+        inputs: By slot, `NAME/INPUT`; a new dictionary whenever one comes or goes.
+        sensors: When each is due.
+        contacts: Who touches whom.
+        log: All that was done to the world.
+    """
+
+    def __init__(self, pb: Client, clock: Clock, world: World) -> None:
+        self._pb = pb
+        self._clock = clock
+        self._world = world
+        self.bodies: dict[str, Body] = {}
+        self.stepping: list[Body] = []
+        self.cameras: dict[str, RgbdSensor] = {}
+        self.inputs: dict[str, Input] = {}
+        self.sensors = SensorSchedule(clock)
+        self.contacts = ContactReader(pb, self.bodies)
+        self.log: list[LogEntry] = []
+        self._filled_entries = 0
+        """How many entries of the log are of filling it."""
+
+    def body(self, name: str) -> Body:
+        """Returns the body of a name.
+
+        Raises:
+            UnknownNameError: If there is none.
+        """
+        if name not in self.bodies:
+            raise UnknownNameError("object", name, list(self.bodies))
+        return self.bodies[name]
+
+    def add(self, kind: str, config: BodyConfig, file: str | None = None) -> Body:
+        """Adds a body, see `World.add`."""
+        name = config.name
+        self._require_new(name, file)
+        try:
+            self._append(LogEntry(name, "add", (kind, config)))
+            body = self.bodies[name]
+            try:
+                self._register(name, *sensors_and_inputs(body, config))
+            except Exception:
+                self._append(LogEntry(name, "remove"))
+                raise
+        except ConfigError as error:
+            raise ConfigError([Problem(file or name, each.key, each.message) for each in error.problems]) from None
+        if type(body).before_step is not Body.before_step:
+            self.stepping.append(body)
+        return body
+
+    def add_camera(self, config: RgbdSensorConfig, file: str | None = None) -> RgbdSensor:
+        """Adds a camera, see `World.add_camera`."""
+        self._require_new(config.name, file)
+        taken = {camera.topic_name for camera in self.cameras.values()}
+        topic_name = config.name if FIRST_TOPIC_NAME in taken else FIRST_TOPIC_NAME
+        if topic_name in taken:
+            message = f"'{topic_name}' is what the topics of the first camera are called; use another name"
+            raise ConfigError([Problem(file or config.name, "name", message)])
+        camera = RgbdSensor(config, self.bodies, self._clock, topic_name)
+        self._take_camera(camera)
+        return camera
+
+    def remove(self, name: str) -> None:
+        """Removes a body or a camera.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        if name in self.cameras:
+            self.cameras = {other: camera for other, camera in self.cameras.items() if other != name}
+        else:
+            body = self.bodies.get(name)
+            self._append(LogEntry(name, "remove"))
+            if body in self.stepping:
+                self.stepping.remove(body)
+        self.sensors.remove(name)
+        self.inputs = {slot: taken for slot, taken in self.inputs.items() if slot.split("/")[0] != name}
+
+    def change_dynamics(self, name: str, link: str, change: ChangeDynamics) -> None:
+        """Changes how a link behaves, the root if its name is empty; see `World.change_dynamics`."""
+        self._append(LogEntry(name, "dynamics", (link, change)))
+
+    def clear(self) -> None:
+        """Takes all out but the cameras and the inputs, which wait for what `fill` brings."""
+        for body in self.bodies.values():
+            body.remove()
+        self.bodies.clear()
+        self.stepping.clear()
+        self.sensors.clear()
+        self.log.clear()
+        self.contacts.outdate()
+
+    def fill(self, loaded: LoadedWorld) -> None:
+        """Puts in what is configured; cameras that are there already stay, with the pose that they have.
+
+        Raises:
+            ConfigError: If something cannot be loaded; then all of the rest is there.
+        """
+        inputs_before = self.inputs
+        self._append(LogEntry("", "world", loaded.config))
+        problems: list[Problem] = []
+        for item in loaded.objects:
+            try:
+                self.add(item.type, item.config, item.file)
+            except ConfigError as error:
+                problems += error.problems
+            except (PhysicsError, PluginError) as error:
+                problems.append(Problem(item.file, "", str(error)))
+        problems += self._fill_in_cameras(loaded)
+        self._filled_entries = len(self.log)
+        # Those that were there before stay till their like has come, for who puts into them meanwhile
+        self.inputs = {slot: taken for slot, taken in self.inputs.items() if taken is not inputs_before.get(slot)}
+        if problems:
+            raise ConfigError(problems)
+
+    def changed_names(self) -> set[str]:
+        """Returns the names of all bodies that came or went since it was filled."""
+        return {entry.name for entry in self.log[self._filled_entries :] if entry.what in ("add", "remove")}
+
+    def _fill_in_cameras(self, loaded: LoadedWorld) -> list[Problem]:
+        before, self.cameras = self.cameras, {}
+        configs = [item.config for item in loaded.cameras]
+        for camera in before.values():
+            if any(camera.config is config for config in configs):
+                self._take_camera(camera)
+        problems: list[Problem] = []
+        for config, file in loaded.cameras:
+            if config.name not in self.cameras:
+                try:
+                    self.add_camera(config, file)
+                except ConfigError as error:
+                    problems += error.problems
+        return problems
+
+    def _take_camera(self, camera: RgbdSensor) -> None:
+        self.cameras = {**self.cameras, camera.name: camera}
+        self._register(camera.name, (camera,), camera.inputs())
+
+    def _require_new(self, name: str, file: str | None) -> None:
+        if name in self.sensors:
+            message = f"'{name}' is taken already; names are unique in a world"
+            raise ConfigError([Problem(file or name, "name", message)])
+
+    def _append(self, entry: LogEntry) -> None:
+        """The one way into the world: does what the entry says and logs it."""
+        self.contacts.outdate()
+        apply(self._pb, self.bodies, entry)
+        self.log.append(entry)
+
+    def _register(self, name: str, sensors: tuple[Sensor, ...], inputs: Mapping[str, Input]) -> None:
+        for sensor in sensors:
+            with blaming(sensor, f"enter of '{sensor.name}'"):
+                sensor.enter(self._world)
+        self.sensors.add(name, sensors)
+        self.inputs = {**self.inputs, **{f"{name}/{key}": value for key, value in inputs.items()}}

@@ -1,0 +1,68 @@
+"""What bodies and sensors take from outside while the world runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from rpbi.config.pybullet_models import ObjectTf
+from rpbi.geometry import Pose
+
+FARTHEST_M = 1e6
+"""Beyond this a body would not stay finite [m]."""
+
+
+@dataclass(frozen=True)
+class Input:
+    """Something that a body or sensor takes from outside.
+
+    Attributes:
+        check: Turns what came into what `apply` takes, in the thread it came in; it touches no PyBullet.
+            It raises ValueError or an InterfaceError for what must be refused.
+        apply: Acts on the newest value, on the simulation thread, before the tick.
+        merge: Joins a value that still waits with a newer one; without it the newer one replaces it.
+        ros_topic: Where to find the topic of an input from another package, a TopicInput, as `module:NAME`.
+    """
+
+    check: Callable[[Any], Any]
+    apply: Callable[[Any], None]
+    merge: Callable[[Any, Any], Any] | None = None
+    ros_topic: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PoseInput(Input):
+    """A pose in the world that follows a TF frame.
+
+    Attributes:
+        tf_id: The frame to follow.
+        hz: How often to look [Hz], in wall time.
+    """
+
+    tf_id: str
+    hz: float
+
+    @classmethod
+    def following(cls, object_tf: ObjectTf, apply: Callable[[Pose], None]) -> PoseInput:
+        """Follows the frame that YAML names under `object_tf`."""
+        return cls(check_pose, apply, tf_id=object_tf.tf_id, hz=object_tf.hz)
+
+
+def check_pose(pose: Pose) -> Pose:
+    """Returns the pose with its quaternion normalised.
+
+    Raises:
+        ValueError: If a number is not finite or the quaternion is zero.
+    """
+    position, quat = pose
+    if not all(map(math.isfinite, (*position, *quat))):
+        raise ValueError(f"pose must be finite, got {position}, {quat}")
+    if max(map(abs, position)) > FARTHEST_M:
+        raise ValueError(f"position must be within +-{FARTHEST_M:g} m, got {position}")
+    norm = math.hypot(*quat)
+    if norm < 1e-6:
+        raise ValueError(f"quaternion must not be zero, got {quat}")
+    x, y, z, w = (component / norm for component in quat)
+    return Pose((position[0], position[1], position[2]), (x, y, z, w))

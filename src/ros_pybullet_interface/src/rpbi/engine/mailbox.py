@@ -1,0 +1,97 @@
+"""Notes from other threads to the one thread that owns PyBullet."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+
+class ClosedError(RuntimeError):
+    """The simulation has ended and takes no more requests."""
+
+
+class Mailbox:
+    """Latest-wins slots for streams, and a queue of calls with futures for requests.
+
+    Any thread may `put` and `request`; only the simulation thread calls `take` and `run_requests`. Its lock is the
+    only one between them, and nobody holds it for longer than it takes to swap a reference.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._slots: dict[str, Any] = {}
+        self._requests: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
+        self._closed = False
+        self.generation = 0
+        """Grows whenever all values that wait are dropped."""
+
+    def put(
+        self, slot: str, value: Any, merge: Callable[[Any, Any], Any] | None = None, generation: int | None = None
+    ) -> None:
+        """Leaves a value in a slot; one that was not taken yet is replaced, or merged with it.
+
+        Args:
+            slot: The slot.
+            value: The value.
+            merge: Joins a value that waits with this one.
+            generation: The generation that the value is of, if one of an earlier generation is to be dropped.
+        """
+        with self._lock:
+            if generation not in (None, self.generation):
+                return
+            if merge is not None and slot in self._slots:
+                value = merge(self._slots[slot], value)
+            self._slots[slot] = value
+
+    def take(self) -> Mapping[str, Any]:
+        """Empties all slots and returns what was in them, by slot name."""
+        if not self._slots:  # the usual case, and the one that must cost nothing
+            return self._slots
+        with self._lock:
+            taken, self._slots = self._slots, {}
+        return taken
+
+    def drop(self) -> None:
+        """Empties all slots, and begins a new generation."""
+        with self._lock:
+            self._slots = {}
+            self.generation += 1
+
+    def request(self, call: Callable[[], T]) -> Future[T]:
+        """Asks the simulation thread to make a call.
+
+        Returns:
+            A future that gets the call's result, or the exception it raised.
+        """
+        future: Future[T] = Future()
+        with self._lock:
+            if not self._closed:
+                self._requests.append((call, future))
+                return future
+        future.set_exception(ClosedError("the simulation has ended"))
+        return future
+
+    def run_requests(self) -> None:
+        """Makes the calls that wait now; those that come meanwhile wait for the next time."""
+        for _ in range(len(self._requests)):
+            call, future = self._requests.popleft()
+            if not future.set_running_or_notify_cancel():
+                continue  # whoever asked has given up waiting
+            try:
+                future.set_result(call())
+            except Exception as error:
+                future.set_exception(error)
+
+    def close(self) -> None:
+        """Refuses further requests and fails those that wait."""
+        with self._lock:
+            self._closed = True
+            waiting, self._requests = self._requests, deque()
+        for _, future in waiting:
+            if future.set_running_or_notify_cancel():
+                future.set_exception(ClosedError("the simulation has ended"))

@@ -1,0 +1,155 @@
+"""All sensors of a world, and when each is due."""
+
+from __future__ import annotations
+
+import heapq
+import logging
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from rpbi.plugins import blame, check_sample, is_foreign
+from rpbi.sensors.sensor import Sensor
+
+from .clock import Clock, Schedule
+
+log = logging.getLogger(__name__)
+
+
+class _Scheduled:
+    """A sensor and when it is due."""
+
+    def __init__(self, sensor: Sensor, dt_ns: int, tick: int, order: int) -> None:
+        self.sensor = sensor
+        self._is_foreign = is_foreign(sensor)
+        self.order = order
+        self.schedule = Schedule(sensor.hz, dt_ns)
+        self.next_tick = self.schedule.next_due(tick)
+        self.read_tick = -1
+        """Tick of the last sample, -1 before the first."""
+
+    def read(self, tick: int) -> Any:
+        try:
+            sample = self.sensor.read(tick)
+            if sample is None:
+                return None
+            if self._is_foreign:
+                check_sample(sample, self.sensor.sample_type, self.sensor.name)
+        except Exception as error:
+            blame(self.sensor, f"read of '{self.sensor.name}' at tick {tick}", error)
+            raise
+        self.read_tick = tick
+        return sample
+
+
+class SensorSchedule:
+    """Reads each sensor of a world when it is due.
+
+    Args:
+        clock: The world's clock.
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._scheduled: dict[str, list[_Scheduled]] = {}
+        self._watching: list[Sensor] = []
+        """Sensors that act at every tick."""
+        self._queue: list[tuple[int, int, _Scheduled]] = []
+        """A heap of when each sensor is due, in which order it came, and the sensor."""
+        self._count = 0
+        self._warned: set[tuple[str, float]] = set()
+        """Names and rates of sensors that were warned of; a reset is no reason to do so again."""
+
+    def __contains__(self, name: str) -> bool:
+        """Whether it knows a body or camera of that name, with sensors or without."""
+        return name in self._scheduled
+
+    def __getitem__(self, name: str) -> list[Sensor]:
+        """Returns the sensors of a body, or the camera of that name."""
+        return [each.sensor for each in self._scheduled[name]]
+
+    def add(self, name: str, sensors: Sequence[Sensor]) -> None:
+        """Takes over the sensors of a body."""
+        dt_ns, tick = self._clock.dt_ns, self._clock.tick
+        self._scheduled[name] = [_Scheduled(one, dt_ns, tick, order) for order, one in enumerate(sensors, self._count)]
+        self._count += len(sensors)
+        for each in self._scheduled[name]:
+            if each.schedule.clamped:
+                self._warn(each.sensor)
+        self._take_stock()
+
+    def remove(self, name: str) -> None:
+        """Forgets the sensors of a body."""
+        del self._scheduled[name]
+        self._take_stock()
+
+    def clear(self) -> None:
+        """Forgets all."""
+        self._scheduled.clear()
+        self._take_stock()
+
+    def _warn(self, sensor: Sensor) -> None:
+        if (sensor.name, sensor.hz) not in self._warned:
+            self._warned.add((sensor.name, sensor.hz))
+            log.warning("%s: %s Hz is more than a sample a tick; it gets one a tick", sensor.name, sensor.hz)
+
+    def before_step(self) -> None:
+        """Lets sensors act that do so before the physics of each tick."""
+        for sensor in self._watching:
+            try:
+                sensor.before_step(self._clock.tick)
+            except Exception as error:
+                blame(sensor, f"before_step of '{sensor.name}' at tick {self._clock.tick}", error)
+                raise
+
+    def after_step(self) -> None:
+        """Lets the same sensors act after it."""
+        for sensor in self._watching:
+            try:
+                sensor.after_step(self._clock.tick)
+            except Exception as error:
+                blame(sensor, f"after_step of '{sensor.name}' at tick {self._clock.tick}", error)
+                raise
+
+    def read_due(self) -> list[Any]:
+        """Returns samples of the sensors that are due at this tick."""
+        tick = self._clock.tick
+        queue = self._queue
+        samples: list[Any] = []
+        while queue and queue[0][0] <= tick:
+            _, order, each = queue[0]
+            each.next_tick = each.schedule.next_due(tick)
+            heapq.heapreplace(queue, (each.next_tick, order, each))
+            if each.sensor.wanted:
+                samples.append(each.read(tick))
+        return _present(samples)
+
+    def read_rest(self) -> list[Any]:
+        """Returns samples of the sensors that were not read at this tick yet."""
+        tick = self._clock.tick
+        return _present(each.read(tick) for each in self._all() if each.read_tick != tick and each.sensor.wanted)
+
+    def read_idle(self, tick: int, since: int) -> list[Any]:
+        """Returns the samples that would have come due between two ticks, had the world not stood still."""
+        now = self._clock.tick
+        return _present(
+            each.read(now) for each in self._all() if each.sensor.wanted and each.schedule.is_due(tick, since)
+        )
+
+    def _take_stock(self) -> None:
+        self._queue = [(each.next_tick, each.order, each) for each in self._all()]
+        heapq.heapify(self._queue)
+        self._watching = [each.sensor for each in self._all() if _acts_at_ticks(type(each.sensor))]
+
+    def _all(self) -> Iterator[_Scheduled]:
+        for scheduled in self._scheduled.values():
+            yield from scheduled
+
+
+def _acts_at_ticks(sensor_type: type[Sensor]) -> bool:
+    """Tells whether a type of sensors does anything before or after the physics of each tick."""
+    return sensor_type.before_step is not Sensor.before_step or sensor_type.after_step is not Sensor.after_step
+
+
+def _present(samples: Any) -> list[Any]:
+    """Leaves out sensors that had nothing to tell."""
+    return [sample for sample in samples if sample is not None]

@@ -1,0 +1,78 @@
+"""Poses, twists and vectors."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import pybullet
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+
+class Pose(NamedTuple):
+    """Pose of a frame in another.
+
+    Attributes:
+        position: x, y, z [m].
+        quat_xyzw: Unit quaternion x, y, z, w.
+    """
+
+    position: Vector = (0.0, 0.0, 0.0)
+    quat_xyzw: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+    def __matmul__(self, other: Pose) -> Pose:
+        """Chains poses: `pose_b_in_a @ pose_c_in_b` is the pose of c in a."""
+        return Pose(*pybullet.multiplyTransforms(*self, *other))
+
+    def inverse(self) -> Pose:
+        """Returns the pose of the other frame in this one."""
+        return Pose(*pybullet.invertTransform(*self))
+
+
+def plus(a: Vector, b: Vector) -> Vector:
+    """Returns the sum of two vectors."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def minus(a: Vector, b: Vector) -> Vector:
+    """Returns the difference of two vectors."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def scaled(factor: float, a: Vector) -> Vector:
+    """Returns a vector times a number."""
+    return factor * a[0], factor * a[1], factor * a[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Returns the cross product of two vectors."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def rotated(quat_xyzw: Quaternion, a: Vector) -> Vector:
+    """Returns a vector of a frame of that orientation in the axes of what the frame is in."""
+    result: Vector = pybullet.rotateVector(quat_xyzw, a)
+    return result
+
+
+def rotated_back(quat_xyzw: Quaternion, a: Vector) -> Vector:
+    """Returns a vector in the axes of a frame of that orientation."""
+    x, y, z, w = quat_xyzw
+    return rotated((-x, -y, -z, w), a)
+
+
+class Twist(NamedTuple):
+    """Velocity of a frame's origin and rotation of the frame.
+
+    Attributes:
+        linear: x, y, z [m/s].
+        angular: About x, y, z [rad/s].
+    """
+
+    linear: Vector = (0.0, 0.0, 0.0)
+    angular: Vector = (0.0, 0.0, 0.0)
+
+    def seen_from(self, quat_xyzw: Quaternion) -> Twist:
+        """Returns the same twist in the axes of a frame of that orientation."""
+        return Twist(rotated_back(quat_xyzw, self.linear), rotated_back(quat_xyzw, self.angular))

@@ -1,0 +1,122 @@
+"""Methods that say where to go from a configuration: damped and selectively damped least squares."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+import pybullet
+
+from .chain import Chain, Target
+
+
+class Step(Protocol):
+    """A method that brings a link nearer to its target."""
+
+    def __call__(self, q: np.ndarray, frozen: np.ndarray, iterations: int) -> np.ndarray:
+        """Returns m positions nearer to the target [rad or m]; limits are not considered.
+
+        Args:
+            q: m positions to start at.
+            frozen: Which joints to leave where they are.
+            iterations: Most iterations to make.
+        """
+
+
+FROZEN = 1e6
+"""Damping that keeps a joint where it is."""
+DAMPING = 1e-3
+"""Damping of the most willing joint. With PyBullet's own 0.5, it takes some hundred iterations rather than ten."""
+JOINT_ITERATIONS_A_CALL = 140
+"""Iterations in one call of PyBullet, times the number of joints: it holds Python's lock meanwhile, some 0.1 ms."""
+
+
+class DampedLeastSquares:
+    """PyBullet's damped least squares.
+
+    Args:
+        chain: The link to move.
+        target: Where it shall be.
+        threshold_m: Distance at which to stop [m].
+        damping: How unwilling each of the m joints is to move; the least is 1.
+    """
+
+    def __init__(self, chain: Chain, target: Target, threshold_m: float, damping: np.ndarray) -> None:
+        self._chain = chain
+        self._damping = DAMPING * damping
+        self._arguments = {"targetPosition": target.position, "residualThreshold": threshold_m}
+        if target.quat_xyzw is not None:
+            self._arguments["targetOrientation"] = target.quat_xyzw
+
+    def __call__(self, q: np.ndarray, frozen: np.ndarray, iterations: int) -> np.ndarray:
+        """See `Step`."""
+        damping = np.where(frozen, FROZEN, self._damping).tolist()
+        a_call = max(1, JOINT_ITERATIONS_A_CALL // len(q))
+        for done in range(0, iterations, a_call):
+            q = self._call(q, damping, min(a_call, iterations - done))
+        return q
+
+    def _call(self, q: np.ndarray, damping: list[float], iterations: int) -> np.ndarray:
+        chain = self._chain
+        chain.set(q)
+        return np.array(
+            chain.pb.calculateInverseKinematics(
+                chain.body_id,
+                chain.link_index,
+                jointDamping=damping,
+                maxNumIterations=iterations,
+                solver=pybullet.IK_DLS,
+                **self._arguments,
+            )
+        )
+
+
+LARGEST_STEP = np.pi / 4
+"""Most that a joint moves in one step [rad or m], as in the paper."""
+
+
+class SelectivelyDampedLeastSquares:
+    """Selectively damped least squares; our own, since PyBullet's ends the process (bullet3 issue 4404).
+
+    After Buss and Kim, Selectively Damped Least Squares for Inverse Kinematics, Journal of Graphics Tools 10(3), 2005.
+    The arguments are those of `DampedLeastSquares`.
+    """
+
+    def __init__(self, chain: Chain, target: Target, threshold_m: float, damping: np.ndarray) -> None:
+        self._chain, self._target, self._threshold_m = chain, target, threshold_m
+        self._willingness = 1.0 / np.sqrt(damping)
+
+    def __call__(self, q: np.ndarray, frozen: np.ndarray, iterations: int) -> np.ndarray:
+        """See `Step`."""
+        willingness = np.where(frozen, 0.0, self._willingness)
+        for _ in range(iterations):
+            self._chain.set(q)
+            error = self._chain.error(self._target)
+            if np.abs(error).max() < 0.5 * self._threshold_m:
+                break
+            jacobian = self._chain.jacobian(q, len(error)) * willingness
+            q = q + willingness * _selectively_damped(jacobian, error)
+        return q
+
+
+def _selectively_damped(jacobian: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Returns the m joints' step for an error; each singular direction is damped by what it asks of the joints."""
+    lengths = np.linalg.norm(jacobian, axis=0)  # how much the link moves with each joint
+    step = np.zeros(jacobian.shape[1])
+    for u, sigma, v in zip(*_directions(jacobian)):
+        if sigma < 1e-9:
+            continue
+        moved = np.abs(v) @ lengths / sigma  # what all joints move for this direction, against the 1 that it gains
+        largest = min(1.0, 1.0 / moved) * LARGEST_STEP
+        step += _clamped(v * (u @ error) / sigma, largest)
+    return _clamped(step, LARGEST_STEP)
+
+
+def _directions(jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    u, sigma, vt = np.linalg.svd(jacobian, full_matrices=False)
+    return u.T, sigma, vt
+
+
+def _clamped(step: np.ndarray, largest: float) -> np.ndarray:
+    size = np.abs(step).max()
+    return step * (largest / size) if size > largest else step

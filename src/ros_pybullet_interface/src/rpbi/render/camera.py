@@ -1,0 +1,159 @@
+"""Pinhole cameras: the matrices that a renderer takes, the K that ROS wants, and depth in metres.
+
+Frames and pixels. The optical frame has x to the right, y down and z forward, as in ROS; the renderer's eye
+frame (OpenGL) has y up and looks along -z. Pixel coordinates are those of ROS and OpenCV: (u, v) = (0, 0) is
+the *centre* of the first pixel, the image spans [-0.5, width - 0.5] x [-0.5, height - 0.5], and so a camera
+without offset has its principal point at ((width - 1) / 2, (height - 1) / 2).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rpbi.geometry import Pose
+
+Array = npt.NDArray[np.floating[Any]]
+
+OPTICAL_TO_EYE = np.diag([1.0, -1.0, -1.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Intrinsics:
+    """Image size, opening and depth range of a pinhole camera with square pixels.
+
+    Attributes:
+        width_px: Columns of the image.
+        height_px: Rows of the image.
+        fov_deg: Vertical opening, from the upper edge of the first row to the lower edge of the last [deg].
+        near_m: Nearest depth that is drawn, along the optical axis [m].
+        far_m: Farthest depth [m], which is also what pixels that see nothing tell.
+    """
+
+    width_px: int = 640
+    height_px: int = 480
+    fov_deg: float = 40.0
+    near_m: float = 0.01
+    far_m: float = 100.0
+
+    @property
+    def projection(self) -> Array:
+        """The 4x4 matrix from the eye frame to clip space, as OpenGL defines it."""
+        near, far = self.near_m, self.far_m
+        scale = 1.0 / math.tan(math.radians(self.fov_deg) / 2.0)
+        matrix = np.zeros((4, 4))
+        matrix[0, 0] = scale * self.height_px / self.width_px
+        matrix[1, 1] = scale
+        matrix[2, 2] = (near + far) / (near - far)
+        matrix[2, 3] = 2.0 * near * far / (near - far)
+        matrix[3, 2] = -1.0
+        return matrix
+
+    @property
+    def K(self) -> Array:  # noqa: N802
+        """The 3x3 matrix from the optical frame to pixels, derived from what is really rendered."""
+        return camera_matrix(self.projection, self.width_px, self.height_px)
+
+
+def camera_matrix(projection: Array, width_px: int, height_px: int) -> Array:
+    """Derives K from a projection matrix.
+
+    A point (x, y, z) of the optical frame is (x, -y, -z) in the eye frame. Its clip coordinates divided by w
+    = z are (P00 x / z - P02, -P11 y / z - P12), where [-1, 1] spans the outer edges of the image and the
+    second grows upwards.
+
+    Args:
+        projection: 4x4 matrix from the eye frame to clip space; P00, P11, P02 and P12 matter.
+        width_px: Columns of the image.
+        height_px: Rows of the image.
+
+    Returns:
+        3x3 matrix; pixel (0, 0) is the centre of the first pixel.
+    """
+    fx = projection[0, 0] * width_px / 2.0
+    fy = projection[1, 1] * height_px / 2.0
+    cx = (1.0 - projection[0, 2]) * width_px / 2.0 - 0.5
+    cy = (1.0 + projection[1, 2]) * height_px / 2.0 - 0.5
+    return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+
+
+def view_matrix(camera: Pose) -> Array:
+    """Returns the 4x4 matrix from the world to the eye frame.
+
+    Args:
+        camera: Pose of the optical frame in the world.
+    """
+    rotation = rotation_matrix(camera.quat_xyzw)
+    optical_from_world = np.eye(4)
+    optical_from_world[:3, :3] = rotation.T
+    optical_from_world[:3, 3] = -rotation.T @ np.asarray(camera.position)
+    return OPTICAL_TO_EYE @ optical_from_world
+
+
+def rotation_matrix(quat_xyzw: tuple[float, float, float, float]) -> Array:
+    """Returns the 3x3 rotation of a unit quaternion."""
+    x, y, z, w = quat_xyzw
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def depth_in_metres(buffer: npt.NDArray[np.float32], intrinsics: Intrinsics) -> npt.NDArray[np.float32]:
+    """Turns a depth buffer into distances along the optical axis.
+
+    Of the equal ways to write it this one keeps single precision: `1 - buffer` is exact where depths are
+    large.
+
+    Args:
+        buffer: Depths as the renderer stores them, 0 at the near and 1 at the far plane, any shape.
+        intrinsics: The camera.
+
+    Returns:
+        Depths z of the optical frame [m], of the same shape.
+    """
+    near, far = np.float32(intrinsics.near_m), np.float32(intrinsics.far_m)
+    inverse = np.subtract(np.float32(1.0), buffer)
+    inverse *= far
+    inverse += near * buffer
+    return np.divide(near * far, inverse, out=inverse)
+
+
+def project(points: Array, camera: Pose, K: Array) -> Array:
+    """Projects points of the world into the image.
+
+    Args:
+        points: n points in the world [m], shape (n, 3).
+        camera: Pose of the optical frame in the world.
+        K: 3x3 camera matrix.
+
+    Returns:
+        Pixels and depth (u, v, z) [px, px, m], shape (n, 3); z <= 0 is behind the camera and its pixels mean
+        nothing.
+    """
+    in_camera = (np.asarray(points) - np.asarray(camera.position)) @ rotation_matrix(camera.quat_xyzw)
+    depth = in_camera[:, 2:]
+    return np.hstack([(in_camera @ K.T)[:, :2] / depth, depth])
+
+
+def back_project(depth_m: Array, K: Array) -> Array:
+    """Returns the points that the pixels of a depth image see.
+
+    Args:
+        depth_m: Depths z [m], shape (height, width).
+        K: 3x3 camera matrix.
+
+    Returns:
+        Points in the optical frame [m], shape (height, width, 3).
+    """
+    height, width = depth_m.shape
+    x = (np.arange(width, dtype=depth_m.dtype) - K[0, 2]) / K[0, 0]
+    y = (np.arange(height, dtype=depth_m.dtype) - K[1, 2]) / K[1, 1]
+    return np.stack([depth_m * x, depth_m * y[:, None], depth_m], axis=-1)

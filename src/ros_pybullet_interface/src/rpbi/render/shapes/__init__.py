@@ -1,0 +1,1 @@
+"""Shapes as the renderer draws them."""

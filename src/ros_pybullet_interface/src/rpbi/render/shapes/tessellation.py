@@ -1,0 +1,91 @@
+"""Shapes that look as they are.
+
+PyBullet draws spheres and cylinders from few triangles (a sphere of 0.2 m is up to 13 mm off), shades the edges of
+boxes away, and with EGL a visual plane or a mesh without a file crashes it. The renderer therefore draws meshes in
+their place, made to measure. Of several transparent shapes from one file EGL draws the wrong ones, so each of them has
+its own.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pybullet
+
+from rpbi.config.pybullet_models import CreateVisualShape
+
+from . import surfaces
+from .surfaces import Surface
+
+_SHAPE_KEYS = ("radius", "halfExtents", "length", "planeNormal", "vertices", "indices", "normals", "uvs")
+_DEFAULT_RADIUS_M, _DEFAULT_LENGTH_M, _DEFAULT_HALF_EXTENTS_M = 0.5, 1.0, (1.0, 1.0, 1.0)
+"""PyBullet's own defaults."""
+
+_SPECK = surfaces.mesh(1e-6 * np.eye(3), np.array([[0, 1, 2]]))
+"""Stands for what cannot be seen at all: EGL would draw it into depth and segmentation."""
+
+
+class FineShapes:
+    """Turns the shapes that PyBullet makes by itself into meshes, as files in a folder of its own."""
+
+    def __init__(self) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="rpbi-shapes-")
+        self._files: dict[bytes, str] = {}
+        self._glassy_count = 0
+        self._surface_of: dict[int, Callable[[CreateVisualShape], Surface | None]] = {
+            pybullet.GEOM_SPHERE: lambda shape: surfaces.capsule(shape.radius or _DEFAULT_RADIUS_M, 0.0),
+            pybullet.GEOM_CAPSULE: lambda shape: surfaces.capsule(*_round_size(shape)),
+            pybullet.GEOM_CYLINDER: lambda shape: surfaces.cylinder(*_round_size(shape)),
+            pybullet.GEOM_BOX: lambda shape: surfaces.box(shape.halfExtents or _DEFAULT_HALF_EXTENTS_M),
+            pybullet.GEOM_PLANE: lambda shape: surfaces.plane(shape.planeNormal or (0.0, 0.0, 1.0)),
+            pybullet.GEOM_MESH: _inline_mesh,
+        }
+
+    def of(self, shape: CreateVisualShape) -> CreateVisualShape:
+        """Returns the shape to draw: a mesh from a file, or the same if it is one already."""
+        opacity = 1.0 if shape.rgbaColor is None else shape.rgbaColor[3]
+        make = self._surface_of.get(shape.shapeType)
+        surface = _SPECK if not opacity else make(shape) if make else None
+        file = shape.fileName if surface is None else self._file(surface)
+        if file is None:
+            return shape
+        if opacity < 1.0:
+            file = self._as_another_file(file)
+        kept = {key: value for key, value in shape if key in shape.model_fields_set and key not in _SHAPE_KEYS}
+        return CreateVisualShape.model_construct(**{**kept, "shapeType": pybullet.GEOM_MESH, "fileName": file})
+
+    def close(self) -> None:
+        """Deletes the files."""
+        self._folder.cleanup()
+
+    def _as_another_file(self, file: str) -> str:
+        """Returns a path of the same file that PyBullet takes for another one."""
+        self._glassy_count += 1
+        folder, name = os.path.split(file)
+        return os.path.join(folder, "./" * self._glassy_count + name)
+
+    def _file(self, surface: Surface) -> str:
+        """Returns the file of a surface; equal ones share one, which PyBullet then reads once."""
+        key = b"".join(part.tobytes() for part in surface)
+        if key not in self._files:
+            path = Path(self._folder.name) / f"shape_{len(self._files)}.obj"
+            path.write_text(surface.as_obj())
+            self._files[key] = str(path)
+        return self._files[key]
+
+
+def _round_size(shape: CreateVisualShape) -> tuple[float, float]:
+    return shape.radius or _DEFAULT_RADIUS_M, shape.length or _DEFAULT_LENGTH_M
+
+
+def _inline_mesh(shape: CreateVisualShape) -> Surface | None:
+    if shape.fileName is not None or not shape.vertices or not shape.indices:
+        return None
+    triangles = np.array(shape.indices).reshape(-1, 3)
+    has_normals = shape.normals is not None and len(shape.normals) == len(shape.vertices)
+    normals = np.array(shape.normals) if has_normals else None
+    return surfaces.mesh(np.array(shape.vertices), triangles, normals)

@@ -1,0 +1,60 @@
+"""Which shapes of a renderer's client can be seen through."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import NamedTuple
+
+from rpbi.engine.client import Client
+
+
+class TransparentShape(NamedTuple):
+    """A shape that is neither opaque nor invisible.
+
+    Attributes:
+        body_id: Its body in the renderer's client.
+        link_index: Its link, -1 for the base.
+        shape_index: Its place among the shapes of that link.
+        rgba: Its colour and opacity, each from 0 to 1.
+    """
+
+    body_id: int
+    link_index: int
+    shape_index: int
+    rgba: tuple[float, float, float, float]
+
+
+class Transparency:
+    """Keeps account of the glassy shapes among bodies that come and go.
+
+    PyBullet's EGL plugin goes on telling the shapes of removed bodies, before those of later bodies with the same id.
+
+    Args:
+        pb: The client.
+    """
+
+    def __init__(self, pb: Client) -> None:
+        self._pb = pb
+        self._stale = {0: len(pb.getVisualShapeData(0))}  # the renderer has drawn a test image
+        self._shapes_of: dict[int, tuple[TransparentShape, ...]] = {}
+        self.shapes: tuple[TransparentShape, ...] = ()
+        """All glassy shapes."""
+
+    def update(self, body_ids: set[int]) -> None:
+        """Takes notice of which bodies there are now."""
+        for body_id in self._shapes_of.keys() - body_ids:
+            del self._shapes_of[body_id]
+            self._stale[body_id] = len(self._pb.getVisualShapeData(body_id))
+        for body_id in body_ids - self._shapes_of.keys():
+            self._shapes_of[body_id] = tuple(self._glassy(body_id))
+        self.shapes = tuple(shape for shapes in self._shapes_of.values() for shape in shapes)
+
+    def _glassy(self, body_id: int) -> list[TransparentShape]:
+        found = []
+        count: Counter[int] = Counter()
+        for data in self._pb.getVisualShapeData(body_id)[self._stale.get(body_id, 0) :]:
+            link_index, rgba = data[1], data[7]
+            if 0.0 < rgba[3] < 1.0:
+                found.append(TransparentShape(body_id, link_index, count[link_index], rgba))
+            count[link_index] += 1
+        return found

@@ -1,0 +1,192 @@
+"""Runs a recorded session again and compares the hashes of its states."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from custom_ros_tools.errors import InterfaceError
+from rpbi.world import World
+
+from .recorded_values import from_text
+from .world_description import WorldDescription
+
+
+class RecordedCommand(NamedTuple):
+    """A command as it was recorded: a WorldCommand with its value as text."""
+
+    tick: int
+    name: str
+    what: str
+    data: str
+
+
+class Checkpoint(NamedTuple):
+    """A state that was recorded, in their order.
+
+    Attributes:
+        resets: How often the world had been reset.
+        tick: The world's tick.
+        commands: How many commands had entered the world since the reset.
+        state_hash: The hash.
+    """
+
+    resets: int
+    tick: int
+    commands: int
+    state_hash: str
+
+    def __str__(self) -> str:
+        return f"tick {self.tick}" + (f" after reset {self.resets}" if self.resets else "")
+
+
+@dataclass
+class Recording:
+    """What is known of a session.
+
+    Attributes:
+        description: What the world was built from.
+        commands: By number of resets and index the commands.
+        checkpoints: The states, in any order.
+    """
+
+    description: WorldDescription
+    commands: dict[int, dict[int, RecordedCommand]] = field(default_factory=dict)
+    checkpoints: set[Checkpoint] = field(default_factory=set)
+
+
+class Difference(NamedTuple):
+    """A state that is not as recorded.
+
+    Attributes:
+        checkpoint: What was recorded.
+        state_hash: What it is now.
+        last_agreement: The last state that agreed, None if there was none since the world was built or reset.
+    """
+
+    checkpoint: Checkpoint
+    state_hash: str
+    last_agreement: Checkpoint | None
+
+
+class ReplayResult(NamedTuple):
+    """How a replay ended.
+
+    Attributes:
+        agreed: How many states agreed.
+        ticks: How many ticks were replayed.
+        difference: The first state that differs, if one does; the replay ends there.
+        left_out: What could not be replayed, and why.
+    """
+
+    agreed: int
+    ticks: int
+    difference: Difference | None
+    left_out: tuple[str, ...]
+
+
+class Replay:
+    """Builds the world of a recording and runs it through its commands.
+
+    Args:
+        recording: The recording.
+        progress: Is told the ticks done since the last time.
+
+    Raises:
+        ConfigError: If the world cannot be built here.
+    """
+
+    def __init__(self, recording: Recording, progress: Callable[[int], Any] = lambda _: None) -> None:
+        self._recording, self._progress = recording, progress
+        self._world = recording.description.build()
+        self._agreed = self._ticks = 0
+        self._left_out: list[str] = []
+
+    def run(self) -> ReplayResult:
+        """Replays all that can be, each reset being a new start, up to the first difference."""
+        difference = None
+        lives: dict[int, set[Checkpoint]] = {}
+        for checkpoint in {Checkpoint(0, 0, 0, self._recording.description.start_hash), *self._recording.checkpoints}:
+            lives.setdefault(checkpoint.resets, set()).add(checkpoint)
+        try:
+            for turn, resets in enumerate(sorted(lives)):
+                if turn:
+                    self._world.reset()
+                difference = self._live(sorted(lives[resets]), self._recording.commands.get(resets, {}))
+                if difference is not None:
+                    break
+        finally:
+            self._world.close()
+        return ReplayResult(self._agreed, self._ticks, difference, tuple(self._left_out))
+
+    def _live(self, checkpoints: list[Checkpoint], commands: Mapping[int, RecordedCommand]) -> Difference | None:
+        """Goes from a start of the world to its last recorded state; returns the first that differs."""
+        done = 0
+        agreement: Checkpoint | None = None
+        for checkpoint in checkpoints:
+            missing = next((index for index in range(done, checkpoint.commands) if index not in commands), None)
+            if missing is not None:
+                self._left_out.append(
+                    f"from {checkpoint} on: command {missing} is not in the recording, which has to begin before the "
+                    "first command, or before a reset"
+                )
+                return None
+            try:
+                done = self._advance(checkpoint, commands, done)
+            except (InterfaceError, ValueError) as error:
+                at = f"tick {self._world.clock.tick}"
+                self._left_out.append(f"from {at} on, before {checkpoint}: {error}")
+                return None
+            state_hash = self._world.state_hash()
+            if state_hash != checkpoint.state_hash:
+                return Difference(checkpoint, state_hash, agreement)
+            self._agreed += 1
+            agreement = checkpoint
+        return None
+
+    def _advance(self, to: Checkpoint, commands: Mapping[int, RecordedCommand], done: int) -> int:
+        """Applies commands and steps up to a checkpoint; returns how many commands were applied since the start."""
+        world, start = self._world, self._world.clock.tick
+        while True:
+            tick = world.clock.tick
+            while done < to.commands and commands[done].tick <= tick:
+                apply_command(world, commands[done])
+                done += 1
+            if tick >= to.tick:
+                break
+            world.step()
+        self._ticks += to.tick - start
+        self._progress(to.tick - start)
+        return done
+
+
+def apply_command(world: World, command: RecordedCommand) -> None:
+    """Does to a world what was done when a command was recorded.
+
+    Raises:
+        InterfaceError: If the world refuses.
+        ValueError: If the command cannot be read, or is none that this world knows.
+    """
+    value = from_text(command.data)
+    try:
+        _apply(world, command.name, command.what, value)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ValueError(f"'{command.what}' of '{command.name}' makes no sense in this world: {error!r}") from error
+
+
+def _apply(world: World, name: str, what: str, value: Any) -> None:
+    if what == "input":
+        world.take_input(name, value)
+    elif what == "add":
+        world.add(*value)
+    elif what == "remove":
+        world.remove(name)
+    elif what == "dynamics":
+        world.change_dynamics(name, value)
+    elif what == "halt":
+        world.halt(value)
+    elif what == "pause":
+        world.pause(value)
+    else:
+        world.act(name, what, value)

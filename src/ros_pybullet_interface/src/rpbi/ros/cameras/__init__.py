@@ -1,0 +1,1 @@
+"""Cameras in ROS: scenes to the renderer process, images from it."""

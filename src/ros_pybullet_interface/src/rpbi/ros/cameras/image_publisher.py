@@ -1,0 +1,169 @@
+"""The node that publishes camera images, inside the renderer process."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import rosgraph
+import rospy
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from std_msgs.msg import Header
+
+from custom_ros_tools.ros.lifecycle.logging_bridge import attach_logging
+from custom_ros_tools.ros.lifecycle.master_watch import MasterWatch
+from rpbi.render.depth import PointCloud
+from rpbi.render.frame import Camera, Demand, Frame
+from rpbi.ros.headers import to_ros_time
+from rpbi.ros.publishers.topics import StateTopic
+
+from .messages import camera_info, cloud_message, image_message
+from .topics import CameraTopic, camera_topics
+
+SINK = "rpbi.ros.cameras.image_publisher:ImagePublisher"
+
+QUEUE_SIZE = 2
+"""Images kept for a slow subscriber: a stopped one must not fill the memory."""
+LONGEST_WAIT_S = 5.0
+"""How long subscribers are waited for that the master knows of [s]."""
+
+
+class ImagePublisher:
+    """Publishes frames on the topics of each camera, and only those that somebody subscribes to."""
+
+    def __init__(self) -> None:
+        # Without ROS time, since it must never wait for the clock: stamps come with the frames.
+        rospy.init_node("rpbi_camera", disable_rostime=True, disable_signals=True)
+        attach_logging("custom_ros_tools")
+        MasterWatch()
+        self._cameras: dict[str, _CameraTopics] = {}
+
+    def add(self, camera: Camera) -> None:
+        """Advertises the topics of a camera; if it is synchronous, waits for those who subscribe to them already."""
+        topics = self._cameras[camera.name] = _CameraTopics(camera)
+        if camera.synchronous:
+            topics.wait_for_subscribers()
+
+    def remove(self, name: str) -> None:
+        """Ends the topics of a camera."""
+        self._cameras.pop(name).close()
+
+    def demands(self) -> Mapping[str, Demand]:
+        """Returns what is subscribed to, by camera.
+
+        Raises:
+            SystemExit: If somebody has shut down the node: without it the process is of no use.
+        """
+        if rospy.is_shutdown():
+            sys.exit(f"{rospy.get_name()} was shut down")
+        return {name: topics.demand() for name, topics in self._cameras.items()}
+
+    def write(self, frame: Frame) -> None:
+        """Publishes a frame."""
+        self._cameras[frame.camera.name].publish(frame)
+
+    def close(self) -> None:
+        """Takes leave of the ROS master."""
+        rospy.signal_shutdown("the simulator has ended")
+
+
+def sink_arguments(node_name: str, argv: Sequence[str]) -> list[str]:
+    """Returns the arguments with which the renderer process is the simulator's companion.
+
+    Args:
+        node_name: The simulator's resolved node name.
+        argv: The simulator's own arguments, remappings included.
+
+    Returns:
+        Its remappings, but the name of the node is its name with `_camera` after it.
+    """
+    remappings = [item for item in argv if ":=" in item and not item.startswith(("__name:=", "__log:=", "_"))]
+    namespace = [item for item in argv if item.startswith("__ns:=")]
+    return [*remappings, *namespace, f"__name:={node_name.rsplit('/', 1)[-1]}_camera"]
+
+
+class _Topic(StateTopic):
+    """A topic that also counts who has ever come.
+
+    Args:
+        topic: Its name.
+        message_type: Its ROS type.
+        waits: Whether it waits until each message is taken, instead of dropping some.
+    """
+
+    def __init__(self, topic: str, message_type: type, waits: bool) -> None:
+        self.seen = 0
+        super().__init__(topic, message_type, QUEUE_SIZE)
+        if waits:
+            self._publisher.impl.set_queue_size(None)  # rospy then sends in the caller's thread
+
+    def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Any) -> None:
+        super().peer_subscribe(topic_name, topic_publish, peer_publish)
+        self.seen += 1
+
+    def subscriber_count(self) -> int:
+        """Returns how many subscribers are connected."""
+        count: int = self._publisher.get_num_connections()
+        return count
+
+
+class _CameraTopics:
+    """The topics of one camera."""
+
+    def __init__(self, camera: Camera) -> None:
+        self._frame_id = camera.frame_id
+        self._info = camera_info(camera)
+        self._cloud = PointCloud(camera.intrinsics) if camera.pointcloud else None
+        self._topics: dict[str, tuple[CameraTopic, _Topic]] = {
+            name: (topic, _Topic(name, topic.message_type, camera.synchronous))
+            for name, topic in camera_topics(camera.topic_name, camera.pointcloud).items()
+        }
+        self._published_ns = -1
+
+    def wait_for_subscribers(self) -> None:
+        """Waits until all who have subscribed at the master are connected; but not for ever, some may be dead."""
+        registered = dict(rosgraph.Master(rospy.get_name()).getSystemState()[1])
+        end_s = time.monotonic() + LONGEST_WAIT_S
+        for name, (_, ros_topic) in self._topics.items():
+            expected = len(registered.get(rospy.resolve_name(name), ()))
+            while ros_topic.subscriber_count() < expected and time.monotonic() < end_s:
+                time.sleep(0.01)
+
+    def demand(self) -> Demand:
+        """Returns what is subscribed to."""
+        topics = self._topics.values()
+        streams = frozenset(topic.stream for topic, ros_topic in topics if ros_topic.has_subscribers)
+        return Demand(streams, sum(ros_topic.seen for _, ros_topic in topics))
+
+    def publish(self, frame: Frame) -> None:
+        """Publishes a frame; one with the last stamp again goes only to who has come since."""
+        header = Header(stamp=to_ros_time(frame.stamp_ns), frame_id=self._frame_id)
+        again = frame.stamp_ns == self._published_ns
+        for topic, ros_topic in self._topics.values():
+            if not ros_topic.has_subscribers:
+                continue
+            message = self._message(topic.stream, frame, header)
+            if message is None:
+                continue  # its first subscriber came while the frame was drawn
+            if again:
+                ros_topic.serve_late(lambda late=message: late)
+            else:
+                ros_topic.publish(message)
+        self._published_ns = frame.stamp_ns
+
+    def close(self) -> None:
+        """Ends the topics."""
+        for _, ros_topic in self._topics.values():
+            ros_topic.close()
+
+    def _message(self, stream: str, frame: Frame, header: Header) -> CameraInfo | Image | PointCloud2 | None:
+        if stream == "info":
+            self._info.header = header
+            return self._info
+        if stream == "points":
+            if self._cloud is None or frame.depth is None or frame.colour is None:
+                return None
+            return cloud_message(self._cloud.of(frame.depth, frame.colour), header)
+        return image_message(stream, frame, header)

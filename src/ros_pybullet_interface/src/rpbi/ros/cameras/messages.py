@@ -1,0 +1,65 @@
+"""What a camera sees, as messages."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
+from std_msgs.msg import Header
+
+from rpbi.render.frame import Camera, Frame
+
+
+def camera_info(camera: Camera) -> CameraInfo:
+    """Returns what ROS has to know of a camera that distorts nothing."""
+    info = CameraInfo(width=camera.intrinsics.width_px, height=camera.intrinsics.height_px)
+    K = camera.intrinsics.K
+    info.K = K.ravel().tolist()
+    info.distortion_model = "plumb_bob"
+    info.D = [0.0] * 5
+    info.R = np.eye(3).ravel().tolist()
+    info.P = np.hstack([K, np.zeros((3, 1))]).ravel().tolist()
+    return info
+
+
+def image_message(stream: str, frame: Frame, header: Header) -> Image | None:
+    """Returns an image of a frame as a message, None if the frame has none of it.
+
+    Args:
+        stream: `colour` (rgb8), `depth` (32FC1, metres) or `segmentation` (mono16, 65535 where nothing is).
+        frame: The frame.
+        header: Stamp and frame of the message.
+    """
+    if stream == "colour":
+        encoding, pixels = "rgb8", frame.colour
+    elif stream == "depth":
+        encoding, pixels = "32FC1", frame.depth
+    else:
+        encoding, pixels = "mono16", _as_mono16(frame.segmentation)
+    if pixels is None:
+        return None
+    height, width = pixels.shape[:2]
+    image = Image(header=header, height=height, width=width, encoding=encoding, is_bigendian=0)
+    image.step = pixels.nbytes // height
+    image.data = pixels.tobytes()
+    return image
+
+
+def cloud_message(points: npt.NDArray[np.float32], header: Header) -> PointCloud2:
+    """Returns points as an organised cloud, pixel by pixel.
+
+    Args:
+        points: x, y, z [m], NaN where nothing is, and the colour; shape (height, width, 4).
+        header: Stamp and frame of the message.
+    """
+    height, width = points.shape[:2]
+    fields = [PointField(name, 4 * index, PointField.FLOAT32, 1) for index, name in enumerate(("x", "y", "z", "rgb"))]
+    cloud = PointCloud2(header=header, height=height, width=width, fields=fields, is_bigendian=False, is_dense=False)
+    cloud.point_step = 4 * points.itemsize
+    cloud.row_step = width * cloud.point_step
+    cloud.data = points.tobytes()
+    return cloud
+
+
+def _as_mono16(body_ids: npt.NDArray[np.int32] | None) -> npt.NDArray[np.uint16] | None:
+    return None if body_ids is None else body_ids.astype(np.uint16)  # -1 becomes 65535

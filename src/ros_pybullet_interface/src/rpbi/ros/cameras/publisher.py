@@ -1,0 +1,157 @@
+"""Where scenes go: to the renderer process, which publishes the images."""
+
+from __future__ import annotations
+
+import sys
+import time
+import zlib
+from collections.abc import Callable, Mapping
+
+import rospy
+
+from custom_ros_tools.errors import PhysicsError
+from rpbi.render.camera import Intrinsics
+from rpbi.render.client import RenderClient
+from rpbi.render.depth import DepthNoise
+from rpbi.render.frame import Camera
+from rpbi.render.priority import take_part
+from rpbi.samples import SceneSample
+from rpbi.sensors import RgbdSensor
+from rpbi.world import World
+
+from .image_publisher import SINK, sink_arguments
+
+LONGEST_WAIT_S = 20.0
+"""How long the world waits for a synchronous camera before it stands still [s] of wall time."""
+
+
+class ScenePublisher:
+    """Feeds the renderer process, and has cameras read only while somebody looks at their images.
+
+    Args:
+        world: The world that the cameras are in.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._sensors: Mapping[str, RgbdSensor] = {}
+        self._synchronous: tuple[RgbdSensor, ...] = ()
+        self._awaited: list[SceneSample] = []
+        self._renderer = RenderClient(
+            (),
+            world.log,
+            lambda: {name: body.body_id for name, body in world.bodies.items()},
+            SINK,
+            sink_arguments(rospy.get_name(), sys.argv),
+        )
+
+    def poll(self) -> None:
+        """Sees to the process; called at every pass of the loop."""
+        if self._sensors is not self._world.cameras:
+            self._take_over(self._world.cameras)
+        self._renderer.poll()
+        for name, sensor in self._sensors.items():
+            sensor.wanted = name in self._renderer.wanted
+
+    def before_tick(self) -> None:
+        """Waits until synchronous cameras can do their part in the coming tick; usually there are none.
+
+        Raises:
+            PhysicsError: If that takes too long.
+        """
+        if self._sensors is not self._world.cameras:
+            self.poll()
+        for sensor in self._synchronous:
+            name = sensor.name
+            if not self._renderer.knows_demand(name):
+                self._wait_for(lambda name=name: self._renderer.knows_demand(name), name, "the renderer is not up")
+            if sensor.pose is None and sensor.wanted:
+                missing = f"there is no TF to '{sensor.config.object_tf.tf_id}'"
+                self._wait_for(lambda sensor=sensor: sensor.pose is not None or not sensor.wanted, name, missing)
+
+    def publish(self, sample: SceneSample, stamp_ns: int) -> None:
+        """Has a scene drawn and published."""
+        self._renderer.send(sample)
+        if self._sensors[sample.name].config.synchronous:
+            self._awaited.append(sample)
+
+    def flush(self) -> None:
+        """Waits for the images of synchronous cameras.
+
+        Raises:
+            PhysicsError: If one does not come.
+        """
+        if not self._awaited:
+            return
+        awaited, self._awaited = self._awaited, []
+        for sample in awaited:
+            self._wait_for(
+                lambda sample=sample: self._renderer.has_shown(sample.name, sample.stamp_ns),
+                sample.name,
+                f"no image of tick {sample.tick}",
+                needs_renderer=True,
+            )
+
+    def serve_late(self) -> None:
+        """Gives the last images to who has come since."""
+        self._renderer.serve_late()
+
+    def restart(self) -> None:
+        """Drops what it keeps of scenes: the world was reset."""
+        self._renderer.forget_scenes()
+
+    def forget(self, name: str) -> None:
+        """Leaves a body that has gone out of the scenes that are still to be drawn."""
+        self._renderer.forget_body(name)
+
+    def facts(self) -> dict[str, str]:
+        """Returns what the diagnostics tell of it."""
+        return {"camera_renderer": self._renderer.renderer or "starting"} if self._sensors else {}
+
+    def close(self) -> None:
+        """Ends the process, which is in a hurry now: it has to take its leave of the ROS master first."""
+        if self._renderer.process_id is not None:
+            take_part(self._renderer.process_id)  # on a busy machine it might not get to its end otherwise
+        self._renderer.stop()
+
+    def _take_over(self, cameras: Mapping[str, RgbdSensor]) -> None:
+        for name, sensor in self._sensors.items():
+            if cameras.get(name) is not sensor:
+                self._renderer.remove(name)
+        for name, sensor in cameras.items():
+            if self._sensors.get(name) is not sensor:
+                self._renderer.add(_camera(sensor))
+        self._sensors = cameras
+        self._synchronous = tuple(sensor for sensor in cameras.values() if sensor.config.synchronous)
+
+    def _wait_for(self, condition: Callable[[], bool], name: str, missing: str, needs_renderer: bool = False) -> None:
+        """Waits for something of a synchronous camera, or until the node shuts down."""
+        end_s = time.monotonic() + LONGEST_WAIT_S
+        while not (condition() or rospy.core.is_shutdown_requested()):
+            self.poll()
+            self._world.take_inputs()
+            if needs_renderer and not self._renderer.is_up:
+                raise PhysicsError(f"camera '{name}' is synchronous: {missing}, the renderer has ended")
+            if time.monotonic() > end_s:
+                raise PhysicsError(f"camera '{name}' is synchronous: {missing} after {LONGEST_WAIT_S:g} s")
+            if not condition():
+                self._renderer.wait(0.02)
+
+
+def _camera(sensor: RgbdSensor) -> Camera:
+    config = sensor.config
+    size = config.intrinsics
+    near_m, far_m = size.range
+    noise = None
+    if config.depth_noise_m or config.depth_noise_growth_per_m:
+        seed = zlib.crc32(config.name.encode()) if config.seed is None else config.seed
+        noise = DepthNoise(config.depth_noise_m, config.depth_noise_growth_per_m, seed)
+    return Camera(
+        sensor.name,
+        config.object_tf.tf_id,
+        Intrinsics(size.width, size.height, size.fov, near_m, far_m),
+        sensor.topic_name,
+        config.pointcloud,
+        config.synchronous,
+        noise,
+    )

@@ -1,0 +1,55 @@
+"""Headers of messages: names of TF frames, and stamps of the world's clock."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import genpy
+
+from rpbi.engine.clock import NS_PER_S
+
+_prefix = ""
+
+
+class Frame(NamedTuple):
+    """Frames that the node puts on TF.
+
+    Attributes:
+        name: Their name, with `NAME` for a body and `LINK` for one of its links.
+        meaning: Which bodies have them, in a sentence.
+    """
+
+    name: str
+    meaning: str
+
+
+FRAMES = (
+    Frame("rpbi/world", "The world, parent of all others. Poses in YAML, topics and services are in it."),
+    Frame("rpbi/NAME", "A dynamic object with `broadcast_hz`."),
+    Frame(
+        "rpbi/NAME/LINK",
+        "URDF frames of links: all of a robot with `broadcast_link_states`, its root link with "
+        "`broadcast_root_tf_hz`, all of a URDF object with `broadcast_hz`.",
+    ),
+)
+
+
+def use_prefix(prefix: str | None) -> None:
+    """Puts a prefix before all frames of this node's world, so that two worlds can share one TF tree."""
+    global _prefix
+    _prefix = f"{prefix}/" if prefix else ""
+
+
+def prefixed(frame: str) -> str:
+    """Returns the full name of a frame of this node's world, such as `rpbi/kuka_lwr`."""
+    return _prefix + frame
+
+
+def world_frame() -> str:
+    """Returns the frame that all poses are in: `rpbi/world`, with the prefix if there is one."""
+    return prefixed("rpbi/world")
+
+
+def to_ros_time(stamp_ns: int) -> genpy.Time:
+    """Returns a stamp [ns] as a ROS time, without going through a float."""
+    return genpy.Time(*divmod(stamp_ns, NS_PER_S))

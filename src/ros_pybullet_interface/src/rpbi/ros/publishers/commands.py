@@ -1,0 +1,108 @@
+"""What a recording needs to be replayed: what the world was built from, and by tick what entered it since."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from std_msgs.msg import String
+
+from ros_pybullet_interface.msg import WorldCommand as WorldCommandMessage
+from ros_pybullet_interface.msg import WorldCommands
+from rpbi.engine.command_log import WorldCommand
+from rpbi.replay.recorded_values import to_text
+from rpbi.replay.world_description import describe
+from rpbi.ros.headers import to_ros_time
+from rpbi.world import World
+
+from .topics import FastTopic
+
+log = logging.getLogger(__name__)
+
+MOST_IN_A_MESSAGE = 25
+"""So that making one never takes long."""
+
+
+class _Reader:
+    """Who gets commands, and up to which they have been sent.
+
+    Args:
+        send: Takes a message.
+    """
+
+    def __init__(self, send: Callable[[WorldCommands], None]) -> None:
+        self.send = send
+        self.next = 0
+
+
+class _CommandTopic(FastTopic):
+    """The topic, which knows its newcomers; whatever is published meanwhile, they want all that came before."""
+
+    def __init__(self) -> None:
+        self.newcomers: deque[_Reader] = deque()
+        super().__init__("rpbi/commands", WorldCommands)
+
+    def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Callable[[Any], None]) -> None:
+        """Notes a new subscriber; rospy calls it from a thread of its own."""
+
+        def send(message: WorldCommands) -> None:
+            with self._publisher.impl.publock:
+                peer_publish(message)
+
+        self.newcomers.append(_Reader(send))
+
+
+class CommandPublisher:
+    """Publishes what a world was built from, and its commands, a few at each pass of the loop.
+
+    Args:
+        world: The world.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._topic = _CommandTopic()
+        self._all = _Reader(self._topic.publish)
+        self._newcomers: list[_Reader] = []
+        self._description = rospy.Publisher("rpbi/world_description", String, queue_size=1, latch=True)
+        self._description.publish(describe(world))
+        self._resets = world.resets
+
+    def spin(self) -> None:
+        """Sends what is new, to newcomers what is old, and to who was slow the rest."""
+        commands, resets = self._world.commands, self._world.resets
+        while self._topic.newcomers:
+            self._newcomers.append(self._topic.newcomers.popleft())
+        if resets != self._resets:
+            self._resets = resets
+            for reader in (self._all, *self._newcomers):
+                reader.next = 0
+        if commands.count != self._all.next:
+            if self._topic.has_subscribers:
+                self._send(self._all)
+            else:
+                self._all.next = commands.count
+        for reader in self._newcomers:
+            self._topic.wrap_connections()
+            self._send(reader)
+        self._newcomers = [reader for reader in self._newcomers if reader.next < commands.count]
+        self._topic.flush()
+
+    def _send(self, reader: _Reader) -> None:
+        first, commands = self._world.commands.since(reader.next, MOST_IN_A_MESSAGE)
+        message = WorldCommands(resets=self._resets, first=first, commands=[_message(each) for each in commands])
+        message.header.stamp = to_ros_time(self._world.clock.stamp_ns)
+        reader.next = first + len(commands)
+        reader.send(message)
+
+
+def _message(command: WorldCommand) -> WorldCommandMessage:
+    try:
+        data = to_text(command.value)
+    except TypeError as error:
+        log.warning("%s: a command cannot be recorded, so no replay will be right: %s", command.name, error)
+        data = ""
+    return WorldCommandMessage(command.tick, command.name, command.what, data)

@@ -1,0 +1,76 @@
+"""Samples as messages: contacts, states of bases, surfaces of soft bodies."""
+
+from __future__ import annotations
+
+from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
+from nav_msgs.msg import Odometry
+from std_msgs.msg import ColorRGBA, Header
+from visualization_msgs.msg import Marker, MarkerArray
+
+from ros_pybullet_interface.msg import ContactPoint, Contacts
+from rpbi.ros.headers import prefixed, to_ros_time, world_frame
+from rpbi.samples import BaseStateSample, ContactArrowsSample, ContactsSample, SurfaceSample
+
+_ARROW = Vector3(0.015, 0.03, 0.04)
+"""Diameters of shaft and head and length of the head [m]."""
+_COLOUR = ColorRGBA(0.85, 0.1, 0.1, 1.0)
+
+
+def contacts_message(sample: ContactsSample, stamp_ns: int) -> Contacts:
+    """Makes the message of a body's contacts."""
+    points = [
+        ContactPoint(
+            link=point.link,
+            other_body=point.other_body,
+            other_link=point.other_link,
+            position=Point(*point.position),
+            normal=Vector3(*point.normal),
+            depth=point.depth,
+            normal_force=point.normal_force,
+            friction_direction_1=Vector3(*point.friction_directions[0]),
+            friction_force_1=point.friction_forces[0],
+            friction_direction_2=Vector3(*point.friction_directions[1]),
+            friction_force_2=point.friction_forces[1],
+        )
+        for point in sample.points
+    ]
+    return Contacts(_header(stamp_ns), Vector3(*sample.force), points)
+
+
+def contact_arrows_message(sample: ContactArrowsSample, stamp_ns: int) -> MarkerArray:
+    """Makes arrows in place of those before."""
+    header = _header(stamp_ns)
+    markers = [Marker(header=header, action=Marker.DELETEALL)]
+    for number, (start, end) in enumerate(sample.arrows):
+        marker = Marker(header=header, ns=sample.name, id=number, type=Marker.ARROW, action=Marker.ADD)
+        marker.points = [Point(*start), Point(*end)]
+        marker.scale, marker.color = _ARROW, _COLOUR
+        marker.pose.orientation.w = 1.0
+        markers.append(marker)
+    return MarkerArray(markers)
+
+
+def _header(stamp_ns: int) -> Header:
+    return Header(stamp=to_ros_time(stamp_ns), frame_id=world_frame())
+
+
+def odometry_message(sample: BaseStateSample, stamp_ns: int) -> Odometry:
+    """Returns pose and twist of a base; covariances are zero, since both are exact."""
+    message = Odometry(child_frame_id=prefixed(sample.frame))
+    message.header.frame_id = world_frame()
+    message.header.stamp = to_ros_time(stamp_ns)
+    message.pose.pose.position = Point(*sample.pose.position)
+    message.pose.pose.orientation = Quaternion(*sample.pose.quat_xyzw)
+    message.twist.twist = Twist(Vector3(*sample.twist.linear), Vector3(*sample.twist.angular))
+    return message
+
+
+def surface_message(sample: SurfaceSample, stamp_ns: int) -> Marker:
+    """Makes a list of triangles in the world."""
+    marker = Marker(ns=sample.name, type=Marker.TRIANGLE_LIST, action=Marker.ADD, scale=Vector3(1.0, 1.0, 1.0))
+    marker.header.stamp = to_ros_time(stamp_ns)
+    marker.header.frame_id = world_frame()
+    marker.pose.orientation.w = 1.0
+    marker.color = ColorRGBA(*sample.rgba)
+    marker.points = [Point(*corner) for corner in sample.corners]
+    return marker

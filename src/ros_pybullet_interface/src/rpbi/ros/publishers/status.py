@@ -1,0 +1,143 @@
+"""The node's own state: /clock, `rpbi/status` and /diagnostics."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Mapping
+
+import rosgraph
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rosgraph_msgs.msg import Clock as ClockMessage
+from std_msgs.msg import Int64
+
+from rpbi.engine.clock import Clock
+from rpbi.engine.pacer import Pacer
+from rpbi.ros.headers import to_ros_time
+
+from .topics import FastTopic
+
+log = logging.getLogger(__name__)
+
+DIAGNOSTICS_PERIOD_S = 1.0
+STOPPED_CLOCK_PERIOD_S = 0.05
+FREE_RUNNING_CLOCK_HZ = 250.0
+FALLING_BEHIND = 0.98
+"""Share of the asked real-time factor below which the diagnostics warn."""
+
+
+def _warn_of_rivals() -> None:
+    """Warns if another node tells the time too: ROS time would jump between the two."""
+    published: list[tuple[str, list[str]]] = rosgraph.Master(rospy.get_name()).getSystemState()[0]
+    rivals = [node for topic, nodes in published if topic == "/clock" for node in nodes if node != rospy.get_name()]
+    if rivals:
+        log.warning("/clock is published by %s too: two worlds cannot both be the clock", ", ".join(rivals))
+
+
+class ClockPublisher:
+    """Simulated time on /clock, of which the simulator is the only source.
+
+    Args:
+        clock: The world's clock.
+        hz: Most messages a second of wall time.
+    """
+
+    def __init__(self, clock: Clock, hz: float) -> None:
+        self._clock = clock
+        self._period_s = 1.0 / hz
+        _warn_of_rivals()
+        self._publisher = FastTopic("/clock", ClockMessage)
+        self._due_s = 0.0
+
+    def publish_tick(self) -> None:
+        """Tells a new tick, unless the rate is used up."""
+        now_s = time.monotonic()
+        if now_s >= self._due_s:
+            # Counting on from the last deadline keeps the mean rate; a pause must not be made up for.
+            self._due_s = max(self._due_s + self._period_s, now_s - self._period_s)
+            self._send()
+
+    def publish_now(self) -> None:
+        """Tells the present tick in any case, for the last one before standing still."""
+        self._due_s = time.monotonic() + STOPPED_CLOCK_PERIOD_S
+        self._send()
+
+    def repeat(self) -> None:
+        """Tells the same tick again now and then while the world stands still, for those who come late."""
+        if time.monotonic() >= self._due_s:
+            self.publish_now()
+
+    def _send(self) -> None:
+        self._publisher.publish(ClockMessage(to_ros_time(self._clock.stamp_ns)))
+
+
+class StatusPublisher:
+    """Whether the world runs, and how well.
+
+    Args:
+        clock: The world's clock.
+        pacer: What keeps it in step with the wall clock.
+        hz: Rate of `rpbi/status` [Hz] of wall time.
+        real_time_factor: The factor asked for; 0 is as fast as it goes.
+        facts: Tells what else the diagnostics should have.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        pacer: Pacer,
+        hz: float,
+        real_time_factor: float,
+        facts: Callable[[], Mapping[str, str]] = dict,
+    ) -> None:
+        self._clock, self._pacer, self._wanted_factor = clock, pacer, real_time_factor
+        self._facts = facts
+        self._period_s = 1.0 / hz
+        self._status = rospy.Publisher("rpbi/status", Int64, queue_size=10)
+        self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
+        self._due_s = 0.0
+        self._diagnostics_due_s = time.monotonic() + DIAGNOSTICS_PERIOD_S
+        self._overruns = 0
+
+    def spin(self, running: bool, stepping: bool = False) -> None:
+        """Publishes what is due by the wall clock.
+
+        Args:
+            running: Whether the world runs.
+            stepping: Whether it is about the ticks of a request.
+        """
+        now_s = time.monotonic()
+        if now_s >= self._due_s:
+            self._due_s = max(self._due_s + self._period_s, now_s)
+            self.publish(running or stepping)
+        if now_s >= self._diagnostics_due_s:
+            self._diagnostics_due_s = max(self._diagnostics_due_s + DIAGNOSTICS_PERIOD_S, now_s)
+            self._publish_diagnostics(running, stepping)
+
+    def publish(self, running: bool) -> None:
+        """Publishes 1 for running, 0 for stopped."""
+        self._status.publish(Int64(int(running)))
+
+    def _publish_diagnostics(self, running: bool, stepping: bool) -> None:
+        factor = self._pacer.measure()
+        overruns = self._pacer.overruns - self._overruns
+        self._overruns = self._pacer.overruns
+        status = DiagnosticStatus(name=f"{rospy.get_name()}: simulation", hardware_id="rpbi", level=DiagnosticStatus.OK)
+        status.message = "running" if running else "stepping" if stepping else "stopped"
+        if running and factor < FALLING_BEHIND * self._wanted_factor:
+            status.level = DiagnosticStatus.WARN
+            status.message = f"too slow: real-time factor {factor:.3f} instead of {self._wanted_factor:g}"
+        values = {
+            "real_time_factor": f"{factor if running else 0.0:.4f}",
+            "overruns_total": str(self._pacer.overruns),
+            "overruns_in_last_period": str(overruns),
+            "lost_s_total": f"{self._pacer.lost_s:.3f}",
+            "tick": str(self._clock.tick),
+            "time_s": f"{self._clock.time_s:.6f}",
+            **self._facts(),
+        }
+        status.values = [KeyValue(key, value) for key, value in values.items()]
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = to_ros_time(self._clock.stamp_ns)
+        self._diagnostics.publish(message)

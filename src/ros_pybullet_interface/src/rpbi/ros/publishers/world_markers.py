@@ -1,0 +1,166 @@
+"""The whole world as markers for RViz, which otherwise knows robots only."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import NamedTuple
+from urllib.parse import quote
+
+import rospy
+from geometry_msgs.msg import Point, Quaternion, Vector3
+from geometry_msgs.msg import Pose as PoseMessage
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+from rpbi.bodies import Body
+from rpbi.bodies.visual_shapes import BodyShape, ShapeKind, body_shapes, followed_frame, link_frame, link_pose
+from rpbi.geometry import Pose
+from rpbi.ros.headers import prefixed, world_frame
+from rpbi.world import World
+
+MARKER_TYPES = {
+    ShapeKind.BOX: Marker.CUBE,
+    ShapeKind.SPHERE: Marker.SPHERE,
+    ShapeKind.CYLINDER: Marker.CYLINDER,
+    ShapeKind.MESH: Marker.MESH_RESOURCE,
+    ShapeKind.TRIANGLES: Marker.TRIANGLE_LIST,
+}
+
+
+def shape_marker(name: str, number: int, shape: BodyShape, frame: str, pose: Pose) -> Marker:
+    """Returns the marker of a shape, which moves with its frame.
+
+    Args:
+        name: The body, for RViz a namespace that can be switched off.
+        number: Which of the body's shapes it is.
+        shape: The shape.
+        frame: TF frame.
+        pose: Pose of the shape in that frame.
+    """
+    marker = Marker(ns=name, id=number, type=MARKER_TYPES[shape.kind], action=Marker.ADD, frame_locked=True)
+    marker.header.frame_id = frame
+    marker.pose = pose_message(pose)
+    marker.scale = Vector3(*shape.size)
+    marker.color = ColorRGBA(*shape.rgba)
+    if shape.mesh_file:
+        marker.mesh_resource = f"file://{quote(shape.mesh_file)}"
+        marker.mesh_use_embedded_materials = shape.is_textured
+    marker.points = [Point(*corner) for corner in shape.corners]
+    return marker
+
+
+def deletion(marker: Marker) -> Marker:
+    """Returns the marker that takes another one away."""
+    gone = Marker(ns=marker.ns, id=marker.id, action=Marker.DELETE)
+    gone.header.frame_id = marker.header.frame_id
+    return gone
+
+
+def moved(marker: Marker, pose: Pose) -> Marker:
+    """Returns the marker at another pose in its frame; the one given stays as it is, since it may be on its way."""
+    copied = Marker(*(getattr(marker, slot) for slot in Marker.__slots__))
+    copied.pose = pose_message(pose)
+    return copied
+
+
+def pose_message(pose: Pose) -> PoseMessage:
+    """Returns a pose as a message."""
+    return PoseMessage(Point(*pose.position), Quaternion(*pose.quat_xyzw))
+
+
+MARKERS_TOPIC = "rpbi/markers"
+STILL = 1e-4
+"""What moves and turns less than that [m, and parts of a quaternion] is not told again."""
+
+_Key = tuple[str, int]
+
+
+class _Loose(NamedTuple):
+    """A shape that no frame of TF carries along."""
+
+    key: _Key
+    body: Body
+    shape: BodyShape
+
+
+class WorldMarkers:
+    """Publishes every visual shape of the world on a latched topic, all together whenever anything comes or goes.
+
+    Each is given in the frame of its link, which TF moves. Shapes of links that are not on TF are given in the world;
+    they are looked at while somebody listens, and all is sent again when one of them has moved.
+
+    Args:
+        world: The world; only the simulation thread may make and poll this.
+        hz: How often to look [Hz] of wall time.
+    """
+
+    def __init__(self, world: World, hz: float) -> None:
+        self._world = world
+        self._period_s = 1.0 / hz
+        self._due_s = 0.0
+        self._seen: tuple[object, ...] = ()
+        self._markers: dict[_Key, Marker] = {}
+        self._loose: list[_Loose] = []
+        self._shown: dict[_Key, Pose] = {}
+        """Where the loose ones were when they were last told."""
+        self._publisher = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=100, latch=True)
+
+    def poll(self) -> None:
+        """Tells what has changed, if it is time to look."""
+        now_s = time.monotonic()
+        if now_s < self._due_s:
+            return
+        self._due_s = max(self._due_s + self._period_s, now_s)
+        present = (len(self._world.log), *self._world.bodies.values())
+        if present != self._seen:
+            self._seen = present
+            self._look_at_all()
+        elif self._loose and self._publisher.get_num_connections():
+            self._look_at_loose()
+
+    def _look_at_all(self) -> None:
+        before, self._markers = self._markers, {}
+        self._loose, self._shown = [], {}
+        for body in self._world.bodies.values():
+            for number, shape in enumerate(body_shapes(body)):
+                self._add((body.name, number), body, shape)
+        gone = [deletion(marker) for key, marker in before.items() if key not in self._markers]
+        if gone or self._markers != before:
+            self._publisher.publish([*gone, *self._markers.values()])
+
+    def _add(self, key: _Key, body: Body, shape: BodyShape) -> None:
+        own = link_frame(body, self._world.sensors_of(body.name), shape.link)
+        frame = followed_frame(body) if own is None else prefixed(own)
+        pose = shape.pose_in_link
+        if frame is None:
+            frame = world_frame()
+            pose = self._shown[key] = link_pose(body, shape.link_index) @ shape.pose_in_link
+            if not _is_finite(pose):
+                return
+            self._loose.append(_Loose(key, body, shape))
+        self._markers[key] = shape_marker(*key, shape, frame, pose)
+
+    def _look_at_loose(self) -> None:
+        links: dict[tuple[int, int], Pose] = {}
+        has_moved = False
+        for key, body, shape in self._loose:
+            link = body.body_id, shape.link_index
+            if link not in links:
+                links[link] = link_pose(body, shape.link_index)
+            pose = links[link] @ shape.pose_in_link
+            if _is_finite(pose) and _differs(pose, self._shown[key]):
+                self._shown[key] = pose
+                self._markers[key] = moved(self._markers[key], pose)
+                has_moved = True
+        if has_moved:
+            self._publisher.publish(list(self._markers.values()))
+
+
+def _differs(one: Pose, other: Pose) -> bool:
+    pairs = zip((*one.position, *one.quat_xyzw), (*other.position, *other.quat_xyzw))
+    return any(abs(a - b) > STILL for a, b in pairs)
+
+
+def _is_finite(pose: Pose) -> bool:
+    return math.isfinite(sum(pose.position) + sum(pose.quat_xyzw))

@@ -1,0 +1,125 @@
+"""The page of all topics, services, frames and parameters of the simulator."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from rpbi.bodies import BODY_TYPES
+from rpbi.reference.markdown import WRITTEN_BY, block, code, link, page, table
+from rpbi.ros.headers import FRAMES
+from rpbi.ros.node_topics import PARAMETERS
+from rpbi.ros.robots.trajectory_messages import CONTROLLER
+from rpbi.world import World
+
+from .interface_table import OF_WINDOW, PUBLISHES, SERVES, SUBSCRIBES, Endpoint, endpoints, of_body, of_camera
+from .reference_world import JOINT
+
+INTRODUCTION = """\
+What the node `ros_pybullet_interface_node.py` has in ROS. `./rpbi check WORLD.yaml` tells the same of your own world.
+
+- `NAME` stands for the name of an object, `JOINT` for that of a joint, `LINK` for that of a link.
+- Names without `/` in front are relative: a namespace moves them.
+- All that is of one tick has that tick's stamp. Rates are in the world's time unless they are said to be in wall time.
+- Keys such as `broadcast_hz` set the rate or open the topic; they stand in [config_reference.md](config_reference.md).
+- A message that has NaN, an unknown joint or the wrong number of values changes nothing and is named in the log. A
+  service that refuses answers `success: false` and why."""
+WINDOW = """\
+With `connection_mode: GUI`, see [gui.md](gui.md); without a window nothing is published, and what asks is refused."""
+OBJECTS = """\
+The column *of* names types of objects, see [concepts.md](concepts.md#bodies-and-sensors). Objects of your own types and
+your own sensors have what their classes say besides, see [extending.md](extending.md)."""
+CAMERAS = """\
+`camera` is the first camera, whatever its name; further ones have `rpbi/NAME/...`. A node of its own publishes them,
+named after the simulator with `_camera` behind. Nothing is drawn that nobody subscribes to. The rate is `hz` of the
+camera, see [cameras.md](cameras.md)."""
+FOLLOWED = """\
+All have the prefix `tf_prefix` of the main file, if there is one. The node listens to TF where `object_tf` names a
+frame that a body or camera follows."""
+OTHERS = """\
+The nodes of custom_ros_tools, which remap joint states and publish transforms and markers, are told in
+[custom_ros_tools.md](custom_ros_tools.md#nodes). The commands of rpbi_utils have no topics of their own, see
+[replay.md](replay.md) and [data.md](data.md)."""
+_FOLLOWER = f"rpbi/NAME/{CONTROLLER}"
+WITH_CONTROL_MSGS = {
+    Endpoint(
+        SERVES,
+        f"{_FOLLOWER}/follow_joint_trajectory",
+        "control_msgs/FollowJointTrajectoryAction",
+        meaning="An action: the robot follows a trajectory and tells how well; where control_msgs is installed.",
+    ): ["robot", "mobile_robot"],
+    Endpoint(
+        SERVES,
+        f"{_FOLLOWER}/query_state",
+        "control_msgs/QueryTrajectoryState",
+        meaning="Tells where the joints will be at a time; where control_msgs is installed.",
+    ): ["robot", "mobile_robot"],
+}
+"""What the page has in any case, so that it is the same where control_msgs is installed and where not."""
+HEADINGS = {PUBLISHES: "Published", SUBSCRIBES: "Subscribed", SERVES: "Services"}
+
+
+def interface_page(world: World, definitions: Mapping[str, str]) -> str:
+    """Returns the page.
+
+    Args:
+        world: A world of one body of each type, named after it, and a camera.
+        definitions: Text of each message and service of ours, such as `ros_pybullet_interface/Contacts`.
+    """
+    of_bodies = {name: list(of_body(world, name, body)) for name, body in world.bodies.items()}
+    of_cameras = [each for name in world.cameras for each in of_camera(world, name)]
+    told = {each for rows in (*of_bodies.values(), of_cameras) for each in rows}
+    rest = [each for each in endpoints(world) if each not in told]
+    of_node = {each: [""] for each in rest if each.note != OF_WINDOW}
+    of_window = {each: [""] for each in rest if each.note == OF_WINDOW}
+    parts = [WRITTEN_BY, "# Topics and services", INTRODUCTION]
+    parts += ["## Simulator", *_tables(of_node, definitions)]
+    parts += ["## Objects", OBJECTS, *_tables({**_owners(of_bodies), **WITH_CONTROL_MSGS}, definitions)]
+    parts += ["## Cameras", CAMERAS, *_tables({each: [""] for each in of_cameras}, definitions)]
+    parts += ["## PyBullet's window", WINDOW, *_tables(of_window, definitions)]
+    parts += ["## Frames", table(("frame", "meaning"), ((code(name), text) for name, text in FRAMES)), FOLLOWED]
+    parts += ["## Parameters", _parameters(), "## Other nodes", OTHERS, "## Messages and services of ours"]
+    for name, text in definitions.items():
+        parts += [f"### {name}", block("", text)]
+    return page(parts)
+
+
+def _owners(of_bodies: Mapping[str, Iterable[Endpoint]]) -> dict[Endpoint, list[str]]:
+    """Returns which types of bodies have what; the names of bodies and joints in it are replaced."""
+    owners: dict[Endpoint, list[str]] = {}
+    for body, rows in of_bodies.items():
+        for row in rows:
+            if row.type.startswith("control_msgs/") and not row.name.endswith("/state"):
+                continue
+            name = row.name.replace(f"rpbi/{body}/", "rpbi/NAME/").replace(f"/{JOINT}/", "/JOINT/")
+            type_name = row.type.replace("control_msgs/", "ros_pybullet_interface/")  # fields and md5 are the same
+            kinds = owners.setdefault(Endpoint(row.kind, name, type_name, "", row.meaning), [])
+            if body not in kinds:
+                kinds.append(body)
+    return owners
+
+
+def _tables(owners: Mapping[Endpoint, list[str]], definitions: Mapping[str, str]) -> Iterator[str]:
+    """Yields a table of each kind of endpoint that there is, with its heading."""
+    for kind, heading in HEADINGS.items():
+        rows = {row: kinds for row, kinds in owners.items() if row.kind == kind}
+        if not rows:
+            continue
+        yield f"**{heading}**"
+        head = ("name", "type", "meaning")
+        if any(kinds != [""] for kinds in rows.values()):
+            yield table((*head, "of"), ((*_cells(row, definitions), _names(kinds)) for row, kinds in rows.items()))
+        else:
+            yield table(head, (_cells(row, definitions) for row in rows))
+
+
+def _cells(row: Endpoint, definitions: Mapping[str, str]) -> tuple[str, str, str]:
+    return code(row.name), link(row.type) if row.type in definitions else row.type, row.meaning
+
+
+def _names(kinds: list[str]) -> str:
+    return "all" if kinds == list(BODY_TYPES) else ", ".join(kinds)
+
+
+def _parameters() -> str:
+    rows = ((code(each.name), "set" if each.is_set else "read", each.meaning) for each in PARAMETERS)
+    return table(("name", "", "meaning"), rows)

@@ -1,0 +1,1 @@
+"""What robots have in ROS beside their samples."""

@@ -1,0 +1,143 @@
+"""Inverse kinematics of robots, as a service that answers and a topic that moves."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields, replace
+from typing import NamedTuple
+
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
+from ros_pybullet_interface.srv import CalculateInverseKinematicsRequest, CalculateInverseKinematicsResponse
+from rpbi.bodies import Body
+from rpbi.bodies.robots.jointed import JointedBody
+from rpbi.geometry import Pose
+from rpbi.kinematics import IKProblem, IKSolution
+from rpbi.ros.headers import to_ros_time
+from rpbi.ros.services.body_context import BodyContext
+from rpbi.urdf.joints import JointTarget
+
+NEAR_M, NEAR_RAD = 0.01, 0.02
+"""A link that was moved has arrived within these: joints within 0.01 rad of their goals may add up to as much."""
+
+
+def ik_topic_suffixes(body: Body) -> tuple[str, ...]:
+    """Returns `ik` for robots that shall have the topic."""
+    return ("ik",) if isinstance(body, JointedBody) and body.config.start_ik_callback else ()
+
+
+def inverse_kinematics(
+    context: BodyContext, request: CalculateInverseKinematicsRequest
+) -> CalculateInverseKinematicsResponse:
+    """Answers with positions of all joints that a motor can move; moves nothing.
+
+    Raises:
+        InterfaceError: If the robot has no such link or has gone.
+        ValueError: If a field of the problem does not make sense.
+    """
+    solution = solve_for_robot(context, request.problem)
+    state = JointState(
+        header=Header(stamp=to_ros_time(context.world.clock.stamp_ns)),
+        name=solution.joint_names,
+        position=solution.positions,
+        velocity=_velocities(request.problem, solution),
+    )
+    return CalculateInverseKinematicsResponse(solution.success, solution.message, state)
+
+
+def move_by_ik(context: BodyContext, problem: CalculateInverseKinematicsProblem) -> None:
+    """Hands the solution to the robot as target of the joints that move the link; the others keep theirs.
+
+    Raises:
+        InterfaceError: If the robot has no such link or has gone.
+        ValueError: If a field of the problem does not make sense, or there is no solution: then nothing moves.
+    """
+    solution = solve_for_robot(context, problem)
+    if not solution.success:
+        raise ValueError(solution.message)
+    velocity = dict(zip(solution.joint_names, _velocities(problem, solution)))
+    target = JointTarget(
+        solution.chain, solution.chain_positions, [velocity[name] for name in solution.chain] if velocity else ()
+    )
+    context.world.put(f"{context.name}/target", target)
+
+
+class LinkResidual(NamedTuple):
+    """How far a link is from where it was to be.
+
+    Attributes:
+        position_m: Distance [m].
+        orientation_rad: Angle [rad], None if any orientation would do.
+    """
+
+    position_m: float
+    orientation_rad: float | None
+
+    @property
+    def is_near(self) -> bool:
+        """Whether that is no more than joints within their tolerances may make of it."""
+        return self.position_m <= NEAR_M and (self.orientation_rad or 0.0) <= NEAR_RAD
+
+    def in_words(self, link: str) -> str:
+        """Returns it as part of a message."""
+        angle = "" if self.orientation_rad is None else f" and {self.orientation_rad:.3g} rad"
+        return f"link '{link}' is {self.position_m * 1e3:.3g} mm{angle} from its target"
+
+
+def residual_of_robot(context: BodyContext, message: CalculateInverseKinematicsProblem) -> LinkResidual:
+    """Measures where the link of a problem is now, against the problem's target in the world.
+
+    Raises:
+        InterfaceError: If the robot has gone.
+    """
+    robot: JointedBody = context.body
+    base, positions = context.ask_body(lambda: (robot.base_pose(), robot.joint_positions()))
+    pose = base @ robot.kinematics.forward(list(positions.values()), message.link_name)
+    angle = None
+    if message.targetOrientation:
+        target = message.targetOrientation
+        cosine = abs(sum(a * b for a, b in zip(pose.quat_xyzw, target))) / math.hypot(*target)
+        angle = 2.0 * math.acos(min(1.0, cosine))
+    return LinkResidual(math.dist(pose.position, message.targetPosition), angle)
+
+
+def solve_for_robot(context: BodyContext, message: CalculateInverseKinematicsProblem) -> IKSolution:
+    """Solves a problem of which the target is in the world, for where the robot is now.
+
+    The search starts at the message's `currentPosition`, or else where the robot's joints are. Any thread but that of
+    the simulation may call it; the simulation goes on meanwhile.
+
+    Raises:
+        InterfaceError: If the robot has no such link or has gone.
+        ValueError: If a field of the problem does not make sense.
+    """
+    robot: JointedBody = context.body
+    problem = IKProblem(**{field.name: getattr(message, field.name) for field in fields(IKProblem)})
+    if not (math.isfinite(message.dt) and message.dt >= 0.0):
+        raise ValueError(f"dt: must not be negative, got {message.dt}")
+    base, positions = context.ask_body(lambda: (robot.base_pose(), robot.joint_positions()), robot)
+    orientation = problem.targetOrientation or Pose().quat_xyzw
+    target = base.inverse() @ Pose(problem.targetPosition, orientation)
+    in_base = replace(
+        problem,
+        targetPosition=target.position,
+        targetOrientation=target.quat_xyzw if problem.targetOrientation else (),
+        currentPosition=problem.currentPosition or tuple(positions.values()),
+    )
+    return robot.kinematics.solve(in_base)
+
+
+def _velocities(problem: CalculateInverseKinematicsProblem, solution: IKSolution) -> list[float]:
+    """Returns the velocities [rad/s or m/s] that lead to the solution in the time given, none without a start or time.
+
+    Raises:
+        ValueError: If the time is too short.
+    """
+    if not (problem.dt and problem.currentPosition):
+        return []
+    velocities = [(goal - here) / problem.dt for goal, here in zip(solution.positions, problem.currentPosition)]
+    if not all(map(math.isfinite, velocities)):
+        raise ValueError(f"dt: too short for a velocity, got {problem.dt}")
+    return velocities

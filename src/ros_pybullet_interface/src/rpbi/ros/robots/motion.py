@@ -1,0 +1,65 @@
+"""Services that move a robot in a given time and answer when it has arrived."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from custom_ros_tools.errors import InterfaceError
+from ros_pybullet_interface.srv import (
+    ResetEffStateRequest,
+    ResetEffStateResponse,
+    ResetJointStateRequest,
+    ResetJointStateResponse,
+)
+from rpbi.control.motion import Motion, MotionResult
+from rpbi.engine.actions import TimedGoal
+from rpbi.ros.services.body_context import BodyContext
+from rpbi.urdf.joints import JointTarget
+
+from .ik import residual_of_robot, solve_for_robot
+
+
+def move_to_joint_state(context: BodyContext, request: ResetJointStateRequest) -> ResetJointStateResponse:
+    """Moves the joints that are named; the others stay."""
+    state = request.joint_state
+    target = JointTarget(state.name, state.position, state.velocity, state.effort)
+    positions = target.values_of("position", "the goal of a motion is a position")
+    result = _move(context, context.body.model.resolve_driven(target.names, positions), request.duration)
+    return ResetJointStateResponse(success=result.success, message=result.message)
+
+
+def move_to_initial_joint_state(context: BodyContext, request: ResetJointStateRequest) -> ResetJointStateResponse:
+    """Moves all joints to where the robot started; the state in the request is not looked at."""
+    result = _move(context, context.body.start_positions(), request.duration)
+    return ResetJointStateResponse(success=result.success, message=result.message)
+
+
+def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> ResetEffStateResponse:
+    """Moves a link to a pose by way of inverse kinematics; nothing moves if that fails."""
+    solution = solve_for_robot(context, request.problem)
+    if not solution.success:
+        return ResetEffStateResponse(success=False, message=f"nothing moved: {solution.message}")
+    goal = context.body.model.resolve(solution.chain, solution.chain_positions)
+    result = _move(context, goal, request.duration)
+    if not result.success:
+        return ResetEffStateResponse(success=False, message=result.message)
+    residual = residual_of_robot(context, request.problem)
+    message = f"{result.message}; {residual.in_words(request.problem.link_name)}"
+    return ResetEffStateResponse(success=residual.is_near, message=message)
+
+
+def _move(context: BodyContext, goal: Mapping[int, float], duration_s: float) -> MotionResult:
+    """Moves and waits for the end.
+
+    Raises:
+        InterfaceError: If the simulation is stopped, has ended or makes no progress.
+        ValueError: If the goal or the duration is refused; nothing moves then.
+    """
+
+    def start() -> Motion:
+        if not context.simulation.running:
+            raise InterfaceError("the simulation is stopped: start it, else nothing moves")
+        motion: Motion = context.world.act(context.name, "move", TimedGoal(goal, duration_s))
+        return motion
+
+    return context.ask.wait_for(context.ask_body(start).result)

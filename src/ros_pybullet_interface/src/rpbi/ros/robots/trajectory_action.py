@@ -1,0 +1,184 @@
+"""The action of a follower of trajectories, for planners such as MoveIt."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from concurrent.futures import wait
+from functools import cache
+from queue import SimpleQueue
+from typing import Any
+
+import rospy
+from actionlib.server_goal_handle import ServerGoalHandle
+from actionlib_msgs.msg import GoalStatus
+
+from custom_ros_tools.errors import InterfaceError
+from rpbi.bodies import Robot
+from rpbi.control.trajectories.controller_state import ControllerState
+from rpbi.control.trajectories.motion import TrajectoryMotion
+from rpbi.control.trajectories.request import ErrorCode, TrajectoryRefusedError
+from rpbi.engine.actions import RecordedTrajectory
+from rpbi.ros.services.body_context import BodyContext
+
+from .stamped_action_server import StampedActionServer
+from .trajectory_messages import (
+    CONTROLLER,
+    FollowJointTrajectoryAction,
+    fill_state,
+    goal_tolerances,
+    trajectory_request,
+)
+
+log = logging.getLogger(__name__)
+
+MOST_TASKS = 100
+"""Tasks that may wait before feedback is left out, as it would pile up in a world that runs much too fast."""
+LONGEST_END_S = 5.0
+"""How long closing waits for the last answers [s]."""
+
+
+def open_trajectory_action(context: BodyContext) -> Callable[[], None] | None:
+    """Serves the action of a robot that follows trajectories; returns what closes it."""
+    if not isinstance(context.body, Robot) or context.body.follower is None:
+        return None
+    if FollowJointTrajectoryAction is None:
+        log.warning(
+            "%s: rpbi/%s/%s has its topics only: the action follow_joint_trajectory and the service query_state need "
+            "control_msgs, which is not installed (docs/trajectories.md tells how)",
+            context.name,
+            context.name,
+            CONTROLLER,
+        )
+        return None
+    return TrajectoryAction(context).close
+
+
+_open_actions: set[TrajectoryAction] = set()
+
+
+@cache
+def _answer_before_shutdown() -> None:
+    """Has ROS wait for the answers to all goals, which end with the world, before it shuts down."""
+    rospy.on_shutdown(lambda: [action.answer_all() for action in list(_open_actions)])
+
+
+class TrajectoryAction:
+    """Serves `follow_joint_trajectory` of one robot.
+
+    actionlib holds its lock while it calls back, and takes it to answer. So neither the simulation thread answers a
+    goal nor a callback waits for the simulation thread: both leave what is to be done to a thread of the action's own.
+
+    Args:
+        context: The robot and the way to it.
+    """
+
+    def __init__(self, context: BodyContext) -> None:
+        self._context = context
+        self._motions: dict[ServerGoalHandle, TrajectoryMotion] = {}
+        self._tasks: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
+        self._thread = threading.Thread(target=self._work, name=f"{context.name} trajectories", daemon=True)
+        self._server = StampedActionServer(
+            f"rpbi/{context.name}/{CONTROLLER}/follow_joint_trajectory",
+            FollowJointTrajectoryAction,
+            context.world.clock,
+            take_goal=lambda goal: self._tasks.put(lambda: self._begin(goal)),
+            take_cancel=lambda goal: self._tasks.put(lambda: self._cancel(goal)),
+        )
+        self._thread.start()
+        self._server.start()
+        _open_actions.add(self)
+        _answer_before_shutdown()
+
+    def close(self) -> None:
+        """Ends the action; the robot has gone before."""
+        _open_actions.discard(self)
+        self.answer_all()
+        self._server.stop()
+
+    def answer_all(self) -> None:
+        """Waits until all goals have their answers; for when their motions have ended, or are about to."""
+        wait([motion.result for motion in list(self._motions.values())], LONGEST_END_S)
+        self._tasks.put(None)
+        self._thread.join(LONGEST_END_S)
+
+    def _work(self) -> None:
+        while (task := self._tasks.get()) is not None:
+            try:
+                task()
+            except Exception:  # the next goals shall have their answers all the same
+                log.exception("%s: a goal could not be served", self._context.name)
+
+    def _begin(self, goal: ServerGoalHandle) -> None:
+        if goal.get_goal_status().status == GoalStatus.RECALLING:
+            goal.set_canceled(self._result(ErrorCode.SUCCESSFUL, "cancelled before it began"))
+            return
+
+        def feed(state: ControllerState) -> None:
+            stamp_ns = self._context.world.clock.stamp_ns
+            if self._tasks.qsize() < MOST_TASKS:
+                self._tasks.put(lambda: goal.publish_feedback(self._feedback(state, stamp_ns)))
+
+        clock, message = self._context.world.clock, goal.get_goal()
+        try:
+            request, tolerances = trajectory_request(message.trajectory), goal_tolerances(message)
+            checked = self._context.body.follower.check(request, tolerances)
+
+            def follow() -> TrajectoryMotion:
+                record = RecordedTrajectory.of(request, tolerances, clock)
+                motion: TrajectoryMotion = self._context.world.act(
+                    self._context.name, "follow", record, lambda body: body.follower.follow(checked, clock, feed)
+                )
+                return motion
+
+            motion = self._context.ask_body(follow)
+        except InterfaceError as error:
+            self._reject(
+                goal, error.code if isinstance(error, TrajectoryRefusedError) else ErrorCode.INVALID_GOAL, error
+            )
+            return
+        except Exception as error:  # nothing that a goal brings along may leave the client without an answer
+            log.exception("a goal failed in a way that is not foreseen")
+            self._reject(goal, ErrorCode.INVALID_GOAL, error)
+            return
+        goal.set_accepted()
+        self._motions[goal] = motion
+        motion.result.add_done_callback(lambda _: self._tasks.put(lambda: self._finish(goal)))
+
+    def _reject(self, goal: ServerGoalHandle, code: ErrorCode, error: Exception) -> None:
+        log.warning("%s: goal refused: %s", self._context.name, error)
+        goal.set_rejected(self._result(code, str(error)), str(error))
+
+    def _cancel(self, goal: ServerGoalHandle) -> None:
+        motion = self._motions.get(goal)
+        if motion is None:
+            return  # it has ended meanwhile
+        try:
+            self._context.ask_body(lambda: self._stop_motion(motion))
+        except InterfaceError as error:
+            log.warning("%s: could not cancel a goal: %s", self._context.name, error)
+
+    def _stop_motion(self, motion: TrajectoryMotion) -> None:
+        if self._context.body.motion is motion:  # else a newer one has replaced it
+            self._context.world.act(self._context.name, "cancel", "cancelled; the joints hold")
+
+    def _finish(self, goal: ServerGoalHandle) -> None:
+        motion = self._motions.pop(goal)
+        success, message = motion.result.result()
+        result = self._result(motion.code, message)
+        if success:
+            goal.set_succeeded(result, message)
+        elif motion.preempted:
+            goal.set_canceled(result, message)
+        else:
+            log.warning("%s: goal aborted: %s", self._context.name, message)
+            goal.set_aborted(result, message)
+
+    def _feedback(self, state: ControllerState, stamp_ns: int) -> Any:
+        return fill_state(self._server.ActionFeedback().feedback, state, stamp_ns)
+
+    def _result(self, code: ErrorCode, message: str) -> Any:
+        result = self._server.ActionResultType()
+        result.error_code, result.error_string = int(code), message
+        return result

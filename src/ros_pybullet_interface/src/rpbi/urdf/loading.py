@@ -1,0 +1,75 @@
+"""Loading a URDF into PyBullet, and what is wrong with one that cannot be loaded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pybullet
+
+from custom_ros_tools.errors import ConfigError, Problem
+from rpbi.config.asset_files import ROBOT_DESCRIPTION
+from rpbi.engine.client import Client
+
+from .document import resolve_meshes
+
+MESH_FORMATS = (".obj", ".stl", ".dae", ".cdf")
+
+
+def urdf_problems(path: str) -> list[str]:
+    """Looks for the problems that are most likely in a URDF file that PyBullet has refused.
+
+    Args:
+        path: The file.
+
+    Returns:
+        A sentence for each; none if the reason is another.
+    """
+    if path == ROBOT_DESCRIPTION:
+        return [f"there is no parameter '{ROBOT_DESCRIPTION}'"]
+    try:
+        root = ElementTree.parse(path).getroot()
+    except OSError as error:
+        return [f"{path}: {(error.strerror or str(error)).lower()}"]
+    except ElementTree.ParseError as error:
+        return [f"{path} is not XML: {error}"]
+    if root.tag != "robot":
+        return [f"{path}: expected <robot> at the top, got <{root.tag}>"]
+    if root.find("link") is None and root.find("deformable") is None:
+        return [f"{path}: the robot has no <link>"]
+    problems = []
+    for mesh in dict.fromkeys(element.get("filename", "") for element in root.iter("mesh")):
+        if Path(mesh).suffix.lower() not in MESH_FORMATS:
+            problems.append(f"{path}: mesh '{mesh}' is none of {', '.join(MESH_FORMATS)}")
+        elif not any((folder / mesh).is_file() for folder in Path(path).absolute().parents):
+            problems.append(f"{path}: no such mesh: {mesh} (looked for beside it and in all folders above)")
+    return problems
+
+
+def load_urdf(
+    pb: Client, name: str, arguments: Mapping[str, Any], prepare: Callable[[str], str] = resolve_meshes
+) -> int:
+    """Loads a URDF file.
+
+    Args:
+        pb: The client.
+        name: Name of the body, for messages.
+        arguments: Those of `loadURDF`.
+        prepare: Returns a file that PyBullet can load in place of `fileName`.
+
+    Returns:
+        PyBullet's id of the body.
+
+    Raises:
+        ConfigError: If it cannot be loaded; it tells what is wrong with the file.
+    """
+    file: str = arguments["fileName"]
+    try:
+        return int(pb.loadURDF(**{**arguments, "fileName": prepare(file)}))
+    except ConfigError as error:
+        messages = [f"{problem.key}: {problem.message}" for problem in error.problems]
+    except (pybullet.error, OSError, UnicodeDecodeError) as error:
+        messages = urdf_problems(file) or [f"PyBullet could not load it: {error}"]
+    raise ConfigError([Problem(name, "loadURDF.fileName", message) for message in messages])

@@ -1,0 +1,101 @@
+"""All links that hang on one joint: their momentum, their weight and what touches them."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from rpbi.engine.client import Client
+from rpbi.geometry import Quaternion, Vector, cross, minus, plus, rotated, rotated_back, scaled
+
+LinkStates = tuple[Any, ...]
+"""What PyBullet's `getLinkStates` returned for the subtree's links, with velocities."""
+
+
+class Momentum(NamedTuple):
+    """Momentum of a subtree; all vectors have world axes.
+
+    Attributes:
+        origin: Origin of the first link's URDF frame [m].
+        quat_xyzw: Orientation of that frame.
+        origin_velocity: Velocity of that origin [m/s].
+        linear: Linear momentum [kg m/s].
+        angular: Angular momentum about that origin [kg m^2/s].
+        mass_moment: Mass times lever from that origin to the centre of mass [kg m].
+    """
+
+    origin: Vector
+    quat_xyzw: Quaternion
+    origin_velocity: Vector
+    linear: Vector
+    angular: Vector
+    mass_moment: Vector
+
+
+class Subtree:
+    """A link of a jointed body and all links below it.
+
+    Args:
+        pb: The client.
+        body_id: PyBullet's id of the body.
+        first_link: PyBullet's index of the link, and of the joint that it hangs on.
+    """
+
+    def __init__(self, pb: Client, body_id: int, first_link: int) -> None:
+        self._pb, self._body_id = pb, body_id
+        links = [first_link]
+        for index in range(first_link + 1, pb.getNumJoints(body_id)):  # parents come before their children
+            if pb.getJointInfo(body_id, index)[16] in links:
+                links.append(index)
+        self._links = tuple(links)
+        self.take_dynamics()
+
+    def take_dynamics(self) -> None:
+        """Takes over the links' masses and inertias as they are now."""
+        infos = [self._pb.getDynamicsInfo(self._body_id, link) for link in self._links]
+        self._inertias = tuple((float(info[0]), info[2]) for info in infos)
+        self.mass_kg = sum(mass for mass, _ in self._inertias)
+
+    def states(self) -> LinkStates:
+        """Reads where the links are and how they move, to be made sense of later."""
+        states: LinkStates = self._pb.getLinkStates(
+            self._body_id, self._links, computeLinkVelocity=1, computeForwardKinematics=1
+        )
+        return states
+
+    def momentum(self, states: LinkStates) -> Momentum:
+        """Returns the momentum of the subtree in one of its states."""
+        origin, quat = states[0][4], states[0][5]
+        linear = angular = mass_moment = (0.0, 0.0, 0.0)
+        for (mass, inertia), (centre, inertial_quat, _, _, _, _, velocity, turning) in zip(self._inertias, states):
+            x, y, z = rotated_back(inertial_quat, turning)
+            spin = rotated(inertial_quat, (inertia[0] * x, inertia[1] * y, inertia[2] * z))
+            moment = scaled(mass, minus(centre, origin))
+            linear = plus(linear, scaled(mass, velocity))
+            angular = plus(angular, plus(cross(moment, velocity), spin))
+            mass_moment = plus(mass_moment, moment)
+        velocity, turning = states[0][6], states[0][7]
+        origin_velocity = plus(velocity, cross(turning, minus(origin, states[0][0])))
+        return Momentum(origin, quat, origin_velocity, linear, angular, mass_moment)
+
+    def contact_wrench(self, origin: Vector) -> tuple[Vector, Vector]:
+        """Returns force [N] and moment about a point [N m], world axes, of contacts with what is not in the subtree.
+
+        PyBullet tells normal and sliding friction forces of the last step; those against rolling and spinning, and
+        contacts with soft bodies, it keeps to itself.
+        """
+        force = moment = (0.0, 0.0, 0.0)
+        body_id, links = self._body_id, self._links
+        touching = self._pb.getContactPoints(body_id)
+        if not any(touch[3] in links or (touch[2] == body_id and touch[4] in links) for touch in touching):
+            return force, moment
+        # Asked for one body, PyBullet turns normals towards it but not friction; asked for all, it turns nothing.
+        for touch in self._pb.getContactPoints():
+            first = touch[1] == body_id and touch[3] in links
+            second = touch[2] == body_id and touch[4] in links
+            if first == second:
+                continue
+            pushed = plus(scaled(touch[9], touch[7]), plus(scaled(touch[10], touch[11]), scaled(touch[12], touch[13])))
+            pushed = pushed if first else scaled(-1.0, pushed)
+            force = plus(force, pushed)
+            moment = plus(moment, cross(minus(touch[5] if first else touch[6], origin), pushed))
+        return force, moment

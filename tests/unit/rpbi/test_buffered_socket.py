@@ -1,0 +1,75 @@
+"""Sending without waiting, over a real pair of sockets."""
+
+import socket
+
+import pytest
+
+from rpbi.ros.publishers.buffered_socket import BufferedSocket
+
+
+@pytest.fixture
+def pair():
+    ours, theirs = socket.socketpair()
+    ours.settimeout(60.0)  # as rospy's are
+    ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 8192)
+    yield ours, theirs
+    ours.close()
+    theirs.close()
+
+
+def _received(theirs):
+    theirs.setblocking(False)
+    data = b""
+    try:
+        while chunk := theirs.recv(65536):
+            data += chunk
+    except BlockingIOError:
+        pass
+    return data
+
+
+def _message(number):
+    return b"%06d" % number * 500
+
+
+def test_what_is_taken_at_once_goes_at_once(pair):
+    patient = BufferedSocket(pair[0], limit=10)
+    patient.sendall(b"hello")
+    assert _received(pair[1]) == b"hello"
+
+
+def test_a_reader_that_sleeps_holds_nobody_up_and_gets_everything_in_order(pair):
+    patient = BufferedSocket(pair[0], limit=1000)
+    for number in range(100):  # far more than the socket's buffer takes
+        patient.sendall(_message(number))
+    data = _received(pair[1])
+    assert len(data) < 100 * len(_message(0)), "the buffer took all: this test shows nothing"
+    while chunk := (patient.flush(), _received(pair[1]))[1]:
+        data += chunk
+    assert data == b"".join(map(_message, range(100)))
+
+
+def test_beyond_the_limit_the_oldest_are_dropped_but_never_a_part_of_one(pair):
+    patient = BufferedSocket(pair[0], limit=5)
+    for number in range(100):
+        patient.sendall(_message(number))
+    data = _received(pair[1])
+    while chunk := (patient.flush(), _received(pair[1]))[1]:
+        data += chunk
+    length = len(_message(0))
+    numbers = [int(data[start : start + 6]) for start in range(0, len(data), length)]
+    assert data == b"".join(map(_message, numbers))
+    assert numbers == sorted(numbers)
+    assert numbers[-5:] == [95, 96, 97, 98, 99]
+    assert len(numbers) < 100
+
+
+def test_a_reader_that_has_gone_is_an_error(pair):
+    patient = BufferedSocket(pair[0], limit=5)
+    pair[1].close()
+    with pytest.raises(BrokenPipeError):
+        patient.sendall(b"x")
+
+
+def test_it_is_otherwise_the_socket(pair):
+    assert BufferedSocket(pair[0], limit=5).fileno() == pair[0].fileno()
