@@ -28,7 +28,7 @@ def measured_rates(messages: Mapping[str, int], expected_hz: Mapping[str, float]
     Args:
         messages: Number of messages by topic.
         expected_hz: Rate by topic [Hz].
-        duration_s: Length of the recording [s] of ROS time.
+        duration_s: Time in which they came [s] of ROS time.
 
     Returns:
         One row a topic with the columns `messages`, `rate_hz`, `expected_hz` and `enough`.
@@ -126,8 +126,8 @@ def slow_lines(summary: Mapping[str, Any], images: Collection[str], required: Co
     if slow_images:
         slowest = min((topics[topic] for topic in slow_images), key=lambda row: row["rate_hz"])
         lines.append(
-            f"images came at {_rate(slowest)}: {_load(summary)}, this machine draws at most "
-            f"{summary['figures']['draw_rate_hz']:.1f} of them a second, and cameras give way to all other programs. "
+            f"images came at {_rate(slowest)}: {_load(summary)}, drawing alone reaches "
+            f"{summary['figures']['draw_rate_hz']:.1f} Hz, and cameras give way to all other programs. "
             f"End other programs, or lower hz, width or height of rgbd_sensor in {world}"
         )
     others = _too_few(summary, topics.keys() - set(images) - set(required))
