@@ -73,7 +73,7 @@ def test_joint_states_or_tf_below_their_rate_are_a_failure_and_no_slowness(topic
 
 def test_physics_below_real_time_is_a_failure():
     assert failures(summary_of(real_time_factor=0.94), REQUIRED) == [
-        "physics ran at 94% of real time; with a load of 13.1 on 2 cores"
+        "physics ran at 94% of real time, with a load of 13.1 on 2 cores"
     ]
 
 

@@ -108,7 +108,7 @@ def save_depth(depth_m: npt.NDArray[np.float32], far_m: float, path: Path) -> No
 def failures(summary: Mapping[str, Any], required: Collection[str]) -> list[str]:
     """Returns a line for each required topic that came too seldom, and for physics that was too slow."""
     factor = summary["figures"]["real_time_factor"]
-    lines = [] if factor >= ENOUGH else [f"physics ran at {factor:.0%} of real time; {_load(summary)}"]
+    lines = [] if factor >= ENOUGH else [f"physics ran at {factor:.0%} of real time, {_load(summary)}"]
     return lines + [f"{topic} came at less than {ENOUGH:.0%} of its rate" for topic in _too_few(summary, required)]
 
 
@@ -133,7 +133,7 @@ def slow_lines(summary: Mapping[str, Any], images: Collection[str], required: Co
     others = _too_few(summary, topics.keys() - set(images) - set(required))
     if others:
         rates = ", ".join(f"{topic} came at {_rate(topics[topic])}" for topic in others)
-        lines.append(f"{rates}: {_load(summary)}, it was not its turn often enough. End other programs")
+        lines.append(f"{rates}: {_load(summary)}, publishers wait for a processor. End other programs")
     return lines
 
 
