@@ -81,6 +81,31 @@ def find_in_table(name: str, base: type, table: Mapping[str, str], kind: str) ->
     return pkgutil.resolve_name(table[name])
 
 
+class ClassTable(Mapping[str, Any]):
+    """Classes by name, each of which is imported when it is asked for.
+
+    Args:
+        paths: `module:Class` by name.
+    """
+
+    def __init__(self, paths: Mapping[str, str]) -> None:
+        self._paths = paths
+
+    def __getitem__(self, name: str) -> Any:
+        return pkgutil.resolve_name(self._paths[name])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._paths)
+
+    def __len__(self) -> int:
+        return len(self._paths)
+
+    def name_of(self, thing: Any) -> str:
+        """Returns the name of a class, or of an object's class; `module:Class` of one that is not in the table."""
+        path = full_name(thing)
+        return next((name for name, each in self._paths.items() if each == path), path)
+
+
 def config_of(found: Any, base: type[_Kind]) -> type[_Kind]:
     """Returns the model of the YAML of a class.
 
