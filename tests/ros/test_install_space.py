@@ -1,4 +1,4 @@
-"""The workspace and the template, installed; neither of them has a devel space to fall back on."""
+"""The workspace and the template, installed; neither of them has sources or a devel space to fall back on."""
 
 from __future__ import annotations
 
@@ -12,23 +12,24 @@ from ros_system import wait_until
 from sensor_msgs.msg import Image, JointState, Range
 
 ROOT = Path(__file__).resolve().parents[2]
-PYTHON = "-DPYTHON_EXECUTABLE=/usr/bin/python3"
 
 
-def _install(workspace: Path, source: Path, onto: Path | None = None) -> Path:
-    """Builds and installs a folder of packages over an installed workspace; returns where, all else is removed."""
-    spaces = f"--build {workspace}/build -DCATKIN_DEVEL_PREFIX={workspace}/devel -DCMAKE_INSTALL_PREFIX={workspace}/to"
-    line = f"catkin_make --no-color --directory {workspace} --source {source} {spaces} {PYTHON} install"
+def _install(workspace: Path, packages: Path, onto: Path | None = None) -> Path:
+    """Builds and installs a copy of some packages over an installed workspace; returns where. All else is removed."""
+    shutil.copytree(packages, workspace / "src", ignore=shutil.ignore_patterns("__pycache__"))
+    line = f"cd {workspace}; catkin_make --no-color install -DPYTHON_EXECUTABLE=/usr/bin/python3"
     done = subprocess.run(in_clean_shell(line, onto and onto / "setup.bash"), capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
-    shutil.rmtree(workspace / "build")
-    shutil.rmtree(workspace / "devel")
-    return workspace / "to"
+    for folder in ("src", "build", "devel"):
+        shutil.rmtree(workspace / folder)
+    return workspace / "install"
 
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory):
-    return _install(tmp_path_factory.mktemp("rpbi"), ROOT / "src")
+    workspace = tmp_path_factory.mktemp("rpbi")
+    (workspace / ".venv").symlink_to(ROOT / ".venv")
+    return _install(workspace, ROOT / "src")
 
 
 @pytest.fixture(scope="module")
