@@ -185,8 +185,9 @@ remove() {
 clean_up() {
   local status=$?
   trap - EXIT INT TERM HUP
-  [[ ! $child ]] || kill "$child" 2>/dev/null || true # and with it all processes of its namespace
-  wait
+  # All processes of its namespace end with it; of other signals, unshare would wait for them
+  [[ ! $child ]] || kill -KILL "$child" 2>/dev/null || true
+  wait 2>/dev/null # without a word on who was killed
   if [[ $keep ]]; then echo "The machines are left in $folder."; else remove "$folder"; fi
   exit "$status"
 }
