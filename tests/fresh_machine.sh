@@ -51,27 +51,31 @@ read_dockerfile() {
 
 # --- A machine
 
-# in_machine ACCOUNT COMMAND: runs it in a login shell, without network if `offline` is set.
+# in_namespaces COMMAND...: runs it where its mounts and processes are its own; without network if `offline` is set.
+in_namespaces() {
+  unshare --mount --pid --fork --kill-child ${offline:+--net} "$@" </dev/null &
+  child=$! # waited for, so that a signal is heard at once
+  wait "$child"
+}
+
+# in_machine ACCOUNT COMMAND: runs it in a login shell.
 in_machine() {
   # shellcheck disable=SC2016 # for the inner shell to expand
-  unshare --mount --pid --fork --kill-child ${offline:+--net} bash -euc '
+  in_namespaces bash -euc '
     [[ ! $4 ]] || ip link set lo up
     mount --rbind /dev "$1/dev"
     mount -t proc proc "$1/proc"
     mount -t sysfs -o ro sysfs "$1/sys"
     exec env -i PATH="$PATH" chroot "$1" su --login "$2" --command "$3"
-  ' - "$machine" "$1" "$2" "${offline-}" </dev/null &
-  child=$! # waited for, so that a signal is heard at once
-  wait "$child"
+  ' - "$machine" "$1" "$2" "${offline-}"
 }
 
 make_base() {
   mirror=${mirror:-$(packages_of_this_machine | sed -n "s| $suite main\$||p" | head -n 1)}
   [[ $mirror ]] || fail "this machine's apt does not know $suite: name a mirror by --mirror"
   mkdir "$folder/base"
-  unshare --mount debootstrap --variant=minbase "$suite" "$folder/base" "$mirror" >"$folder/debootstrap.log" 2>&1 &
-  child=$!
-  wait "$child" || fail "debootstrap failed: $(tail -n 3 "$folder/debootstrap.log")"
+  in_namespaces debootstrap --variant=minbase "$suite" "$folder/base" "$mirror" >"$folder/debootstrap.log" 2>&1 ||
+    fail "debootstrap failed: $(tail -n 3 "$folder/debootstrap.log")"
   take_over_network "$folder/base"
 }
 
@@ -186,8 +190,7 @@ clean_up() {
   local status=$?
   trap - EXIT INT TERM HUP
   # All processes of its namespace end with it; of other signals, unshare would wait for them
-  [[ ! $child ]] || kill -KILL "$child" 2>/dev/null || true
-  wait 2>/dev/null # without a word on who was killed
+  [[ ! $child ]] || { kill -KILL "$child" && wait; } 2>/dev/null || true
   if [[ $keep ]]; then echo "The machines are left in $folder."; else remove "$folder"; fi
   exit "$status"
 }
