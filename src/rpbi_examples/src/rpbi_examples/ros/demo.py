@@ -89,7 +89,7 @@ def _demo(arguments: argparse.Namespace) -> int:
     bag = out / "recording.bag"
     expected_hz = _expected_rates()
     with _Example(arguments.headless, out / "launch.log"):
-        with Recorder(bag, [*expected_hz, "/diagnostics", "/tf_static"]):
+        with Recorder(bag, [*expected_hz, "/diagnostics", "/tf_static"], timeout_s=START_TIMEOUT_S):
             _say(f"recording {arguments.seconds:g} s of {len(expected_hz)} topics into {bag}")
             time.sleep(arguments.seconds)
     _say("reading the bag")
