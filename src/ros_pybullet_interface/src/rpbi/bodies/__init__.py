@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from custom_ros_tools.plugins import find_class, full_name
 from rpbi.bodies.robots.mobile_robot import MobileRobot
 from rpbi.bodies.robots.robot import Robot
 from rpbi.bodies.robots.visual_robot import VisualRobot
-from rpbi.plugins import find_class, full_name
 
 from .body import Body
 from .body_config import BodyConfig
