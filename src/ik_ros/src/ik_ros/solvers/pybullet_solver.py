@@ -14,7 +14,7 @@ from ik_ros.chain.solver import ChainConfig, ChainSolver, refuse_mimics
 from ik_ros.problem import IKProblem
 from rpbi.kinematics import IKProblem as PybulletProblem
 from rpbi.kinematics import Kinematics
-from rpbi.urdf.document import write_description
+from rpbi.urdf.files import write_description
 
 
 class PybulletConfig(ChainConfig):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from rpbi.engine.client import Client
 from rpbi.geometry import Vector
-from rpbi.urdf.document import resolve_meshes
+from rpbi.urdf.files import resolve_meshes
 
 if TYPE_CHECKING:
     from rpbi.bodies.robots.jointed import JointedBody

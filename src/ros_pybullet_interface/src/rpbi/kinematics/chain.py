@@ -10,7 +10,7 @@ import numpy as np
 
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose, Quaternion, Vector
-from rpbi.urdf.document import write_description
+from rpbi.urdf.files import write_description
 from rpbi.urdf.joints import Joint
 
 from .residual import Residual
@@ -33,7 +33,7 @@ class Chain:
 
     Args:
         pb: A private client.
-        urdf: What is between the root and the link, see `Skeleton.chain`.
+        urdf: What is between the root and the link, see `UrdfDocument.bare`.
         scaling: PyBullet's `globalScaling`.
         link_name: The link.
         joint_names: The n joints of the robot that a motor can move.

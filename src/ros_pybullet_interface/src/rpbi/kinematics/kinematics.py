@@ -14,9 +14,9 @@ import pybullet
 from custom_ros_tools.errors import PhysicsError, UnknownNameError
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose
-from rpbi.urdf.document import write_description
+from rpbi.urdf.document import MOVING, UrdfDocument
+from rpbi.urdf.files import write_description
 from rpbi.urdf.joints import Joint
-from rpbi.urdf.skeleton import Skeleton
 
 from .chain import Chain, Target
 from .joint_limits import JointLimits
@@ -46,7 +46,7 @@ class Kinematics:
     """
 
     def __init__(self, urdf_path: str, scaling: float = 1.0, flags: int = 0) -> None:
-        self._skeleton = Skeleton(urdf_path)
+        self._document = UrdfDocument(urdf_path, not_xml="expected well-formed XML")
         self._scaling = scaling
         self._lock = threading.Lock()
         self._pb = Client(pybullet.DIRECT)
@@ -135,7 +135,7 @@ class Kinematics:
         """Returns all joints in the order in which PyBullet loads them."""
         pb = self._pb
         body_id = pb.loadURDF(
-            write_description(self._skeleton.text()), useFixedBase=True, globalScaling=self._scaling, flags=flags
+            write_description(self._document.bare()), useFixedBase=True, globalScaling=self._scaling, flags=flags
         )
         joints = [Joint.from_info(pb.getJointInfo(body_id, i)) for i in range(pb.getNumJoints(body_id))]
         self._root_link = pb.getBodyInfo(body_id)[0].decode()
@@ -154,10 +154,13 @@ class Kinematics:
         if link_name not in self._links:
             raise UnknownNameError("link", link_name, self._links)
         if link_name not in self._chains:
-            try:
-                urdf = self._skeleton.chain(link_name)
-            except ValueError as error:
-                raise ValueError(f"link_name: {error}") from None
+            links = [link_name]
+            for joint, kind, parent in self._document.joints_above(link_name):
+                if kind not in (*MOVING, "fixed"):
+                    only = "only revolute and prismatic ones are solved for"
+                    raise ValueError(f"link_name: '{link_name}' hangs on '{joint}', a {kind} joint; {only}")
+                links.append(parent)
+            urdf = self._document.bare(links)
             self._chains[link_name] = Chain(self._pb, urdf, self._scaling, link_name, self.joint_names)
         return self._chains[link_name]
 
