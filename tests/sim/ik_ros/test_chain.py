@@ -13,9 +13,9 @@ from custom_ros_tools.errors import UnknownNameError
 from ik_ros.chain.description import read_chain
 from ik_ros.chain.forward_kinematics import Chain
 from ik_ros.conformance import distances
-from ik_ros.limits import Limits
 from rpbi.geometry import Pose
 from rpbi.kinematics import Kinematics
+from rpbi.kinematics.limits import Limits
 
 DATA = Path(pybullet_data.getDataPath())
 LWR = Path(__file__).resolve().parents[3] / "src/rpbi_examples/robots/kuka_lwr.urdf"
@@ -114,9 +114,9 @@ def test_nothing_is_farther_than_the_reach(rig):
         chain, limits = Chain(description), Limits(description.lower, description.upper, description.is_revolute)
         generator = random.Random(2)
         poses = [chain.pose(limits.random(generator, limits.middle)) for _ in range(300)]
-        assert all(chain.may_reach(pose, (0.0, 0.0, 0.0)) for pose in poses)
-        assert not chain.may_reach(Pose((5.0, 0.0, 0.0)), (0.0, 0.0, 0.0))
-        assert chain.may_reach(Pose((5.0, 0.0, 0.0)), (5.0, 0.0, 0.0))
+        assert all(chain.reach.covers(pose.position) for pose in poses)
+        assert not chain.reach.covers((5.0, 0.0, 0.0))
+        assert chain.reach.covers((5.0, 0.0, 0.0), 5.0)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import PyKDL
 
-from ik_ros.limits import Limits
+from rpbi.kinematics.limits import Limits
 
 from .forward_kinematics import Chain
 from .goal import Goal

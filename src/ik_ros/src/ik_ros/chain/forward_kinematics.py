@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 import PyKDL
 
-from rpbi.geometry import Pose, Vector
+from rpbi.geometry import Pose
+from rpbi.kinematics.limits import Reach
 
 from .description import ChainDescription
 
@@ -24,8 +25,7 @@ class Chain:
     Attributes:
         kdl: KDL's chain; its m joints are those that are not fixed.
         is_plain: Whether the m joints are the n variables, since none mimics another.
-        anchor: Where the first of the m joints is in the base [m].
-        reach_m: No position of the joints brings the tip farther from there than this [m], inf for endless rails.
+        reach: How far they bring the tip.
     """
 
     def __init__(self, description: ChainDescription) -> None:
@@ -34,6 +34,7 @@ class Chain:
             not description.mimics
         )
         self.kdl = _kdl_chain(description)
+        moving = [joint for joint in description.joints if joint.is_moving]
         self._positions = PyKDL.JntArray(len(self._drives))
         self._frame = PyKDL.Frame()
         self._jacobian = PyKDL.Jacobian(len(self._drives))
@@ -42,18 +43,9 @@ class Chain:
         self._variables = np.zeros((len(self._drives), len(description.joint_names)))
         for joint, drive in enumerate(self._drives):
             self._variables[joint, drive.variable] = drive.multiplier
-        first = self.kdl.getSegment(0).getJoint()
-        self.anchor: Vector = tuple(first.JointOrigin())
-        self.reach_m = _reach_m(description)
-
-    def may_reach(self, target: Pose, position_tolerance: Vector) -> bool:
-        """Tells whether a target is no farther away than the chain is long.
-
-        Args:
-            target: Where the tip shall be in the base.
-            position_tolerance: How far off it may be along each axis of the target [m].
-        """
-        return math.dist(target.position, self.anchor) <= self.reach_m + math.hypot(*position_tolerance)
+        x, y, z = self.kdl.getSegment(0).getJoint().JointOrigin()
+        carried = description.joints[description.joints.index(moving[0]) + 1 :]
+        self.reach = Reach.of((x, y, z), [math.hypot(*joint.xyz) for joint in carried], moving)
 
     def frame(self, q: Sequence[float]) -> PyKDL.Frame:
         """Returns the pose of the tip in the base, valid until the next call.
@@ -104,11 +96,3 @@ def _kdl_chain(description: ChainDescription) -> PyKDL.Chain:
         fixed = PyKDL.Frame()
     chain.addSegment(PyKDL.Segment(description.tip, PyKDL.Joint(PyKDL.Joint.Fixed), fixed))
     return chain
-
-
-def _reach_m(description: ChainDescription) -> float:
-    joints = list(description.joints)
-    while not joints[0].is_moving:
-        del joints[0]
-    travel = [max(abs(joint.lower), abs(joint.upper)) for joint in joints if joint.is_moving and not joint.is_revolute]
-    return sum(travel) + sum(math.hypot(*joint.xyz) for joint in joints[1:])

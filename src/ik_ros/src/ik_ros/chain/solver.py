@@ -12,11 +12,11 @@ from pydantic import ValidationInfo, model_validator
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.schema import ConfigModel, KeyedError, Text
-from ik_ros.limits import Limits, StartLimits
 from ik_ros.problem import IKProblem, IKSolution
-from ik_ros.solver import Solver
+from ik_ros.solver import Solver, StartLimits
 from rpbi.config.asset_files import ExistingFile
-from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
+from rpbi.kinematics.limits import Limits
+from rpbi.kinematics.residual import Residual
 
 from .description import ChainDescription, read_chain
 from .forward_kinematics import Chain
@@ -127,7 +127,9 @@ class ChainSolver(Solver):
 
     def is_beyond_reach(self, problem: IKProblem) -> bool:
         """Tells whether the target is farther away than the chain is long."""
-        return problem.target is not None and not self.chain.may_reach(problem.target, problem.position_tolerance)
+        if problem.target is None:
+            return False
+        return not self.chain.reach.covers(problem.target.position, math.hypot(*problem.position_tolerance))
 
     def _start(self, given: Mapping[str, float]) -> list[float]:
         """Returns n positions within limits [rad or m]."""
@@ -138,15 +140,10 @@ class ChainSolver(Solver):
         return self._start_limits.wrap_to_limits([given.get(name, position) for name, position in middle])
 
     def _in_words(self, problem: IKProblem, goal: Goal, residual: Residual) -> str:
-        with_angle = not goal.any_orientation
-        angle = f" and {residual.orientation_rad:.3g} rad" if with_angle else ""
-        tip, target = self.description.tip, "its target" if goal.is_point else "the tolerances of its target"
-        if residual.size <= 1.0:
-            return f"'{tip}' is within {residual.position_m * 1e3:.3g} mm{angle} of {target}"
-        enough = f"{POSITION_TOLERANCE_M * 1e3:g} mm"
-        enough += f" and {ORIENTATION_TOLERANCE_RAD:g} rad" if with_angle else ""
-        far = "; it is farther away than the chain is long" if self.is_beyond_reach(problem) else ""
-        return f"'{tip}' misses {target} by {residual.position_m * 1e3:.4g} mm{angle}; {enough} would do{far}"
+        target = "its target" if goal.is_point else "the tolerances of its target"
+        words = residual.in_words(self.description.tip, not goal.any_orientation, target)
+        is_far = residual.size > 1.0 and self.is_beyond_reach(problem)
+        return words + ("; it is farther away than the chain is long" if is_far else "")
 
 
 def refuse_mimics(description: ChainDescription, config: ChainConfig, solver: str) -> None:

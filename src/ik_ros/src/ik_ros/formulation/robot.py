@@ -9,9 +9,9 @@ import numpy as np
 import pinocchio as pin
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
-from ik_ros.limits import Limits
 from ik_ros.shape import ShapeConfig
 from rpbi.geometry import Pose
+from rpbi.kinematics.limits import Limits
 from rpbi.urdf.document import MOVING, UrdfDocument
 
 from .clearance import RobotShape

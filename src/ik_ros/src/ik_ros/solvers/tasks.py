@@ -10,9 +10,8 @@ import numpy as np
 
 from custom_ros_tools.errors import MissingDependency, UnknownNameError
 from custom_ros_tools.schema import KeyedError
-from ik_ros.limits import StartLimits
 from ik_ros.problem import IKProblem, IKSolution
-from ik_ros.solver import Solver
+from ik_ros.solver import Solver, StartLimits
 from rpbi.kinematics.residual import Residual
 
 try:

@@ -73,9 +73,8 @@ class TracIkSolver(ChainSolver):
         """
         refuse_boxes(problem, "trac_ik")
         target = (*goal.frame.p, *goal.frame.M.GetQuaternion())
-        generator = random.Random(problem.seed)
-        for attempt in range(1 if self.is_beyond_reach(problem) else 1 + self._restarts):
-            first = self.limits.random(generator, start) if attempt else start
+        restarts = 0 if self.is_beyond_reach(problem) else self._restarts
+        for first in self.limits.starts(start, random.Random(problem.seed), restarts):
             status, *q = pytracik.ik(self._trac_ik, first, *target).tolist()
             if status >= 0:
                 return [q]
