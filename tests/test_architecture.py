@@ -13,6 +13,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
+from import_graph import imported_names
 
 ROOT = Path(__file__).resolve().parent.parent
 SRC = ROOT / "src"
@@ -33,7 +34,7 @@ ALLOWED = {
 }
 """What each package may depend on."""
 MIDDLEWARE = re.compile(r"^(rospy|tf2_ros|rosbag|rosgraph|roslib|genpy|\w+_msgs|\w+_srvs)$")
-MESSAGES_OF_OURS = re.compile(r"^(ros_pybullet_interface|custom_ros_tools\.(srv|msg))$")
+MESSAGES_OF_OURS = re.compile(r"^(ros_pybullet_interface|\w+\.(srv|msg))(\.|$)")
 MAX_NODE_LINES = 10
 
 
@@ -42,14 +43,10 @@ def _python_files(package: str) -> list[Path]:
 
 
 def _imports(path: Path) -> set[str]:
-    """Returns the full names of all modules that a file imports from outside its own package."""
-    names: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
-            names.add(node.module)
-    return names
+    """Returns the full names of all that a file imports."""
+    (source,) = (each for each in path.parents if each.name == "src" and each.parent.parent == SRC)
+    module = ".".join(path.relative_to(source).with_suffix("").parts).removesuffix(".__init__")
+    return set(imported_names(path, module))
 
 
 def test_every_package_is_known_here():
@@ -73,7 +70,8 @@ def _is_for_typing(path: Path, name: str) -> bool:
     """Tells whether an import stands under TYPE_CHECKING only."""
     for node in ast.parse(path.read_text()).body:
         if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING":
-            return any(getattr(inner, "module", None) == name for inner in node.body)
+            modules = [getattr(inner, "module", None) for inner in node.body]
+            return any(module and f"{name}.".startswith(f"{module}.") for module in modules)
     return False
 
 

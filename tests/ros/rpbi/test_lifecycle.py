@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 import threading
 import time
 from pathlib import Path
@@ -122,7 +121,7 @@ def test_ctrl_c_with_a_subscriber_that_does_not_take_its_messages(ros, tmp_path)
 
 
 def _holder(ros, *topics):
-    holder = ros.start([sys.executable, str(Path(__file__).with_name("hold_topics.py")), *topics])
+    holder = ros.start_program("hold_topics.py", *topics)
     wait_until(lambda: "listening" in ros.output(holder), "it listens")
     return holder
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 from contextlib import contextmanager
-from pathlib import Path
 from xmlrpc.client import ServerProxy
 
 from node_world import main_config
@@ -80,7 +78,7 @@ def test_everybody_is_found_again_and_connections_last(ros, tmp_path, second_mas
     assert set(names) <= set(master.api.getParamNames())
     assert master.api.getParam("/use_sim_time") is True
 
-    visitor = _command(ros, master, sys.executable, str(Path(__file__).with_name("visitor.py")))
+    visitor = ros.start_program("visitor.py", **master.environment)
     assert visitor.wait(30.0) == 0, ros.output(visitor)
     said = ros.output(visitor)
     assert "moved" in said and "slept until" in said and "stopped" in said and "tick " in said, said

@@ -13,7 +13,7 @@ import rospy
 import yaml
 from camera_world import CAMERA
 from node_world import Rosout, add, main_config, objects, publishing, remove
-from ros_system import wait_until
+from ros_system import SUPPORT, support_on_path, wait_until
 from sensor_msgs.msg import Image, Range
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
@@ -186,17 +186,12 @@ def test_without_the_package_the_node_says_what_is_missing(ros, workspace):
     assert "Traceback" not in printed
 
 
-FAULTY = str(ROOT / "tests" / "sim" / "rpbi")
-FAULTY_TOPICS = str(ROOT / "tests" / "ros" / "rpbi")
-
-
 def _faulty(ros, tmp_path, **keys):
     """Starts a world with a thing that fails."""
     config = main_config(tmp_path)
     thing = {"name": "thing", "type": "faulty_lab:Thing", **keys}
     config["objects"] = [ros.write_yaml("thing.yaml", thing)]
-    path = os.pathsep.join((os.environ["PYTHONPATH"], FAULTY, FAULTY_TOPICS))
-    return ros.simulator(config, use_sim_time=True, wait=False, PYTHONPATH=path)
+    return ros.simulator(config, use_sim_time=True, wait=False, **support_on_path())
 
 
 @pytest.mark.parametrize(
@@ -224,7 +219,7 @@ def test_a_class_that_fails_in_a_tick_stops_the_simulation_with_one_line(ros, tm
     rosout = Rosout(ros)
     process = _faulty(ros, tmp_path, fails="before_step")
     failure = "faulty_lab:Thing failed in before_step of 'thing' at tick 5: ZeroDivisionError: division by zero"
-    rosout.wait_for([f"simulation stopped: {failure} ({FAULTY}/faulty_lab.py, line"], 30.0)
+    rosout.wait_for([f"simulation stopped: {failure} ({SUPPORT}/faulty_lab.py, line"], 30.0)
     assert "Traceback" not in ros.output(process)
     answer = ros.call("/rpbi/step", Trigger)
     assert not answer.success and failure in answer.message
@@ -236,8 +231,8 @@ def test_a_class_that_fails_in_a_tick_stops_the_simulation_with_one_line(ros, tm
 @pytest.mark.parametrize(
     ("keys", "cause"),
     [
-        ({"topic": "faulty_topics:PUSH_X"}, f"AttributeError: 'float' object has no attribute 'x' ({FAULTY_TOPICS}/"),
-        ({"topic": "faulty_topics:PUSH", "fails": "check"}, f"KeyError: 'no such unit' ({FAULTY}/"),
+        ({"topic": "faulty_topics:PUSH_X"}, f"AttributeError: 'float' object has no attribute 'x' ({SUPPORT}/"),
+        ({"topic": "faulty_topics:PUSH", "fails": "check"}, f"KeyError: 'no such unit' ({SUPPORT}/"),
     ],
 )
 def test_a_message_that_its_class_fails_with_is_refused_and_says_where(ros, tmp_path, keys, cause):

@@ -8,7 +8,7 @@ import pytest
 from worlds import ball, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.bodies import VisualRobot
+from rpbi.bodies.robots.visual_robot import VisualRobot
 from rpbi.geometry import Pose
 from rpbi.urdf.joints import JointTarget
 from rpbi.world import World

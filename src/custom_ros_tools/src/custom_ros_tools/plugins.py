@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 import traceback
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,31 @@ from custom_ros_tools.errors import UnknownNameError, hint
 
 own_folders = [str(Path(__file__).parent)]
 """Folders of the packages that look classes up and call them; `cause_of` looks for the fault outside of these."""
+
+
+class ClassTable(Mapping[str, Any]):
+    """Classes by name, each of which is imported when it is asked for.
+
+    Args:
+        paths: `module:Class` by name.
+    """
+
+    def __init__(self, paths: Mapping[str, str]) -> None:
+        self._paths = paths
+
+    def __getitem__(self, name: str) -> Any:
+        return pkgutil.resolve_name(self._paths[name])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._paths)
+
+    def __len__(self) -> int:
+        return len(self._paths)
+
+    def name_of(self, thing: Any) -> str:
+        """Returns the name of a class, or of an object's class; `module:Class` of one that is not in the table."""
+        path = full_name(thing)
+        return next((name for name, each in self._paths.items() if each == path), path)
 
 
 def find(name: str) -> Any:

@@ -16,7 +16,7 @@ from rpbi.render.depth import DepthNoise
 from rpbi.render.frame import Camera
 from rpbi.render.priority import take_part
 from rpbi.samples import SceneSample
-from rpbi.sensors import RgbdSensor
+from rpbi.sensors.rgbd import RgbdSensor
 from rpbi.world import World
 
 from .image_publisher import SINK, sink_arguments

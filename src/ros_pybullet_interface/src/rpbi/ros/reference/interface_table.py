@@ -26,7 +26,7 @@ from rpbi.ros.services.node_services import NODE_SERVICES
 from rpbi.ros.services.time_services import TIME_SERVICES
 from rpbi.ros.window.debug_camera import GET_SERVICE, RESET_TOPIC
 from rpbi.ros.window.topics import published_topics
-from rpbi.sensors import LinkPoseSensor
+from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.world import World
 
 PUBLISHES = "publishes"

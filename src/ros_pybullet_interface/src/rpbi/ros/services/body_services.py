@@ -18,8 +18,9 @@ from ros_pybullet_interface.srv import (
     RobotInfo,
     SetJointState,
 )
-from rpbi.bodies import Body, Robot
+from rpbi.bodies import Body
 from rpbi.bodies.robots.jointed import JointedBody
+from rpbi.bodies.robots.robot import Robot
 from rpbi.engine.inputs import PoseInput, check_pose
 from rpbi.geometry import Pose
 from rpbi.ros.robots.ik import inverse_kinematics

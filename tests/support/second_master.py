@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import subprocess
 from typing import Any
 
 import rosgraph
 from ros_system import wait_until
+from workplace import Port
 
 KINDS = ("publishes", "subscribes", "serves")
 
@@ -28,17 +28,15 @@ class SecondMaster:
 
     def __init__(self, ros: Any) -> None:
         self._ros = ros
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self._port = probe.getsockname()[1]
-        self.uri = f"http://127.0.0.1:{self._port}"
+        self._port = Port()
+        self.uri = self._port.uri
         self.environment = {"ROS_MASTER_URI": self.uri}
         self.api = rosgraph.Master("/tests", master_uri=self.uri)
         self.start()
 
     def start(self) -> None:
         """Starts it, with an empty memory."""
-        command = ["rosmaster", "--core", "-p", str(self._port)]
+        command = ["rosmaster", "--core", "-p", str(self._port.number)]
         self.process: subprocess.Popen[bytes] = self._ros.start(command, log="master.log", **self.environment)
         wait_until(self.api.is_online, "the second master answers")
 

@@ -98,7 +98,7 @@ def stripes() -> Image.Image:
 
 
 if __name__ == "__main__":
-    folder = Path(__file__).parent
+    folder = Path(__file__).parents[2] / "src/rpbi_examples/configs/meshes"
     (folder / "torus.vtk").write_text(vtk())
     (folder / "torus.obj").write_text(obj())
     (folder / "torus.mtl").write_text(MATERIAL)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Make the meshes of the KUKA LWR4+ in this folder: `make_meshes.py [--out FOLDER]`.
+"""Makes the meshes of the KUKA LWR4+ of rpbi_examples: `make_meshes.py [--out FOLDER]`.
 
 Nothing here was measured or taken from CAD files: the shapes are designed around the published kinematics
 (shoulder at 0.31 m, upper arm 0.4 m, forearm 0.39 m, flange 0.078 m). Each of the four equal arm segments is
@@ -17,6 +17,7 @@ import numpy as np
 from implicit_surface import Array, Field, disc, polygonise, rounded_box, smooth_max, smooth_min
 from mesh import Mesh, merge, moved, revolve, write_materials, write_obj
 
+FOLDER = Path(__file__).parents[2] / "src/rpbi_examples/robots/kuka_lwr"
 NECK, ELBOW, WRIST, FLANGE = 0.060, 0.072, 0.055, 0.037  # radii of roll, pitch, wrist and last joint [m]
 SEAM = 0.029  # the wrist's pitch joint closes this far beside the arm's axis [m]
 HIDDEN = 0.0045  # how far both halves of a pitch joint reach past its seam, inside the ring [m]
@@ -158,7 +159,7 @@ MATERIALS: dict[str, tuple[tuple[float, float, float], Callable[[], dict[str, Me
 def main() -> None:
     """Write all meshes and their materials."""
     parser = argparse.ArgumentParser(description="Make the meshes of the KUKA LWR4+.")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="folder to write to")
+    parser.add_argument("--out", type=Path, default=FOLDER, help="folder to write to")
     out = parser.parse_args().out
     for material, (_, make) in MATERIALS.items():
         for name, mesh in make().items():

@@ -10,14 +10,12 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+from worlds import FLOOR, ball, box, iiwa, write_world
 
-from worlds import FLOOR, ball, box, iiwa, write_world  # noqa: E402
-
-from rpbi.bodies import BODY_TYPES  # noqa: E402
-from rpbi.config.loading import load_object  # noqa: E402
-from rpbi.urdf.joints import JointTarget  # noqa: E402
-from rpbi.world import World  # noqa: E402
+from rpbi.bodies import BODY_TYPES
+from rpbi.config.loading import load_object
+from rpbi.urdf.joints import JointTarget
+from rpbi.world import World
 
 TICKS = 3000
 

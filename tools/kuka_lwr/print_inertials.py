@@ -8,10 +8,10 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-from make_meshes import MATERIALS
+from make_meshes import FOLDER, MATERIALS
 from mesh import Array, mass_properties
 
-URDF = Path(__file__).parents[1] / "kuka_lwr.urdf"
+URDF = FOLDER.with_suffix(".urdf")
 
 
 def inertials(urdf: Path = URDF) -> dict[str, tuple[float, Array, Array]]:

@@ -5,15 +5,26 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import rosgraph
+import roslib.packages
 import rospy
 import yaml
+
+SUPPORT = Path(__file__).resolve().parent
+"""Where the tests' helpers are, and programs that tests start."""
+
+
+def support_on_path() -> dict[str, str]:
+    """Returns the environment in which other processes import the tests' helpers."""
+    return {"PYTHONPATH": os.pathsep.join((os.environ.get("PYTHONPATH", ""), str(SUPPORT)))}
 
 
 def wait_until(condition: Callable[[], Any], what: str, timeout_s: float = 20.0) -> Any:
@@ -104,6 +115,8 @@ class RosSystem:
 
     def start(self, command: Sequence[str], log: str | None = None, **environment: str) -> subprocess.Popen:
         """Starts a program in a process group of its own; its output goes to `output(process)`."""
+        if command[0] == "rosrun":
+            command = [find_executable(command[1], command[2]), *command[3:]]
         path = self.folder / (log or f"{len(self.processes)}.log")
         with open(path, "w") as file:
             process = subprocess.Popen(
@@ -117,6 +130,10 @@ class RosSystem:
         process.log_path = path  # type: ignore[attr-defined]
         self.processes.append(process)
         return process
+
+    def start_program(self, name: str, *arguments: str, **environment: str) -> subprocess.Popen:
+        """Starts one of the programs that stand beside this module."""
+        return self.start([sys.executable, str(SUPPORT / name), *arguments], **environment)
 
     def output(self, process: subprocess.Popen) -> str:
         """Returns what a program has printed so far."""
@@ -180,6 +197,12 @@ class RosSystem:
             rospy.delete_param(name)
         if late:
             raise AssertionError("\n".join(late))
+
+
+@cache
+def find_executable(package: str, name: str) -> str:
+    """Returns the path of what `rosrun` would run, without the processes by which `rosrun` finds it."""
+    return str(roslib.packages.find_node(package, name)[0])
 
 
 def _provider(service: str) -> str | None:

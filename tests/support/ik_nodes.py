@@ -15,7 +15,7 @@ from tf2_msgs.msg import TFMessage
 from ik_ros.msg import IKProblem
 from rpbi.kinematics import Kinematics
 
-ARM = str(Path(__file__).resolve().parents[3] / "src/rpbi_examples/robots/kuka_lwr.urdf")
+ARM = str(Path(__file__).resolve().parents[2] / "src/rpbi_examples/robots/kuka_lwr.urdf")
 TIP = "end_effector_ball"
 CHAIN = {"urdf_filename": ARM, "base_link": "lwr_arm_0_link", "tip_link": TIP}
 JOINTS = [f"lwr_arm_{number}_joint" for number in range(7)]

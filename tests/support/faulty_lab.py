@@ -6,7 +6,8 @@ import math
 from typing import Any, NamedTuple
 
 from custom_ros_tools.errors import ConfigError, Problem
-from rpbi.bodies import Body, BodyConfig, DynamicObject
+from rpbi.bodies import Body, BodyConfig
+from rpbi.bodies.dynamic import DynamicObject
 from rpbi.engine.inputs import Input
 from rpbi.sensors import BodySensor
 

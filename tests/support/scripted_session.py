@@ -12,26 +12,24 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+import pybullet
+from mobile_base import mobile_base
+from worlds import FLOOR, ball, box, iiwa, write_world
 
-import pybullet  # noqa: E402
-from mobile_base import mobile_base  # noqa: E402
-from worlds import FLOOR, ball, box, iiwa, write_world  # noqa: E402
-
-from rpbi.bodies import BODY_TYPES  # noqa: E402
-from rpbi.config.loading import load_object  # noqa: E402
-from rpbi.config.pybullet_models import ChangeDynamics  # noqa: E402
-from rpbi.control.trajectories.request import TrajectoryRequest, Waypoint  # noqa: E402
-from rpbi.engine.actions import RecordedTrajectory, TimedGoal  # noqa: E402
+from rpbi.bodies import BODY_TYPES
+from rpbi.config.loading import load_object
+from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.control.trajectories.request import TrajectoryRequest, Waypoint
+from rpbi.engine.actions import RecordedTrajectory, TimedGoal
 from rpbi.geometry import (
-    Pose,  # noqa: E402
-    Twist,  # noqa: E402
+    Pose,
+    Twist,
 )
-from rpbi.replay.recorded_values import to_text  # noqa: E402
-from rpbi.replay.session import Checkpoint, RecordedCommand, Recording, Replay  # noqa: E402
-from rpbi.replay.world_description import WorldDescription, describe  # noqa: E402
-from rpbi.urdf.joints import JointTarget  # noqa: E402
-from rpbi.world import World  # noqa: E402
+from rpbi.replay.recorded_values import to_text
+from rpbi.replay.session import Checkpoint, RecordedCommand, Recording, Replay
+from rpbi.replay.world_description import WorldDescription, describe
+from rpbi.urdf.joints import JointTarget
+from rpbi.world import World
 
 JOINTS = [f"lbr_iiwa_joint_{number}" for number in range(1, 8)]
 MODES = (pybullet.POSITION_CONTROL, pybullet.VELOCITY_CONTROL, pybullet.TORQUE_CONTROL)

@@ -1,4 +1,4 @@
-"""Writes the shapes and the texture of the examples' scenery beside itself.
+"""Writes the shapes and the texture of the examples' scenery.
 
 PyBullet's EGL renderer shades GEOM_BOX and GEOM_CYLINDER as if they were balls: it takes the direction from the centre
 for the normal at each corner, and so floors get seams and boxes look inflated. Meshes bring normals of their own.
@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-FOLDER = Path(__file__).parent
+FOLDER = Path(__file__).parents[2] / "src/rpbi_examples/configs/meshes"
 FLOOR_M = 12
 """Edge of the floor [m]; its tiles have edges of 1 m."""
 TILE_PX, JOINT_PX, JOINT_GREY = 256, 2, 205
