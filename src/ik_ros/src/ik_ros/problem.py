@@ -101,7 +101,7 @@ def _number(what: str, value: float) -> float:
 
 
 @dataclass(frozen=True)
-class JointTrajectory:
+class SampledTrajectory:
     """Positions of n joints over time.
 
     Attributes:
@@ -139,5 +139,5 @@ class IKSolution:
     position_error_m: float = 0.0
     orientation_error_rad: float = 0.0
     alternatives: tuple[tuple[float, ...], ...] = ()
-    trajectory: JointTrajectory | None = None
+    trajectory: SampledTrajectory | None = None
     base_pose: Pose | None = None

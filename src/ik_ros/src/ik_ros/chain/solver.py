@@ -16,11 +16,10 @@ from ik_ros.problem import IKProblem, IKSolution
 from ik_ros.solver import Solver, StartLimits
 from rpbi.config.asset_files import ExistingFile
 from rpbi.kinematics.limits import Limits
-from rpbi.kinematics.residual import Residual
+from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
 from .description import ChainDescription, read_chain
-from .forward_kinematics import Chain
-from .goal import Goal
+from .kdl import Goal, KdlChain
 
 
 class ChainConfig(ConfigModel):
@@ -67,7 +66,7 @@ class ChainSolver(Solver):
 
     def __init__(self, config: ChainConfig) -> None:
         self.description: ChainDescription = read_chain(config.urdf_filename, config.base_link, config.tip_link)
-        self.chain = Chain(self.description)
+        self.chain = KdlChain(self.description)
         self.joint_names = self.description.joint_names
         self.base_frame = self.description.base
         self.velocity_limits = self.description.velocity_limits
@@ -155,3 +154,22 @@ def refuse_mimics(description: ChainDescription, config: ChainConfig, solver: st
     if mimics := description.mimics:
         message = f"{', '.join(mimics)}: '{solver}' cannot solve for joints that mimic others; 'kdl' can"
         raise ConfigError([Problem(config.urdf_filename, "", message)])
+
+
+def refuse_boxes(problem: IKProblem, solver: str, may_turn: bool = False) -> None:
+    """Refuses tolerances that are larger than what counts as reached anyway.
+
+    Args:
+        problem: The question.
+        solver: Name of the solver that cannot make use of them.
+        may_turn: Whether it can make use of those for rotations.
+
+    Raises:
+        ValueError: If there are some; it names the field.
+    """
+    limits = [("position_tolerance", POSITION_TOLERANCE_M), ("rotation_tolerance", ORIENTATION_TOLERANCE_RAD)]
+    for name, most in limits[:1] if may_turn else limits:
+        values = getattr(problem, name)
+        if max(values) > most:
+            advice = "the solver 'kdl' makes use of them"
+            raise ValueError(f"{name}: '{solver}' takes none above {most:g}, got {values}; {advice}")

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 import PyKDL
 
 from custom_ros_tools.schema import Count
-from ik_ros.chain.descent import levenberg_marquardt
-from ik_ros.chain.goal import Goal
+from ik_ros.chain.kdl import Goal
+from ik_ros.chain.levenberg_marquardt import levenberg_marquardt
 from ik_ros.chain.solver import ChainConfig, ChainSolver
 from ik_ros.problem import IKProblem
 

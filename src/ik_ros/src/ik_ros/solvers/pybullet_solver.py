@@ -9,8 +9,8 @@ from pydantic import model_validator
 
 from custom_ros_tools.schema import Count, KeyedError, ListOf, NonNegative
 from ik_ros.chain.description import read_chain
-from ik_ros.chain.goal import Goal, refuse_boxes
-from ik_ros.chain.solver import ChainConfig, ChainSolver, refuse_mimics
+from ik_ros.chain.kdl import Goal
+from ik_ros.chain.solver import ChainConfig, ChainSolver, refuse_boxes, refuse_mimics
 from ik_ros.problem import IKProblem
 from rpbi.kinematics import Kinematics
 from rpbi.kinematics.problem import PybulletProblem

@@ -11,8 +11,8 @@ from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, MissingDependency, Problem
 from custom_ros_tools.schema import Count, Positive, Unit
-from ik_ros.chain.goal import Goal, refuse_boxes
-from ik_ros.chain.solver import ChainConfig, ChainSolver, refuse_mimics
+from ik_ros.chain.kdl import Goal
+from ik_ros.chain.solver import ChainConfig, ChainSolver, refuse_boxes, refuse_mimics
 from ik_ros.problem import IKProblem
 
 try:

@@ -10,6 +10,8 @@ from rpbi.geometry import Vector
 from rpbi.urdf.document import UrdfJoint
 from rpbi.urdf.joints import LIMIT_ROUNDING, Joint
 
+from .residual import POSITION_TOLERANCE_M
+
 TURN = 2.0 * math.pi
 
 
@@ -113,8 +115,13 @@ class Reach(NamedTuple):
         return cls(anchor, sum(lengths) + sum(travel))
 
     def covers(self, position: Sequence[float], tolerance_m: float = 0.0) -> bool:
-        """Tells whether a position in the base is not outside by more than a tolerance [m]."""
-        return math.dist(position, self.anchor) <= self.radius_m + tolerance_m
+        """Tells whether the tip may come as near to a position in the base as counts as reached.
+
+        Args:
+            position: The position [m].
+            tolerance_m: How far off the position it may be beside that [m].
+        """
+        return math.dist(position, self.anchor) <= self.radius_m + tolerance_m + POSITION_TOLERANCE_M
 
 
 def _turned(position: float, lower: float, upper: float) -> float:
