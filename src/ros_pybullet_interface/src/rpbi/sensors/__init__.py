@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from custom_ros_tools.plugins import ClassTable, find_class
 from rpbi.config.sensors import SensorConfig
-from rpbi.plugins import ClassTable, find_class
 
 from .body_sensor import BodySensor
 from .sensor import Sensor
