@@ -48,7 +48,7 @@ class ConfigModel(BaseModel):
 
     @classmethod
     def parse(cls: type[Model], data: Mapping[str, Any], file: str, context: Mapping[str, Any] | None = None) -> Model:
-        """Validate what was read from a file.
+        """Validates what was read from a file.
 
         Args:
             data: The mapping; it is not changed and not kept.
@@ -56,7 +56,7 @@ class ConfigModel(BaseModel):
             context: What validators find in `info.context` beside `file`, such as the folders to search.
 
         Raises:
-            ConfigError: with one `Problem` for each fault.
+            ConfigError: With one `Problem` for each fault.
         """
         if not isinstance(data, Mapping):
             got = "nothing" if data is None else type(data).__name__
@@ -109,6 +109,7 @@ HzOrOff = Annotated[float, Field(ge=0), Unit("Hz")]
 Seconds = Annotated[float, Field(gt=0), Unit("s")]
 Pixels = Annotated[int, Field(gt=0, le=8192), Unit("px")]
 Metres = Annotated[float, Unit("m")]
+NonNegativeMetres = Annotated[float, Field(ge=0), Unit("m")]
 PositiveMetres = Annotated[float, Field(gt=0), Unit("m")]
 Kilograms = Annotated[float, Field(ge=0), Unit("kg")]
 Degrees = Annotated[float, Unit("deg")]

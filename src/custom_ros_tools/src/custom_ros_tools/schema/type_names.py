@@ -24,7 +24,7 @@ _REPR.maxlevel = 2  # aliases can make a short YAML text unfold without end
 
 
 def shown(value: Any) -> str:
-    """Return a value as the user would have written it in YAML, shortened."""
+    """Returns a value as the user would have written it in YAML, shortened."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):
@@ -102,7 +102,7 @@ def _bounds(schema: Schema) -> str:
 
 
 def number_advice(kind: str, value: Any) -> str:
-    """Say what to write where YAML took a number for text, as it does with 1e-3."""
+    """Says what to write where YAML took a number for text, as it does with 1e-3."""
     if kind not in ("float_type", "int_type") or not isinstance(value, str):
         return ""
     match = re.fullmatch(r"\s*([-+]?)(\d+|\d*\.\d*\d|\d+\.)[eE]([-+]?)(\d+)\s*", value)

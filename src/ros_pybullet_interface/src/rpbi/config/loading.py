@@ -172,9 +172,9 @@ class _Reader:
         """Returns the search paths that exist, also when something else in the main file is wrong."""
         given = self._data.get("setAdditionalSearchPath")
         found: list[str] = []
-        for _, name in _texts([given] if isinstance(given, str) else given):
+        for name in [given] if isinstance(given, str) else given if isinstance(given, (list, tuple)) else ():
             with contextlib.suppress(ValueError):  # it is reported with the main file
-                found.append(find_folder(name, self._path))
+                found += [find_folder(name, self._path)] if isinstance(name, str) and name else []
         return tuple(found)
 
 
@@ -183,9 +183,3 @@ def _object_entries(given: Any) -> Iterator[tuple[int, ObjectEntry]]:
     for index, entry in enumerate(given if isinstance(given, (list, tuple)) else ()):
         with contextlib.suppress(ValueError):
             yield index, parse_object_entry(entry)
-
-
-def _texts(given: Any) -> list[tuple[int, str]]:
-    """Returns the texts in a list with their indices; what is neither is reported by the model."""
-    entries = given if isinstance(given, (list, tuple)) else []
-    return [(index, entry) for index, entry in enumerate(entries) if isinstance(entry, str) and entry]

@@ -76,7 +76,7 @@ def load_object(kind: str, data: Mapping[str, Any], file: str, context: Mapping[
         context: For files: `file` (the path, if `file` is not it), `search_paths`, `robot_description`.
 
     Raises:
-        ConfigError: with all of its problems; one of them may be that there is no such type.
+        ConfigError: With all of its problems; one of them may be that there is no such type.
     """
     problems = [Problem(file, "name", f"'{RESERVED_NAME}' is reserved")] if name_in(data) == RESERVED_NAME else []
     try:

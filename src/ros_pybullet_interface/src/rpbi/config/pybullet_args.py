@@ -31,13 +31,13 @@ class Constants:
     names: tuple[str, ...]
 
     def parse(self, given: Any) -> int:
-        """Return the number of one constant.
+        """Returns the number of one constant.
 
         Args:
             given: Its name or number.
 
         Raises:
-            ValueError: if it is not of this family.
+            ValueError: If it is not of this family.
         """
         if isinstance(given, str):
             return self._named(given.strip())
@@ -71,13 +71,13 @@ class Flags(Constants):
     """A family of PyBullet constants that are bits: `A|B`, a list of names and numbers, or one number."""
 
     def parse(self, given: Any) -> int:
-        """Return the numbers of all constants, or-ed.
+        """Returns the numbers of all constants, or-ed.
 
         Args:
             given: `"A|B"`, a number, or a list of both.
 
         Raises:
-            ValueError: if one of them is not of this family.
+            ValueError: If one of them is not of this family.
         """
         if isinstance(given, str):
             return _union(self._named(name.strip()) for name in given.split("|"))

@@ -24,6 +24,7 @@ from custom_ros_tools.schema import (
     ListOf,
     Metres,
     NonNegative,
+    NonNegativeMetres,
     Position,
     Positive,
     PositiveMetres,
@@ -67,7 +68,7 @@ class PybulletModel(ConfigModel):
     """Keyword arguments of one PyBullet function."""
 
     def kwargs(self) -> dict[str, Any]:
-        """Return the arguments that the user wrote, with constants as numbers."""
+        """Returns the arguments that the user wrote, with constants as numbers."""
         return self.model_dump(exclude_unset=True, exclude_none=True)
 
 
@@ -151,17 +152,15 @@ class ChangeDynamics(PybulletModel):
     localInertiaDiagonal: (
         Annotated[tuple[NonNegative, NonNegative, NonNegative], Field(strict=False), Unit("kg m^2")] | None
     ) = optional("Principal moments of inertia of the base link.")
-    ccdSweptSphereRadius: Annotated[NonNegative, Unit("m")] | None = optional(
+    ccdSweptSphereRadius: NonNegativeMetres | None = optional(
         "Radius of the sphere for continuous collision detection."
     )
-    contactProcessingThreshold: Annotated[NonNegative, Unit("m")] | None = optional(
-        "Distance below which contacts are solved."
-    )
+    contactProcessingThreshold: NonNegativeMetres | None = optional("Distance below which contacts are solved.")
     activationState: Annotated[int, ACTIVATION_STATES] | None = optional("ACTIVATION_STATE_... flags.")
     jointDamping: Annotated[NonNegative, Unit("N m s/rad or N s/m")] | None = optional("Damping of the joint.")
     anisotropicFriction: Vec3 | None = optional("Factors on friction along x, y and z.")
     maxJointVelocity: Annotated[Positive, Unit("rad/s or m/s")] | None = optional("Largest velocity of the joint.")
-    collisionMargin: Annotated[NonNegative, Unit("m")] | None = optional("Margin around the shape.")
+    collisionMargin: NonNegativeMetres | None = optional("Margin around the shape.")
     jointLowerLimit: Annotated[float, Unit("rad or m")] | None = optional("Lower limit of the joint.")
     jointUpperLimit: Annotated[float, Unit("rad or m")] | None = optional("Upper limit of the joint.")
     jointLimitForce: Annotated[NonNegative, Unit("N m or N")] | None = optional("Largest effort at the joint's limits.")

@@ -14,6 +14,7 @@ from custom_ros_tools.schema import (
     Kilograms,
     Metres,
     NonNegative,
+    NonNegativeMetres,
     Position,
     Positive,
     Quat,
@@ -42,7 +43,7 @@ class LoadSoftBody(PybulletModel):
     baseOrientation: Quat | None = optional("Start orientation as x, y, z, w.")
     scale: Positive | None = optional("Factor on all lengths of the mesh.")
     mass: Annotated[Kilograms, Field(gt=0)] | None = optional("Mass of the whole body.")
-    collisionMargin: Annotated[NonNegative, Unit("m")] | None = optional("Margin around the surface.")
+    collisionMargin: NonNegativeMetres | None = optional("Margin around the surface.")
     useMassSpring: Switch | None = optional("Whether it is made of springs, as cloth is.")
     useBendingSprings: Switch | None = optional("Whether springs resist bending as well.")
     useNeoHookean: Switch | None = optional("Whether it is a neo-Hookean solid; needs tetrahedra.")

@@ -13,7 +13,9 @@ from custom_ros_tools.schema import (
     Degrees,
     KeyedError,
     ListOf,
+    Metres,
     NonNegative,
+    NonNegativeMetres,
     Position,
     PositiveMetres,
     Rgb,
@@ -50,7 +52,7 @@ class Connect(PybulletModel):
         return self
 
     def kwargs(self) -> dict[str, Any]:
-        """Return the arguments that the user wrote, and `connection_mode` in any case."""
+        """Returns the arguments that the user wrote, and `connection_mode` in any case."""
         return {"connection_mode": self.connection_mode, **super().kwargs()}
 
 
@@ -68,7 +70,7 @@ class SetGravity(PybulletModel):
     gravZ: Acceleration = Field(0.0, description="Acceleration along z, -9.81 on Earth.")
 
     def kwargs(self) -> dict[str, Any]:
-        """Return all three, as PyBullet wants them."""
+        """Returns all three, as PyBullet wants them."""
         return self.model_dump()
 
 
@@ -77,12 +79,10 @@ class SetPhysicsEngineParameter(PybulletModel):
 
     numSolverIterations: Iterations | None = optional("Most iterations of the solver.")
     useSplitImpulse: Switch | None = optional("Whether penetration is solved apart from velocity.")
-    splitImpulsePenetrationThreshold: Annotated[float, Unit("m")] | None = optional(
-        "Penetration from which it is solved apart."
-    )
+    splitImpulsePenetrationThreshold: Metres | None = optional("Penetration from which it is solved apart.")
     numSubSteps: Count | None = optional("Parts that each step is divided into.")
     collisionFilterMode: Count | None = optional("0: both masks must match, 1: one of them.")
-    contactBreakingThreshold: Annotated[NonNegative, Unit("m")] | None = optional("Distance at which contacts end.")
+    contactBreakingThreshold: NonNegativeMetres | None = optional("Distance at which contacts end.")
     maxNumCmdPer1ms: int | None = optional("Most commands in a millisecond.")
     enableFileCaching: Switch | None = optional("Whether files are read once only.")
     restitutionVelocityThreshold: Annotated[NonNegative, Unit("m/s")] | None = optional(
@@ -93,14 +93,12 @@ class SetPhysicsEngineParameter(PybulletModel):
     frictionERP: NonNegative | None = optional("The same for friction, if anchored.")
     enableConeFriction: Switch | None = optional("Whether friction is a cone, else a pyramid.")
     deterministicOverlappingPairs: Switch | None = optional("Whether contacts are sorted.")
-    allowedCcdPenetration: Annotated[NonNegative, Unit("m")] | None = optional(
-        "Penetration allowed to continuous collision detection."
-    )
+    allowedCcdPenetration: NonNegativeMetres | None = optional("Penetration allowed to continuous collision detection.")
     jointFeedbackMode: Annotated[int, JOINT_FEEDBACK_MODES] | None = optional(
         "JOINT_FEEDBACK_... flags: where force and torque of a joint are told."
     )
     solverResidualThreshold: NonNegative | None = optional("Residual at which the solver stops.")
-    contactSlop: Annotated[NonNegative, Unit("m")] | None = optional("Penetration left alone.")
+    contactSlop: NonNegativeMetres | None = optional("Penetration left alone.")
     enableSAT: Switch | None = optional("Whether the separating axis test is used.")
     constraintSolverType: Annotated[int, SOLVER_TYPES] | None = optional("CONSTRAINT_SOLVER_LCP_... constant.")
     globalCFM: NonNegative | None = optional("Softness of all constraints.")
@@ -112,7 +110,7 @@ class SetPhysicsEngineParameter(PybulletModel):
 
 
 def _as_list(given: Any) -> Any:
-    """Split `A|B`; anything that is no list is a list of one."""
+    """Splits `A|B`; anything that is no list is a list of one."""
     if isinstance(given, str):
         return given.split("|")
     return given if isinstance(given, (list, tuple)) else [given]
@@ -141,7 +139,7 @@ class ConfigureDebugVisualizer(PybulletModel):
     rgbBackground: Rgb | None = optional("Colour of the background, each from 0 to 1.")
 
     def calls(self) -> list[dict[str, Any]]:
-        """Return the arguments of one call for each flag; PyBullet's constants cannot be or-ed."""
+        """Returns the arguments of one call for each flag; PyBullet's constants cannot be or-ed."""
         others = {"enable": self.enable, **self.kwargs()}
         return [{**others, "flag": flag} for flag in self.flag]
 
@@ -155,5 +153,5 @@ class ResetDebugVisualizerCamera(PybulletModel):
     cameraTargetPosition: Position = Field((0.0, 0.0, 0.0), description="What it looks at.")
 
     def kwargs(self) -> dict[str, Any]:
-        """Return all four, as PyBullet wants them."""
+        """Returns all four, as PyBullet wants them."""
         return self.model_dump()

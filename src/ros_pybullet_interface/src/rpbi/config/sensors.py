@@ -16,6 +16,7 @@ from custom_ros_tools.schema import (
     KeyedError,
     Name,
     NonNegative,
+    NonNegativeMetres,
     Positive,
     PositiveMetres,
     Switch,
@@ -123,9 +124,7 @@ class RgbdSensorConfig(ConfigModel):
     hz: Hz = Field(30.0, description="Images in a second.")
     pointcloud: Switch = Field(False, description="Whether point clouds are published too.")
     synchronous: Switch = Field(False, description="Whether the simulation waits for every image.")
-    depth_noise_m: Annotated[NonNegative, Unit("m")] = Field(
-        0.0, description="Standard deviation of the depths' noise."
-    )
+    depth_noise_m: NonNegativeMetres = Field(0.0, description="Standard deviation of the depths' noise.")
     depth_noise_growth_per_m: Annotated[NonNegative, Unit("1/m")] = Field(
         0.0, description="What the squared depth adds to that deviation; about 0.0014 for a structured-light camera."
     )

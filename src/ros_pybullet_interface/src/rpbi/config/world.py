@@ -127,7 +127,7 @@ class WorldConfig(ConfigModel):
         return cls.model_construct(content.model_fields_set & cls.model_fields.keys(), **values)
 
     def search_paths(self) -> tuple[str, ...]:
-        """Return the folders to look for files in, as absolute paths."""
+        """Returns the folders to look for files in, as absolute paths."""
         return self.setAdditionalSearchPath
 
 
