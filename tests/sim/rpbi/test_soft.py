@@ -14,8 +14,7 @@ from worlds import box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, PhysicsError, UnknownNameError
 from rpbi.bodies.soft import SoftObject
-from rpbi.config.pybullet_models import ChangeDynamics
-from rpbi.config.pybullet_soft_models import CreateSoftBodyAnchor, LoadSoftBody
+from rpbi.config.pybullet_models import ChangeDynamics, CreateSoftBodyAnchor, LoadSoftBody
 from rpbi.geometry import Pose
 from rpbi.samples import ContactsSample, SurfaceSample
 from rpbi.world import World
