@@ -177,7 +177,7 @@ def test_it_is_checked_and_tested_without_a_master(workspace):
 def test_without_the_package_the_node_says_what_is_missing(ros, workspace):
     belt = workspace / "src" / NAME / "configs" / "belt.yaml"
     process = ros.simulator({"objects": [str(belt)]}, wait=False)
-    assert process.wait(30) == 1
+    assert process.wait(60.0) == 1
     printed = ros.output(process)
     missing = f"no module '{NAME}': is its package built, and its workspace sourced?"
     assert f"{belt}: type: {missing}" in printed and f"{belt}: sensors[0].type: {missing}" not in printed
@@ -208,7 +208,7 @@ def _faulty(ros, tmp_path, **keys):
 )  # fmt: skip
 def test_a_package_without_what_it_needs_ends_the_node_with_one_line(ros, tmp_path, keys, line):
     process = _faulty(ros, tmp_path, **keys)
-    assert process.wait(30) == 1
+    assert process.wait(60.0) == 1
     printed = ros.output(process)
     assert line in printed and "Traceback" not in printed
 
@@ -217,7 +217,7 @@ def test_a_class_that_fails_in_a_tick_stops_the_simulation_with_one_line(ros, tm
     rosout = Rosout(ros)
     process = _faulty(ros, tmp_path, fails="before_step")
     failure = "faulty_lab:Thing failed in before_step of 'thing' at tick 5: ZeroDivisionError: division by zero"
-    rosout.wait_for([f"simulation stopped: {failure} ({SUPPORT}/faulty_lab.py, line"], 30.0)
+    rosout.wait_for([f"simulation stopped: {failure} ({SUPPORT}/faulty_lab.py, line"])
     assert "Traceback" not in ros.output(process)
     answer = ros.call("/rpbi/step", Trigger)
     assert not answer.success and failure in answer.message
