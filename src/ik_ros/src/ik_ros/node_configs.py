@@ -23,7 +23,7 @@ from custom_ros_tools.schema import (
     Text,
 )
 
-from .joint_rate_limiter import JointRateLimiterConfig
+from .problem_stream import JointRateLimiterConfig
 
 
 class InteractiveTargetConfig(ConfigModel):

@@ -6,9 +6,10 @@ import math
 import threading
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import ClassVar
 
-from pydantic import ValidationInfo, model_validator
+from pydantic import model_validator
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.schema import ConfigModel, KeyedError, Text
@@ -18,7 +19,7 @@ from rpbi.config.asset_files import ExistingFile
 from rpbi.kinematics.limits import Limits
 from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
-from .description import ChainDescription, read_chain
+from .description import ChainDescription
 from .kdl import Goal, KdlChain
 
 
@@ -35,10 +36,15 @@ class ChainConfig(ConfigModel):
     base_link: Text
     tip_link: Text
 
+    @cached_property
+    def chain(self) -> ChainDescription:
+        """What lies between the links."""
+        return ChainDescription(self.urdf_filename, self.base_link, self.tip_link)
+
     @model_validator(mode="after")
-    def _chain_can_be_solved_for(self, info: ValidationInfo) -> ChainConfig:
+    def _chain_can_be_solved_for(self) -> ChainConfig:
         try:
-            read_chain(self.urdf_filename, self.base_link, self.tip_link)
+            _ = self.chain
         except UnknownNameError as error:
             key = "base_link" if error.name == self.base_link else "tip_link"
             raise KeyedError(key, str(error)) from None
@@ -65,19 +71,18 @@ class ChainSolver(Solver):
     Config: ClassVar[type[ChainConfig]] = ChainConfig
 
     def __init__(self, config: ChainConfig) -> None:
-        self.description: ChainDescription = read_chain(config.urdf_filename, config.base_link, config.tip_link)
+        self.description = config.chain
         self.chain = KdlChain(self.description)
         self.joint_names = self.description.joint_names
         self.base_frame = self.description.base
         self.velocity_limits = self.description.velocity_limits
-        self.use_limits(self.description.lower, self.description.upper)
+        self.use_limits(self.description.limits)
         self._lock = threading.Lock()
 
-    def use_limits(self, lower: Sequence[float], upper: Sequence[float]) -> None:
-        """Sets the n limits of the joints [rad or m], -inf and inf where there are none."""
-        self.lower, self.upper = tuple(lower), tuple(upper)
-        self.limits = Limits(lower, upper, self.description.is_revolute)
-        self._start_limits = StartLimits(self.joint_names, self.limits)
+    def use_limits(self, limits: Limits) -> None:
+        """Sets the limits of the n joints."""
+        self.limits, self.lower, self.upper = limits, limits.lower, limits.upper
+        self._start_limits = StartLimits(self.joint_names, limits)
 
     @abstractmethod
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:

@@ -45,9 +45,6 @@ class KdlSolver(ChainSolver):
     It goes from the start to the nearest solution. Where that is outside limits, random starts follow, after an own
     descent within limits if the start is near the target. That descent does all where there are tolerances, or joints
     that mimic others.
-
-    Args:
-        config: Its options.
     """
 
     Config = KdlConfig
@@ -69,7 +66,7 @@ class KdlSolver(ChainSolver):
                 best, least = q, size
             if least <= 1.0:
                 return [best]
-        return [self.mended(goal, best)]
+        return [levenberg_marquardt(self.chain, goal, self.limits, best)]
 
     def candidates(self, problem: IKProblem, goal: Goal, start: list[float], restarts: int) -> Iterator[list[float]]:
         """Tells where each start leads, within limits.
@@ -95,10 +92,6 @@ class KdlSolver(ChainSolver):
             has_arrived |= arrived
             if count == GIVE_UP_AFTER and not has_arrived:
                 return
-
-    def mended(self, goal: Goal, q: list[float]) -> list[float]:
-        """Returns positions as near to the goal as a descent within limits gets from these [rad or m]."""
-        return levenberg_marquardt(self.chain, goal, self.limits, q)
 
     def _starts(self, problem: IKProblem, start: list[float], restarts: int) -> Iterator[list[float]]:
         """Tells where to start: where it was asked for, and then at random."""

@@ -43,9 +43,6 @@ class TracIkSolver(ChainSolver):
 
     It is not deterministic: its two threads race, and where it ends depends on the clock.
 
-    Args:
-        config: Its options.
-
     Raises:
         ConfigError: If a joint of the chain mimics another, or slides without limits; it names the joint.
     """

@@ -30,10 +30,6 @@ class ComInSupport(Task):
 
     The polygon is the convex hull of the contact points where they are now; that it moves with them is left out of the
     Jacobian, since feet that stand are held by constraints of their own.
-
-    Args:
-        config: Its options.
-        robot: The robot.
     """
 
     Config = ComInSupportConfig

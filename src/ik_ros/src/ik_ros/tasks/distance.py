@@ -28,12 +28,7 @@ class DistanceConfig(TaskConfig):
 
 
 class Distance(Task):
-    """Keeps shapes of the formulation apart, in pairs; one of each pair at most is a box, and one at least moves.
-
-    Args:
-        config: Its options.
-        robot: The robot, which knows the shapes.
-    """
+    """Keeps shapes of the formulation apart, in pairs; one of each pair at most is a box, and one at least moves."""
 
     Config = DistanceConfig
 

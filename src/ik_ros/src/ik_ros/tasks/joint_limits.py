@@ -24,12 +24,7 @@ class JointLimitsConfig(TaskConfig):
 
 
 class JointLimits(JointTask):
-    """Keeps joints within limits; those of the URDF are kept anyway.
-
-    Args:
-        config: Its options.
-        robot: The robot.
-    """
+    """Keeps joints within limits; those of the URDF are kept anyway."""
 
     Config = JointLimitsConfig
 

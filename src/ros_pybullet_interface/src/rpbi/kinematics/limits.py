@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
+
+import numpy as np
 
 from rpbi.geometry import Vector
 from rpbi.urdf.document import UrdfJoint
@@ -15,11 +18,7 @@ from .residual import POSITION_TOLERANCE_M
 TURN = 2.0 * math.pi
 
 
-class Generator(Protocol):
-    """Random numbers, such as `random.Random` and `numpy.random.Generator`."""
-
-    def uniform(self, low: float, high: float, /) -> float:
-        """Returns a number between two."""
+Generator = random.Random | np.random.Generator
 
 
 class Limits:
