@@ -17,15 +17,9 @@ WORKPLACE = Workplace()
 
 import rosgraph  # noqa: E402
 from ros_system import RosSystem, stop_group, wait_until  # noqa: E402
-from run_report import RunReport  # noqa: E402
 from second_master import SecondMaster  # noqa: E402
-from work_plan import WorkPlan  # noqa: E402
 
-
-def pytest_configure(config: pytest.Config) -> None:
-    """Has the run planned and reported."""
-    config.pluginmanager.register(WorkPlan())
-    config.pluginmanager.register(RunReport())
+pytest_plugins = ("work_plan", "run_report")
 
 
 def pytest_terminal_summary() -> None:
@@ -38,7 +32,7 @@ def no_process_is_left() -> Iterator[None]:
     """Fails the last test of a worker if any of its tests left a process behind, and ends that process."""
     yield
     with contextlib.suppress(TimeoutError):  # whoever was told to end may need a moment
-        wait_until(lambda: not WORKPLACE.processes(), "all processes have ended", 5.0)
+        wait_until(lambda: not WORKPLACE.processes(), "all processes have ended", 15.0)
     left = WORKPLACE.processes()
     for process_id in left:
         with contextlib.suppress(ProcessLookupError):

@@ -27,7 +27,7 @@ def start_node(ros: Any, executable: str, solver: str, services: str, **paramete
     name = executable.removesuffix(".py")
     rospy.set_param(f"/{name}", parameters)
     process = ros.start(["rosrun", "ik_ros", executable, solver, f"__name:={name}"])
-    rospy.wait_for_service(services, timeout=20.0)
+    rospy.wait_for_service(services, timeout=60.0)
     return process
 
 

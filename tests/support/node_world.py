@@ -94,7 +94,7 @@ class Rosout:
         """Returns the messages that contain a text."""
         return [log for log in list(self._listener.messages) if containing in log.msg]
 
-    def wait_for(self, texts: Sequence[str], timeout_s: float = 5.0) -> None:
+    def wait_for(self, texts: Sequence[str], timeout_s: float = 60.0) -> None:
         """Waits until messages that contain these texts have come."""
         wait_until(
             lambda: all(self.logs(text) for text in texts),

@@ -18,6 +18,8 @@ import roslib.packages
 import rospy
 import yaml
 
+from ros_pybullet_interface.srv import ListObjects
+
 SUPPORT = Path(__file__).resolve().parent
 """Where the tests' helpers are, and programs that tests start."""
 
@@ -27,7 +29,7 @@ def support_on_path() -> dict[str, str]:
     return {"PYTHONPATH": os.pathsep.join((os.environ.get("PYTHONPATH", ""), str(SUPPORT)))}
 
 
-def wait_until(condition: Callable[[], Any], what: str, timeout_s: float = 20.0) -> Any:
+def wait_until(condition: Callable[[], Any], what: str, timeout_s: float = 60.0, every_s: float = 0.02) -> Any:
     """Waits until a condition holds and returns its value; errors of a master that is not up yet count as no."""
     end_s = time.monotonic() + timeout_s
     while True:
@@ -39,14 +41,14 @@ def wait_until(condition: Callable[[], Any], what: str, timeout_s: float = 20.0)
             return value
         if time.monotonic() > end_s:
             raise TimeoutError(f"it did not come about within {timeout_s:g} s that {what}")
-        time.sleep(0.02)
+        time.sleep(every_s)
 
 
 FOREIGN = ("rostopic",)
 """Programs of rospy's that sometimes hang on Ctrl-C, and have nothing to finish."""
 
 
-def stop_group(process: subprocess.Popen, timeout_s: float = 15.0) -> int:
+def stop_group(process: subprocess.Popen, timeout_s: float = 60.0) -> int:
     """Ends a process and its children as Ctrl-C would; returns its exit code.
 
     Raises:
@@ -75,7 +77,7 @@ class Listener:
         self.arrival_s.append(time.monotonic())
         self.messages.append(message)
 
-    def wait_for(self, count: int = 1, timeout_s: float = 20.0) -> list[Any]:
+    def wait_for(self, count: int = 1, timeout_s: float = 60.0) -> list[Any]:
         """Waits until so many messages have come and returns all."""
         wait_until(lambda: len(self.messages) >= count, f"{count} messages came on {self.topic}", timeout_s)
         return self.messages
@@ -159,10 +161,10 @@ class RosSystem:
         if wait:
             wait_until(
                 lambda: process.poll() is not None or _provider(service) not in (None, before),
-                "the node is up",
-                40.0,
+                "the node serves",
             )
             assert process.poll() is None, self.output(process)
+            self.call(service, ListObjects)  # its loop answers, and runs when all topics and services are there
         return process
 
     def listen(self, topic: str, message_type: type) -> Listener:
@@ -173,7 +175,7 @@ class RosSystem:
 
     def call(self, service: str, service_type: type, *arguments: Any, **fields: Any) -> Any:
         """Calls a service."""
-        rospy.wait_for_service(service, timeout=20.0)
+        rospy.wait_for_service(service, timeout=60.0)
         return rospy.ServiceProxy(service, service_type)(*arguments, **fields)
 
     def write_yaml(self, name: str, data: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""What a run of the tests tells of itself: where its time went."""
+"""Plugin for pytest: a run ends with where its time went."""
 
 from __future__ import annotations
 
@@ -10,6 +10,11 @@ from typing import Any
 import pytest
 
 SLOWEST = 10
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Has this run measured and reported."""
+    config.pluginmanager.register(RunReport())
 
 
 class RunReport:

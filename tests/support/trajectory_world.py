@@ -71,7 +71,7 @@ class Goal:
 
     def wait(self) -> tuple[int, int, str]:
         """Waits for the end; returns the status, the error code and the error string."""
-        assert self._done.wait(30.0), "the goal was not answered"
+        assert self._done.wait(60.0), "the goal was not answered"
         result = self.handle.get_result()
         return self.handle.get_terminal_state(), result.error_code, result.error_string
 

@@ -46,7 +46,7 @@ def test_a_name_that_is_used_again_in_a_world_that_stands_still_is_seen_as_what_
     assert remove(ros, "thing").success
     assert add(ros, PybulletObject.DYNAMIC, box("thing", basePosition=[0.4, 0.0, 0.1])).success
     second = ros.listen("/rpbi/camera/segmentation", Image)
-    second.wait_for(1, 30.0)
+    second.wait_for(1)
     assert not rosout.logs("the renderer ended")
 
 
@@ -64,7 +64,7 @@ def test_services_of_a_robot_never_answer_that_it_is_unknown_because_of_a_reset(
     for _ in range(20):
         assert ros.call("/rpbi/reset", Trigger).success
     over.set()
-    asking.join(20.0)
+    asking.join(60.0)
     assert len(answers) > 20
     assert not [answer for answer in answers if "unknown" in answer]
 
