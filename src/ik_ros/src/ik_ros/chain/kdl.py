@@ -85,7 +85,7 @@ class Goal:
     """A target with a box of tolerances around it.
 
     Args:
-        problem: The question.
+        problem: The problem.
 
     Attributes:
         frame: The target in the base.

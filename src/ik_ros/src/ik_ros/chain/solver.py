@@ -24,7 +24,7 @@ from .kdl import Goal, KdlChain
 
 
 class ChainConfig(ConfigModel):
-    """What every solver of one link's pose is told.
+    """Options of every solver of one link's pose.
 
     Attributes:
         urdf_filename: The robot; `{package}/path` and `package://` are resolved.
@@ -57,7 +57,7 @@ class ChainSolver(Solver):
     """Brings the tip of a chain of joints to a target.
 
     Any thread may call it; a lock inside lets one in at a time. A subclass only looks for positions: here they are
-    brought into limits, put into the chain and judged, so that success is told only where it is true.
+    brought into limits, put into the chain and judged, so that success is answered only where it is true.
 
     Args:
         config: Its options.
@@ -89,7 +89,7 @@ class ChainSolver(Solver):
         """Looks for joint positions.
 
         Args:
-            problem: The question.
+            problem: The problem.
             goal: Its target with tolerances.
             start: n positions within limits [rad or m].
 
@@ -130,7 +130,7 @@ class ChainSolver(Solver):
         return goal.residual(self.chain.frame(q))
 
     def is_beyond_reach(self, problem: IKProblem) -> bool:
-        """Tells whether the target is farther away than the chain is long."""
+        """Returns whether the target is farther away than the chain is long."""
         if problem.target is None:
             return False
         return not self.chain.reach.covers(problem.target.position, math.hypot(*problem.position_tolerance))
@@ -165,7 +165,7 @@ def refuse_boxes(problem: IKProblem, solver: str, may_turn: bool = False) -> Non
     """Refuses tolerances that are larger than what counts as reached anyway.
 
     Args:
-        problem: The question.
+        problem: The problem.
         solver: Name of the solver that cannot make use of them.
         may_turn: Whether it can make use of those for rotations.
 

@@ -23,7 +23,7 @@ AXES: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")
 
 
 class FrameTaskConfig(TaskConfig):
-    """What tasks about a link are told.
+    """Options of tasks about a link.
 
     Attributes:
         frame: The link.
@@ -79,7 +79,7 @@ class FrameTask(Task):
         self._set_goal(pose, (0.0,) * 6)
 
     def aim(self, problem: IKProblem) -> None:
-        """Takes over the target of a problem, with its tolerances, as the goal."""
+        """Takes the target of a problem, with its tolerances, as the goal."""
         if problem.target is not None:
             self._set_goal(problem.target, (*problem.position_tolerance, *problem.rotation_tolerance))
 

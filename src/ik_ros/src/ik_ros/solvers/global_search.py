@@ -27,7 +27,7 @@ class GlobalConfig(KdlConfig):
             [rad or m, root of the sum of squares]; or `middle_of_limits`, how far the joint that is nearest to a
             limit is from the middle, as a part of half its range.
         distinct: Two solutions are distinct if a joint differs by more than this [rad or m].
-        most: How many solutions to tell at most, the best one included.
+        most: How many solutions to return at most, the best one included.
     """
 
     restarts: Count = 100

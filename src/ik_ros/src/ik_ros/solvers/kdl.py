@@ -69,10 +69,10 @@ class KdlSolver(ChainSolver):
         return [levenberg_marquardt(self.chain, goal, self.limits, best)]
 
     def candidates(self, problem: IKProblem, goal: Goal, start: list[float], restarts: int) -> Iterator[list[float]]:
-        """Tells where each start leads, within limits.
+        """Yields where each start leads, within limits.
 
         Args:
-            problem: The question.
+            problem: The problem.
             goal: Its target with tolerances.
             start: The first n positions to start from [rad or m].
             restarts: How many random ones follow.
@@ -94,7 +94,7 @@ class KdlSolver(ChainSolver):
                 return
 
     def _starts(self, problem: IKProblem, start: list[float], restarts: int) -> Iterator[list[float]]:
-        """Tells where to start: where it was asked for, and then at random."""
+        """Returns where to start: where it was asked for, and then at random."""
         most = min(restarts, RESTARTS_BEYOND_REACH) if self.is_beyond_reach(problem) else restarts
         return self.limits.starts(start, random.Random(problem.seed), most)
 

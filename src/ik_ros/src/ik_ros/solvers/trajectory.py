@@ -242,7 +242,7 @@ class TrajectorySolver(KdlSolver):
         return float(np.array(self._distances.map(len(q))(q.T)).min())
 
     def _too_fast(self, spline: Spline, points: np.ndarray, duration_s: float) -> list[str]:
-        """Tells where speeds or accelerations are beyond their limits, checked closely."""
+        """Returns where speeds or accelerations are beyond their limits, checked closely."""
         problems = []
         for order, most, per in ((1, self._max_velocity, "s"), (2, self._max_acceleration, "s^2")):
             values = np.abs(spline.basis(_checks(spline), order) @ points).max(axis=0) / duration_s**order

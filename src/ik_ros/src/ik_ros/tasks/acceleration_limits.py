@@ -15,7 +15,7 @@ from ik_ros.problem import IKProblem
 
 
 class AccelerationLimitsConfig(TaskConfig):
-    """What this task is told.
+    """Options of this task.
 
     Attributes:
         dt_s: Time between solutions [s].

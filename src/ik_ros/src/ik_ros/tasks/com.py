@@ -14,7 +14,7 @@ from ik_ros.problem import IKProblem
 
 
 class ComConfig(TaskConfig):
-    """What this task is told.
+    """Options of this task.
 
     Attributes:
         goal: Where it shall be, x, y, z in the base [m]; None: each problem says.

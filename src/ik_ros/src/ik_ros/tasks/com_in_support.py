@@ -14,7 +14,7 @@ from ik_ros.formulation.task import Linearization, Task, TaskConfig
 
 
 class ComInSupportConfig(TaskConfig):
-    """What this task is told.
+    """Options of this task.
 
     Attributes:
         support: Points of links that stand on the ground, in the link [m], such as the corners of both soles.

@@ -16,7 +16,7 @@ NEAR_M = 0.3
 
 
 class DistanceConfig(TaskConfig):
-    """What this task is told.
+    """Options of this task.
 
     Attributes:
         pairs: Names of two shapes each.

@@ -11,7 +11,7 @@ from ik_ros.formulation.task import TaskConfig
 
 
 class JointLimitsConfig(TaskConfig):
-    """What this task is told.
+    """Options of this task.
 
     Attributes:
         limits: Lower and upper limit of joints [rad or m].

@@ -21,7 +21,7 @@ ZERO = np.zeros(2)
 
 
 class LookAtConfig(TaskConfig):
-    """What this task is told.
+    """Options of this task.
 
     Attributes:
         frame: The link.

@@ -14,7 +14,7 @@ from ik_ros.problem import IKProblem
 
 
 class PostureConfig(TaskConfig):
-    """What this task is told.
+    """Options of this task.
 
     Attributes:
         goal: Position of each joint that counts [rad or m].

@@ -15,7 +15,7 @@ from ik_ros.problem import IKProblem
 
 
 class VelocityLimitsConfig(TaskConfig):
-    """What this task is told.
+    """Options of this task.
 
     Attributes:
         dt_s: Time from the previous solution to this one [s].

@@ -114,7 +114,7 @@ class Reach(NamedTuple):
         return cls(anchor, sum(lengths) + sum(travel))
 
     def covers(self, position: Sequence[float], tolerance_m: float = 0.0) -> bool:
-        """Tells whether the tip may come as near to a position in the base as counts as reached.
+        """Returns whether the tip may come as near to a position in the base as counts as reached.
 
         Args:
             position: The position [m].

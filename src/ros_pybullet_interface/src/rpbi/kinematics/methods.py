@@ -42,7 +42,6 @@ class DampedLeastSquares:
             self._arguments["targetOrientation"] = target.quat_xyzw
 
     def __call__(self, q: np.ndarray, frozen: np.ndarray, iterations: int) -> np.ndarray:
-        """See `Step`."""
         damping = np.where(frozen, FROZEN, self._damping).tolist()
         a_call = max(1, JOINT_ITERATIONS_A_CALL // len(q))
         for done in range(0, iterations, a_call):
@@ -80,7 +79,6 @@ class SelectivelyDampedLeastSquares:
         self._willingness = 1.0 / np.sqrt(damping)
 
     def __call__(self, q: np.ndarray, frozen: np.ndarray, iterations: int) -> np.ndarray:
-        """See `Step`."""
         willingness = np.where(frozen, 0.0, self._willingness)
         for _ in range(iterations):
             self._chain.set(q)
