@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import PyKDL
 
@@ -96,7 +97,7 @@ class KdlSolver(ChainSolver):
     def _starts(self, problem: IKProblem, start: list[float], restarts: int) -> Iterator[list[float]]:
         """Returns where to start: where it was asked for, and then at random."""
         most = min(restarts, RESTARTS_BEYOND_REACH) if self.is_beyond_reach(problem) else restarts
-        return self.limits.starts(start, random.Random(problem.seed), most)
+        return self.limits.starts(start, most, partial(random.Random, problem.seed))
 
     def _nearest(self, goal: Goal, first: Sequence[float], near: Sequence[float]) -> tuple[list[float], bool]:
         """Returns where KDL gets to from `first`, brought into limits, and whether it arrived but for the limits."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -83,9 +83,16 @@ class Limits:
             positions.append(generator.uniform(low, high))
         return positions
 
-    def starts(self, first: list[float], generator: Generator, restarts: int) -> Iterator[list[float]]:
-        """Yields n positions to start a search at [rad or m]: first the given ones, then as many random ones."""
+    def starts(self, first: list[float], restarts: int, seed: Callable[[], Generator]) -> Iterator[list[float]]:
+        """Yields n positions to start a search at [rad or m].
+
+        Args:
+            first: The first ones.
+            restarts: How many random ones follow.
+            seed: Returns what they are drawn from; only called if they are asked for, since that takes a while.
+        """
         yield first
+        generator = seed()
         for _ in range(restarts):
             yield self.random(generator, first)
 
