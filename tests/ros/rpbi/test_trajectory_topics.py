@@ -45,6 +45,7 @@ def test_feedback_comes_at_its_rate_of_simulated_time_and_tells_where_the_joints
     assert goal.feedback[7].desired.velocities[0] > 0.3  # the middle of a cubic from rest to rest
 
 
+@pytest.mark.quick
 def test_without_control_msgs_there_are_topics_and_the_log_tells_what_is_missing(ros, tmp_path):
     log = Rosout(ros)
     robot = iiwa(joint_trajectory_controller={"state_publish_rate": 100}, **HOME)
