@@ -12,7 +12,7 @@ FILES = {
   <name>control_msgs</name>
   <version>1.0.0</version>
   <description>Messages of trajectory followers, for tests.</description>
-  <maintainer email="maintainers@users.noreply.h-seed-eaf057c3.example">ROS-PyBullet interface maintainers</maintainer>
+  <maintainer email="maintainers@users.noreply.h-seed-eaf057c3.example">ROS-PyBullet Interface developers</maintainer>
   <license>LGPL-3.0-or-later</license>
   <buildtool_depend>catkin</buildtool_depend>
   <depend>actionlib_msgs</depend>

@@ -19,7 +19,8 @@ from worlds import FLOOR, ball, box, iiwa, write_world
 from rpbi.bodies import BODY_TYPES
 from rpbi.config.loading import load_object
 from rpbi.config.pybullet_models import ChangeDynamics
-from rpbi.control.trajectories.request import TrajectoryRequest, Waypoint
+from rpbi.control.trajectories.request import TrajectoryPoint as Point
+from rpbi.control.trajectories.request import TrajectoryRequest
 from rpbi.engine.actions import RecordedTrajectory, TimedGoal
 from rpbi.geometry import (
     Pose,
@@ -131,7 +132,7 @@ class Script:
             goal = {robot.model[name].index: draw.uniform(-0.5, 0.5) for name in JOINTS[:3]}
             world.act("iiwa", "move", TimedGoal(goal, draw.uniform(0.1, 1.0)))
         else:
-            points = tuple(Waypoint(time_s, tuple(draw.uniform(-0.5, 0.5) for _ in JOINTS)) for time_s in (0.5, 1.0))
+            points = tuple(Point(time_s, tuple(draw.uniform(-0.5, 0.5) for _ in JOINTS)) for time_s in (0.5, 1.0))
             stamp_ns = world.clock.stamp_ns + draw.choice((0, 100_000_000))
             request = TrajectoryRequest(tuple(JOINTS), points, stamp_ns)
             world.act("iiwa", "follow", RecordedTrajectory.of(request, None, world.clock))

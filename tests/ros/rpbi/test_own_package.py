@@ -12,6 +12,7 @@ import pytest
 import rospy
 import yaml
 from camera_world import CAMERA
+from clean_shell import in_clean_shell
 from node_world import Rosout, add, main_config, objects, publishing, remove
 from ros_system import SUPPORT, support_on_path, wait_until
 from sensor_msgs.msg import Image, Range
@@ -29,10 +30,7 @@ CONVEYOR, RANGE_FINDER = f"{NAME}.conveyor:Conveyor", f"{NAME}.range_finder:Rang
 
 
 def _in_workspace(folder: Path, line: str) -> list[str]:
-    """Returns a command line in a shell that knows nothing but the `setup.bash` of a workspace."""
-    keep = [f"{name}={os.environ[name]}" for name in ("ROS_MASTER_URI", "ROS_IP", "ROS_HOME", "HOME")]
-    path = "PATH=/usr/local/bin:/usr/bin:/bin"
-    return ["env", "-i", *keep, path, "bash", "-c", f"source {folder}/devel/setup.bash && cd {folder} && {line}"]
+    return in_clean_shell(f"cd {folder}; {line}", folder / "devel" / "setup.bash")
 
 
 def _do(folder: Path, line: str, code: int = 0) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rpbi.plugins import ClassTable, find_class
+from custom_ros_tools.plugins import ClassTable, find_class
 
 from .body import Body
 from .body_config import BodyConfig

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from rpbi.config.pybullet_models import LoadURDF
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose, Vector
-from rpbi.urdf.document import resolve_meshes
+from rpbi.urdf.files import resolve_meshes
 from rpbi.urdf.joints import JointModel
 
 

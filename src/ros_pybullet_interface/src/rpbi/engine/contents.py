@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from custom_ros_tools.errors import ConfigError, PhysicsError, PluginError, Problem, UnknownNameError
+from custom_ros_tools.plugins import find_class
 from rpbi.bodies import Body, BodyConfig
 from rpbi.config.loading import LoadedWorld
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.config.sensors import FIRST_TOPIC_NAME, RgbdSensorConfig
-from rpbi.plugins import blaming, find_class
+from rpbi.plugins import blaming
 from rpbi.sensors import BodySensor
 from rpbi.sensors.contacts import ContactReader
 from rpbi.sensors.rgbd import RgbdSensor

@@ -14,10 +14,11 @@ import rospy
 from sensor_msgs.msg import JointState
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, PluginError, Problem
+from custom_ros_tools.plugins import cause_of, full_name
 from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
 from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Pose, Twist
-from rpbi.plugins import cause_of, full_name, is_foreign
+from rpbi.plugins import is_foreign
 from rpbi.ros.publishers.sample_topics import find_topic
 from rpbi.urdf.joints import JointTarget, WrongQuantityError
 from rpbi.world import World

@@ -28,7 +28,7 @@ from rpbi.ros.services.dynamics_services import DynamicsServices
 from rpbi.ros.services.node_services import NodeServices
 from rpbi.ros.services.time_services import TimeServices
 from rpbi.ros.window.topics import WindowTopics
-from rpbi.urdf.document import write_description
+from rpbi.urdf.files import write_description
 from rpbi.world import World
 
 from .headers import use_prefix

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from custom_ros_tools.plugins import ClassTable
 from rpbi.config.sensors import SensorConfig
-from rpbi.plugins import ClassTable
 
 from .body_sensor import BodySensor
 from .sensor import Sensor

@@ -11,9 +11,9 @@ from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
 from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.plugins import find, full_name
 from ros_pybullet_interface.msg import Contacts
 from rpbi.control.trajectories.controller_state import ControllerState
-from rpbi.plugins import find, full_name
 from rpbi.ros.headers import prefixed, to_ros_time
 from rpbi.ros.robots.trajectory_messages import CONTROLLER, JointTrajectoryControllerState, state_message
 from rpbi.samples import (

@@ -14,7 +14,7 @@ from custom_ros_tools.ros.lifecycle.kept_parameters import kept_parameters
 from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.config.asset_files import find_file
 from rpbi.ros.services.body_context import BodyContext
-from rpbi.urdf.document import description_for_ros
+from rpbi.urdf.files import description_for_ros
 
 
 def publish_description(context: BodyContext) -> Callable[[], None] | None:

@@ -1,4 +1,4 @@
-"""Damped least squares within limits and tolerances."""
+"""The method of Levenberg and Marquardt, within limits and tolerances."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 import PyKDL
 
-from ik_ros.limits import Limits
+from rpbi.kinematics.limits import Limits
 
-from .forward_kinematics import Chain
-from .goal import Goal
+from .kdl import Goal, KdlChain
 
 ITERATIONS = 60
 LEVER_M = 0.1
@@ -27,11 +26,11 @@ PATIENCE = 3
 """... and after so many such iterations the descent ends."""
 
 
-def levenberg_marquardt(chain: Chain, goal: Goal, limits: Limits, start: Sequence[float]) -> list[float]:
+def levenberg_marquardt(chain: KdlChain, goal: Goal, limits: Limits, start: Sequence[float]) -> list[float]:
     """Goes from a start towards a goal, and never beyond limits.
 
-    The method of Levenberg and Marquardt for how far the link is off beyond its tolerances. Joints that are at a limit
-    and would leave it stand still for that iteration.
+    It minimises how far the link is off beyond its tolerances. Joints that are at a limit and would leave it stand
+    still for that iteration.
 
     Args:
         chain: The chain.
@@ -74,7 +73,7 @@ def levenberg_marquardt(chain: Chain, goal: Goal, limits: Limits, start: Sequenc
     return list(q.tolist())
 
 
-def _error(chain: Chain, goal: Goal, q: np.ndarray) -> tuple[np.ndarray, list[float]]:
+def _error(chain: KdlChain, goal: Goal, q: np.ndarray) -> tuple[np.ndarray, list[float]]:
     """Returns what is beyond the tolerances [m], and the rotation vector from target to link [rad]."""
     off = goal.off(chain.frame(q.tolist()))
     error = np.array(goal.beyond(off))
@@ -82,7 +81,7 @@ def _error(chain: Chain, goal: Goal, q: np.ndarray) -> tuple[np.ndarray, list[fl
     return error, off[3:]
 
 
-def _jacobian(chain: Chain, q: np.ndarray, to_target: np.ndarray, turn: Sequence[float]) -> np.ndarray:
+def _jacobian(chain: KdlChain, q: np.ndarray, to_target: np.ndarray, turn: Sequence[float]) -> np.ndarray:
     """Returns how the error changes with the joints, tolerances aside, 6 x n.
 
     A rotation vector does not change by the angular velocity alone: that is multiplied by the inverse of the left

@@ -75,7 +75,7 @@ class Iterate(NamedTuple):
     step: float
 
 
-class Descent:
+class GaussNewton:
     """Goes to where the costs are low and the constraints hold, by Gauss-Newton steps.
 
     Each step minimises the weighted squares of the costs, linearised, and a damping, such that the linearised

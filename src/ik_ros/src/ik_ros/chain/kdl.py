@@ -1,4 +1,4 @@
-"""Forward kinematics of a chain of joints."""
+"""A chain of joints and its goal in the Orocos Kinematics and Dynamics Library, which takes a microsecond a call."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from collections.abc import Sequence
 import numpy as np
 import PyKDL
 
-from rpbi.geometry import Pose, Vector
+from ik_ros.problem import IKProblem
+from rpbi.geometry import Pose
+from rpbi.kinematics.limits import Reach
+from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
 from .description import ChainDescription
 
 
-class Chain:
-    """Where the tip of a chain is, and how it moves.
-
-    The Orocos Kinematics and Dynamics Library does the work, since it takes a microsecond. One thread at a time.
+class KdlChain:
+    """Where the tip of a chain is, and how it moves; one thread at a time.
 
     Args:
         description: The chain.
@@ -24,8 +25,7 @@ class Chain:
     Attributes:
         kdl: KDL's chain; its m joints are those that are not fixed.
         is_plain: Whether the m joints are the n variables, since none mimics another.
-        anchor: Where the first of the m joints is in the base [m].
-        reach_m: No position of the joints brings the tip farther from there than this [m], inf for endless rails.
+        reach: How far they bring the tip.
     """
 
     def __init__(self, description: ChainDescription) -> None:
@@ -34,6 +34,7 @@ class Chain:
             not description.mimics
         )
         self.kdl = _kdl_chain(description)
+        moving = [joint for joint in description.joints if joint.is_moving]
         self._positions = PyKDL.JntArray(len(self._drives))
         self._frame = PyKDL.Frame()
         self._jacobian = PyKDL.Jacobian(len(self._drives))
@@ -42,18 +43,9 @@ class Chain:
         self._variables = np.zeros((len(self._drives), len(description.joint_names)))
         for joint, drive in enumerate(self._drives):
             self._variables[joint, drive.variable] = drive.multiplier
-        first = self.kdl.getSegment(0).getJoint()
-        self.anchor: Vector = tuple(first.JointOrigin())
-        self.reach_m = _reach_m(description)
-
-    def may_reach(self, target: Pose, position_tolerance: Vector) -> bool:
-        """Tells whether a target is no farther away than the chain is long.
-
-        Args:
-            target: Where the tip shall be in the base.
-            position_tolerance: How far off it may be along each axis of the target [m].
-        """
-        return math.dist(target.position, self.anchor) <= self.reach_m + math.hypot(*position_tolerance)
+        x, y, z = self.kdl.getSegment(0).getJoint().JointOrigin()
+        carried = description.joints[description.joints.index(moving[0]) + 1 :]
+        self.reach = Reach.of((x, y, z), [math.hypot(*joint.xyz) for joint in carried], moving)
 
     def frame(self, q: Sequence[float]) -> PyKDL.Frame:
         """Returns the pose of the tip in the base, valid until the next call.
@@ -90,6 +82,65 @@ class Chain:
                 positions[i] = drive.multiplier * q[drive.variable] + drive.offset
 
 
+class Goal:
+    """A target with a box of tolerances around it.
+
+    Args:
+        problem: The question.
+
+    Attributes:
+        frame: The target in the base.
+        inverse: The base in the target.
+        tolerance: How far off the link may be: 3 ways along the axes of the target [m], and 3 components of the
+            rotation vector from the target to the link, in the target [rad]; inf where any will do.
+        is_point: Whether the box is no larger than what counts as reached anyway.
+
+    Raises:
+        ValueError: If the problem has no target.
+    """
+
+    def __init__(self, problem: IKProblem) -> None:
+        if problem.target is None:
+            raise ValueError("target: missing; this solver moves one link to a pose")
+        position, quat_xyzw = problem.target
+        self.frame = PyKDL.Frame(PyKDL.Rotation.Quaternion(*quat_xyzw), PyKDL.Vector(*position))
+        self.inverse = self.frame.Inverse()
+        turns = (math.inf if angle >= math.pi else angle for angle in problem.rotation_tolerance)
+        self.tolerance = (*problem.position_tolerance, *turns)
+        self.is_point = (
+            max(problem.position_tolerance) <= POSITION_TOLERANCE_M
+            and max(problem.rotation_tolerance) <= ORIENTATION_TOLERANCE_RAD
+        )
+
+    @property
+    def any_orientation(self) -> bool:
+        """Whether the link may be turned as it likes."""
+        return min(self.tolerance[3:]) == math.inf
+
+    def off(self, frame: PyKDL.Frame) -> list[float]:
+        """Returns how far a link is off: 3 ways [m] and a rotation vector [rad], in the target.
+
+        Args:
+            frame: Where the link is in the base.
+        """
+        difference = self.inverse * frame
+        p, turn = difference.p, difference.M.GetRot()
+        return [p[0], p[1], p[2], turn[0], turn[1], turn[2]]
+
+    def beyond(self, off: list[float]) -> list[float]:
+        """Returns what of these 6 values is beyond the tolerances."""
+        return [math.copysign(max(abs(value) - tolerance, 0.0), value) for value, tolerance in zip(off, self.tolerance)]
+
+    def residual(self, frame: PyKDL.Frame) -> Residual:
+        """Returns how far a link is off beyond the tolerances.
+
+        Args:
+            frame: Where the link is in the base.
+        """
+        x, y, z, rx, ry, rz = self.beyond(self.off(frame))
+        return Residual(math.hypot(x, y, z), math.hypot(rx, ry, rz))
+
+
 def _kdl_chain(description: ChainDescription) -> PyKDL.Chain:
     chain = PyKDL.Chain()
     fixed = PyKDL.Frame()  # of the joint's parent link in the link that the last moving joint moves
@@ -104,11 +155,3 @@ def _kdl_chain(description: ChainDescription) -> PyKDL.Chain:
         fixed = PyKDL.Frame()
     chain.addSegment(PyKDL.Segment(description.tip, PyKDL.Joint(PyKDL.Joint.Fixed), fixed))
     return chain
-
-
-def _reach_m(description: ChainDescription) -> float:
-    joints = list(description.joints)
-    while not joints[0].is_moving:
-        del joints[0]
-    travel = [max(abs(joint.lower), abs(joint.upper)) for joint in joints if joint.is_moving and not joint.is_revolute]
-    return sum(travel) + sum(math.hypot(*joint.xyz) for joint in joints[1:])
