@@ -96,6 +96,7 @@ REFUSALS = {
 }
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("case", REFUSALS)
 def test_a_refusal_names_topic_and_reason(ros, node, case):
     message, reason = REFUSALS[case]

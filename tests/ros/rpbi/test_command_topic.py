@@ -31,6 +31,7 @@ def publisher(ros, world):
     publisher._description.unregister()
 
 
+@pytest.mark.quick
 def test_none_of_many_newcomers_at_once_is_lost(world, publisher):
     world.commands.note(WorldCommand(0, "", "halt", "a test"))
     told = []
