@@ -157,4 +157,4 @@ def main() -> None:
     def start() -> object:
         return RobotIKSetup() if name == "pybullet" and rospy.has_param("~config") else SetupNode(name)
 
-    run_node(f"ik_setup_{name.rpartition(':')[2]}", start, anonymous=True)
+    run_node(f"ik_setup_{name.rpartition(':')[2]}", start, anonymous=True, loggers=["rpbi"])

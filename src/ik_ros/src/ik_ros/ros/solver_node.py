@@ -182,4 +182,4 @@ def _parameters() -> tuple[SolverNodeParameters, dict[str, object]]:
 def main() -> None:
     """Runs the node."""
     name = solver_argument("ik_solver_node.py")
-    run_node(f"ik_solver_{name.rpartition(':')[2]}", lambda: SolverNode(name), anonymous=True)
+    run_node(f"ik_solver_{name.rpartition(':')[2]}", lambda: SolverNode(name), anonymous=True, loggers=["rpbi"])

@@ -11,28 +11,24 @@ from typing import Any
 import pybullet
 import rospy
 
-from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, Problem
-from custom_ros_tools.ros.lifecycle.fatal_log import log_fatal_lines, log_loss_of_master
-from custom_ros_tools.ros.lifecycle.interrupts import leaving_ros_on_interrupt, wait_for_master
+from custom_ros_tools.errors import ConfigError, PhysicsError, Problem
 from custom_ros_tools.ros.lifecycle.kept_parameters import kept_parameters
-from custom_ros_tools.ros.lifecycle.logging_bridge import attach_logging
-from custom_ros_tools.ros.lifecycle.master_watch import MasterWatch
+from custom_ros_tools.ros.lifecycle.run_node import run_node
 from rpbi.bodies import BODY_TYPES
 from rpbi.config.asset_files import ROBOT_DESCRIPTION
 from rpbi.config.loading import load_world_dict
 from rpbi.ros.publishers.sample_publishers import SamplePublishers
 from rpbi.ros.publishers.status import FREE_RUNNING_CLOCK_HZ, ClockPublisher
 from rpbi.ros.publishers.world_markers import WorldMarkers
-from rpbi.ros.services.camera_services import CameraServices
-from rpbi.ros.services.dynamics_services import DynamicsServices
-from rpbi.ros.services.node_services import NodeServices
-from rpbi.ros.services.time_services import TimeServices
+from rpbi.ros.services.node_context import NodeContext
 from rpbi.ros.window.topics import WindowTopics
 from rpbi.urdf.document import write_description
 from rpbi.world import World
 
+from .endpoints import serve
 from .headers import use_prefix
 from .initial_state import start_where_robots_are
+from .node_endpoints import NODE_SERVICES
 from .object_lifecycle import ObjectLifecycle
 from .requests import Requests
 from .simulation import Simulation
@@ -58,7 +54,7 @@ def robot_description_file() -> str | None:
 
 
 def uses_simulated_time() -> bool:
-    """Tells whether stamps are to be simulated time."""
+    """Returns whether stamps are to be simulated time."""
     return bool(_parameter_above("use_sim_time", False))
 
 
@@ -85,12 +81,11 @@ class SimulatorNode:
     """Builds the world of `~config` and connects everything in it to ROS.
 
     Raises:
-        ConfigError: If the configuration is wrong; it tells everything that is.
+        ConfigError: If the configuration is wrong; it has everything that is.
         PhysicsError: If PyBullet cannot do what is asked.
     """
 
     def __init__(self) -> None:
-        MasterWatch()
         description = robot_description_file()
         loaded = load_world_dict(config_parameter(), "~config", BODY_TYPES, description)
         loaded = start_where_robots_are(loaded)
@@ -124,13 +119,12 @@ class SimulatorNode:
             self._cameras.before_tick,
         )
         ask = Requests(self._simulation)
-        self._objects = ObjectLifecycle(self._world, self._simulation, ask, publishers)
-        context = {"search_paths": config.search_paths(), ROBOT_DESCRIPTION: description}
-        NodeServices(self._simulation, ask, self._objects.add, self._objects.remove, context)
-        CameraServices(self._objects.add_camera, config.search_paths())
-        DynamicsServices(self._world, ask)
+        self._objects = ObjectLifecycle(self._simulation, ask, publishers)
+        loading = {"search_paths": config.search_paths(), ROBOT_DESCRIPTION: description}
+        context = NodeContext(self._simulation, ask, self._objects, loading)
         window.serve(ask)
-        TimeServices(self._simulation, ask, self._objects.reset)
+        for service in NODE_SERVICES:
+            serve(service, context)
         if config.start_pybullet_after_initialization:
             self._simulation.start()
 
@@ -162,25 +156,8 @@ class SimulatorNode:
 
 def main() -> None:
     """Runs the node; exits with 1 if it cannot start, with 0 when it is interrupted."""
-    if not wait_for_master():
-        return
     # Without ROS time: the simulator is the source of /clock and must never wait for it.
-    rospy.init_node("ros_pybullet_interface", disable_rostime=True, disable_signals=True)
-    attach_logging()
-    try:
-        node = SimulatorNode()
-    except InterfaceError as error:
-        log_fatal_lines(str(error).splitlines())
-        sys.exit(1)
-    except ConnectionError as error:
-        log_loss_of_master(error)
-        sys.exit(1)
-    with leaving_ros_on_interrupt():
-        try:
-            node.run()
-        except PhysicsError as error:
-            log_fatal_lines([str(error)])
-            sys.exit(1)
+    run_node("ros_pybullet_interface", SimulatorNode, SimulatorNode.run, ros_time=False)
 
 
 def _clock_hz(config: Any) -> float:

@@ -9,15 +9,14 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
 from rpbi.engine.pacer import Pacer
 from rpbi.ros.publishers.commands import CommandPublisher
+from rpbi.ros.publishers.sample_publishers import TickPublisher
 from rpbi.ros.publishers.state import StatePublisher
 from rpbi.ros.publishers.status import ClockPublisher, StatusPublisher
-from rpbi.ros.publishers.tick_publishers import TickPublisher
 from rpbi.ros.publishers.topic_publisher import SamplePublisher
 from rpbi.world import World
-
-from .step_burst import StepBurst
 
 log = logging.getLogger(__name__)
 
@@ -25,6 +24,32 @@ IDLE_PERIOD_S = 0.001
 """Shortest time between two looks at requests while stopped [s]."""
 BURST_S = 0.01
 """How long ticks follow each other before the loop looks at requests [s]."""
+
+
+class StepBurst:
+    """Counts the ticks of one request; whoever asked waits for `done`.
+
+    Args:
+        steps: How many ticks.
+    """
+
+    def __init__(self, steps: int) -> None:
+        self.done: Future[tuple[int, int]] = Future()
+        """Tick and stamp [ns] after the last one."""
+        self._steps = self.left = steps
+
+    def finish(self, tick: int, stamp_ns: int) -> None:
+        """Ends the wait: all is done."""
+        if self.done.set_running_or_notify_cancel():
+            self.done.set_result((tick, stamp_ns))
+
+    def fail(self, error: Exception) -> None:
+        """Ends the wait: no more ticks come."""
+        if self.done.set_running_or_notify_cancel():
+            self.done.set_exception(error)
+
+    def __str__(self) -> str:
+        return f"after {self._steps - self.left} of {self._steps} ticks"
 
 
 class Simulation:
@@ -39,7 +64,7 @@ class Simulation:
         status_hz: Rate of the status [Hz].
         clock: Publishes /clock if stamps are simulated time.
         helpers: Called at every pass; they must return at once.
-        facts: Tells what else the diagnostics should have.
+        facts: Returns what else the diagnostics are to have.
         before_tick: Called before each tick, which waits for it.
     """
 
@@ -57,7 +82,7 @@ class Simulation:
         self.world = world
         self.running = False
         self._broken = False
-        self._log_fatal_lines = ""
+        self._why_broken = ""
         """Why it broke off the last time."""
         self._burst: StepBurst | None = None
         self._thread: int | None = None
@@ -96,7 +121,7 @@ class Simulation:
         return True
 
     def stop(self) -> bool:
-        """Lets the world stand still, with all of its last tick told.
+        """Lets the world stand still, with all of its last tick published.
 
         Returns:
             False if it stands still already.
@@ -201,6 +226,7 @@ class Simulation:
         self._status.spin(self.running, self._burst is not None)
         self._state.spin(self.running or self._burst is not None)
         self._commands.spin()
+        flush_buffered_sockets()
 
     def _advance(self) -> None:
         if self._pacer.is_due():
@@ -212,7 +238,7 @@ class Simulation:
         self._state.take_tick()
 
     def _take_last_tick(self) -> None:
-        """Goes one tick on before standing still: all of it is told, whatever is due."""
+        """Goes one tick on before standing still: all of it is published, whatever is due."""
         self._before_tick()
         self._publishers.publish_all(self.world.step())
         self._state.take_tick()
@@ -235,7 +261,7 @@ class Simulation:
         return burst
 
     def _break_burst(self, error: Exception) -> None:
-        """Ends the ticks of a request before their time, with all of the last one told."""
+        """Ends the ticks of a request before their time, with all of the last one published."""
         burst = self._end_burst()
         self._halt()
         burst.fail(error)
@@ -250,11 +276,11 @@ class Simulation:
             raise InterfaceError("the simulation is stepping: wait for that, or stop it")
 
     def _break_off(self, error: Exception) -> None:
-        """Stands still, and tells no more of a world that is broken; until somebody starts or steps it again."""
-        if self._broken and str(error) == self._log_fatal_lines:
-            return  # it goes on telling the same
+        """Stands still, and publishes no more of a world that is broken; until somebody starts or steps it again."""
+        if self._broken and str(error) == self._why_broken:
+            return  # it goes on saying the same
         log.error("simulation stopped: %s", error, exc_info=not isinstance(error, InterfaceError))
-        self.running, self._broken, self._log_fatal_lines = False, True, str(error)
+        self.running, self._broken, self._why_broken = False, True, str(error)
         if self._burst is not None:
             self._end_burst().fail(error)
         self.world.halt("the simulation broke off")

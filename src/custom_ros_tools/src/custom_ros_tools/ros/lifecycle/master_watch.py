@@ -9,7 +9,8 @@ from xmlrpc.client import MultiCall
 
 import rosgraph
 import rospy
-from rospy.impl.paramserver import get_param_server_cache
+
+from custom_ros_tools.ros.rospy_internals import answer_cached, registry
 
 from .kept_parameters import kept_parameters
 from .registrations import Registrations
@@ -25,14 +26,16 @@ class MasterWatch:
 
     When the master cannot be reached, it says so; connections that exist do not need it. When the master is back, all
     topics, services and parameters of the node are registered again, since rospy does that at the start only. If
-    another node has taken the name meanwhile, this one ends, as ROS has it when a master sees both.
+    another node has taken the name meanwhile, this one ends, as ROS has it when a master sees both. A rospy that is
+    built otherwise than expected registers nothing again, which is said at the start.
 
     Make it once, after `rospy.init_node`.
     """
 
     def __init__(self) -> None:
         self._name, self._uri = rospy.get_name(), rosgraph.get_master_uri()
-        self._registrations = Registrations()
+        found = registry()
+        self._registrations = None if found is None else Registrations(found)
         self._process: int | None = None
         self._is_gone = self._is_over = False
         self._registering = threading.Lock()
@@ -40,7 +43,8 @@ class MasterWatch:
             self._process = master.getPid(self._name)[2]
             kept_parameters.keep("/use_sim_time")
             kept_parameters.keep(self._name)
-            _log_without_master()
+            # rospy asks the master for each line that it logs: one that hangs would hold up who says anything
+            answer_cached(_ASKED_BY_LOGGING, rospy.get_param_cached(_ASKED_BY_LOGGING, False))
         rospy.on_shutdown(self._end)
         WallTimer(LOOK_HZ, self._look)
 
@@ -56,7 +60,9 @@ class MasterWatch:
                     error,
                     self._name,
                 )
-            self._is_gone, self._registrations.are_complete = True, False
+            self._is_gone = True
+            if self._registrations is not None:
+                self._registrations.are_complete = False
 
     def _compare(self, master: Any) -> None:
         """Compares what the master knows of us with what is."""
@@ -66,8 +72,12 @@ class MasterWatch:
         (_, _, process), (_, _, node_uri) = calls()
         if node_uri and node_uri != rospy.get_node_uri():
             self._give_way(node_uri)
+        elif self._registrations is None:
+            if process != self._process:
+                rospy.logwarn("the ROS master at %s is another one: it knows nothing of %s", self._uri, self._name)
+            self._process, self._is_gone = process, False
         elif process != self._process or not node_uri or not self._registrations.are_complete:
-            self._register(master)
+            self._register(master, self._registrations)
             self._process, self._is_gone = process, False
 
     def _give_way(self, node_uri: str) -> None:
@@ -75,11 +85,11 @@ class MasterWatch:
             rospy.logfatal("another node is called %s by now (at %s): this one ends", self._name, node_uri)
             rospy.signal_shutdown("another node has its name")
 
-    def _register(self, master: Any) -> None:
+    def _register(self, master: Any, registrations: Registrations) -> None:
         with self._registering:
             if self._is_over:
                 return
-            topics, services = self._registrations.repeat(master)
+            topics, services = registrations.repeat(master)
         rospy.loginfo(
             "the ROS master at %s is back: %s has registered its %d topics and %d services again",
             self._uri,
@@ -92,9 +102,3 @@ class MasterWatch:
         """Sees to it that nothing is registered after the node has taken its leave."""
         with self._registering:
             self._is_over = True
-
-
-def _log_without_master() -> None:
-    """Answers what rospy asks the master for each line that it logs: one that hangs would hold up who says anything."""
-    answer = rospy.get_param_cached(_ASKED_BY_LOGGING, False)
-    get_param_server_cache().set(_ASKED_BY_LOGGING, answer)

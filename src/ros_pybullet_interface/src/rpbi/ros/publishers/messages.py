@@ -1,23 +1,49 @@
-"""Samples as messages: contacts, states of bases, surfaces of soft bodies."""
+"""Samples as messages."""
 
 from __future__ import annotations
 
-from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
+from geometry_msgs.msg import Point, Quaternion, Twist, Vector3, Wrench, WrenchStamped
 from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ros_pybullet_interface.msg import ContactPoint, Contacts
 from rpbi.ros.headers import prefixed, to_ros_time, world_frame
-from rpbi.samples import BaseStateSample, ContactArrowsSample, ContactsSample, SurfaceSample
+from rpbi.samples import (
+    BaseStateSample,
+    ContactArrowsSample,
+    ContactsSample,
+    JointStateSample,
+    SurfaceSample,
+    WrenchSample,
+)
 
 _ARROW = Vector3(0.015, 0.03, 0.04)
 """Diameters of shaft and head and length of the head [m]."""
 _COLOUR = ColorRGBA(0.85, 0.1, 0.1, 1.0)
 
 
+def joint_state_message(sample: JointStateSample, stamp_ns: int) -> JointState:
+    """Returns positions, velocities and efforts of all joints."""
+    message = JointState(
+        name=sample.joint_names, position=sample.position, velocity=sample.velocity, effort=sample.effort
+    )
+    message.header.stamp = to_ros_time(stamp_ns)
+    return message
+
+
+def wrench_message(sample: WrenchSample, stamp_ns: int) -> WrenchStamped:
+    """Returns force and moment; frames that are not the world's own get no prefix."""
+    message = WrenchStamped(wrench=Wrench(Vector3(*sample.force), Vector3(*sample.torque)))
+    is_ours = sample.frame_id.startswith("rpbi/")
+    message.header.frame_id = prefixed(sample.frame_id) if is_ours else sample.frame_id
+    message.header.stamp = to_ros_time(stamp_ns)
+    return message
+
+
 def contacts_message(sample: ContactsSample, stamp_ns: int) -> Contacts:
-    """Makes the message of a body's contacts."""
+    """Returns where others touch a body, and their forces."""
     points = [
         ContactPoint(
             link=point.link,
@@ -38,7 +64,7 @@ def contacts_message(sample: ContactsSample, stamp_ns: int) -> Contacts:
 
 
 def contact_arrows_message(sample: ContactArrowsSample, stamp_ns: int) -> MarkerArray:
-    """Makes arrows in place of those before."""
+    """Returns arrows in place of those before."""
     header = _header(stamp_ns)
     markers = [Marker(header=header, action=Marker.DELETEALL)]
     for number, (start, end) in enumerate(sample.arrows):
@@ -50,15 +76,9 @@ def contact_arrows_message(sample: ContactArrowsSample, stamp_ns: int) -> Marker
     return MarkerArray(markers)
 
 
-def _header(stamp_ns: int) -> Header:
-    return Header(stamp=to_ros_time(stamp_ns), frame_id=world_frame())
-
-
 def odometry_message(sample: BaseStateSample, stamp_ns: int) -> Odometry:
     """Returns pose and twist of a base; covariances are zero, since both are exact."""
-    message = Odometry(child_frame_id=prefixed(sample.frame))
-    message.header.frame_id = world_frame()
-    message.header.stamp = to_ros_time(stamp_ns)
+    message = Odometry(_header(stamp_ns), prefixed(sample.frame))
     message.pose.pose.position = Point(*sample.pose.position)
     message.pose.pose.orientation = Quaternion(*sample.pose.quat_xyzw)
     message.twist.twist = Twist(Vector3(*sample.twist.linear), Vector3(*sample.twist.angular))
@@ -66,11 +86,14 @@ def odometry_message(sample: BaseStateSample, stamp_ns: int) -> Odometry:
 
 
 def surface_message(sample: SurfaceSample, stamp_ns: int) -> Marker:
-    """Makes a list of triangles in the world."""
+    """Returns a surface as triangles in the world."""
     marker = Marker(ns=sample.name, type=Marker.TRIANGLE_LIST, action=Marker.ADD, scale=Vector3(1.0, 1.0, 1.0))
-    marker.header.stamp = to_ros_time(stamp_ns)
-    marker.header.frame_id = world_frame()
+    marker.header = _header(stamp_ns)
     marker.pose.orientation.w = 1.0
     marker.color = ColorRGBA(*sample.rgba)
     marker.points = [Point(*corner) for corner in sample.corners]
     return marker
+
+
+def _header(stamp_ns: int) -> Header:
+    return Header(stamp=to_ros_time(stamp_ns), frame_id=world_frame())

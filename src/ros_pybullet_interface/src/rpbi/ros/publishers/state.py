@@ -7,17 +7,24 @@ import time
 from ros_pybullet_interface.msg import SimulationState
 from rpbi.engine.clock import Schedule
 from rpbi.engine.pacer import Pacer
+from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import to_ros_time
 from rpbi.world import World
 
 from .topics import FastTopic
 
+STATE = Topic(
+    "rpbi/state",
+    SimulationState,
+    meaning="Tick, time, real-time factor and hash of the state; `state_hz`, `state_hash_hz`.",
+    key="state_hz",
+)
 WINDOW_S = 1.0
 """Over how long the real-time factor is measured at least [s] of wall time."""
 
 
 class StatePublisher:
-    """Tells how the simulation is doing, at a rate of the wall clock, and its hash, at a rate of the world's.
+    """Publishes how the simulation is doing, at a rate of the wall clock, and its hash, at a rate of the world's.
 
     Args:
         world: The world.
@@ -30,7 +37,7 @@ class StatePublisher:
         config = world.config
         self._period_s = 1.0 / config.state_hz if config.state_hz else float("inf")
         self._schedule = Schedule(config.state_hash_hz, world.clock.dt_ns) if config.state_hash_hz else None
-        self._topic = FastTopic("rpbi/state", SimulationState)
+        self._topic = FastTopic(STATE.name, SimulationState)
         self._due_s = time.monotonic() if config.state_hz else float("inf")
         self._factor = 0.0
         self._moves = False
@@ -39,14 +46,14 @@ class StatePublisher:
         self.restart()
 
     def restart(self) -> None:
-        """Tells a world that was built or reset, with its hash."""
+        """Publishes a world that was built or reset, with its hash."""
         tick = self._world.clock.tick
         self._hash_tick = None if self._schedule is None else self._schedule.next_due(tick)
         self._begin_window()
         self._publish(self._schedule is not None)
 
     def take_tick(self) -> None:
-        """Tells the hash of a tick, if it is due."""
+        """Publishes the hash of a tick, if it is due."""
         tick = self._world.clock.tick
         if self._schedule is not None and self._hash_tick is not None and tick >= self._hash_tick:
             self._hash_tick = self._schedule.next_due(tick)

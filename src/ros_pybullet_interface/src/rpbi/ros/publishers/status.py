@@ -14,11 +14,20 @@ from std_msgs.msg import Int64
 
 from rpbi.engine.clock import Clock
 from rpbi.engine.pacer import Pacer
+from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import to_ros_time
 
 from .topics import FastTopic
 
 log = logging.getLogger(__name__)
+
+CLOCK = Topic(
+    "/clock", ClockMessage, meaning="The world's time, if `/use_sim_time` is true; every tick, or `clock_hz`."
+)
+STATUS = Topic(
+    "rpbi/status", Int64, meaning="1 while the world runs, 0 while it stands still; `status_hz`.", key="status_hz"
+)
+DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, meaning="Real-time factor, overruns, lost time, renderer; 1 Hz.")
 
 DIAGNOSTICS_PERIOD_S = 1.0
 STOPPED_CLOCK_PERIOD_S = 0.05
@@ -28,9 +37,9 @@ FALLING_BEHIND = 0.98
 
 
 def _warn_of_rivals() -> None:
-    """Warns if another node tells the time too: ROS time would jump between the two."""
+    """Warns if another node publishes the time too: ROS time would jump between the two."""
     published: list[tuple[str, list[str]]] = rosgraph.Master(rospy.get_name()).getSystemState()[0]
-    rivals = [node for topic, nodes in published if topic == "/clock" for node in nodes if node != rospy.get_name()]
+    rivals = [node for topic, nodes in published if topic == CLOCK.name for node in nodes if node != rospy.get_name()]
     if rivals:
         log.warning("/clock is published by %s too: two worlds cannot both be the clock", ", ".join(rivals))
 
@@ -47,11 +56,11 @@ class ClockPublisher:
         self._clock = clock
         self._period_s = 1.0 / hz
         _warn_of_rivals()
-        self._publisher = FastTopic("/clock", ClockMessage)
+        self._publisher = FastTopic(CLOCK.name, ClockMessage)
         self._due_s = 0.0
 
     def publish_tick(self) -> None:
-        """Tells a new tick, unless the rate is used up."""
+        """Publishes a new tick, unless the rate is used up."""
         now_s = time.monotonic()
         if now_s >= self._due_s:
             # Counting on from the last deadline keeps the mean rate; a pause must not be made up for.
@@ -59,12 +68,12 @@ class ClockPublisher:
             self._send()
 
     def publish_now(self) -> None:
-        """Tells the present tick in any case, for the last one before standing still."""
+        """Publishes the present tick in any case, for the last one before standing still."""
         self._due_s = time.monotonic() + STOPPED_CLOCK_PERIOD_S
         self._send()
 
     def repeat(self) -> None:
-        """Tells the same tick again now and then while the world stands still, for those who come late."""
+        """Publishes the same tick again now and then while the world stands still, for those who come late."""
         if time.monotonic() >= self._due_s:
             self.publish_now()
 
@@ -80,7 +89,7 @@ class StatusPublisher:
         pacer: What keeps it in step with the wall clock.
         hz: Rate of `rpbi/status` [Hz] of wall time.
         real_time_factor: The factor asked for; 0 is as fast as it goes.
-        facts: Tells what else the diagnostics should have.
+        facts: Returns what else the diagnostics are to have.
     """
 
     def __init__(
@@ -94,8 +103,8 @@ class StatusPublisher:
         self._clock, self._pacer, self._wanted_factor = clock, pacer, real_time_factor
         self._facts = facts
         self._period_s = 1.0 / hz
-        self._status = rospy.Publisher("rpbi/status", Int64, queue_size=10)
-        self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
+        self._status = rospy.Publisher(STATUS.name, Int64, queue_size=10)
+        self._diagnostics = rospy.Publisher(DIAGNOSTICS.name, DiagnosticArray, queue_size=10)
         self._due_s = 0.0
         self._diagnostics_due_s = time.monotonic() + DIAGNOSTICS_PERIOD_S
         self._overruns = 0

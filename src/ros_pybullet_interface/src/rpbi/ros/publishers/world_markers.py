@@ -16,6 +16,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from rpbi.bodies import Body
 from rpbi.bodies.visual_shapes import BodyShape, ShapeKind, body_shapes, followed_frame, link_frame, link_pose
 from rpbi.geometry import Pose
+from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import prefixed, world_frame
 from rpbi.world import World
 
@@ -69,9 +70,14 @@ def pose_message(pose: Pose) -> PoseMessage:
     return PoseMessage(Point(*pose.position), Quaternion(*pose.quat_xyzw))
 
 
-MARKERS_TOPIC = "rpbi/markers"
+MARKERS = Topic(
+    "rpbi/markers",
+    MarkerArray,
+    meaning="All visual shapes, for RViz; latched, sent when something comes, goes or moves; `markers_hz`.",
+    key="markers_hz",
+)
 STILL = 1e-4
-"""What moves and turns less than that [m, and parts of a quaternion] is not told again."""
+"""What moves and turns less than that [m, and parts of a quaternion] is not sent again."""
 
 _Key = tuple[str, int]
 
@@ -103,11 +109,11 @@ class WorldMarkers:
         self._markers: dict[_Key, Marker] = {}
         self._loose: list[_Loose] = []
         self._shown: dict[_Key, Pose] = {}
-        """Where the loose ones were when they were last told."""
-        self._publisher = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=100, latch=True)
+        """Where the loose ones were when they were last sent."""
+        self._publisher = rospy.Publisher(MARKERS.name, MarkerArray, queue_size=100, latch=True)
 
     def poll(self) -> None:
-        """Tells what has changed, if it is time to look."""
+        """Publishes what has changed, if it is time to look."""
         now_s = time.monotonic()
         if now_s < self._due_s:
             return

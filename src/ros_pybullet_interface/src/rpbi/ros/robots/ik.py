@@ -23,9 +23,9 @@ NEAR_M, NEAR_RAD = 0.01, 0.02
 """A link that was moved has arrived within these: joints within 0.01 rad of their goals may add up to as much."""
 
 
-def ik_topic_suffixes(body: Body) -> tuple[str, ...]:
-    """Returns `ik` for robots that shall have the topic."""
-    return ("ik",) if isinstance(body, JointedBody) and body.config.start_ik_callback else ()
+def moved_by_ik(body: Body) -> tuple[str, ...]:
+    """Returns the owner of the topic: a robot that is to have it."""
+    return (body.name,) if isinstance(body, JointedBody) and body.config.start_ik_callback else ()
 
 
 def inverse_kinematics(

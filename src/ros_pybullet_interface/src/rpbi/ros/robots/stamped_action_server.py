@@ -49,13 +49,6 @@ class StampedActionServer(ActionServer):
             setattr(self, key, _StampedTopic(publisher.resolved_name, publisher.data_class, self._clock))
             publisher.unregister()
 
-    def publish_status(self) -> None:
-        """Tells the status of all goals, and sends what slow clients have not taken yet."""
-        with self.lock:
-            super().publish_status()
-            self.result_pub.flush()
-            self.feedback_pub.flush()
-
 
 class _StampedTopic(FastTopic):
     """A topic with the stamps of the world, under the names by which actionlib uses it."""

@@ -20,9 +20,11 @@ from rpbi.control.trajectories.controller_state import ControllerState
 from rpbi.control.trajectories.motion import TrajectoryMotion
 from rpbi.control.trajectories.request import ErrorCode, TrajectoryRefusedError
 from rpbi.engine.actions import RecordedTrajectory
+from rpbi.ros.endpoints import Service
 from rpbi.ros.services.body_context import BodyContext
 
 from .stamped_action_server import StampedActionServer
+from .trajectory_commands import followers_with_control_msgs
 from .trajectory_messages import (
     CONTROLLER,
     FollowJointTrajectoryAction,
@@ -33,6 +35,13 @@ from .trajectory_messages import (
 
 log = logging.getLogger(__name__)
 
+ACTION = Service(
+    f"rpbi/{{name}}/{CONTROLLER}/follow_joint_trajectory",
+    FollowJointTrajectoryAction,
+    None,
+    "",
+    followers_with_control_msgs,
+)
 MOST_TASKS = 100
 """Tasks that may wait before feedback is left out, as it would pile up in a world that runs much too fast."""
 LONGEST_END_S = 5.0
@@ -80,8 +89,8 @@ class TrajectoryAction:
         self._tasks: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._thread = threading.Thread(target=self._work, name=f"{context.name} trajectories", daemon=True)
         self._server = StampedActionServer(
-            f"rpbi/{context.name}/{CONTROLLER}/follow_joint_trajectory",
-            FollowJointTrajectoryAction,
+            ACTION.name.format(name=context.name),
+            ACTION.service_type,
             context.world.clock,
             take_goal=lambda goal: self._tasks.put(lambda: self._begin(goal)),
             take_cancel=lambda goal: self._tasks.put(lambda: self._cancel(goal)),

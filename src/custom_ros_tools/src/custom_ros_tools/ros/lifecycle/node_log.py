@@ -1,8 +1,9 @@
-"""What a node says just before it ends, so that it is heard."""
+"""What a node logs, on the console and in /rosout: its packages' loggers, and last lines so that they are heard."""
 
 from __future__ import annotations
 
 import contextlib
+import logging
 import sys
 import time
 from collections.abc import Iterable
@@ -17,12 +18,32 @@ LONGEST_WAIT_S = 2.0
 SENDING_S = 0.2
 
 
-def log_fatal_lines(lines: Iterable[str]) -> None:
-    """Logs lines as fatal, on the console and in /rosout.
+class _RosHandler(logging.Handler):
+    """Hands log records to rospy."""
 
-    Args:
-        lines: What to say.
-    """
+    def emit(self, record: logging.LogRecord) -> None:
+        levels = (
+            (logging.CRITICAL, rospy.logfatal),
+            (logging.ERROR, rospy.logerr),
+            (logging.WARNING, rospy.logwarn),
+            (logging.INFO, rospy.loginfo),
+            (logging.DEBUG, rospy.logdebug),
+        )
+        next(send for level, send in levels if record.levelno >= level)(self.format(record))
+
+
+def attach_logging(modules: Iterable[str]) -> None:
+    """Attaches the loggers of top-level Python modules to /rosout; call it once, after `rospy.init_node`."""
+    handler = _RosHandler(level=logging.DEBUG)
+    for module in modules:
+        logger = logging.getLogger(module)
+        logger.setLevel(logging.INFO)
+        logger.propagate = False
+        logger.addHandler(handler)
+
+
+def log_fatal_lines(lines: Iterable[str]) -> None:
+    """Logs lines as fatal, on the console and in /rosout, just before the node ends."""
     publisher = rospy.Publisher(ROSOUT, Log, queue_size=100, latch=True)  # another handle on what rospy logs to
     end_s = time.monotonic() + LONGEST_WAIT_S
     expected = _listeners()
@@ -32,15 +53,6 @@ def log_fatal_lines(lines: Iterable[str]) -> None:
     for line in lines:
         rospy.logfatal(line)
     time.sleep(SENDING_S)
-
-
-def log_loss_of_master(error: ConnectionError) -> None:
-    """Logs that the ROS master has gone while it was needed.
-
-    Args:
-        error: What the call to it raised.
-    """
-    log_fatal_lines([f"the ROS master at {rosgraph.get_master_uri()} has gone while the node was starting: {error}"])
 
 
 def _listeners() -> int:

@@ -1,0 +1,46 @@
+"""Topics, services and parameters that the node has whatever is in its world."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from rpbi.ros.publishers.commands import COMMANDS, DESCRIPTION
+from rpbi.ros.publishers.state import STATE
+from rpbi.ros.publishers.status import CLOCK, DIAGNOSTICS, STATUS
+from rpbi.ros.publishers.world_markers import MARKERS
+from rpbi.ros.services.dynamics_services import DYNAMICS_SERVICES
+from rpbi.ros.services.object_services import OBJECT_SERVICES
+from rpbi.ros.services.time_services import TIME_SERVICES
+
+NODE_TOPICS = (STATUS, STATE, COMMANDS, DESCRIPTION, MARKERS, DIAGNOSTICS, CLOCK)
+"""What it publishes."""
+NODE_SERVICES = (*OBJECT_SERVICES, *DYNAMICS_SERVICES, *TIME_SERVICES)
+"""What it serves."""
+
+
+class Parameter(NamedTuple):
+    """A parameter of the node.
+
+    Attributes:
+        name: Its name, with `NAME` for a robot.
+        is_set: Whether the node sets it, else it reads it.
+        meaning: What it says, in a sentence.
+    """
+
+    name: str
+    is_set: bool
+    meaning: str
+
+
+PARAMETERS = (
+    Parameter("~config", False, "The main YAML file as a mapping; required."),
+    Parameter(
+        "use_sim_time", False, "Whether stamps are the world's time, else wall time; from here or a namespace above."
+    ),
+    Parameter(
+        "robot_description",
+        False,
+        "URDF of robots whose `fileName` is `robot_description`; from here or a namespace above.",
+    ),
+    Parameter("rpbi/NAME/robot_description", True, "URDF of a robot, for RViz and robot_state_publisher."),
+)
