@@ -10,7 +10,6 @@ import rospy
 from ros_system import wait_until
 from worlds import write_world
 
-from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
 from ros_pybullet_interface.msg import WorldCommands
 from rpbi.engine.command_log import WorldCommand
 from rpbi.ros.publishers.commands import CommandPublisher

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -14,6 +15,10 @@ from rpbi.plugins import find, full_name
 
 Owners = Callable[[Body], Sequence[str]]
 """Returns what stands for `{name}` in the names of what a body has by a row; nothing if it has it not."""
+
+
+Answer = tuple[bool, str]
+"""`success` and `message` of a response."""
 
 
 def of(body_type: type[Body]) -> Owners:
@@ -48,18 +53,21 @@ class Service(NamedTuple):
     Attributes:
         name: Its name, with `{name}` for the body or sensor.
         service_type: Its ROS type.
-        handler: Returns the response to a context and a request. What it raises for a request that must be refused
-            (InterfaceError or ValueError) becomes `success=False` and its message, or an error of the call where the
-            response has no `success`. None where something else serves it.
-        meaning: What it does, in a sentence.
+        handler: Returns the response to a context and a request, or the response's fields in a tuple. What it raises
+            for a request that must be refused (InterfaceError or ValueError) becomes `success=False` and its message,
+            or an error of the call where the response has no `success`. None where something else serves it.
         owners: Which bodies have it, if bodies have it.
     """
 
     name: str
     service_type: Any
     handler: Callable[[Any, Any], Any] | None
-    meaning: str
     owners: Owners = of(Body)
+
+    @property
+    def meaning(self) -> str:
+        """What it does: the first paragraph of its handler's docstring."""
+        return " ".join((inspect.getdoc(self.handler) or "").split("\n\n")[0].split()) if self.handler else ""
 
 
 _warn = ThrottledWarning()

@@ -20,7 +20,7 @@ from rpbi.config.loading import load_world_dict
 from rpbi.ros.publishers.sample_publishers import SamplePublishers
 from rpbi.ros.publishers.status import FREE_RUNNING_CLOCK_HZ, ClockPublisher
 from rpbi.ros.publishers.world_markers import WorldMarkers
-from rpbi.ros.services.node_context import NodeContext
+from rpbi.ros.services.node_services import NODE_SERVICES, NodeContext
 from rpbi.ros.window.topics import WindowTopics
 from rpbi.urdf.document import write_description
 from rpbi.world import World
@@ -28,7 +28,6 @@ from rpbi.world import World
 from .endpoints import serve
 from .headers import use_prefix
 from .initial_state import start_where_robots_are
-from .node_endpoints import NODE_SERVICES
 from .object_lifecycle import ObjectLifecycle
 from .requests import Requests
 from .simulation import Simulation
@@ -110,7 +109,7 @@ class SimulatorNode:
         helpers += (self._cameras.poll, *window.polls)
         self._simulation = Simulation(
             self._world,
-            publishers.by_type,
+            publishers,
             config.real_time_factor,
             config.status_hz,
             clock,

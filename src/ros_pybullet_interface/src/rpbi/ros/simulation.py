@@ -12,10 +12,9 @@ from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
 from rpbi.engine.pacer import Pacer
 from rpbi.ros.publishers.commands import CommandPublisher
-from rpbi.ros.publishers.sample_publishers import TickPublisher
+from rpbi.ros.publishers.sample_publishers import SamplePublishers, TickPublisher
 from rpbi.ros.publishers.state import StatePublisher
 from rpbi.ros.publishers.status import ClockPublisher, StatusPublisher
-from rpbi.ros.publishers.topic_publisher import SamplePublisher
 from rpbi.world import World
 
 log = logging.getLogger(__name__)
@@ -59,7 +58,7 @@ class Simulation:
 
     Args:
         world: The world.
-        publishers: Where samples go, one for each type of sample; there may be more later.
+        publishers: Where samples go.
         real_time_factor: Simulated seconds per wall second; 0 is as fast as it goes.
         status_hz: Rate of the status [Hz].
         clock: Publishes /clock if stamps are simulated time.
@@ -71,7 +70,7 @@ class Simulation:
     def __init__(
         self,
         world: World,
-        publishers: Mapping[type, SamplePublisher],
+        publishers: SamplePublishers,
         real_time_factor: float,
         status_hz: float,
         clock: ClockPublisher | None = None,

@@ -1,9 +1,9 @@
-"""Where samples go: one publisher for each type of samples."""
+"""Where samples go: those of a sensor to a topic of its own, poses of links to TF."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
@@ -18,23 +18,8 @@ from .topics import FastTopic
 TF = Topic("/tf", TFMessage, meaning="Where it is, see [frames](#frames).")
 
 
-class SamplePublisher(Protocol):
-    """Takes one type of samples."""
-
-    def publish(self, sample: Any, stamp_ns: int) -> None:
-        """Passes a sample on."""
-
-    def flush(self) -> None:
-        """Sends what was collected during the tick."""
-
-    def serve_late(self) -> None:
-        """Gives the last state to subscribers that have come since."""
-
-    def forget(self, name: str) -> FastTopic | None:
-        """Drops what it keeps of a body or sensor that has gone; returns its topic, if it has one to close."""
-
-    def restart(self) -> None:
-        """Drops what it keeps of all samples: the world was reset."""
+SampleKey = tuple[type, str]
+"""Type and name of the samples of a sensor: sensors of a body may have its name."""
 
 
 class _Route(NamedTuple):
@@ -45,16 +30,16 @@ class _Route(NamedTuple):
 
 
 class TopicPublisher:
-    """Samples of one type, each sensor on a topic of its own."""
+    """Samples of sensors, each on a topic of its own."""
 
     def __init__(self) -> None:
-        self._routes: dict[str, _Route] = {}
-        self._last: dict[str, tuple[Any, int]] = {}
+        self._routes: dict[SampleKey, _Route] = {}
+        self._last: dict[SampleKey, tuple[Any, int]] = {}
 
-    def open(self, name: str, row: Topic) -> None:
+    def open(self, key: SampleKey, row: Topic) -> None:
         """Advertises the topic of a sensor; any thread may call it."""
-        topic = FastTopic(row.name.format(name=name), row.message_type)
-        self._routes = {**self._routes, name: _Route(topic, row.handler)}
+        topic = FastTopic(row.name.format(name=key[1]), row.message_type)
+        self._routes = {**self._routes, key: _Route(topic, row.handler)}
 
     def publish(self, sample: Any, stamp_ns: int) -> None:
         """Sends a sample.
@@ -62,8 +47,9 @@ class TopicPublisher:
         Raises:
             PluginError: If another package makes no message of it that can be sent.
         """
-        self._last[sample.name] = sample, stamp_ns
-        route = self._routes.get(sample.name)  # there is none as long as the body is new
+        key = type(sample), sample.name
+        self._last[key] = sample, stamp_ns
+        route = self._routes.get(key)  # there is none as long as the body is new
         if route is not None and route.topic.has_subscribers:
             try:
                 route.topic.publish(route.to_message(sample, stamp_ns))
@@ -71,29 +57,22 @@ class TopicPublisher:
                 blame(route.to_message, f"the message of '{sample.name}'", error)
                 raise
 
-    def flush(self) -> None:
-        """Has nothing to send: each sensor has a topic of its own."""
-
     def serve_late(self) -> None:
         """Gives the last samples to who has come since."""
-        for name, (topic, to_message) in self._routes.items():
-            if name in self._last:
-                with blaming(to_message, f"the message of '{name}'"):
-                    topic.serve_late(lambda last=self._last[name], make=to_message: make(*last))
+        for key, (topic, to_message) in self._routes.items():
+            if key in self._last:
+                with blaming(to_message, f"the message of '{key[1]}'"):
+                    topic.serve_late(lambda last=self._last[key], make=to_message: make(*last))
 
     def restart(self) -> None:
         """Drops what it keeps of all samples; the topics stay."""
         self._last.clear()
 
-    def forget(self, name: str) -> FastTopic | None:
-        """Drops what it keeps of a sensor.
-
-        Returns:
-            Its topic. Closing it is left to another thread, since the ROS master may be slow to answer.
-        """
-        self._last.pop(name, None)
+    def forget(self, key: SampleKey) -> FastTopic | None:
+        """Drops what it keeps of a sensor; returns its topic, which is left to close."""
+        self._last.pop(key, None)
         routes = dict(self._routes)
-        route = routes.pop(name, None)
+        route = routes.pop(key, None)
         self._routes = routes
         return None if route is None else route.topic
 

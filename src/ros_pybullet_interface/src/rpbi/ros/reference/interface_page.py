@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from rpbi.bodies import BODY_TYPES
 from rpbi.reference.markdown import WRITTEN_BY, block, code, link, page, table
 from rpbi.ros.headers import FRAMES
-from rpbi.ros.node_endpoints import PARAMETERS
+from rpbi.ros.node_topics import PARAMETERS
 from rpbi.ros.robots.trajectory_messages import CONTROLLER
 from rpbi.world import World
 

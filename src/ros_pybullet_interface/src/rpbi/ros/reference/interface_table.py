@@ -10,12 +10,13 @@ from rpbi.engine.inputs import PoseInput
 from rpbi.ros.cameras.topics import camera_topics
 from rpbi.ros.endpoints import Service, Topic
 from rpbi.ros.inputs import topic_input
-from rpbi.ros.node_endpoints import NODE_SERVICES, NODE_TOPICS
+from rpbi.ros.node_topics import NODE_TOPICS
 from rpbi.ros.publishers.sample_topics import sample_topic
 from rpbi.ros.publishers.topic_publisher import TF
 from rpbi.ros.publishers.world_markers import MARKERS
 from rpbi.ros.robots.trajectory_action import ACTION
 from rpbi.ros.services.body_endpoints import BODY_SERVICES, BODY_TOPICS
+from rpbi.ros.services.node_services import NODE_SERVICES
 from rpbi.ros.window.debug_camera import GET, RESET
 from rpbi.ros.window.topics import published_topics
 from rpbi.sensors import LinkPoseSensor

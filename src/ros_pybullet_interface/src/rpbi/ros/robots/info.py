@@ -24,7 +24,7 @@ from rpbi.urdf.joints import Joint
 
 
 def robot_info(context: BodyContext, _: RobotInfoRequest) -> RobotInfoResponse:
-    """Returns a robot's joints and where they are."""
+    """Returns joints, limits, force-torque sensors and the present joint state."""
     robot: JointedBody = context.body
 
     def read() -> RobotInfoResponse:

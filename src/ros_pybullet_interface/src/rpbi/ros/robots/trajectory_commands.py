@@ -40,7 +40,7 @@ def follow_command(context: BodyContext, message: JointTrajectory) -> None:
 
 
 def query_state(context: BodyContext, request: Any) -> Any:
-    """Returns where the joints are to be at a time, as far as it is known now."""
+    """Returns where joints will be at a time; only with control_msgs."""
     follower, clock = context.body.follower, context.world.clock
     stamp_ns = request.time.to_nsec()
 
@@ -48,7 +48,4 @@ def query_state(context: BodyContext, request: Any) -> Any:
         return follower.desired(clock.time_s + (stamp_ns - clock.stamp_ns) / NS_PER_S)
 
     state = context.ask_body(desired)
-    response = QueryTrajectoryState._response_class()
-    response.name = follower.joint_names
-    response.position, response.velocity, response.acceleration = state
-    return response
+    return follower.joint_names, *state

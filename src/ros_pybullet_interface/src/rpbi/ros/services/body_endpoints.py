@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import wait
 from contextlib import ExitStack
+from typing import Any
 
-from std_srvs.srv import Empty, EmptyRequest, EmptyResponse, Trigger
+from std_srvs.srv import Empty, Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.srv import SetString, SetTransform, SetTransformRequest, SetTransformResponse
+from custom_ros_tools.srv import SetString, SetTransform, SetTransformRequest
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
 from ros_pybullet_interface.srv import (
     CalculateInverseKinematics,
@@ -23,7 +24,7 @@ from rpbi.bodies import Body, Robot
 from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.engine.inputs import PoseInput, check_pose
 from rpbi.geometry import Pose
-from rpbi.ros.endpoints import Service, Topic, of, serve, subscribe
+from rpbi.ros.endpoints import Answer, Service, Topic, of, serve, subscribe
 from rpbi.ros.requests import Requests
 from rpbi.ros.robots.ik import inverse_kinematics, move_by_ik, moved_by_ik
 from rpbi.ros.robots.info import publish_description, robot_info
@@ -49,8 +50,10 @@ LOOK_AGAIN_AFTER_S = 0.2
 """How often it is seen whether samples still come [s] of wall time."""
 
 
-def set_pose(context: BodyContext, request: SetTransformRequest) -> SetTransformResponse:
-    """Puts the base link's frame at a pose in the world, at rest, whatever is in the way.
+def set_pose(context: BodyContext, request: SetTransformRequest) -> Answer:
+    """Puts the base link at a pose in the world, at rest.
+
+    Its URDF frame is put there, whatever is in the way.
 
     Raises:
         ValueError: If the pose is not finite, or the body follows a TF frame, which would take it back.
@@ -61,7 +64,7 @@ def set_pose(context: BodyContext, request: SetTransformRequest) -> SetTransform
         if isinstance(taken, PoseInput):
             raise ValueError(f"'{context.name}' follows the TF frame '{taken.tf_id}': move that")
     context.act("teleport", pose)
-    return SetTransformResponse(True, f"'{context.name}' was put there")
+    return True, f"'{context.name}' was put there"
 
 
 def force_torque_sensors(body: Body) -> list[str]:
@@ -69,8 +72,8 @@ def force_torque_sensors(body: Body) -> list[str]:
     return [sensor.name for sensor in body.force_torque_sensors] if isinstance(body, JointedBody) else []
 
 
-def zero_force_torque(context: BodyContext, _: EmptyRequest) -> EmptyResponse:
-    """Averages the coming samples and takes the mean for zero; answers when that is done.
+def zero_force_torque(context: BodyContext, _: Any) -> tuple[()]:
+    """Takes the mean of the next 100 samples of that force-torque sensor for zero.
 
     Raises:
         InterfaceError: If the simulation is stopped, before or meanwhile, or the robot goes; the old zero stays then.
@@ -92,77 +95,23 @@ def zero_force_torque(context: BodyContext, _: EmptyRequest) -> EmptyResponse:
     zeroing = context.ask_body(start, body)
     while not wait([zeroing.mean], timeout=LOOK_AGAIN_AFTER_S).done:
         context.ask_body(check, body)
-    return EmptyResponse()
+    return ()
 
 
-BODY_SERVICES: tuple[Service, ...] = (
-    Service("rpbi/{name}/set_pose", SetTransform, set_pose, "Puts the base link at a pose in the world, at rest."),
-    Service(
-        "rpbi/{name}/robot_info",
-        RobotInfo,
-        robot_info,
-        "Returns joints, limits, force-torque sensors and the present joint state.",
-        of(JointedBody),
-    ),
-    Service(
-        "rpbi/{name}/ik",
-        CalculateInverseKinematics,
-        inverse_kinematics,
-        "Returns joint positions that bring a link to a pose; moves nothing.",
-        of(JointedBody),
-    ),
-    Service(
-        "rpbi/{name}/set_joint_state",
-        SetJointState,
-        set_joint_state,
-        "Puts the joints that are named somewhere at once, within their limits.",
-        of(JointedBody),
-    ),
-    Service(
-        "rpbi/{name}/ft_sensor",
-        Empty,
-        zero_force_torque,
-        "Takes the mean of the next 100 samples of that force-torque sensor for zero.",
-        force_torque_sensors,
-    ),
-    Service(
-        "rpbi/{name}/set_control_mode",
-        SetString,
-        set_control_mode,
-        "Switches to `POSITION_CONTROL`, `VELOCITY_CONTROL` or `TORQUE_CONTROL`.",
-        of(Robot),
-    ),
-    Service("rpbi/{name}/stop_motion", Trigger, stop_motion, "Ends a timed motion.", of(Robot)),
-    Service(
-        "rpbi/{name}/move_to_joint_state",
-        ResetJointState,
-        move_to_joint_state,
-        "Moves the joints that are named, in `duration` [s]; answers at the end.",
-        of(Robot),
-    ),
-    Service(
-        "rpbi/{name}/move_to_initial_joint_state",
-        ResetJointState,
-        move_to_initial_joint_state,
-        "Moves all joints to where they started, in `duration` [s]; answers at the end.",
-        of(Robot),
-    ),
-    Service(
-        "rpbi/{name}/move_to_eff_state",
-        ResetEffState,
-        move_to_eff_state,
-        "Moves a link to a pose by inverse kinematics, in `duration` [s]; answers at the end.",
-        of(Robot),
-    ),
-    Service(
-        f"rpbi/{{name}}/{CONTROLLER}/query_state",
-        QueryTrajectoryState,
-        query_state,
-        "Returns where joints will be at a time; only with control_msgs.",
-        followers_with_control_msgs,
-    ),
+BODY_SERVICES = (
+    Service("rpbi/{name}/set_pose", SetTransform, set_pose),
+    Service("rpbi/{name}/robot_info", RobotInfo, robot_info, of(JointedBody)),
+    Service("rpbi/{name}/ik", CalculateInverseKinematics, inverse_kinematics, of(JointedBody)),
+    Service("rpbi/{name}/set_joint_state", SetJointState, set_joint_state, of(JointedBody)),
+    Service("rpbi/{name}/ft_sensor", Empty, zero_force_torque, force_torque_sensors),
+    Service("rpbi/{name}/set_control_mode", SetString, set_control_mode, of(Robot)),
+    Service("rpbi/{name}/stop_motion", Trigger, stop_motion, of(Robot)),
+    Service("rpbi/{name}/move_to_joint_state", ResetJointState, move_to_joint_state, of(Robot)),
+    Service("rpbi/{name}/move_to_initial_joint_state", ResetJointState, move_to_initial_joint_state, of(Robot)),
+    Service("rpbi/{name}/move_to_eff_state", ResetEffState, move_to_eff_state, of(Robot)),
+    Service(f"rpbi/{{name}}/{CONTROLLER}/query_state", QueryTrajectoryState, query_state, followers_with_control_msgs),
 )
-BODY_TOPICS: tuple[Topic, ...] = (
+BODY_TOPICS = (
     Topic(
         "rpbi/{name}/ik",
         CalculateInverseKinematicsProblem,

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import rospy
 
 from custom_ros_tools.errors import ConfigError, InterfaceError
 from ros_pybullet_interface.msg import ResetDebugVisualizerCamera as CameraMessage
-from ros_pybullet_interface.srv import (
-    GetDebugVisualizerCamera,
-    GetDebugVisualizerCameraRequest,
-    GetDebugVisualizerCameraResponse,
-)
+from ros_pybullet_interface.srv import GetDebugVisualizerCamera
 from rpbi.config.pybullet_world_models import ResetDebugVisualizerCamera
 from rpbi.ros.endpoints import Service, Topic, serve, subscribe
 from rpbi.ros.requests import Requests
@@ -53,13 +50,13 @@ class DebugCamera:
         serve(GET, self)
         subscribe(RESET, self)
 
-    def get(self, _: GetDebugVisualizerCameraRequest) -> GetDebugVisualizerCameraResponse:
+    def get(self, _: Any) -> CameraMessage:
         """Returns where the window looks from.
 
         Raises:
             InterfaceError: If there is no window.
         """
-        return GetDebugVisualizerCameraResponse(_message(self._ask(lambda: self._present_window().camera())))
+        return _message(self._ask(lambda: self._present_window().camera()))
 
     def reset(self, message: CameraMessage) -> None:
         """Has the window look from somewhere else.
@@ -85,12 +82,7 @@ def _message(camera: ResetDebugVisualizerCamera) -> CameraMessage:
     return CameraMessage(**camera.model_dump())
 
 
-GET = Service(
-    "rpbi/get_debug_visualizer_camera",
-    GetDebugVisualizerCamera,
-    DebugCamera.get,
-    "Returns where the window looks from.",
-)
+GET = Service("rpbi/get_debug_visualizer_camera", GetDebugVisualizerCamera, DebugCamera.get)
 RESET = Topic(
     "rpbi/reset_debug_visualizer_camera",
     CameraMessage,

@@ -1,4 +1,4 @@
-"""Topics, services and parameters that the node has whatever is in its world."""
+"""Topics and parameters that the node has whatever is in its world."""
 
 from __future__ import annotations
 
@@ -8,14 +8,9 @@ from rpbi.ros.publishers.commands import COMMANDS, DESCRIPTION
 from rpbi.ros.publishers.state import STATE
 from rpbi.ros.publishers.status import CLOCK, DIAGNOSTICS, STATUS
 from rpbi.ros.publishers.world_markers import MARKERS
-from rpbi.ros.services.dynamics_services import DYNAMICS_SERVICES
-from rpbi.ros.services.object_services import OBJECT_SERVICES
-from rpbi.ros.services.time_services import TIME_SERVICES
 
 NODE_TOPICS = (STATUS, STATE, COMMANDS, DESCRIPTION, MARKERS, DIAGNOSTICS, CLOCK)
 """What it publishes."""
-NODE_SERVICES = (*OBJECT_SERVICES, *DYNAMICS_SERVICES, *TIME_SERVICES)
-"""What it serves."""
 
 
 class Parameter(NamedTuple):
