@@ -18,7 +18,6 @@ from rpbi.bodies import BODY_TYPES
 from rpbi.config.asset_files import ROBOT_DESCRIPTION
 from rpbi.config.loading import load_world_dict
 from rpbi.ros.publishers.sample_publishers import SamplePublishers
-from rpbi.ros.publishers.status import FREE_RUNNING_CLOCK_HZ, ClockPublisher
 from rpbi.ros.publishers.world_markers import WorldMarkers
 from rpbi.ros.services.node_services import NODE_SERVICES, NodeContext
 from rpbi.ros.window.topics import WindowTopics
@@ -46,29 +45,17 @@ def config_parameter() -> dict[str, Any]:
     return config
 
 
-def robot_description_file() -> str | None:
-    """Returns a file with the robot description of the parameter server, None if there is none."""
-    text = _parameter_above("robot_description", None)
-    return None if text is None else write_description(text)
-
-
-def uses_simulated_time() -> bool:
-    """Returns whether stamps are to be simulated time."""
-    return bool(_parameter_above("use_sim_time", False))
-
-
-def _parameter_above(name: str, default: Any) -> Any:
-    """Returns a parameter of this namespace or, failing that, of the nearest one around it."""
+def parameter_above(name: str) -> Any:
+    """Returns a parameter of this namespace or, failing that, of the nearest one around it; None if there is none."""
     found = rospy.search_param(name)
     if found is None:
-        return default
+        return None
     kept_parameters.keep(found)
     return rospy.get_param(found)
 
 
 log = logging.getLogger(__name__)
 
-MAX_CLOCK_HZ = 1000.0
 LONGEST_END_S = 10.0
 """How long ROS waits for the loop and the renderer before it shuts down without them [s]."""
 
@@ -85,12 +72,13 @@ class SimulatorNode:
     """
 
     def __init__(self) -> None:
-        description = robot_description_file()
+        urdf = parameter_above("robot_description")
+        description = None if urdf is None else write_description(urdf)
         loaded = load_world_dict(config_parameter(), "~config", BODY_TYPES, description)
         loaded = start_where_robots_are(loaded)
         config = loaded.config
         use_prefix(config.tf_prefix)
-        simulated = uses_simulated_time()
+        simulated = bool(parameter_above("use_sim_time"))
         if config.real_time_factor != 1 and not simulated:
             log.warning(
                 "real_time_factor is %g but /use_sim_time is not true: stamps are wall time and tell nothing of it",
@@ -101,22 +89,12 @@ class SimulatorNode:
         for name in self._world.bodies:
             publishers.find_topics(name)
         self._cameras = publishers.cameras
-        clock = ClockPublisher(self._world.clock, _clock_hz(config)) if simulated else None
         helpers: list[Callable[[], None]] = []
         if config.markers_hz:
             helpers.append(WorldMarkers(self._world, config.markers_hz).poll)
         window = WindowTopics(self._world)
         helpers += (self._cameras.poll, *window.polls)
-        self._simulation = Simulation(
-            self._world,
-            publishers,
-            config.real_time_factor,
-            config.status_hz,
-            clock,
-            helpers,
-            self._cameras.facts,
-            self._cameras.before_tick,
-        )
+        self._simulation = Simulation(self._world, publishers, helpers)
         ask = Requests(self._simulation)
         self._objects = ObjectLifecycle(self._simulation, ask, publishers)
         loading = {"search_paths": config.search_paths(), ROBOT_DESCRIPTION: description}
@@ -157,11 +135,3 @@ def main() -> None:
     """Runs the node; exits with 1 if it cannot start, with 0 when it is interrupted."""
     # Without ROS time: the simulator is the source of /clock and must never wait for it.
     run_node("ros_pybullet_interface", SimulatorNode, SimulatorNode.run, ros_time=False)
-
-
-def _clock_hz(config: Any) -> float:
-    if not config.real_time_factor:
-        limit = FREE_RUNNING_CLOCK_HZ
-    else:
-        limit = min(config.real_time_factor / config.timeStep, MAX_CLOCK_HZ)
-    return min(config.clock_hz or limit, limit)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 
 from custom_ros_tools.errors import InterfaceError
@@ -14,7 +14,7 @@ from rpbi.engine.pacer import Pacer
 from rpbi.ros.publishers.commands import CommandPublisher
 from rpbi.ros.publishers.sample_publishers import SamplePublishers, TickPublisher
 from rpbi.ros.publishers.state import StatePublisher
-from rpbi.ros.publishers.status import ClockPublisher, StatusPublisher
+from rpbi.ros.publishers.status import StatusPublisher
 from rpbi.world import World
 
 log = logging.getLogger(__name__)
@@ -59,42 +59,26 @@ class Simulation:
     Args:
         world: The world.
         publishers: Where samples go.
-        real_time_factor: Simulated seconds per wall second; 0 is as fast as it goes.
-        status_hz: Rate of the status [Hz].
-        clock: Publishes /clock if stamps are simulated time.
         helpers: Called at every pass; they must return at once.
-        facts: Returns what else the diagnostics are to have.
-        before_tick: Called before each tick, which waits for it.
     """
 
-    def __init__(
-        self,
-        world: World,
-        publishers: SamplePublishers,
-        real_time_factor: float,
-        status_hz: float,
-        clock: ClockPublisher | None = None,
-        helpers: Sequence[Callable[[], None]] = (),
-        facts: Callable[[], Mapping[str, str]] = dict,
-        before_tick: Callable[[], None] = lambda: None,
-    ) -> None:
+    def __init__(self, world: World, publishers: SamplePublishers, helpers: Sequence[Callable[[], None]]) -> None:
         self.world = world
         self.running = False
-        self._broken = False
-        self._why_broken = ""
-        """Why it broke off the last time."""
+        self._failure: str | None = None
+        """Why it has broken off, until somebody starts or steps it again."""
         self._burst: StepBurst | None = None
         self._thread: int | None = None
         self.passes = 0
         """Grows as long as the loop is alive."""
         idle_ticks = max(1, round(IDLE_PERIOD_S / world.clock.dt_s))
-        self._publishers = TickPublisher(world, publishers, clock, idle_ticks)
+        self._publishers = TickPublisher(world, publishers, idle_ticks)
         self._helpers = helpers
-        self._before_tick = before_tick
-        self._pacer = Pacer(world.clock.dt_s, real_time_factor)
+        self._before_tick = publishers.cameras.before_tick
+        self._pacer = Pacer(world.clock.dt_s, world.config.real_time_factor)
         self._idle_pacer = Pacer(max(world.clock.dt_s, IDLE_PERIOD_S))
-        self._status = StatusPublisher(world.clock, self._pacer, status_hz, real_time_factor, facts)
-        self._state = StatePublisher(world, self._pacer, real_time_factor)
+        self._status = StatusPublisher(world, self._pacer, publishers.cameras.facts)
+        self._state = StatePublisher(world, self._pacer)
         self._commands = CommandPublisher(world)
 
     @property
@@ -114,7 +98,7 @@ class Simulation:
         if self.running:
             return False
         self._refuse_while_stepping()
-        self.running, self._broken = True, False
+        self.running, self._failure = True, None
         self._pacer.restart()
         self._status.publish(True)
         return True
@@ -144,7 +128,7 @@ class Simulation:
             PhysicsError: If something in the world is not finite any more.
         """
         self._refuse_while_moving()
-        self._broken = False
+        self._failure = None
         self._status.publish(True)
         self._take_last_tick()
         self._status.publish(False)
@@ -167,7 +151,7 @@ class Simulation:
         if not steps:
             burst.finish(self.world.clock.tick, self.world.clock.stamp_ns)
             return burst.done
-        self._broken = False
+        self._failure = None
         self._burst, self._state.is_stepping = burst, True
         self._status.publish(True)
         return burst.done
@@ -189,7 +173,7 @@ class Simulation:
         except InterfaceError as error:
             self._break_off(error)
             raise
-        self._broken = False
+        self._failure = None
         refill()
         self.world.take_inputs()
         self._pacer.restart()
@@ -276,10 +260,10 @@ class Simulation:
 
     def _break_off(self, error: Exception) -> None:
         """Stands still, and publishes no more of a world that is broken; until somebody starts or steps it again."""
-        if self._broken and str(error) == self._why_broken:
+        if str(error) == self._failure:
             return  # it goes on saying the same
         log.error("simulation stopped: %s", error, exc_info=not isinstance(error, InterfaceError))
-        self.running, self._broken, self._why_broken = False, True, str(error)
+        self.running, self._failure = False, str(error)
         if self._burst is not None:
             self._end_burst().fail(error)
         self.world.halt("the simulation broke off")
@@ -296,6 +280,6 @@ class Simulation:
         if not self._idle_pacer.is_due():
             return
         self._publishers.repeat_time()
-        if not self._broken:
+        if self._failure is None:
             self.world.take_inputs()
             self._publishers.publish_idle()

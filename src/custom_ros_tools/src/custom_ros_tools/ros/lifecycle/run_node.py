@@ -8,33 +8,40 @@ inherit the block, which leaves their end to this process.
 
 from __future__ import annotations
 
+import contextlib
+import logging
 import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TypeVar
 
 import rosgraph
 import rospy
+from rosgraph_msgs.msg import Log
 
 from custom_ros_tools.errors import InterfaceError
 
 from .master_watch import MasterWatch
-from .node_log import attach_logging, log_fatal_lines
 
 T = TypeVar("T")
 
 LONGEST_FAREWELL_S = 10.0
 """How long leaving the ROS master may take [s]; it may hang or be gone."""
 MASTER_PERIOD_S = 0.2
+ROSOUT = "/rosout"
+LONGEST_WAIT_S = 2.0
+"""How long to wait for those who listen to /rosout; a node that has just begun is not connected to them yet."""
+SENDING_S = 0.2
 
 
 def init_node(name: str, loggers: Iterable[str] = (), anonymous: bool = False, ros_time: bool = True) -> None:
     """Makes this process a node that a ROS master finds again when it comes back; for the arguments see `run_node`."""
     rospy.init_node(name, anonymous=anonymous, disable_rostime=not ros_time, disable_signals=True)
-    attach_logging({"custom_ros_tools", *loggers})
+    _attach_logging({"custom_ros_tools", *loggers})
     MasterWatch()
 
 
@@ -76,11 +83,11 @@ def run_node(
                 run(node)
             ended.wait()
         except InterfaceError as error:
-            log_fatal_lines(str(error).splitlines())
+            _log_fatal_lines(str(error).splitlines())
             sys.exit(1)
         except ConnectionError as error:
             uri = rosgraph.get_master_uri()
-            log_fatal_lines([f"the ROS master at {uri} has gone while the node was starting: {error}"])
+            _log_fatal_lines([f"the ROS master at {uri} has gone while the node was starting: {error}"])
             sys.exit(1)
         except rospy.ROSInterruptException:
             return
@@ -122,3 +129,48 @@ def _interrupt() -> None:
 def _wait_and_leave() -> None:
     signal.sigwait({signal.SIGINT})
     rospy.signal_shutdown("interrupted, or at its end")
+
+
+class _RosHandler(logging.Handler):
+    """Hands log records to rospy."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        levels = (
+            (logging.CRITICAL, rospy.logfatal),
+            (logging.ERROR, rospy.logerr),
+            (logging.WARNING, rospy.logwarn),
+            (logging.INFO, rospy.loginfo),
+            (logging.DEBUG, rospy.logdebug),
+        )
+        next(send for level, send in levels if record.levelno >= level)(self.format(record))
+
+
+def _attach_logging(modules: Iterable[str]) -> None:
+    """Attaches the loggers of top-level Python modules to /rosout; call it once, after `rospy.init_node`."""
+    handler = _RosHandler(level=logging.DEBUG)
+    for module in modules:
+        logger = logging.getLogger(module)
+        logger.setLevel(logging.INFO)
+        logger.propagate = False
+        logger.addHandler(handler)
+
+
+def _log_fatal_lines(lines: Iterable[str]) -> None:
+    """Logs lines as fatal, on the console and in /rosout, just before the node ends."""
+    publisher = rospy.Publisher(ROSOUT, Log, queue_size=100, latch=True)  # another handle on what rospy logs to
+    end_s = time.monotonic() + LONGEST_WAIT_S
+    expected = _listeners()
+    while publisher.get_num_connections() < expected and time.monotonic() < end_s and not rospy.is_shutdown():
+        time.sleep(0.01)
+    print(file=sys.stderr)  # libraries, PyBullet for one, may leave their own last line unended
+    for line in lines:
+        rospy.logfatal(line)
+    time.sleep(SENDING_S)
+
+
+def _listeners() -> int:
+    """Returns how many nodes listen to /rosout."""
+    with contextlib.suppress(OSError, rosgraph.MasterException):
+        subscribed = rosgraph.Master(rospy.get_name()).getSystemState()[1]
+        return len(dict(subscribed).get(ROSOUT, ()))
+    return 0

@@ -97,16 +97,13 @@ class TickPublisher:
     Args:
         world: The world.
         publishers: Where samples go.
-        clock: Publishes /clock if stamps are simulated time.
         idle_ticks: How many ticks pass between two calls of `publish_idle` were the world running.
     """
 
-    def __init__(
-        self, world: World, publishers: SamplePublishers, clock: ClockPublisher | None, idle_ticks: int
-    ) -> None:
+    def __init__(self, world: World, publishers: SamplePublishers, idle_ticks: int) -> None:
         self._world = world
         self._publishers = publishers
-        self._clock = clock
+        self._clock = ClockPublisher(world) if world.clock.simulated else None
         self._idle_ticks = idle_ticks
         self._idle_tick = 0
         """The tick at which the world would be, had it not stood still."""

@@ -1,17 +1,19 @@
-"""The topic of each type of samples."""
+"""The topic of each type of samples, and the samples as messages."""
 
 from __future__ import annotations
 
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import Point, Quaternion, Twist, Vector3, Wrench, WrenchStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
+from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from custom_ros_tools.errors import ConfigError, Problem
-from ros_pybullet_interface.msg import Contacts
+from ros_pybullet_interface.msg import ContactPoint, Contacts
 from rpbi.control.trajectories.controller_state import ControllerState
 from rpbi.plugins import full_name
 from rpbi.ros.endpoints import Topic, find_topic
+from rpbi.ros.headers import prefixed, to_ros_time, world_frame
 from rpbi.ros.robots.trajectory_messages import CONTROLLER, JointTrajectoryControllerState, state_message
 from rpbi.samples import (
     BaseStateSample,
@@ -25,14 +27,85 @@ from rpbi.samples import (
 )
 from rpbi.sensors.sensor import Sensor
 
-from .messages import (
-    contact_arrows_message,
-    contacts_message,
-    joint_state_message,
-    odometry_message,
-    surface_message,
-    wrench_message,
-)
+_ARROW = Vector3(0.015, 0.03, 0.04)
+"""Diameters of shaft and head and length of the head [m]."""
+_COLOUR = ColorRGBA(0.85, 0.1, 0.1, 1.0)
+
+
+def joint_state_message(sample: JointStateSample, stamp_ns: int) -> JointState:
+    """Returns positions, velocities and efforts of all joints."""
+    message = JointState(
+        name=sample.joint_names, position=sample.position, velocity=sample.velocity, effort=sample.effort
+    )
+    message.header.stamp = to_ros_time(stamp_ns)
+    return message
+
+
+def wrench_message(sample: WrenchSample, stamp_ns: int) -> WrenchStamped:
+    """Returns force and moment; frames that are not the world's own get no prefix."""
+    message = WrenchStamped(wrench=Wrench(Vector3(*sample.force), Vector3(*sample.torque)))
+    is_ours = sample.frame_id.startswith("rpbi/")
+    message.header.frame_id = prefixed(sample.frame_id) if is_ours else sample.frame_id
+    message.header.stamp = to_ros_time(stamp_ns)
+    return message
+
+
+def contacts_message(sample: ContactsSample, stamp_ns: int) -> Contacts:
+    """Returns where others touch a body, and their forces."""
+    points = [
+        ContactPoint(
+            link=point.link,
+            other_body=point.other_body,
+            other_link=point.other_link,
+            position=Point(*point.position),
+            normal=Vector3(*point.normal),
+            depth=point.depth,
+            normal_force=point.normal_force,
+            friction_direction_1=Vector3(*point.friction_directions[0]),
+            friction_force_1=point.friction_forces[0],
+            friction_direction_2=Vector3(*point.friction_directions[1]),
+            friction_force_2=point.friction_forces[1],
+        )
+        for point in sample.points
+    ]
+    return Contacts(_header(stamp_ns), Vector3(*sample.force), points)
+
+
+def contact_arrows_message(sample: ContactArrowsSample, stamp_ns: int) -> MarkerArray:
+    """Returns arrows in place of those before."""
+    header = _header(stamp_ns)
+    markers = [Marker(header=header, action=Marker.DELETEALL)]
+    for number, (start, end) in enumerate(sample.arrows):
+        marker = Marker(header=header, ns=sample.name, id=number, type=Marker.ARROW, action=Marker.ADD)
+        marker.points = [Point(*start), Point(*end)]
+        marker.scale, marker.color = _ARROW, _COLOUR
+        marker.pose.orientation.w = 1.0
+        markers.append(marker)
+    return MarkerArray(markers)
+
+
+def odometry_message(sample: BaseStateSample, stamp_ns: int) -> Odometry:
+    """Returns pose and twist of a base; covariances are zero, since both are exact."""
+    message = Odometry(_header(stamp_ns), prefixed(sample.frame))
+    message.pose.pose.position = Point(*sample.pose.position)
+    message.pose.pose.orientation = Quaternion(*sample.pose.quat_xyzw)
+    message.twist.twist = Twist(Vector3(*sample.twist.linear), Vector3(*sample.twist.angular))
+    return message
+
+
+def surface_message(sample: SurfaceSample, stamp_ns: int) -> Marker:
+    """Returns a surface as triangles in the world."""
+    marker = Marker(ns=sample.name, type=Marker.TRIANGLE_LIST, action=Marker.ADD, scale=Vector3(1.0, 1.0, 1.0))
+    marker.header = _header(stamp_ns)
+    marker.pose.orientation.w = 1.0
+    marker.color = ColorRGBA(*sample.rgba)
+    marker.points = [Point(*corner) for corner in sample.corners]
+    return marker
+
+
+def _header(stamp_ns: int) -> Header:
+    return Header(stamp=to_ros_time(stamp_ns), frame_id=world_frame())
+
 
 TOPICS: dict[type, Topic] = {
     WrenchSample: Topic(

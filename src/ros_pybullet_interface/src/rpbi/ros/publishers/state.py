@@ -29,11 +29,10 @@ class StatePublisher:
     Args:
         world: The world.
         pacer: What keeps it in step with the wall clock.
-        real_time_factor: The factor asked for; 0 is as fast as it goes.
     """
 
-    def __init__(self, world: World, pacer: Pacer, real_time_factor: float) -> None:
-        self._world, self._pacer, self._wanted_factor = world, pacer, real_time_factor
+    def __init__(self, world: World, pacer: Pacer) -> None:
+        self._world, self._pacer = world, pacer
         config = world.config
         self._period_s = 1.0 / config.state_hz if config.state_hz else float("inf")
         self._schedule = Schedule(config.state_hash_hz, world.clock.dt_ns) if config.state_hash_hz else None
@@ -93,7 +92,7 @@ class StatePublisher:
             stepping=self.is_stepping,
             tick=clock.tick,
             simulated_time=clock.time_s,
-            real_time_factor_asked=self._wanted_factor,
+            real_time_factor_asked=self._world.config.real_time_factor,
             real_time_factor=self._factor,
             overruns=self._pacer.overruns,
             lost_time=self._pacer.lost_s,

@@ -12,10 +12,10 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rosgraph_msgs.msg import Clock as ClockMessage
 from std_msgs.msg import Int64
 
-from rpbi.engine.clock import Clock
 from rpbi.engine.pacer import Pacer
 from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import to_ros_time
+from rpbi.world import World
 
 from .topics import FastTopic
 
@@ -31,6 +31,7 @@ DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, meaning="Real-time factor, 
 
 DIAGNOSTICS_PERIOD_S = 1.0
 STOPPED_CLOCK_PERIOD_S = 0.05
+MAX_CLOCK_HZ = 1000.0
 FREE_RUNNING_CLOCK_HZ = 250.0
 FALLING_BEHIND = 0.98
 """Share of the asked real-time factor below which the diagnostics warn."""
@@ -48,13 +49,14 @@ class ClockPublisher:
     """Simulated time on /clock, of which the simulator is the only source.
 
     Args:
-        clock: The world's clock.
-        hz: Most messages a second of wall time.
+        world: The world; its configuration has the most messages a second of wall time.
     """
 
-    def __init__(self, clock: Clock, hz: float) -> None:
-        self._clock = clock
-        self._period_s = 1.0 / hz
+    def __init__(self, world: World) -> None:
+        self._clock, config = world.clock, world.config
+        factor = config.real_time_factor
+        limit_hz = min(factor / config.timeStep, MAX_CLOCK_HZ) if factor else FREE_RUNNING_CLOCK_HZ
+        self._period_s = 1.0 / min(config.clock_hz or limit_hz, limit_hz)
         _warn_of_rivals()
         self._publisher = FastTopic(CLOCK.name, ClockMessage)
         self._due_s = 0.0
@@ -85,24 +87,15 @@ class StatusPublisher:
     """Whether the world runs, and how well.
 
     Args:
-        clock: The world's clock.
+        world: The world.
         pacer: What keeps it in step with the wall clock.
-        hz: Rate of `rpbi/status` [Hz] of wall time.
-        real_time_factor: The factor asked for; 0 is as fast as it goes.
         facts: Returns what else the diagnostics are to have.
     """
 
-    def __init__(
-        self,
-        clock: Clock,
-        pacer: Pacer,
-        hz: float,
-        real_time_factor: float,
-        facts: Callable[[], Mapping[str, str]] = dict,
-    ) -> None:
-        self._clock, self._pacer, self._wanted_factor = clock, pacer, real_time_factor
-        self._facts = facts
-        self._period_s = 1.0 / hz
+    def __init__(self, world: World, pacer: Pacer, facts: Callable[[], Mapping[str, str]]) -> None:
+        self._clock, self._pacer, self._facts = world.clock, pacer, facts
+        self._wanted_factor = world.config.real_time_factor
+        self._period_s = 1.0 / world.config.status_hz
         self._status = rospy.Publisher(STATUS.name, Int64, queue_size=10)
         self._diagnostics = rospy.Publisher(DIAGNOSTICS.name, DiagnosticArray, queue_size=10)
         self._due_s = 0.0

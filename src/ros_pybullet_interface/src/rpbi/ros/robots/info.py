@@ -16,7 +16,7 @@ from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import RobotInfoRequest, RobotInfoResponse
 from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.config.asset_files import find_file
-from rpbi.ros.publishers.messages import joint_state_message
+from rpbi.ros.publishers.sample_topics import joint_state_message
 from rpbi.ros.services.body_context import BodyContext
 from rpbi.sensors.joint_state import JointStateSensor
 from rpbi.urdf.document import description_for_ros
