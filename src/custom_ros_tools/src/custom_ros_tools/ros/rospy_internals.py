@@ -11,7 +11,7 @@ import socket
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from importlib import import_module
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import rospy
 
@@ -101,14 +101,6 @@ class DirectSending:
         return True
 
 
-class RegistrationListener(Protocol):
-    """Is told by rospy which topics and services come and go; for the arguments see `Registry.entries`."""
-
-    def reg_added(self, name: str, type_or_uri: str, kind: str) -> None: ...
-
-    def reg_removed(self, name: str, type_or_uri: str, kind: str) -> None: ...
-
-
 class Registry:
     """The topics and services that this node has by rospy."""
 
@@ -135,8 +127,8 @@ class Registry:
                 *(("srv", *each) for each in self._services.get_services()),
             ]
 
-    def hand_over(self, listener: RegistrationListener) -> None:
-        """Has somebody else tell the master what comes and goes, in the place of rospy."""
+    def hand_over(self, listener: Any) -> None:
+        """Has somebody else register what comes and goes, in the place of rospy, by `reg_added` and `reg_removed`."""
         with self._listeners.lock:
             self._listeners.listeners[self._listeners.listeners.index(self._rospys)] = listener
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+from custom_ros_tools.ros.lifecycle.wall_timer import WallRate
 from ros_pybullet_interface.msg import SimulationState
 from rpbi.engine.clock import Schedule
 from rpbi.engine.pacer import Pacer
@@ -34,10 +35,9 @@ class StatePublisher:
     def __init__(self, world: World, pacer: Pacer) -> None:
         self._world, self._pacer = world, pacer
         config = world.config
-        self._period_s = 1.0 / config.state_hz if config.state_hz else float("inf")
+        self._rate = WallRate(config.state_hz)
         self._schedule = Schedule(config.state_hash_hz, world.clock.dt_ns) if config.state_hash_hz else None
         self._topic = FastTopic(STATE.name, SimulationState)
-        self._due_s = time.monotonic() if config.state_hz else float("inf")
         self._factor = 0.0
         self._moves = False
         self.is_stepping = False
@@ -72,10 +72,7 @@ class StatePublisher:
             ticks = self._world.clock.tick - self._window_tick
             self._factor = ticks * self._world.clock.dt_s / (now_s - self._window_s)
             self._window_s, self._window_tick = now_s, self._world.clock.tick
-        elif now_s < self._due_s:
-            return
-        if now_s >= self._due_s:
-            self._due_s = max(self._due_s + self._period_s, now_s)
+        if self._rate.is_due():
             self._publish()
 
     def _begin_window(self) -> None:

@@ -12,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rosgraph_msgs.msg import Clock as ClockMessage
 from std_msgs.msg import Int64
 
+from custom_ros_tools.ros.lifecycle.wall_timer import WallRate
 from rpbi.engine.pacer import Pacer
 from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import to_ros_time
@@ -29,7 +30,6 @@ STATUS = Topic(
 )
 DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, meaning="Real-time factor, overruns, lost time, renderer; 1 Hz.")
 
-DIAGNOSTICS_PERIOD_S = 1.0
 STOPPED_CLOCK_PERIOD_S = 0.05
 MAX_CLOCK_HZ = 1000.0
 FREE_RUNNING_CLOCK_HZ = 250.0
@@ -95,11 +95,10 @@ class StatusPublisher:
     def __init__(self, world: World, pacer: Pacer, facts: Callable[[], Mapping[str, str]]) -> None:
         self._clock, self._pacer, self._facts = world.clock, pacer, facts
         self._wanted_factor = world.config.real_time_factor
-        self._period_s = 1.0 / world.config.status_hz
+        self._rate = WallRate(world.config.status_hz)
+        self._diagnostics_rate = WallRate(1.0, delay_s=1.0)
         self._status = rospy.Publisher(STATUS.name, Int64, queue_size=10)
         self._diagnostics = rospy.Publisher(DIAGNOSTICS.name, DiagnosticArray, queue_size=10)
-        self._due_s = 0.0
-        self._diagnostics_due_s = time.monotonic() + DIAGNOSTICS_PERIOD_S
         self._overruns = 0
 
     def spin(self, running: bool, stepping: bool = False) -> None:
@@ -109,12 +108,9 @@ class StatusPublisher:
             running: Whether the world runs.
             stepping: Whether it is about the ticks of a request.
         """
-        now_s = time.monotonic()
-        if now_s >= self._due_s:
-            self._due_s = max(self._due_s + self._period_s, now_s)
+        if self._rate.is_due():
             self.publish(running or stepping)
-        if now_s >= self._diagnostics_due_s:
-            self._diagnostics_due_s = max(self._diagnostics_due_s + DIAGNOSTICS_PERIOD_S, now_s)
+        if self._diagnostics_rate.is_due():
             self._publish_diagnostics(running, stepping)
 
     def publish(self, running: bool) -> None:

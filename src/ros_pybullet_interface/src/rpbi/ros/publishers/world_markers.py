@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from typing import NamedTuple
 from urllib.parse import quote
 
@@ -13,6 +12,7 @@ from geometry_msgs.msg import Pose as PoseMessage
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
+from custom_ros_tools.ros.lifecycle.wall_timer import WallRate
 from rpbi.bodies import Body
 from rpbi.bodies.visual_shapes import BodyShape, ShapeKind, body_shapes, followed_frame, link_frame, link_pose
 from rpbi.geometry import Pose
@@ -103,8 +103,7 @@ class WorldMarkers:
 
     def __init__(self, world: World, hz: float) -> None:
         self._world = world
-        self._period_s = 1.0 / hz
-        self._due_s = 0.0
+        self._rate = WallRate(hz)
         self._seen: tuple[object, ...] = ()
         self._markers: dict[_Key, Marker] = {}
         self._loose: list[_Loose] = []
@@ -114,10 +113,8 @@ class WorldMarkers:
 
     def poll(self) -> None:
         """Publishes what has changed, if it is time to look."""
-        now_s = time.monotonic()
-        if now_s < self._due_s:
+        if not self._rate.is_due():
             return
-        self._due_s = max(self._due_s + self._period_s, now_s)
         present = (len(self._world.log), *self._world.bodies.values())
         if present != self._seen:
             self._seen = present

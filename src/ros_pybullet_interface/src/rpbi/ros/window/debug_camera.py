@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import rospy
 
 from custom_ros_tools.errors import ConfigError, InterfaceError
+from custom_ros_tools.ros.lifecycle.wall_timer import WallRate
 from ros_pybullet_interface.msg import ResetDebugVisualizerCamera as CameraMessage
 from ros_pybullet_interface.srv import GetDebugVisualizerCamera
 from rpbi.config.pybullet_world_models import ResetDebugVisualizerCamera
@@ -16,7 +16,7 @@ from rpbi.ros.requests import Requests
 from rpbi.window import Window
 
 CAMERA = Topic("rpbi/debug_visualizer_camera", CameraMessage, meaning="Where the window looks from now; 30 Hz.")
-PERIOD_S = 1.0 / 30.0
+HZ = 30.0
 
 
 class DebugCamera:
@@ -28,15 +28,13 @@ class DebugCamera:
 
     def __init__(self, window: Window | None) -> None:
         self._window = window
-        self._due_s = 0.0
+        self._rate = WallRate(HZ)
         self._publisher = None if window is None else rospy.Publisher(CAMERA.name, CameraMessage, queue_size=10)
 
     def poll(self) -> None:
         """Publishes it if it is time to."""
-        now_s = time.monotonic()
-        if self._window is None or self._publisher is None or now_s < self._due_s:
+        if self._window is None or self._publisher is None or not self._rate.is_due():
             return
-        self._due_s = max(self._due_s + PERIOD_S, now_s)
         if self._publisher.get_num_connections():
             self._publisher.publish(_message(self._window.camera()))
 

@@ -12,6 +12,7 @@ import rospy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int64MultiArray
 
+from custom_ros_tools.ros.lifecycle.wall_timer import WallRate
 from ros_pybullet_interface.msg import KeyboardEvent
 from ros_pybullet_interface.msg import MouseEvent as MouseMessage
 from rpbi.engine.clock import Clock
@@ -39,7 +40,7 @@ NUMBERS = Topic(
 )
 LARGEST_SHARE = 0.25
 """Of wall time, that drawing may take from physics: images come less often rather than that."""
-HELD_PERIOD_S = 1.0 / 60.0
+HELD_HZ = 60.0
 """How often a key that is held is published [s] of wall time; what happens to keys is published at once."""
 KEY_WORDS = {DOWN: "key_is_down", PRESSED: "", RELEASED: "key_was_released"}
 MOUSE_WORDS = {1: "mouse_move_event", 2: "mouse_button_event"}
@@ -60,7 +61,7 @@ class GuiEvents:
         self._window, self._clock = window, clock
         self._keys = rospy.Publisher(KEYBOARD.name, KeyboardEvent, queue_size=100) if keyboard else None
         self._mouse = rospy.Publisher(MOUSE.name, MouseMessage, queue_size=100) if mouse else None
-        self._held_due_s = 0.0
+        self._held_rate = WallRate(HELD_HZ)
 
     def poll(self) -> None:
         """Publishes what has happened since the last time."""
@@ -74,10 +75,7 @@ class GuiEvents:
         events = list(self._window.key_events())
         if not events:
             return
-        now_s = time.monotonic()
-        is_due = now_s >= self._held_due_s
-        if is_due:
-            self._held_due_s = now_s + HELD_PERIOD_S
+        is_due = self._held_rate.is_due()
         for event in events:
             if is_due or event.state != DOWN:
                 publisher.publish(self._key_message(event))
@@ -114,18 +112,16 @@ class VisualizerImage:
 
     def __init__(self, window: Window, clock: Clock, hz: float, width_px: int, height_px: int) -> None:
         self._window, self._clock = window, clock
-        self._period_s = 1.0 / hz
+        self._rate = WallRate(hz)
         self._size = width_px, height_px
-        self._due_s = 0.0
         self._images = rospy.Publisher(IMAGE.name, Image, queue_size=2)
         self._numbers = rospy.Publisher(NUMBERS.name, Int64MultiArray, queue_size=2)
 
     def poll(self) -> None:
         """Draws an image if it is time to and somebody looks."""
-        start_s = time.monotonic()
-        if start_s < self._due_s:
+        if not self._rate.is_due():
             return
-        self._due_s = max(self._due_s + self._period_s, start_s)
+        start_s = time.monotonic()
         as_image, as_numbers = (topic.get_num_connections() > 0 for topic in (self._images, self._numbers))
         if not as_image and not as_numbers:
             return
@@ -134,8 +130,7 @@ class VisualizerImage:
             self._images.publish(self._message(rgba))
         if as_numbers:
             self._numbers.publish(_Numbers(rgba))
-        end_s = time.monotonic()
-        self._due_s = max(self._due_s, start_s + (end_s - start_s) / LARGEST_SHARE)
+        self._rate.rest((time.monotonic() - start_s) * (1.0 / LARGEST_SHARE - 1.0))
 
     def _message(self, rgba: npt.NDArray[np.uint8]) -> Image:
         height, width, _ = rgba.shape
