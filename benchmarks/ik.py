@@ -15,7 +15,7 @@ import PyKDL
 from result import Result, Target
 
 from custom_ros_tools.errors import MissingDependency
-from ik_ros.chain.goal import Goal
+from ik_ros.chain.kdl import Goal
 from ik_ros.lookup import make_solver
 from ik_ros.problem import IKProblem
 from ik_ros.solver import Solver

@@ -1,35 +1,25 @@
-"""What all tests share: the workspace on the path, and a private ROS master on a free port."""
+"""What all tests share: a workplace for each worker, a ROS master in it, and how a run is planned and reported."""
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import os
-import socket
+import signal
 import subprocess
-import sys
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from workplace import Workplace
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "tests"))
+WORKPLACE = Workplace()
 
+import rosgraph  # noqa: E402
+from ros_system import RosSystem, stop_group, wait_until  # noqa: E402
+from second_master import SecondMaster  # noqa: E402
 
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-# rospy reads these when it is imported, so they must stand before any test module is.
-_HOME = tempfile.TemporaryDirectory(prefix="rpbi-tests-")
-os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{_free_port()}"
-os.environ["ROS_IP"] = "127.0.0.1"
-os.environ["ROS_HOME"] = _HOME.name
-os.environ.pop("ROS_HOSTNAME", None)
-os.environ.pop("ROS_NAMESPACE", None)
+pytest_plugins = ("work_plan", "run_report")
 
 
 def pytest_terminal_summary() -> None:
@@ -37,29 +27,39 @@ def pytest_terminal_summary() -> None:
     ctypes.CDLL(None).fflush(None)
 
 
-@pytest.fixture(scope="session")
-def ros_master() -> Iterator[str]:
-    """A ROS master of our own; its URI. It ends with the tests."""
-    uri = os.environ["ROS_MASTER_URI"]
-    log = open(Path(_HOME.name) / "roscore.log", "w")
-    roscore = subprocess.Popen(
-        ["roscore", "-p", uri.rsplit(":", 1)[1]], stdout=log, stderr=subprocess.STDOUT, start_new_session=True
-    )
-    import rosgraph
-    from ros_system import stop_group, wait_until
+@pytest.fixture(scope="session", autouse=True)
+def no_process_is_left() -> Iterator[None]:
+    """Fails the last test of a worker if any of its tests left a process behind, and ends that process."""
+    yield
+    with contextlib.suppress(TimeoutError):  # whoever was told to end may need a moment
+        wait_until(lambda: not WORKPLACE.processes(), "all processes have ended", 15.0)
+    left = WORKPLACE.processes()
+    for process_id in left:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(process_id, signal.SIGKILL)
+    assert not left, f"tests left processes behind: {left}"
 
-    wait_until(rosgraph.is_master_online, "the ROS master answers", 30.0)
-    wait_until(lambda: rosgraph.Master("/tests").lookupNode("/rosout"), "rosout is up", 30.0)
-    yield uri
+
+@pytest.fixture(scope="session")
+def ros_master(no_process_is_left: None) -> Iterator[str]:
+    """A ROS master of our own; its URI. It ends with the tests."""
+    port = WORKPLACE.port
+    log_path = WORKPLACE.folder / "roscore.log"
+    with open(log_path, "w") as log:
+        command = ["roscore", "-p", str(port.number)]
+        roscore = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
+    try:
+        wait_until(rosgraph.is_master_online, "the ROS master answers", 60.0)
+        wait_until(lambda: rosgraph.Master("/tests").lookupNode("/rosout"), "rosout is up", 60.0)
+    except TimeoutError as error:
+        raise TimeoutError(f"{error}:\n{log_path.read_text()}") from None
+    yield port.uri
     stop_group(roscore)
-    log.close()
 
 
 @pytest.fixture
-def ros(ros_master: str, tmp_path: Path) -> Iterator[RosSystem]:  # noqa: F821
+def ros(ros_master: str, tmp_path: Path) -> Iterator[RosSystem]:
     """Starts nodes, talks to them and stops them after the test."""
-    from ros_system import RosSystem
-
     system = RosSystem(tmp_path)
     try:
         yield system
@@ -68,10 +68,8 @@ def ros(ros_master: str, tmp_path: Path) -> Iterator[RosSystem]:  # noqa: F821
 
 
 @pytest.fixture(scope="module")
-def module_ros(ros_master: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[RosSystem]:  # noqa: F821
+def module_ros(ros_master: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[RosSystem]:
     """Nodes that all tests of a module use; each test leaves them as it found them."""
-    from ros_system import RosSystem
-
     system = RosSystem(tmp_path_factory.mktemp("module"))
     try:
         yield system
@@ -80,8 +78,6 @@ def module_ros(ros_master: str, tmp_path_factory: pytest.TempPathFactory) -> Ite
 
 
 @pytest.fixture
-def second_master(ros: RosSystem) -> SecondMaster:  # noqa: F821
+def second_master(ros: RosSystem) -> SecondMaster:
     """A master that may be killed; the tests' own one goes on."""
-    from second_master import SecondMaster
-
     return SecondMaster(ros)

@@ -13,6 +13,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
+from import_graph import imported_names
 
 ROOT = Path(__file__).resolve().parent.parent
 SRC = ROOT / "src"
@@ -33,7 +34,7 @@ ALLOWED = {
 }
 """What each package may depend on."""
 MIDDLEWARE = re.compile(r"^(rospy|tf2_ros|rosbag|rosgraph|roslib|genpy|\w+_msgs|\w+_srvs)$")
-MESSAGES_OF_OURS = re.compile(r"^(ros_pybullet_interface|custom_ros_tools\.(srv|msg))$")
+MESSAGES_OF_OURS = re.compile(r"^(ros_pybullet_interface|\w+\.(srv|msg))(\.|$)")
 MAX_NODE_LINES = 10
 
 
@@ -42,14 +43,10 @@ def _python_files(package: str) -> list[Path]:
 
 
 def _imports(path: Path) -> set[str]:
-    """Returns the full names of all modules that a file imports from outside its own package."""
-    names: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
-            names.add(node.module)
-    return names
+    """Returns the full names of all that a file imports."""
+    (source,) = (each for each in path.parents if each.name == "src" and each.parent.parent == SRC)
+    module = ".".join(path.relative_to(source).with_suffix("").parts).removesuffix(".__init__")
+    return set(imported_names(path, module))
 
 
 def test_every_package_is_known_here():
@@ -73,7 +70,8 @@ def _is_for_typing(path: Path, name: str) -> bool:
     """Tells whether an import stands under TYPE_CHECKING only."""
     for node in ast.parse(path.read_text()).body:
         if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING":
-            return any(getattr(inner, "module", None) == name for inner in node.body)
+            modules = [getattr(inner, "module", None) for inner in node.body]
+            return any(module and f"{name}.".startswith(f"{module}.") for module in modules)
     return False
 
 
@@ -169,11 +167,33 @@ def test_every_solver_is_shown_in_the_example_and_held_to_the_conformance_suite(
         assert f'    solver_name = "{name}"\n' in tests, f"no SolverConformance has solver '{name}'"
 
 
-def test_every_body_type_is_shown_in_an_example_and_tested():
+def test_every_body_type_is_shown_in_an_example():
+    from rpbi.bodies import BODY_TYPES
+    from rpbi.config.loading import load_world
+
+    worlds = (SRC / "rpbi_examples/configs").glob("*/config.yaml")
+    shown = {each.type for world in worlds for each in load_world(str(world), BODY_TYPES).objects}
+    assert shown == set(BODY_TYPES)
+
+
+class KeyRecorder(dict):
+    """A YAML without keys that notes which ones are looked for."""
+
+    def __init__(self) -> None:
+        self.asked: set[str] = set()
+
+    def get(self, key, default=None):
+        self.asked.add(key)
+        return default
+
+
+def test_every_body_type_is_tested():
+    """Of types that share a section, the keys by which they are told apart must be in a test as well."""
     from rpbi.bodies import BODY_TYPES
 
-    worlds = "".join(path.read_text() for path in (SRC / "rpbi_examples/configs").rglob("*.yaml"))
-    tests = "".join(path.read_text() for path in (ROOT / "tests").rglob("*.py"))
+    tests = "".join(path.read_text() for path in (ROOT / "tests").rglob("*.py") if path != Path(__file__))
     for kind, body_type in BODY_TYPES.items():
-        assert f"{body_type.section}:" in worlds, f"no example has a {kind} object"
-        assert body_type.section in tests, f"no test has a {kind} object"
+        keys = KeyRecorder()
+        body_type.claims(keys)
+        for key in {body_type.section, *keys.asked}:
+            assert re.search(rf"\b{key}\b(=|\": )", tests), f"no test has a {kind} object: {key}"

@@ -38,7 +38,7 @@ def test_node_runs_with_the_interpreter_that_has_ros(node: Path) -> None:
     assert os.access(node, os.X_OK)
 
 
-def test_catkin_lint_finds_no_error_in_the_packages() -> None:
-    command = ["catkin_lint", "--offline", "-W0", str(ROOT / "src")]
+def test_catkin_lint_finds_nothing_in_packages_and_templates() -> None:
+    command = ["catkin_lint", "--offline", "--strict", "-W1", str(ROOT / "src"), str(ROOT / "templates")]
     result = subprocess.run(command, capture_output=True, text=True)
     assert result.returncode == 0, result.stdout + result.stderr

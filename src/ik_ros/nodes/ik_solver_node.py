@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Solves problems of inverse kinematics."""
 
-from custom_ros_tools.node import run
+from custom_ros_tools.ros.node import run
 
 run("ik_ros.ros.solver_node:main")

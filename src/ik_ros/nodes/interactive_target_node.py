@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Broadcasts a TF frame that is dragged in RViz."""
 
-from custom_ros_tools.node import run
+from custom_ros_tools.ros.node import run
 
 run("ik_ros.ros.interactive_target:main")

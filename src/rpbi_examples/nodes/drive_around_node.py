@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Drives a mobile base along a route."""
 
-from custom_ros_tools.node import run
+from custom_ros_tools.ros.node import run
 
 run("rpbi_examples.ros.drive_around:main")

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Moves a frame in a figure eight."""
 
-from custom_ros_tools.node import run
+from custom_ros_tools.ros.node import run
 
 run("rpbi_examples.ros.figure_eight:main")

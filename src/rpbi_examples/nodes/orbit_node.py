@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Moves the camera's frame around the scene."""
 
-from custom_ros_tools.node import run
+from custom_ros_tools.ros.node import run
 
 run("rpbi_examples.ros.orbit:main")

@@ -93,13 +93,13 @@ def test_several_nodes_do_not_replace_each_others_markers(ros, tmp_path):
 )
 def test_wrong_configuration_is_named_and_ends_the_node(ros, config, told):
     process = start(ros, config)
-    assert process.wait(20) == 1
+    assert process.wait(60.0) == 1
     assert told in ros.output(process) and "Traceback" not in ros.output(process)
 
 
 def test_without_a_configuration_it_says_what_is_missing(ros):
     process = ros.start(["rosrun", "custom_ros_tools", "attach_marker"])
-    assert process.wait(20) == 1
+    assert process.wait(60.0) == 1
     for key in ("node", "type", "scale"):
         assert f"~config: {key}: missing" in ros.output(process)
 

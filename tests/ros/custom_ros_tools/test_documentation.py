@@ -47,7 +47,7 @@ def test_example_runs(ros, module):
     ros.start(box.split())
     code = EXAMPLES[module] if "ros_node" in module else f"import rospy\nrospy.init_node('a')\n{EXAMPLES[module]}"
     process = ros.start([sys.executable, "-c", code])
-    assert process.wait(30) == 0, ros.output(process)
+    assert process.wait(60.0) == 0, ros.output(process)
     states.unregister()
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
-from pathlib import Path
 
 import pytest
 from ros_system import wait_until
@@ -19,8 +17,7 @@ NEW = {("publishes", "/new"), ("serves", "/new_too")} | OWN
 @pytest.mark.parametrize("way", ["is killed", "hangs"])
 def test_what_is_opened_and_closed_while_the_master_is_away(ros, tmp_path, second_master, way):
     sign = tmp_path / "now"
-    script = Path(__file__).with_name("busy_without_master.py")
-    node = ros.start([sys.executable, str(script), str(sign)], **second_master.environment)
+    node = ros.start_program("busy_without_master.py", str(sign), **second_master.environment)
     wait_until(lambda: "ready" in ros.output(node), "the node is up")
     wait_until(lambda: set(second_master.registrations(NODE)) == OLD, "the master knows it")
     assert second_master.api.getParam("/old_parameter") == 1
@@ -45,9 +42,7 @@ def test_what_is_opened_and_closed_while_the_master_is_away(ros, tmp_path, secon
 
 
 def test_a_master_that_ends_while_a_node_starts_is_told_in_one_line(ros, second_master):
-    script = Path(__file__).with_name("loses_its_master.py")
-    command = [sys.executable, str(script), str(second_master.process.pid)]
-    node = ros.start(command, **second_master.environment)
-    assert node.wait(20.0) == 1
+    node = ros.start_program("loses_its_master.py", str(second_master.process.pid), **second_master.environment)
+    assert node.wait(60.0) == 1
     said = ros.output(node)
     assert said.count("has gone while the node was starting") == 1 and "Traceback" not in said, said

@@ -27,7 +27,7 @@ def start(ros) -> Callable[..., Any]:
         for name, value in parameters.items():
             rospy.set_param(f"/{default_name}/{name}", value)
         process = ros.start(["rosrun", "custom_ros_tools", executable, *arguments])
-        rospy.wait_for_service(toggle, timeout=20.0)
+        rospy.wait_for_service(toggle, timeout=60.0)
         return process
 
     return run
@@ -183,7 +183,7 @@ def test_wrong_configuration_is_named_and_ends_the_node(ros, executable, paramet
         for key, value in parameters.items():
             rospy.set_param(f"/{name}/{key}", value)
     process = ros.start(["rosrun", "custom_ros_tools", executable])
-    assert process.wait(20) == 1
+    assert process.wait(60.0) == 1
     assert told in ros.output(process) and "Traceback" not in ros.output(process)
 
 

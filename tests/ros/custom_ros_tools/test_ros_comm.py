@@ -30,7 +30,7 @@ def test_handler_waits_for_its_service_and_says_so_after_a_while(ros, monkeypatc
     rosout.wait_for(["still waiting for service /late"])
     assert not got
     service = rospy.Service("/late", Trigger, lambda _: TriggerResponse(True, "at last"))
-    waiting.join(20.0)
+    waiting.join(60.0)
     assert got[0]().message == "at last"
     service.shutdown()
 

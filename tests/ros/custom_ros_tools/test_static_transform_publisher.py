@@ -157,7 +157,7 @@ def test_wrong_arguments_and_parameters_are_named_and_end_the_node(ros, argument
     for key, value in parameters.items():
         rospy.set_param(f"/{NAMES[0]}/{key}", value)
     process = start(ros, *arguments.split())
-    assert process.wait(20) == 1
+    assert process.wait(60.0) == 1
     assert told in ros.output(process) and "Traceback" not in ros.output(process)
 
 

@@ -91,7 +91,7 @@ def test_nothing_is_published_before_there_is_a_target_or_when_its_tf_stops(ros,
     wait_until(lambda: rosout.logs("there is no TF from 'foot' to 'target'"), "it says what it lacks")
     assert problems.messages == []
     hear(problems, target, lambda _: True, "problems come")
-    wait_until(lambda: rosout.logs("is stale: nothing new has come"), "it says that TF is stale", 20.0)
+    wait_until(lambda: rosout.logs("is stale: nothing new has come"), "it says that TF is stale")
     wait_until_none_comes(problems)
     count = len(problems.messages)
     wait_until(lambda: target() or len(problems.messages) > count, "problems come again when TF does")
@@ -174,7 +174,7 @@ def test_it_is_switched_by_service(ros, target):
 def test_wrong_parameters_end_it_with_1_and_their_names(ros, parameters, told):
     rospy.set_param("/ik_setup_node", parameters)
     process = ros.start(["rosrun", "ik_ros", "ik_setup_node.py", "kdl", "__name:=ik_setup_node"])
-    assert process.wait(20.0) == 1
+    assert process.wait(60.0) == 1
     assert told in ros.output(process), ros.output(process)
 
 
@@ -226,7 +226,7 @@ def test_simulated_robot_is_asked_itself(ros, target):
             p = found.translation
             return math.dist((p.x, p.y, p.z), (0.5, 0.1, 0.6)) < 5e-3
 
-        wait_until(is_there, "the arm goes to the target", 30.0)
+        wait_until(is_there, "the arm goes to the target")
 
 
 def test_frame_that_is_dragged_in_rviz_is_broadcast_where_the_handles_are(ros):

@@ -226,7 +226,7 @@ def problem_at(positions):
 def test_wrong_parameters_end_it_with_1_and_their_names(ros, solver, parameters, told):
     rospy.set_param("/ik_solver_node", {**dict(CHAIN_OF_TEST), **parameters})
     process = ros.start(["rosrun", "ik_ros", "ik_solver_node.py", solver, "__name:=ik_solver_node"])
-    assert process.wait(20.0) == 1
+    assert process.wait(60.0) == 1
     output = ros.output(process)
     assert told in output, output
     assert "Traceback" not in output
@@ -234,7 +234,7 @@ def test_wrong_parameters_end_it_with_1_and_their_names(ros, solver, parameters,
 
 def test_without_a_solver_it_tells_which_there_are(ros):
     process = ros.start(["rosrun", "ik_ros", "ik_solver_node.py"])
-    assert process.wait(20.0) == 2
+    assert process.wait(60.0) == 2
     assert "kdl" in ros.output(process) and "trac_ik" in ros.output(process)
 
 

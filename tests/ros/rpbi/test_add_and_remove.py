@@ -317,7 +317,7 @@ def test_of_many_who_add_the_same_name_at_once_one_succeeds(ros, world):
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(20.0)
+        thread.join(60.0)
     assert sorted(answers) == [False] * 5 + [True]
     assert remove(ros, "same").success
 
@@ -342,7 +342,7 @@ def test_asking_about_a_robot_that_comes_and_goes_gets_answers_or_plain_errors(r
         assert remove(ros, "new").success
     over.set()
     for thread in threads:
-        thread.join(20.0)
+        thread.join(60.0)
     assert 7 in outcomes
     assert {outcome for outcome in outcomes if isinstance(outcome, int)} == {7}
     assert "Traceback" not in ros.output(world)

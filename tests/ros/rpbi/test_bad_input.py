@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import sys
 import time
-from pathlib import Path
 
 import pytest
 import rospy
@@ -66,7 +64,7 @@ def test_bad_targets_among_good_ones_are_refused_whole_and_named_now_and_then(ro
     rosout = Rosout(ros)
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     tf = ros.listen("/tf", TFMessage)
-    ros.start([sys.executable, str(Path(__file__).with_name("flood_targets.py")), TOPIC, JOINT, str(GOAL)])
+    ros.start_program("flood_targets.py", TOPIC, JOINT, str(GOAL))
     wait_until(
         lambda: joint_states.messages and abs(joint_states.messages[-1].position[3] - GOAL) < 0.01,
         "good ones are obeyed",
@@ -137,7 +135,7 @@ def test_tf_that_never_comes_is_named(ros, node):
     rosout = Rosout(ros)
     missing = {**FLOOR, "name": "also_lost", "object_tf": {"tf_id": "never/there/either", "hz": 10}}
     assert add(ros, PybulletObject.COLLISION, missing).success
-    rosout.wait_for(["no TF from 'rpbi/world' to 'never/there/either'"], 15.0)
+    rosout.wait_for(["no TF from 'rpbi/world' to 'never/there/either'"])
     said = rosout.logs("never/there/either")
     assert len(said) == 1 and said[0].level == Log.WARN
     assert "also_lost" in said[0].msg

@@ -19,7 +19,7 @@ def fails(ros):
     def start(config):
         rosout = Rosout(ros)
         process = ros.simulator(config, wait=False)
-        assert process.wait(30) == 1, ros.output(process)
+        assert process.wait(60.0) == 1, ros.output(process)
         printed = ros.output(process)
         assert "Traceback" not in printed
         assert _of_group(process.pid) == [], "a process is left"
@@ -153,7 +153,7 @@ def test_without_a_configuration_it_says_how_to_load_one(ros):
     if rospy.has_param(f"{NODE}/config"):
         rospy.delete_param(f"{NODE}/config")
     process = ros.start(["rosrun", "ros_pybullet_interface", "ros_pybullet_interface_node.py"])
-    assert process.wait(30) == 1
+    assert process.wait(60.0) == 1
     assert "~config: missing" in ros.output(process) and "rosparam" in ros.output(process)
 
 

@@ -79,7 +79,7 @@ def test_several_cameras_have_their_own_topics_sizes_and_rates(ros):
 def test_later_camera_may_not_take_the_topics_of_the_first(ros):
     file = ros.write_yaml("camera.yaml", {**CAMERA, "name": "camera"})
     node = ros.simulator(box_world(ros, rgbd_sensor=CAMERA, rgbd_sensors=[file]), wait=False)
-    assert node.wait(30.0) == 1
+    assert node.wait(60.0) == 1
     assert "name: 'camera' is what the topics of the first camera are called" in ros.output(node)
 
 

@@ -36,7 +36,7 @@ def test_image_of_a_step_comes_before_its_answer(ros, placed):
         answer = ros.call("/rpbi/step", Trigger)
         assert answer.success, answer.message
         stamp_ns = int(answer.message.split("stamp ")[1].replace(".", ""))
-        wait_until(lambda stamp_ns=stamp_ns: depth.stamps_ns[-1] == stamp_ns, "the image of the step is here", 1.0)
+        wait_until(lambda stamp_ns=stamp_ns: depth.stamps_ns[-1] == stamp_ns, "the image of the step is here")
     assert np.array_equal(np.diff(depth.stamps_ns), [DT_NS] * 20)
     image = np.frombuffer(depth.messages[-1].data, np.float32).reshape(120, 160)
     assert image[60, 80] == pytest.approx(HEIGHT_M - 0.2, abs=2e-3)

@@ -96,7 +96,7 @@ def _fails_with(ros, topic, meanwhile, listener):
     thread.start()
     listener.wait_for(seen + 5)
     meanwhile()
-    thread.join(20.0)
+    thread.join(60.0)
     assert not thread.is_alive()
     return errors
 
@@ -135,5 +135,5 @@ def test_simulator_with_an_unknown_joint_does_not_start_and_says_why(ros, simula
     config = main_config(ros.folder, robots=(robot,), setAdditionalSearchPath="pybullet_data_path")
     rosout = Rosout(ros)
     failing = ros.simulator(config, use_sim_time=True, wait=False, namespace="/second/")
-    assert failing.wait(40) == 1
+    assert failing.wait(60.0) == 1
     rosout.wait_for(["enabled_joint_force_torque_sensors[0]"])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 import threading
 import time
 from pathlib import Path
@@ -24,7 +23,7 @@ from ros_pybullet_interface.msg import PybulletObject
 from ros_pybullet_interface.srv import AddPybulletObject
 
 NODE = "/ros_pybullet_interface"
-ENDS_WITHIN_S = 15.0  # it takes less than 2 s; a busy machine must not fail the test
+ENDS_WITHIN_S = 60.0  # it takes less than 2 s; a busy machine must not fail the test
 CAMERA = {"name": "camera", "object_tf": {"tf_id": "camera"}, "intrinsics": {"width": 64, "height": 48}}
 STATES = {
     "running": {},
@@ -96,7 +95,7 @@ def test_sigterm_and_a_second_ctrl_c_are_no_worse(ros, tmp_path):
 
 def test_rosnode_kill_ends_it(ros, tmp_path):
     process = ros.simulator(_config(tmp_path))
-    subprocess.run(["rosnode", "kill", NODE], check=True, capture_output=True, timeout=30)
+    subprocess.run(["rosnode", "kill", NODE], check=True, capture_output=True, timeout=60.0)
     assert process.wait(ENDS_WITHIN_S) == 0, ros.output(process)
     assert "Traceback" not in ros.output(process), ros.output(process)
 
@@ -105,7 +104,7 @@ def test_a_camera_whose_node_is_killed_comes_back(ros, tmp_path):
     process = ros.simulator(_config(tmp_path, rgbd_sensor=CAMERA))
     published = ("publishes", "/rpbi/camera/colour/image")
     wait_until(lambda: published in registrations(f"{NODE}_camera"), "the camera is up")
-    subprocess.run(["rosnode", "kill", f"{NODE}_camera"], check=True, capture_output=True, timeout=30)
+    subprocess.run(["rosnode", "kill", f"{NODE}_camera"], check=True, capture_output=True, timeout=60.0)
     wait_until(lambda: "it is started again" in ros.output(process), "the simulator sees that it has gone")
     wait_until(lambda: published in registrations(f"{NODE}_camera"), "the camera is up again")
 
@@ -122,7 +121,7 @@ def test_ctrl_c_with_a_subscriber_that_does_not_take_its_messages(ros, tmp_path)
 
 
 def _holder(ros, *topics):
-    holder = ros.start([sys.executable, str(Path(__file__).with_name("hold_topics.py")), *topics])
+    holder = ros.start_program("hold_topics.py", *topics)
     wait_until(lambda: "listening" in ros.output(holder), "it listens")
     return holder
 

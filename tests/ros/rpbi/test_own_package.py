@@ -12,8 +12,9 @@ import pytest
 import rospy
 import yaml
 from camera_world import CAMERA
+from clean_shell import in_clean_shell
 from node_world import Rosout, add, main_config, objects, publishing, remove
-from ros_system import wait_until
+from ros_system import SUPPORT, support_on_path, wait_until
 from sensor_msgs.msg import Image, Range
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
@@ -29,10 +30,7 @@ CONVEYOR, RANGE_FINDER = f"{NAME}.conveyor:Conveyor", f"{NAME}.range_finder:Rang
 
 
 def _in_workspace(folder: Path, line: str) -> list[str]:
-    """Returns a command line in a shell that knows nothing but the `setup.bash` of a workspace."""
-    keep = [f"{name}={os.environ[name]}" for name in ("ROS_MASTER_URI", "ROS_IP", "ROS_HOME", "HOME")]
-    path = "PATH=/usr/local/bin:/usr/bin:/bin"
-    return ["env", "-i", *keep, path, "bash", "-c", f"source {folder}/devel/setup.bash && cd {folder} && {line}"]
+    return in_clean_shell(f"cd {folder}; {line}", folder / "devel" / "setup.bash")
 
 
 def _do(folder: Path, line: str, code: int = 0) -> str:
@@ -179,15 +177,11 @@ def test_it_is_checked_and_tested_without_a_master(workspace):
 def test_without_the_package_the_node_says_what_is_missing(ros, workspace):
     belt = workspace / "src" / NAME / "configs" / "belt.yaml"
     process = ros.simulator({"objects": [str(belt)]}, wait=False)
-    assert process.wait(30) == 1
+    assert process.wait(60.0) == 1
     printed = ros.output(process)
     missing = f"no module '{NAME}': is its package built, and its workspace sourced?"
     assert f"{belt}: type: {missing}" in printed and f"{belt}: sensors[0].type: {missing}" not in printed
     assert "Traceback" not in printed
-
-
-FAULTY = str(ROOT / "tests" / "sim" / "rpbi")
-FAULTY_TOPICS = str(ROOT / "tests" / "ros" / "rpbi")
 
 
 def _faulty(ros, tmp_path, **keys):
@@ -195,8 +189,7 @@ def _faulty(ros, tmp_path, **keys):
     config = main_config(tmp_path)
     thing = {"name": "thing", "type": "faulty_lab:Thing", **keys}
     config["objects"] = [ros.write_yaml("thing.yaml", thing)]
-    path = os.pathsep.join((os.environ["PYTHONPATH"], FAULTY, FAULTY_TOPICS))
-    return ros.simulator(config, use_sim_time=True, wait=False, PYTHONPATH=path)
+    return ros.simulator(config, use_sim_time=True, wait=False, **support_on_path())
 
 
 @pytest.mark.parametrize(
@@ -215,7 +208,7 @@ def _faulty(ros, tmp_path, **keys):
 )  # fmt: skip
 def test_a_package_without_what_it_needs_ends_the_node_with_one_line(ros, tmp_path, keys, line):
     process = _faulty(ros, tmp_path, **keys)
-    assert process.wait(30) == 1
+    assert process.wait(60.0) == 1
     printed = ros.output(process)
     assert line in printed and "Traceback" not in printed
 
@@ -224,7 +217,7 @@ def test_a_class_that_fails_in_a_tick_stops_the_simulation_with_one_line(ros, tm
     rosout = Rosout(ros)
     process = _faulty(ros, tmp_path, fails="before_step")
     failure = "faulty_lab:Thing failed in before_step of 'thing' at tick 5: ZeroDivisionError: division by zero"
-    rosout.wait_for([f"simulation stopped: {failure} ({FAULTY}/faulty_lab.py, line"], 30.0)
+    rosout.wait_for([f"simulation stopped: {failure} ({SUPPORT}/faulty_lab.py, line"])
     assert "Traceback" not in ros.output(process)
     answer = ros.call("/rpbi/step", Trigger)
     assert not answer.success and failure in answer.message
@@ -236,8 +229,8 @@ def test_a_class_that_fails_in_a_tick_stops_the_simulation_with_one_line(ros, tm
 @pytest.mark.parametrize(
     ("keys", "cause"),
     [
-        ({"topic": "faulty_topics:PUSH_X"}, f"AttributeError: 'float' object has no attribute 'x' ({FAULTY_TOPICS}/"),
-        ({"topic": "faulty_topics:PUSH", "fails": "check"}, f"KeyError: 'no such unit' ({FAULTY}/"),
+        ({"topic": "faulty_topics:PUSH_X"}, f"AttributeError: 'float' object has no attribute 'x' ({SUPPORT}/"),
+        ({"topic": "faulty_topics:PUSH", "fails": "check"}, f"KeyError: 'no such unit' ({SUPPORT}/"),
     ],
 )
 def test_a_message_that_its_class_fails_with_is_refused_and_says_where(ros, tmp_path, keys, cause):

@@ -199,7 +199,7 @@ def test_resets_at_once_from_many_are_all_served(ros, start):
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(20.0)
+        thread.join(60.0)
     assert done == [True] * 8
 
 

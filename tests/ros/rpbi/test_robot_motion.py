@@ -62,7 +62,7 @@ def in_background(call):
     thread.start()
 
     def wait():
-        thread.join(30.0)
+        thread.join(60.0)
         return answers[0]
 
     return wait

@@ -136,7 +136,7 @@ def test_a_robot_starts_where_another_one_is(ros, tmp_path):
 def test_a_robot_to_start_at_that_says_nothing_is_named(ros, tmp_path):
     robot = iiwa(initial_joint_state_topic="/nobody/joint_states")
     node = ros.simulator(main_config(tmp_path, robots=(robot,)), wait=False)
-    assert node.wait(30.0) == 1
+    assert node.wait(60.0) == 1
     assert "initial_joint_state_topic: no joint states came on /nobody/joint_states within 5 s" in ros.output(node)
 
 
@@ -144,7 +144,7 @@ def test_half_a_message_to_start_from_is_refused_whole(ros, tmp_path):
     robot = iiwa(initial_joint_state_topic="/real/joint_states")
     with _saying("/real/joint_states", JointState(name=[FIRST, "lbr_iiwa_joint_4"], position=[0.7])):
         node = ros.simulator(main_config(tmp_path, robots=(robot,)), wait=False)
-        assert node.wait(30.0) == 1
+        assert node.wait(60.0) == 1
     complaint = "expected a position for each name on /real/joint_states, got 2 names, 1 positions"
     assert f"initial_joint_state_topic: {complaint}" in ros.output(node)
 

@@ -17,12 +17,12 @@ class Node(RosNode):
         self.states = self.Publisher("states", JointState, queue_size=10)
         self.Service("ask", Trigger, lambda _: TriggerResponse(True, str(self.get_param("~speed"))))
         self.Subscriber("states", JointState, self.take, queue_size=10)
-        self.wait_for_service("ask", timeout=10)
+        self.wait_for_service("ask", timeout=60)
         print("answer", self.ServiceProxy("ask", Trigger)().message, flush=True)
         self.timer = self.Timer(self.Duration(0.02), self.send)
         self.Rate(100.0).sleep()
-        print("message", self.wait_for_message("states", JointState, timeout=10).name, flush=True)
-        print("tf", self.wait_for_tf("world", "box", timeout=10)[0], flush=True)
+        print("message", self.wait_for_message("states", JointState, timeout=60).name, flush=True)
+        print("tf", self.wait_for_tf("world", "box", timeout=60)[0], flush=True)
         self.loginfo("done")
 
     def send(self, event):

@@ -83,7 +83,7 @@ def test_a_step_goes_one_tick_on_and_everything_of_that_tick_arrives(ros, simula
     assert second_stamp == first_stamp + 1_000_000
     assert first_stamp == (first_tick + 1) * 1_000_000
     for stamp in (first_stamp, second_stamp):
-        wait_until(lambda stamp=stamp: stamp in joint_states.stamps_ns, "its joint states arrive", 5.0)
+        wait_until(lambda stamp=stamp: stamp in joint_states.stamps_ns, "its joint states arrive")
         wait_until(
             lambda stamp=stamp: stamp in [message.clock.to_nsec() for message in clock.messages], "its clock comes"
         )
@@ -98,7 +98,7 @@ def test_an_answer_to_a_stop_comes_after_the_last_tick_was_told(ros, simulator):
     joint_states.wait_for(5)
     assert ros.call("/rpbi/stop", Trigger).success
     last = wait_until(lambda: _standing(clock), "the clock stands")
-    wait_until(lambda: joint_states.stamps_ns[-1] == last, "the joint states of the last tick arrive", 5.0)
+    wait_until(lambda: joint_states.stamps_ns[-1] == last, "the joint states of the last tick arrive")
 
 
 def _standing(clock):

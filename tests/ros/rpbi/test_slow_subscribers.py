@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 import threading
 import time
-from pathlib import Path
 
 import pytest
 import rospy
@@ -37,7 +35,7 @@ def frozen(ros, tmp_path):
     )
     ros.simulator(config, use_sim_time=True)
     topics = ["/clock", "/tf", "/rpbi/iiwa/joint_states"]
-    holder = ros.start([sys.executable, str(Path(__file__).with_name("hold_topics.py")), *topics])
+    holder = ros.start_program("hold_topics.py", *topics)
     wait_until(lambda: "listening" in ros.output(holder), "it listens")
     os.kill(holder.pid, signal.SIGSTOP)
     yield holder

@@ -114,7 +114,7 @@ def test_a_huge_number_holds_up_nothing_and_a_stop_ends_it(ros, stopped):
         "the diagnostics say so, and find nothing wrong with it",
     )
     assert ros.call("/rpbi/stop", Trigger).success
-    thread.join(10.0)
+    thread.join(60.0)
     assert not answers[-1].success
     assert re.fullmatch(r"stopped after \d+ of 4000000000 ticks", answers[-1].message)
     here = ros.call("/rpbi/step_n", StepN, 0)
@@ -126,7 +126,7 @@ def test_a_reset_ends_it(ros, stopped):
     answers, thread = _later(ros, HUGE)
     wait_until(lambda: _is_stepping(ros), "it steps")
     assert ros.call("/rpbi/reset", Trigger).success
-    thread.join(10.0)
+    thread.join(60.0)
     assert "the world was reset after" in answers[-1].message
     assert ros.call("/rpbi/step_n", StepN, 3).tick == 3
 
@@ -138,8 +138,8 @@ def test_the_node_ends_in_the_middle_of_it(ros, tmp_path):
     thread.start()
     wait_until(lambda: "stepping" in ros.call("/other/rpbi/step", Trigger).message, "it steps")
     process.send_signal(2)
-    assert process.wait(15) == 0, ros.output(process)
-    thread.join(10.0)
+    assert process.wait(60.0) == 0, ros.output(process)
+    thread.join(60.0)
 
 
 def test_a_tick_listener_waits_for_all_of_a_tick(ros, stopped):

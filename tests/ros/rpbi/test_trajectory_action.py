@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -51,12 +49,9 @@ def test_goal_is_reached_with_joints_in_any_order(start):
 
 def test_client_with_simulated_time_is_served_in_it(start, control_msgs):
     robot = start(real_time_factor=3)
-    helpers = Path(__file__).parent
-    paths = [control_msgs, str(helpers), str(helpers.parents[1]), os.environ.get("PYTHONPATH", "")]
+    paths = f"{control_msgs}:{os.environ.get('PYTHONPATH', '')}"
     arguments = [str(value) for value in (3.0, *moved(0.5))]
-    client = robot.ros.start(
-        [sys.executable, str(helpers / "trajectory_client.py"), *arguments], PYTHONPATH=":".join(paths)
-    )
+    client = robot.ros.start_program("trajectory_client.py", *arguments, PYTHONPATH=paths)
     assert client.wait(60.0) == 0, robot.ros.output(client)
     printed = robot.ros.output(client)
     assert f"state {GoalStatus.SUCCEEDED}, code 0, took " in printed

@@ -25,7 +25,7 @@ def launch(ros, example: str, **arguments: object) -> None:
     """Starts an example without windows and waits until its world runs."""
     given = [f"{key}:={value}" for key, value in arguments.items()]
     process = ros.start(["roslaunch", "rpbi_examples", f"{example}.launch", "headless:=true", *given])
-    wait_until(lambda: process.poll() is not None or _serves("/rpbi/list_objects"), f"{example} is up", 40.0)
+    wait_until(lambda: process.poll() is not None or _serves("/rpbi/list_objects"), f"{example} is up")
     assert process.poll() is None, ros.output(process)
 
 
@@ -108,7 +108,7 @@ def test_panda_swings(ros):
     states = ros.listen("/rpbi/panda/joint_states", JointState)
     first = states.wait_for(1)[0]
     index = first.name.index("panda_joint4")
-    wait_until(lambda: abs(states.messages[-1].position[index] - first.position[index]) > 0.3, "it moves", 30.0)
+    wait_until(lambda: abs(states.messages[-1].position[index] - first.position[index]) > 0.3, "it moves")
 
 
 def test_kuka_holds_still_until_it_is_told_to_move(ros):
@@ -132,3 +132,15 @@ def test_still_scene_stands_still_with_the_tool_at_the_whiteboard(ros, position)
     board_x, ball_radius = -0.187, 0.015
     assert position(ball)[0] - board_x == pytest.approx(ball_radius, abs=5e-3)
     assert position(cup) == pytest.approx((0.05, 0.70, 0.501), abs=2e-3)
+
+
+def test_twin_shows_a_metre_beside_what_the_arm_does(ros, position):
+    launch(ros, "visual_robot")
+    arm, twin = "rpbi/kuka_lwr/lwr_arm_7_link", "rpbi/twin/lwr_arm_7_link"
+    start = wait_until(lambda: position(twin), "its frames are on TF")
+
+    def shows_it():
+        here, there = position(arm), position(twin)
+        return math.dist(there, start) > 0.05 and math.dist((here[0], here[1] + 1.0, here[2]), there) < 0.05
+
+    wait_until(shows_it, "the twin moves as the arm does")

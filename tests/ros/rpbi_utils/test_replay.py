@@ -6,30 +6,25 @@ import math
 import os
 import shutil
 import subprocess
-import sys
 import time
-from pathlib import Path
 
 import pytest
 import rosbag
 import rospy
 from geometry_msgs.msg import Quaternion, Transform, Twist, Vector3
+from mobile_base import mobile_base
+from node_world import add, main_config, publishing, remove
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from worlds import FLOOR, ball, box, iiwa
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "rpbi"))
-
-from mobile_base import mobile_base  # noqa: E402
-from node_world import add, main_config, publishing, remove  # noqa: E402
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
-from worlds import FLOOR, ball, box, iiwa  # noqa: E402
-
-from custom_ros_tools.srv import SetString, SetTransform  # noqa: E402
-from ros_pybullet_interface.msg import SimulationState, WorldCommands  # noqa: E402
-from ros_pybullet_interface.srv import ChangeDynamics, ResetJointState, SetJointState, StepN  # noqa: E402
-from rpbi_utils import Recorder  # noqa: E402
+from custom_ros_tools.srv import SetString, SetTransform
+from ros_pybullet_interface.msg import SimulationState, WorldCommands
+from ros_pybullet_interface.srv import ChangeDynamics, ResetJointState, SetJointState, StepN
+from rpbi_utils import Recorder
 
 TOPICS = ["/rpbi/world_description", "/rpbi/state", "/rpbi/commands"]
 JOINTS = ["lbr_iiwa_joint_1", "lbr_iiwa_joint_2", "lbr_iiwa_joint_4"]

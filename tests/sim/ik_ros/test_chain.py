@@ -11,11 +11,11 @@ import pytest
 
 from custom_ros_tools.errors import UnknownNameError
 from ik_ros.chain.description import read_chain
-from ik_ros.chain.forward_kinematics import Chain
+from ik_ros.chain.kdl import KdlChain
 from ik_ros.conformance import distances
-from ik_ros.limits import Limits
 from rpbi.geometry import Pose
 from rpbi.kinematics import Kinematics
+from rpbi.kinematics.limits import Limits
 
 DATA = Path(pybullet_data.getDataPath())
 LWR = Path(__file__).resolve().parents[3] / "src/rpbi_examples/robots/kuka_lwr.urdf"
@@ -67,7 +67,7 @@ def test_the_tip_is_where_pybullet_has_it_and_moves_as_its_jacobian_says(name, r
     path, base, tip = CHAINS[name]
     path = rig if path == "rig.urdf" else str(path)
     description = read_chain(path, base, tip)
-    chain = Chain(description)
+    chain = KdlChain(description)
     limits = Limits(description.lower, description.upper, description.is_revolute)
     robot = Kinematics(path)
     generator = random.Random(1)
@@ -111,12 +111,12 @@ def test_joints_limits_and_velocities_are_those_of_the_urdf(rig):
 def test_nothing_is_farther_than_the_reach(rig):
     for path, base, tip in CHAINS.values():
         description = read_chain(rig if path == "rig.urdf" else str(path), base, tip)
-        chain, limits = Chain(description), Limits(description.lower, description.upper, description.is_revolute)
+        chain, limits = KdlChain(description), Limits(description.lower, description.upper, description.is_revolute)
         generator = random.Random(2)
         poses = [chain.pose(limits.random(generator, limits.middle)) for _ in range(300)]
-        assert all(chain.may_reach(pose, (0.0, 0.0, 0.0)) for pose in poses)
-        assert not chain.may_reach(Pose((5.0, 0.0, 0.0)), (0.0, 0.0, 0.0))
-        assert chain.may_reach(Pose((5.0, 0.0, 0.0)), (5.0, 0.0, 0.0))
+        assert all(chain.reach.covers(pose.position) for pose in poses)
+        assert not chain.reach.covers((5.0, 0.0, 0.0))
+        assert chain.reach.covers((5.0, 0.0, 0.0), 5.0)
 
 
 @pytest.mark.parametrize(
@@ -154,5 +154,5 @@ def test_the_length_of_an_axis_does_not_matter(tmp_path):
     """PyBullet would let a joint slide twice as far."""
     path = tmp_path / "rig.urdf"
     path.write_text(RIG.replace('<axis xyz="1 0 0"/>', '<axis xyz="2 0 0"/>'))
-    chain = Chain(read_chain(str(path), "rail", "carriage"))
+    chain = KdlChain(read_chain(str(path), "rail", "carriage"))
     assert chain.pose([0.4]).position == pytest.approx((0.4, 0.0, 0.2))

@@ -8,7 +8,8 @@ import pytest
 from worlds import ball, write_world
 
 from custom_ros_tools.errors import ConfigError, PhysicsError
-from rpbi.bodies import DynamicObject, UrdfObject
+from rpbi.bodies.dynamic import DynamicObject
+from rpbi.bodies.urdf_object import UrdfObject
 from rpbi.world import World
 
 ARM = """

@@ -18,7 +18,9 @@ from rpbi.control.trajectories.request import (
     GoalTolerances,
     TrajectoryRefusedError,
     TrajectoryRequest,
-    Waypoint,
+)
+from rpbi.control.trajectories.request import (
+    TrajectoryPoint as Point,
 )
 from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
@@ -47,7 +49,7 @@ class Arm:
 
     def follow(
         self,
-        *points: Waypoint,
+        *points: Point,
         names: Sequence[str] = ARM,
         start_in_s: float | None = None,
         tolerances: GoalTolerances | None = GoalTolerances(),  # noqa: B008
@@ -82,7 +84,7 @@ def arm(tmp_path: Path) -> Arm:
 @pytest.mark.parametrize("mode", ["POSITION_CONTROL", "VELOCITY_CONTROL"])
 def test_follows_a_smooth_trajectory_to_a_hair(tmp_path, mode):
     arm = Arm(tmp_path, robot={"setJointMotorControlArray": {"controlMode": mode}})
-    motion = arm.follow(Waypoint(1.0, STRETCHED, STILL, STILL), Waypoint(2.0, STILL, STILL, STILL))
+    motion = arm.follow(Point(1.0, STRETCHED, STILL, STILL), Point(2.0, STILL, STILL, STILL))
     worst = arm.worst(1.999)
     assert worst.position < 1e-4 and worst.velocity < 0.02
     assert not motion.is_over
@@ -93,7 +95,7 @@ def test_follows_a_smooth_trajectory_to_a_hair(tmp_path, mode):
 
 def test_line_arrives_with_a_velocity_and_has_its_goal_time_to_stop(tmp_path):
     arm = Arm(tmp_path, {"constraints": {"goal_time": 0.2}})
-    motion = arm.follow(Waypoint(0.5, STRETCHED), Waypoint(1.0, STILL))
+    motion = arm.follow(Point(0.5, STRETCHED), Point(1.0, STILL))
     arm.step(1.2)
     assert motion.result.result().success
     assert arm.position == pytest.approx(STILL, abs=1e-3)
@@ -101,7 +103,7 @@ def test_line_arrives_with_a_velocity_and_has_its_goal_time_to_stop(tmp_path):
 
 
 def test_holds_its_goal_when_it_has_ended(arm):
-    arm.follow(Waypoint(0.5, STRETCHED, STILL))
+    arm.follow(Point(0.5, STRETCHED, STILL))
     arm.step(1.0)
     assert arm.robot.motion is None
     arm.step(2.0)
@@ -109,12 +111,12 @@ def test_holds_its_goal_when_it_has_ended(arm):
 
 
 def test_begins_at_its_stamp_and_leaves_out_points_that_are_past(arm):
-    arm.follow(Waypoint(0.5, STRETCHED, STILL), start_in_s=0.5)
+    arm.follow(Point(0.5, STRETCHED, STILL), start_in_s=0.5)
     arm.step(0.5)
     assert arm.position == pytest.approx(STILL, abs=1e-4)
     arm.step(0.5)
     assert arm.position == pytest.approx(STRETCHED, abs=1e-3)
-    arm.follow(Waypoint(0.1, STRETCHED, STILL), Waypoint(1.0, STILL, STILL), start_in_s=-0.5)
+    arm.follow(Point(0.1, STRETCHED, STILL), Point(1.0, STILL, STILL), start_in_s=-0.5)
     arm.step(0.5)
     assert arm.position == pytest.approx(STILL, abs=1e-3)
 
@@ -122,15 +124,15 @@ def test_begins_at_its_stamp_and_leaves_out_points_that_are_past(arm):
 def test_all_points_past_is_refused(arm):
     arm.step(1.0)
     with pytest.raises(TrajectoryRefusedError, match=r"all points are in the past, the last one by 0.4 s") as refused:
-        arm.follow(Waypoint(0.1, STRETCHED), start_in_s=-0.5)
+        arm.follow(Point(0.1, STRETCHED), start_in_s=-0.5)
     assert refused.value.code == ErrorCode.OLD_HEADER_TIMESTAMP
     assert arm.robot.motion is None
 
 
 def test_splices_smoothly_and_preempts(arm):
-    first = arm.follow(Waypoint(2.0, STRETCHED, STILL))
+    first = arm.follow(Point(2.0, STRETCHED, STILL))
     arm.step(1.0)
-    second = arm.follow(Waypoint(1.0, STILL, STILL), start_in_s=0.5)
+    second = arm.follow(Point(1.0, STILL, STILL), start_in_s=0.5)
     assert first.preempted and not first.result.result().success
     before = arm.follower.state(arm.time_s).velocity
     arm.step(0.4)  # still on the first one
@@ -144,7 +146,7 @@ def test_leaving_the_path_breaks_it_off_and_stops_the_arm(tmp_path):
     rock = box("rock", (0.2, 0.5, 1.0), basePosition=[0.8, 0.0, 1.0], baseMass=2000.0)
     constraints = {"lbr_iiwa_joint_2": {"trajectory": 0.05}}
     arm = Arm(tmp_path, {"constraints": constraints}, collision=(FLOOR,), dynamic=(rock,))
-    motion = arm.follow(Waypoint(3.0, (0.0, 1.2, *STILL[2:]), STILL))
+    motion = arm.follow(Point(3.0, (0.0, 1.2, *STILL[2:]), STILL))
     arm.step(3.5)
     assert not motion.result.result().success and motion.code == ErrorCode.PATH_TOLERANCE_VIOLATED
     assert "'lbr_iiwa_joint_2' is 0.05" in motion.result.result().message
@@ -162,7 +164,7 @@ def test_goal_may_be_reached_within_its_time_and_not_later(tmp_path):
         (tmp_path / f"{goal_time}").mkdir()
         keys = {"constraints": {"goal_time": goal_time, **{name: {"goal": 1e-3} for name in ARM}}}
         arm = Arm(tmp_path / f"{goal_time}", keys, robot=weak)
-        late[goal_time] = arm.follow(Waypoint(0.2, (0.3,) * 7, STILL))
+        late[goal_time] = arm.follow(Point(0.2, (0.3,) * 7, STILL))
         arm.step(3.3)
     assert late[0.0].code == ErrorCode.GOAL_TOLERANCE_VIOLATED
     assert "of its goal, 0.001 s after the end" in late[0.0].result.result().message
@@ -172,7 +174,7 @@ def test_goal_may_be_reached_within_its_time_and_not_later(tmp_path):
 def test_without_tolerances_nothing_is_looked_at(tmp_path):
     weak = {"setJointMotorControlArray": {"controlMode": "POSITION_CONTROL", "velocityGains": [0.05]}}
     arm = Arm(tmp_path, {"constraints": {name: {"goal": 1e-9, "trajectory": 1e-9} for name in ARM}}, robot=weak)
-    motion = arm.follow(Waypoint(0.2, (0.3,) * 7, STILL), tolerances=None)
+    motion = arm.follow(Point(0.2, (0.3,) * 7, STILL), tolerances=None)
     arm.step(0.3)
     assert motion.result.result().success
 
@@ -180,7 +182,7 @@ def test_without_tolerances_nothing_is_looked_at(tmp_path):
 @pytest.mark.parametrize("stop_s", [0.0, 0.3])
 def test_cancelling_stops_the_arm_in_the_time_that_is_set(tmp_path, stop_s):
     arm = Arm(tmp_path, {"stop_trajectory_duration": stop_s})
-    motion = arm.follow(Waypoint(2.0, STRETCHED, STILL))
+    motion = arm.follow(Point(2.0, STRETCHED, STILL))
     arm.step(1.0)
     at, speed = arm.position[0], arm.follower.state(arm.time_s).velocity[0]
     arm.follower.cancel("enough", arm.world.clock, motion)
@@ -191,15 +193,15 @@ def test_cancelling_stops_the_arm_in_the_time_that_is_set(tmp_path, stop_s):
 
 
 def test_cancelling_what_is_not_followed_any_more_does_nothing(arm):
-    first = arm.follow(Waypoint(2.0, STRETCHED, STILL))
-    second = arm.follow(Waypoint(0.5, STRETCHED, STILL))
+    first = arm.follow(Point(2.0, STRETCHED, STILL))
+    second = arm.follow(Point(0.5, STRETCHED, STILL))
     arm.follower.cancel("late", arm.world.clock, first)
     arm.step(0.6)
     assert second.result.result().success
 
 
 def test_empty_trajectory_makes_the_arm_hold(arm):
-    arm.follow(Waypoint(2.0, STRETCHED, STILL))
+    arm.follow(Point(2.0, STRETCHED, STILL))
     arm.step(1.0)
     held = arm.position
     hold = arm.follow(names=())
@@ -210,9 +212,9 @@ def test_empty_trajectory_makes_the_arm_hold(arm):
 
 def test_joints_that_are_left_out_go_on_with_theirs(tmp_path):
     arm = Arm(tmp_path, {"allow_partial_joints_goal": True})
-    arm.follow(Waypoint(2.0, (0.5, -0.5), (0.0, 0.0)), names=ARM[:2])
+    arm.follow(Point(2.0, (0.5, -0.5), (0.0, 0.0)), names=ARM[:2])
     arm.step(0.5)
-    arm.follow(Waypoint(0.5, (0.3,), (0.0,)), names=ARM[1:2])
+    arm.follow(Point(0.5, (0.3,), (0.0,)), names=ARM[1:2])
     arm.step(2.0)
     assert arm.position[:2] == pytest.approx((0.5, 0.3), abs=1e-3)
 
@@ -221,7 +223,7 @@ def test_cancelling_leaves_joints_alone_that_no_trajectory_drives(tmp_path):
     arm = Arm(tmp_path, {"allow_partial_joints_goal": True})
     target = arm.world.inputs["iiwa/target"]
     target.apply(target.check(JointTarget(["lbr_iiwa_joint_7"], [1.5])))
-    arm.follow(Waypoint(2.0, (0.5,), (0.0,)), names=ARM[:1])
+    arm.follow(Point(2.0, (0.5,), (0.0,)), names=ARM[:1])
     arm.step(0.05)
     arm.follower.cancel("enough", arm.world.clock)
     arm.step(2.0)
@@ -232,8 +234,8 @@ def test_only_its_own_joints_are_driven(tmp_path):
     arm = Arm(tmp_path, {"joints": list(ARM[4:])})
     assert arm.follower.joint_names == ARM[4:]
     with pytest.raises(TrajectoryRefusedError, match="unknown joint 'lbr_iiwa_joint_1'"):
-        arm.follow(Waypoint(1.0, STILL), names=ARM)
-    motion = arm.follow(Waypoint(0.5, (0.2, 0.3, 0.4), (0.0,) * 3), names=ARM[4:])
+        arm.follow(Point(1.0, STILL), names=ARM)
+    motion = arm.follow(Point(0.5, (0.2, 0.3, 0.4), (0.0,) * 3), names=ARM[4:])
     arm.step(0.6)
     assert motion.result.result().success
 
@@ -241,11 +243,11 @@ def test_only_its_own_joints_are_driven(tmp_path):
 def test_torque_control_refuses_and_tells_why(tmp_path):
     arm = Arm(tmp_path, robot={"setJointMotorControlArray": {"controlMode": "TORQUE_CONTROL"}})
     with pytest.raises(TrajectoryRefusedError, match="TORQUE_CONTROL"):
-        arm.follow(Waypoint(1.0, STRETCHED))
+        arm.follow(Point(1.0, STRETCHED))
 
 
 def test_world_that_stands_still_keeps_the_trajectory_and_breaks_off_timed_motions(arm):
-    motion = arm.follow(Waypoint(1.0, STRETCHED, STILL))
+    motion = arm.follow(Point(1.0, STRETCHED, STILL))
     arm.step(0.5)
     arm.world.pause("the simulation was stopped")
     assert not motion.is_over
@@ -260,7 +262,7 @@ def test_world_that_stands_still_keeps_the_trajectory_and_breaks_off_timed_motio
 
 @pytest.mark.parametrize("end", ["remove", "close"])
 def test_goal_is_answered_when_robot_or_world_goes(arm, end):
-    motion = arm.follow(Waypoint(1.0, STRETCHED, STILL))
+    motion = arm.follow(Point(1.0, STRETCHED, STILL))
     arm.step(0.2)
     if end == "remove":
         arm.world.remove("iiwa")
@@ -272,7 +274,7 @@ def test_goal_is_answered_when_robot_or_world_goes(arm, end):
 
 
 def test_timed_motion_takes_over_and_tells_so(arm):
-    motion = arm.follow(Waypoint(1.0, STRETCHED, STILL))
+    motion = arm.follow(Point(1.0, STRETCHED, STILL))
     arm.step(0.2)
     arm.robot.run(TimedMotion(arm.robot.model, {0: 0.0}, 0.5))
     assert "a newer motion replaced it" in motion.result.result(timeout=0).message
@@ -281,7 +283,7 @@ def test_timed_motion_takes_over_and_tells_so(arm):
 def test_feedback_comes_at_its_rate_of_ticks_with_errors_of_one_time(tmp_path):
     arm = Arm(tmp_path, {"action_monitor_rate": 25})
     fed: list[Any] = []
-    arm.follow(Waypoint(1.0, STRETCHED, STILL), feedback=fed.append)
+    arm.follow(Point(1.0, STRETCHED, STILL), feedback=fed.append)
     arm.step(1.1)
     times = [state.time_from_start_s for state in fed]
     assert len(times) in (25, 26)
@@ -295,9 +297,9 @@ def test_same_trajectories_give_the_same_motion_bit_for_bit(tmp_path):
     for number in range(2):
         (tmp_path / str(number)).mkdir()
         arm = Arm(tmp_path / str(number))
-        arm.follow(Waypoint(1.0, STRETCHED, STILL))
+        arm.follow(Point(1.0, STRETCHED, STILL))
         arm.step(0.7)
-        arm.follow(Waypoint(0.8, STILL, STILL), start_in_s=0.1)
+        arm.follow(Point(0.8, STILL, STILL), start_in_s=0.1)
         arm.step(1.0)
         runs.append(arm.follower.state(arm.time_s))
     assert runs[0] == runs[1]

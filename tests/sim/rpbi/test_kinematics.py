@@ -86,8 +86,12 @@ def _assert_solved(kinematics, link, goal, solution):
     distance, angle = _far(kinematics.forward(solution.positions, link), goal)
     assert solution.success, solution.message
     assert distance <= 1e-3 and angle <= 0.01, "success is told only where it is true"
+    _assert_within_limits(kinematics, solution)
+
+
+def _assert_within_limits(kinematics, solution):
     limits = kinematics.limits
-    assert (solution.positions >= limits.lower).all() and (solution.positions <= limits.upper).all()
+    assert all(low <= q <= high for low, q, high in zip(limits.lower, solution.positions, limits.upper))
 
 
 def test_forward_kinematics_are_those_of_the_simulated_robot(tmp_path):
@@ -122,6 +126,16 @@ def test_reachable_poses_are_reached_within_limits(arm, start):
         near = np.clip(near, kinematics.limits.lower, kinematics.limits.upper)
         problem = IKProblem(link, *goal, currentPosition=list(near) if start == "near" else elbow)
         _assert_solved(kinematics, link, goal, kinematics.solve(problem))
+
+
+def test_from_near_a_limit_no_joint_goes_to_the_other_one(iiwa_arm):
+    """On the way to a near solution, joints overshoot their limits; there they stop."""
+    generator = np.random.default_rng(7)
+    for positions in _random_positions(iiwa_arm, 400):
+        near = np.clip(positions + generator.normal(0.0, 0.1, 7), iiwa_arm.limits.lower, iiwa_arm.limits.upper)
+        goal = iiwa_arm.forward(positions, "lbr_iiwa_link_7")
+        solution = iiwa_arm.solve(IKProblem("lbr_iiwa_link_7", *goal, currentPosition=near))
+        assert solution.success and np.abs(np.subtract(solution.positions, near)).max() < 1.0
 
 
 def test_selectively_damped_least_squares_reach_too_and_pybullet_survives_it(arm):
@@ -159,8 +173,7 @@ def test_a_robot_that_is_there_stays(iiwa_arm):
 def test_an_unreachable_target_is_a_failure_with_the_residual_and_the_best_within_limits(iiwa_arm, position):
     solution = iiwa_arm.solve(IKProblem("lbr_iiwa_link_7", position, (0.0, 0.0, 0.0, 1.0), currentPosition=ELBOW))
     assert not solution.success
-    limits = iiwa_arm.limits
-    assert (solution.positions >= limits.lower).all() and (solution.positions <= limits.upper).all()
+    _assert_within_limits(iiwa_arm, solution)
     left = math.dist(iiwa_arm.forward(solution.positions, "lbr_iiwa_link_7").position, position)
     assert left == pytest.approx(solution.position_error_m)
     assert f"misses its target by {left * 1e3:.4g} mm and {solution.orientation_error_rad:.3g} rad" in solution.message
@@ -255,7 +268,7 @@ def test_a_threshold_that_cannot_be_met_does_not_lead_away_from_the_near_solutio
         goal = iiwa_arm.forward(positions, link)
         solution = iiwa_arm.solve(IKProblem(link, *goal, currentPosition=near, residualThreshold=1e-15))
         assert solution.success
-        assert np.abs(solution.positions - near).max() < 0.5
+        assert np.abs(np.subtract(solution.positions, near)).max() < 0.5
 
 
 def test_few_iterations_get_less_far_but_never_outside_limits(iiwa_arm):

@@ -13,7 +13,7 @@ from soft_meshes import DEFORMABLE, GROUND, MASS_KG, block, write_block
 from worlds import box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, PhysicsError, UnknownNameError
-from rpbi.bodies import SoftObject
+from rpbi.bodies.soft import SoftObject
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.config.pybullet_soft_models import CreateSoftBodyAnchor, LoadSoftBody
 from rpbi.geometry import Pose

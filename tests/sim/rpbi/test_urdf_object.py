@@ -10,7 +10,7 @@ import pytest
 from worlds import FLOOR, ball, write_world
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.bodies import UrdfObject
+from rpbi.bodies.urdf_object import UrdfObject
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose
 from rpbi.render.mirror import Mirror

@@ -8,7 +8,7 @@ import pytest
 from worlds import ball, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.bodies import VisualRobot
+from rpbi.bodies.robots.visual_robot import VisualRobot
 from rpbi.geometry import Pose
 from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
@@ -150,11 +150,18 @@ def test_gravity_compensation_of_a_spherical_joint_is_refused(build, tmp_path):
 def test_gravity_compensation_of_a_robot_without_joints_does_nothing(build, tmp_path):
     urdf = tmp_path / "stone.urdf"
     urdf.write_text(STONE)
-    world = build(
-        iiwa(
-            loadURDF={"fileName": str(urdf)},
-            setJointMotorControlArray={"controlMode": "TORQUE_CONTROL"},
-            gravity_compensation=True,
+    worlds = [
+        build(
+            iiwa(
+                loadURDF={"fileName": str(urdf)},
+                setJointMotorControlArray={"controlMode": "TORQUE_CONTROL"},
+                gravity_compensation=compensates,
+            )
         )
-    )
-    run(world, 10)
+        for compensates in (True, False)
+    ]
+    for world in worlds:
+        run(world, 10)
+    fallen, also_fallen = (world.bodies["iiwa"].base_pose() for world in worlds)
+    assert fallen == also_fallen
+    assert fallen.position[2] < -0.01

@@ -16,6 +16,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 ROBOTS = Path(__file__).resolve().parents[3] / "src" / "rpbi_examples" / "robots"
 MESHES = ROBOTS / "kuka_lwr"
+TOOLS = ROBOTS.parents[2] / "tools/kuka_lwr"
 URDF = ElementTree.parse(ROBOTS / "kuka_lwr.urdf")
 HOME_DEG = (0, 30, 0, -90, 0, 60, 0)
 ARM_LINKS = [f"lwr_arm_{i}_link" for i in range(8)]
@@ -162,7 +163,7 @@ def test_inertias_belong_to_bodies_that_can_exist() -> None:
 
 
 def test_inertias_are_those_of_the_meshes() -> None:
-    script = subprocess.run([sys.executable, MESHES / "print_inertials.py"], capture_output=True, text=True, check=True)
+    script = subprocess.run([sys.executable, TOOLS / "print_inertials.py"], capture_output=True, text=True, check=True)
     text = (ROBOTS / "kuka_lwr.urdf").read_text()
     printed = [line for line in script.stdout.splitlines() if line.startswith(" ")]
     assert len(printed) == 5 * len(ARM_LINKS + TOOL_LINKS)
@@ -170,7 +171,7 @@ def test_inertias_are_those_of_the_meshes() -> None:
 
 
 def test_script_makes_the_meshes_again(tmp_path: Path) -> None:
-    subprocess.run([sys.executable, MESHES / "make_meshes.py", "--out", tmp_path], check=True)
+    subprocess.run([sys.executable, TOOLS / "make_meshes.py", "--out", tmp_path], check=True)
     made = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     kept = {path.name: path.read_bytes() for path in MESHES.iterdir() if path.suffix in (".obj", ".mtl")}
     assert sorted(made) == sorted(kept)

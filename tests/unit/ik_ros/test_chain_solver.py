@@ -8,8 +8,8 @@ import pytest
 from planar_arm import planar_arm
 
 from ik_ros.chain.solver import ChainConfig, ChainSolver
-from ik_ros.limits import TURN
 from ik_ros.problem import IKProblem
+from rpbi.kinematics.limits import TURN
 
 TRUTH = (0.2, 1.0, -0.9)
 

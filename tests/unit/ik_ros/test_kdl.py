@@ -11,7 +11,7 @@ import pytest
 from planar_arm import LIMITED, planar_arm
 
 from custom_ros_tools.errors import ConfigError, UnknownNameError
-from ik_ros.chain.goal import Goal
+from ik_ros.chain.kdl import Goal
 from ik_ros.conformance import distances, random_quat
 from ik_ros.lookup import make_solver
 from ik_ros.problem import IKProblem

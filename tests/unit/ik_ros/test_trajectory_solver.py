@@ -17,7 +17,7 @@ from tree_robot import TREE
 
 from custom_ros_tools.errors import ConfigError, UnknownNameError
 from ik_ros.lookup import make_solver
-from ik_ros.problem import IKProblem, IKSolution, JointTrajectory, Waypoint
+from ik_ros.problem import IKProblem, IKSolution, SampledTrajectory, Waypoint
 from ik_ros.solvers.trajectory import KEPT_PROGRAMS, TrajectorySolver
 from ik_ros.trajectory.forward_kinematics import ForwardKinematics, rotation_vector
 from ik_ros.trajectory.program import Program
@@ -59,13 +59,13 @@ def start(positions: Any = BENT) -> dict[str, float]:
     return dict(zip(JOINTS, positions))
 
 
-def checked(solution: IKSolution) -> JointTrajectory:
+def checked(solution: IKSolution) -> SampledTrajectory:
     assert solution.success, solution.message
     assert solution.trajectory is not None
     return solution.trajectory
 
 
-def at(trajectory: JointTrajectory, time_s: float) -> list[float]:
+def at(trajectory: SampledTrajectory, time_s: float) -> list[float]:
     """Returns the positions at one of a trajectory's times."""
     i = int(np.argmin(np.abs(np.array(trajectory.times_s) - time_s)))
     assert trajectory.times_s[i] == pytest.approx(time_s)
@@ -133,7 +133,7 @@ def test_obstacles_are_gone_around(kinematics):
     ways = [(side * 0.7, 0.9, 0.0, -1.0, 0.0, 1.0, 0.0) for side in (-1.0, 1.0)]
     problem = IKProblem(start=start(ways[0]), waypoints=(Waypoint(4.0, kinematics.forward(ways[1], TIP)),))
 
-    def nearest_to_pole(trajectory: JointTrajectory) -> float:
+    def nearest_to_pole(trajectory: SampledTrajectory) -> float:
         tips = [kinematics.forward(q, TIP).position for q in trajectory.positions]
         return min(math.hypot(x - 0.6, y, max(0.0, z - 0.7)) for x, y, z in tips) - 0.08 - 0.05
 

@@ -17,7 +17,9 @@ from rpbi.control.trajectories.request import (
     JointTolerance,
     TrajectoryRefusedError,
     TrajectoryRequest,
-    Waypoint,
+)
+from rpbi.control.trajectories.request import (
+    TrajectoryPoint as Point,
 )
 from rpbi.control.trajectories.tolerances import resolved_tolerances
 from rpbi.control.trajectories.trajectory import Knot, Trajectory
@@ -35,7 +37,7 @@ NAMES = tuple(JOINTS)
 STILL = (0.0, 0.0, 0.0)
 
 
-def request(*points: Waypoint, names: tuple[str, ...] = NAMES) -> TrajectoryRequest:
+def request(*points: Point, names: tuple[str, ...] = NAMES) -> TrajectoryRequest:
     return TrajectoryRequest(names, points)
 
 
@@ -45,7 +47,7 @@ def standing(position: float, time_s: float = 0.0) -> Trajectory:
 
 def test_columns_go_to_the_joints_that_are_named():
     joint_trajectories = validate_trajectory(
-        request(Waypoint(1.0, (0.1, 0.2, 0.3)), names=("wheel", "a", "b")), JOINTS, False
+        request(Point(1.0, (0.1, 0.2, 0.3)), names=("wheel", "a", "b")), JOINTS, False
     )
     assert {course.joint.name: course.trajectory.goal[0] for course in joint_trajectories} == {
         "wheel": 0.1,
@@ -57,30 +59,30 @@ def test_columns_go_to_the_joints_that_are_named():
 @pytest.mark.parametrize(
     "asked, code, message",
     [
-        (request(Waypoint(1.0, STILL), names=("a", "b", "c")), -2, "unknown joint 'c'"),
-        (request(Waypoint(1.0, STILL), names=("a", "b", "a")), -2, "joint 'a' is named more than once"),
-        (request(Waypoint(1.0, (0.0, 0.0)), names=("a", "b")), -2, "missing: wheel"),
-        (request(Waypoint(1.0, (), STILL)), -1, "point 0: expected positions of 3 joints, got 0"),
-        (request(Waypoint(1.0, STILL, (0.0,))), -1, "point 0: expected velocities of 3 joints, got 1"),
-        (request(Waypoint(1.0, STILL, STILL, (0.0,) * 4)), -1, "point 0: expected accelerations of 3 joints, got 4"),
-        (request(Waypoint(1.0, STILL, (), STILL)), -1, "point 0: accelerations need velocities"),
-        (request(Waypoint(1.0, STILL), Waypoint(1.0, STILL)), -1, "point 1: times must increase strictly"),
-        (request(Waypoint(1.0, (0.0, math.nan, 0.0))), -1, "point 0: positions must be finite, got nan for joint 'b'"),
-        (request(Waypoint(1.0, STILL, (INF, 0.0, 0.0))), -1, "velocities must be finite, got inf for joint 'a'"),
-        (request(Waypoint(1.0, STILL), Waypoint(2.0, (0.0, -2.1, 0.0))), -1, "point 1: joint 'b' must be within -2 to"),
-        (request(Waypoint(1.0, STILL, (0.0, 3.1, 0.0))), -1, "joint 'b' would need 3.1 rad/s at point 0"),
+        (request(Point(1.0, STILL), names=("a", "b", "c")), -2, "unknown joint 'c'"),
+        (request(Point(1.0, STILL), names=("a", "b", "a")), -2, "joint 'a' is named more than once"),
+        (request(Point(1.0, (0.0, 0.0)), names=("a", "b")), -2, "missing: wheel"),
+        (request(Point(1.0, (), STILL)), -1, "point 0: expected positions of 3 joints, got 0"),
+        (request(Point(1.0, STILL, (0.0,))), -1, "point 0: expected velocities of 3 joints, got 1"),
+        (request(Point(1.0, STILL, STILL, (0.0,) * 4)), -1, "point 0: expected accelerations of 3 joints, got 4"),
+        (request(Point(1.0, STILL, (), STILL)), -1, "point 0: accelerations need velocities"),
+        (request(Point(1.0, STILL), Point(1.0, STILL)), -1, "point 1: times must increase strictly"),
+        (request(Point(1.0, (0.0, math.nan, 0.0))), -1, "point 0: positions must be finite, got nan for joint 'b'"),
+        (request(Point(1.0, STILL, (INF, 0.0, 0.0))), -1, "velocities must be finite, got inf for joint 'a'"),
+        (request(Point(1.0, STILL), Point(2.0, (0.0, -2.1, 0.0))), -1, "point 1: joint 'b' must be within -2 to"),
+        (request(Point(1.0, STILL, (0.0, 3.1, 0.0))), -1, "joint 'b' would need 3.1 rad/s at point 0"),
         (
-            request(Waypoint(1.0, STILL), Waypoint(1.5, (1.6, 0.0, 0.0))),
+            request(Point(1.0, STILL), Point(1.5, (1.6, 0.0, 0.0))),
             -1,
             "joint 'a' would need 3.2 rad/s between points 0 and 1; its limit is 3",
         ),
         (
-            request(Waypoint(1.0, STILL, STILL), Waypoint(1.5, (1.5, 0.0, 0.0), STILL)),
+            request(Point(1.0, STILL, STILL), Point(1.5, (1.5, 0.0, 0.0), STILL)),
             -1,
             "joint 'a' would need 4.5 rad/s between points 0 and 1",
         ),
         (
-            request(Waypoint(1.0, (1.9, 0.0, 0.0), (2.0, 0.0, 0.0)), Waypoint(2.0, (1.9, 0.0, 0.0), (-2.0, 0.0, 0.0))),
+            request(Point(1.0, (1.9, 0.0, 0.0), (2.0, 0.0, 0.0)), Point(2.0, (1.9, 0.0, 0.0), (-2.0, 0.0, 0.0))),
             -1,
             "joint 'a' must be within -2 to 2 rad, got 2.4, where the curve swings between points 0 and 1",
         ),
@@ -94,7 +96,7 @@ def test_what_cannot_be_followed_is_refused_with_its_code(asked, code, message):
 
 
 def test_part_of_the_joints_will_do_where_that_is_allowed():
-    joint_trajectories = validate_trajectory(request(Waypoint(1.0, (0.5,)), names=("b",)), JOINTS, True)
+    joint_trajectories = validate_trajectory(request(Point(1.0, (0.5,)), names=("b",)), JOINTS, True)
     assert [course.joint.name for course in joint_trajectories] == ["b"]
 
 
@@ -107,16 +109,16 @@ def test_planned_motion_at_the_speed_limit_is_not_refused_for_what_its_curve_mak
             ramp = min(t, 0.3)
             position = -1.5 + 5.0 * ramp**2 + 3.0 * (t - ramp)
             velocity, acceleration = 10.0 * ramp, 10.0 * (t < 0.3)
-            points.append(Waypoint(number * 0.1 + 0.1, (position,), (velocity,), (acceleration,)))
+            points.append(Point(number * 0.1 + 0.1, (position,), (velocity,), (acceleration,)))
         validate_trajectory(request(*points[:10], names=("a",)), {"a": JOINTS["a"]}, False)
 
 
-def joint_trajectory_of(*points: Waypoint, name: str = "a"):
+def joint_trajectory_of(*points: Point, name: str = "a"):
     return validate_trajectory(request(*points, names=(name,)), {name: JOINTS[name]}, False)[0]
 
 
 def test_joined_course_leaves_out_what_is_past_and_goes_straight_to_the_next_point():
-    course = joint_trajectory_of(Waypoint(0.5, (1.0,)), Waypoint(1.5, (0.5,)), Waypoint(2.5, (-0.5,)))
+    course = joint_trajectory_of(Point(0.5, (1.0,)), Point(1.5, (0.5,)), Point(2.5, (-0.5,)))
     joined = course.joined(standing(0.0), start_s=9.0, from_s=10.0)
     assert [joined.sample(t).position[0] for t in (9.0, 10.0, 10.25, 10.5, 11.0, 11.5)] == pytest.approx(
         [0.0, 0.0, 0.25, 0.5, 0.0, -0.5]
@@ -125,7 +127,7 @@ def test_joined_course_leaves_out_what_is_past_and_goes_straight_to_the_next_poi
 
 def test_joined_course_begins_with_the_motion_under_way():
     current = Trajectory([Knot(0.0, (0.0,), (0.0,)), Knot(2.0, (1.0,), (0.0,))])
-    course = joint_trajectory_of(Waypoint(1.0, (-0.5,), (0.0,)))
+    course = joint_trajectory_of(Point(1.0, (-0.5,), (0.0,)))
     joined = course.joined(current, start_s=1.0, from_s=1.0)
     before, after = joined.sample(1.0 - 1e-9), joined.sample(1.0 + 1e-9)
     assert after.position == pytest.approx(before.position, abs=1e-6)
@@ -139,7 +141,7 @@ def test_joined_course_begins_with_the_motion_under_way():
     [(0.0, 1.5 * math.pi, -0.5 * math.pi), (6.0 * math.pi, 0.5, 6.0 * math.pi + 0.5), (0.2, 0.3, 0.3)],
 )
 def test_joint_without_limits_takes_the_short_way_and_keeps_its_turns_from_then_on(now, asked, goes_to):
-    course = joint_trajectory_of(Waypoint(1.0, (asked,)), Waypoint(2.0, (asked + 7.0,)), name="wheel")
+    course = joint_trajectory_of(Point(1.0, (asked,)), Point(2.0, (asked + 7.0,)), name="wheel")
     joined = course.joined(standing(now), 0.0, 0.0)
     assert joined.sample(1.0).position[0] == pytest.approx(goes_to)
     assert joined.goal[0] == pytest.approx(goes_to + 7.0)
@@ -147,11 +149,11 @@ def test_joint_without_limits_takes_the_short_way_and_keeps_its_turns_from_then_
 
 def test_first_point_that_cannot_be_reached_in_time_is_refused():
     with pytest.raises(TrajectoryRefusedError, match="joint 'a' would need 15 rad/s on the way to point 0"):
-        joint_trajectory_of(Waypoint(0.1, (1.5,))).joined(standing(0.0), 0.0, 0.0)
+        joint_trajectory_of(Point(0.1, (1.5,))).joined(standing(0.0), 0.0, 0.0)
 
 
 def test_joint_that_was_pushed_beyond_its_limit_may_come_back():
-    joined = joint_trajectory_of(Waypoint(1.0, (1.0,))).joined(standing(2.3), 0.0, 0.0)
+    joined = joint_trajectory_of(Point(1.0, (1.0,))).joined(standing(2.3), 0.0, 0.0)
     assert joined.goal == (1.0,)
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.urdf.document import description_for_ros, joint_types, resolve_meshes
+from rpbi.urdf.document import UrdfDocument
+from rpbi.urdf.files import description_for_ros, resolve_meshes
 
 
 def urdf(folder: Path, inner: str) -> str:
@@ -63,4 +64,4 @@ def test_ros_gets_relative_meshes_with_their_folder_and_those_of_packages_as_the
 def test_characters_that_are_no_xml_are_left_out(tmp_path):
     path = urdf(tmp_path, "\0" + mesh("a.obj"))
     assert len(meshes(description_for_ros(path))) == 1
-    assert joint_types(path) == {}
+    assert UrdfDocument(path).joint_types == {}

@@ -4,7 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rpbi_examples.demo_report import as_text, measured_rates, tracking_error
+from rpbi_examples.demo_report import as_text, failures, measured_rates, slow_lines, tracking_error
+
+IMAGES, REQUIRED = ("/image", "/info"), ("/states", "/tf")
 
 
 def test_a_topic_below_95_percent_of_its_rate_is_found():
@@ -26,6 +28,58 @@ def test_the_summary_marks_what_came_too_seldom():
     lines = as_text({"topics": topics, "figures": {"overruns": 3}}).splitlines()
     assert [line.split()[0] for line in lines if "TOO FEW" in line] == ["/slow"]
     assert any(line.split() == ["overruns", "3"] for line in lines)
+
+
+def summary_of(real_time_factor=1.0, **messages):
+    """Returns the summary of 10 s in which topics had so many messages, of 1000; those that are not named had all."""
+    expected_hz = dict.fromkeys((*IMAGES, *REQUIRED, "/clock"), 100.0)
+    counts = {topic: messages.get(topic.strip("/"), 1000) for topic in expected_hz}
+    topics = measured_rates(counts, expected_hz, 10.0).to_dict(orient="index")
+    figures = {"real_time_factor": real_time_factor, "draw_rate_hz": 21.0, "load_average": 13.1, "cores": 2}
+    return {"topics": topics, "figures": figures}
+
+
+def slow(summary):
+    return slow_lines(summary, IMAGES, REQUIRED, "world.yaml")
+
+
+def test_what_reaches_its_rate_needs_no_word():
+    summary = summary_of()
+    assert failures(summary, REQUIRED) == slow(summary) == []
+
+
+def test_few_images_are_no_failure_but_one_line_with_what_limits_them_and_what_to_do():
+    summary = summary_of(image=39, info=120)
+    assert failures(summary, REQUIRED) == []
+    assert slow(summary) == [
+        "images came at 3.9 instead of 100 Hz: with a load of 13.1 on 2 cores, drawing alone reaches 21.0 Hz, "
+        "and cameras give way to all other programs. End other programs, or lower hz, width or height of rgbd_sensor "
+        "in world.yaml"
+    ]
+
+
+def test_a_clock_that_skips_ticks_is_no_failure_but_a_line():
+    summary = summary_of(clock=670)
+    assert failures(summary, REQUIRED) == []
+    assert [line.partition(":")[0] for line in slow(summary)] == ["/clock came at 67.0 instead of 100 Hz"]
+
+
+@pytest.mark.parametrize("topic", REQUIRED)
+def test_joint_states_or_tf_below_their_rate_are_a_failure_and_no_slowness(topic):
+    summary = summary_of(**{topic.strip("/"): 900})
+    assert failures(summary, REQUIRED) == [f"{topic} came at less than 95% of its rate"]
+    assert slow(summary) == []
+
+
+def test_physics_below_real_time_is_a_failure():
+    assert failures(summary_of(real_time_factor=0.94), REQUIRED) == [
+        "physics ran at 94% of real time, with a load of 13.1 on 2 cores"
+    ]
+
+
+def test_where_all_topics_are_required_few_images_are_a_failure():
+    summary = summary_of(image=39)
+    assert failures(summary, summary["topics"]) == ["/image came at less than 95% of its rate"]
 
 
 def test_tracking_error_compares_with_the_target_that_held_and_by_joint_name():

@@ -18,9 +18,9 @@ import pytest
 from custom_ros_tools.errors import UnknownNameError
 from rpbi.geometry import Pose, Quaternion
 from rpbi.kinematics import Kinematics
+from rpbi.kinematics.limits import Limits
 from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
 
-from .limits import Limits
 from .lookup import make_solver
 from .problem import IKProblem, IKSolution
 from .solver import Solver

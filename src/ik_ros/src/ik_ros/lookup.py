@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import Any, cast
 
 from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.plugins import find_in_table
 from custom_ros_tools.schema import ConfigModel
-from rpbi.plugins import find_in_table
 
 from .solver import Solver
 from .solvers import SOLVERS

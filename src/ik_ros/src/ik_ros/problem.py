@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from rpbi.geometry import Pose
+from rpbi.geometry import Pose, normalized
 
 Vector = tuple[float, float, float]
 JointPositions = Mapping[str, float]
@@ -82,11 +82,9 @@ class IKProblem:
 def _pose(what: str, pose: Pose) -> Pose:
     x, y, z = _numbers(f"{what}: position", pose.position, 3)
     quaternion = _numbers(f"{what}: quaternion", pose.quat_xyzw, 4)
-    norm = math.hypot(*quaternion)
-    if norm < 1e-6:
+    if math.hypot(*quaternion) < 1e-6:
         raise ValueError(f"{what}: quaternion: must not be zero, got {quaternion}")
-    qx, qy, qz, qw = (component / norm for component in quaternion)
-    return Pose((x, y, z), (qx, qy, qz, qw))
+    return Pose((x, y, z), normalized(quaternion))
 
 
 def _numbers(what: str, values: Sequence[float], count: int | None = None) -> tuple[float, ...]:
@@ -103,7 +101,7 @@ def _number(what: str, value: float) -> float:
 
 
 @dataclass(frozen=True)
-class JointTrajectory:
+class SampledTrajectory:
     """Positions of n joints over time.
 
     Attributes:
@@ -141,5 +139,5 @@ class IKSolution:
     position_error_m: float = 0.0
     orientation_error_rad: float = 0.0
     alternatives: tuple[tuple[float, ...], ...] = ()
-    trajectory: JointTrajectory | None = None
+    trajectory: SampledTrajectory | None = None
     base_pose: Pose | None = None

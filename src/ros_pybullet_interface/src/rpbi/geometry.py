@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import pybullet
@@ -28,6 +30,13 @@ class Pose(NamedTuple):
     def inverse(self) -> Pose:
         """Returns the pose of the other frame in this one."""
         return Pose(*pybullet.invertTransform(*self))
+
+
+def normalized(quat_xyzw: Sequence[float]) -> Quaternion:
+    """Returns the unit quaternion of the same rotation."""
+    norm = math.hypot(*quat_xyzw)
+    x, y, z, w = (component / norm for component in quat_xyzw)
+    return x, y, z, w
 
 
 def plus(a: Vector, b: Vector) -> Vector:

@@ -1,84 +1,20 @@
-"""Classes of other packages, named as `module:Class`, and errors that name them when they fail."""
+"""What classes of other packages must have, and errors that name them when they fail."""
 
 from __future__ import annotations
 
-import importlib
 import math
-import pkgutil
-import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
-from custom_ros_tools.errors import InterfaceError, PluginError, UnknownNameError, hint
+from custom_ros_tools.errors import InterfaceError, PluginError
+from custom_ros_tools.plugins import cause_of, full_name, own_folders
 
 _Kind = TypeVar("_Kind")
 
 _OWN_PACKAGE = __name__.split(".")[0]
-_OWN_FOLDER = str(Path(__file__).parent)
-
-
-def find(name: str) -> Any:
-    """Returns what another package offers under a name.
-
-    Args:
-        name: `module:Name`, such as `my_robot_lab.conveyor:Conveyor`.
-
-    Raises:
-        ValueError: If there is no such thing, or its module cannot be imported.
-    """
-    module_name, _, attribute = name.partition(":")
-    if not attribute or not all(part.isidentifier() for part in module_name.split(".")):
-        raise ValueError(f"expected a name like 'my_package.my_module:MyClass', got '{name}'")
-    try:
-        module = importlib.import_module(module_name)
-    except Exception as error:
-        missing = error.name if isinstance(error, ModuleNotFoundError) else None
-        if missing is not None and f"{module_name}.".startswith(f"{missing}."):
-            raise ValueError(_is_missing(missing)) from None
-        raise ValueError(f"'{module_name}' cannot be imported: {cause_of(error)}") from error
-    if not hasattr(module, attribute):
-        known = [each for each in vars(module) if not each.startswith("_")]
-        raise ValueError(f"'{module_name}' has no '{attribute}'{hint(attribute, known)}")
-    return getattr(module, attribute)
-
-
-def find_class(name: str, base: type) -> Any:
-    """Returns a class of another package.
-
-    Args:
-        name: `module:Class`.
-        base: What it must be a subclass of.
-
-    Raises:
-        ValueError: If there is no such class.
-    """
-    found = find(name)
-    if isinstance(found, type) and issubclass(found, base):
-        return found
-    raise ValueError(f"expected a subclass of {full_name(base)}, got '{name}'")
-
-
-def find_in_table(name: str, base: type, table: Mapping[str, str], kind: str) -> Any:
-    """Returns a class of a table, or of another package.
-
-    Args:
-        name: A name of the table, or `module:Class`.
-        base: What a class of another package must be a subclass of.
-        table: `module:Class` by name; a module is imported when it is asked for.
-        kind: What the classes are, for the message.
-
-    Raises:
-        UnknownNameError: If the table does not have the name.
-        ValueError: If another package has no such class.
-        MissingDependency: If the module of the table says so.
-    """
-    if ":" in name:
-        return find_class(name, base)
-    if name not in table:
-        raise UnknownNameError(kind, name, [*table, "their_package.module:Class"])
-    return pkgutil.resolve_name(table[name])
+own_folders.append(str(Path(__file__).parent))
 
 
 def config_of(found: Any, base: type[_Kind]) -> type[_Kind]:
@@ -97,36 +33,9 @@ def config_of(found: Any, base: type[_Kind]) -> type[_Kind]:
     raise ValueError(f"expected a Config in '{full_name(found)}' that is a subclass of {full_name(base)}")
 
 
-def full_name(thing: Any) -> str:
-    """Returns the name by which `find` finds a class or function, or the class of anything else."""
-    named = thing if hasattr(thing, "__qualname__") else type(thing)
-    return f"{named.__module__}:{named.__qualname__}"
-
-
 def is_foreign(thing: Any) -> bool:
     """Tells whether a class or function, or the class of anything else, comes from another package."""
     return full_name(thing).split(":")[0].split(".")[0] != _OWN_PACKAGE
-
-
-def cause_of(error: Exception) -> str:
-    """Returns what happened and where in the other package, in one line."""
-    text = f"{type(error).__name__}: {error}"
-    places = [frame for frame in traceback.extract_tb(error.__traceback__) if _is_elsewhere(frame.filename)]
-    if not places or isinstance(error, SyntaxError):  # which tells its place itself
-        return text
-    return f"{text} ({places[-1].filename}, line {places[-1].lineno})"
-
-
-def _is_elsewhere(file: str) -> bool:
-    return not file.startswith((_OWN_FOLDER, "<frozen importlib")) and "/importlib/" not in file
-
-
-def _is_missing(module: str) -> str:
-    outer, _, inner = module.rpartition(".")
-    if not outer:
-        return f"no module '{module}': is its package built, and its workspace sourced?"
-    folders = getattr(importlib.import_module(outer), "__path__", ())
-    return f"'{outer}' has no module '{inner}'{hint(inner, [each.name for each in pkgutil.iter_modules(folders)])}"
 
 
 def blame(thing: Any, doing: str, error: Exception) -> None:

@@ -21,11 +21,11 @@ from rpbi.engine.contents import WorldContents
 from rpbi.engine.inputs import Input
 from rpbi.engine.mailbox import Mailbox
 from rpbi.engine.state_hash import state_hash
+from rpbi.sensors.rgbd import RgbdSensor
 from rpbi.sensors.sensor import Sensor
 
 from .bodies import BODY_TYPES, Body, BodyConfig
 from .plugins import blame, blaming
-from .sensors import RgbdSensor
 from .window import Window, check_recording
 
 log = logging.getLogger(__name__)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ def measured_rates(messages: Mapping[str, int], expected_hz: Mapping[str, float]
     Args:
         messages: Number of messages by topic.
         expected_hz: Rate by topic [Hz].
-        duration_s: Length of the recording [s] of ROS time.
+        duration_s: Time in which they came [s] of ROS time.
 
     Returns:
         One row a topic with the columns `messages`, `rate_hz`, `expected_hz` and `enough`.
@@ -103,6 +103,51 @@ def save_depth(depth_m: npt.NDArray[np.float32], far_m: float, path: Path) -> No
     axis.set_xlabel("column [px]")
     axis.set_ylabel("row [px]")
     _save(figure, path, "Depth image")
+
+
+def failures(summary: Mapping[str, Any], required: Collection[str]) -> list[str]:
+    """Returns a line for each required topic that came too seldom, and for physics that was too slow."""
+    factor = summary["figures"]["real_time_factor"]
+    lines = [] if factor >= ENOUGH else [f"physics ran at {factor:.0%} of real time, {_load(summary)}"]
+    return lines + [f"{topic} came at less than {ENOUGH:.0%} of its rate" for topic in _too_few(summary, required)]
+
+
+def slow_lines(summary: Mapping[str, Any], images: Collection[str], required: Collection[str], world: str) -> list[str]:
+    """Returns what came too seldom because the machine is slow or busy: what limits it, and what to do.
+
+    Args:
+        summary: The summary.
+        images: Topics of the camera; they share a line.
+        required: Topics that this is no excuse for.
+        world: Main YAML file.
+    """
+    topics, lines = summary["topics"], []
+    slow_images = _too_few(summary, images)
+    if slow_images:
+        slowest = min((topics[topic] for topic in slow_images), key=lambda row: row["rate_hz"])
+        lines.append(
+            f"images came at {_rate(slowest)}: {_load(summary)}, drawing alone reaches "
+            f"{summary['figures']['draw_rate_hz']:.1f} Hz, and cameras give way to all other programs. "
+            f"End other programs, or lower hz, width or height of rgbd_sensor in {world}"
+        )
+    others = _too_few(summary, topics.keys() - set(images) - set(required))
+    if others:
+        rates = ", ".join(f"{topic} came at {_rate(topics[topic])}" for topic in others)
+        lines.append(f"{rates}: {_load(summary)}, publishers wait for a processor. End other programs")
+    return lines
+
+
+def _too_few(summary: Mapping[str, Any], wanted: Collection[str]) -> list[str]:
+    return [topic for topic, row in summary["topics"].items() if topic in wanted and not row["enough"]]
+
+
+def _rate(row: Mapping[str, Any]) -> str:
+    return f"{row['rate_hz']:.1f} instead of {row['expected_hz']:g} Hz"
+
+
+def _load(summary: Mapping[str, Any]) -> str:
+    figures = summary["figures"]
+    return f"with a load of {figures['load_average']:.1f} on {figures['cores']} cores"
 
 
 def write_summary(summary: Mapping[str, Any], path: Path) -> None:

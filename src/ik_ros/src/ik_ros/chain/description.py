@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from xml.etree import ElementTree
 
 from custom_ros_tools.errors import UnknownNameError
-from rpbi.urdf.skeleton import Skeleton
-
-from .joint import ChainJoint
+from rpbi.urdf.document import UrdfDocument, UrdfJoint, chain_urdf
 
 
 @dataclass(frozen=True)
@@ -43,12 +40,11 @@ class ChainDescription:
         velocity_limits: Their largest speeds [rad/s or m/s], inf where there is none.
         is_revolute: Which of them turn.
         robot_joints: All joints of the robot.
-        urdf: A URDF of the chain alone, of bare links and joints.
     """
 
     base: str
     tip: str
-    joints: tuple[ChainJoint, ...]
+    joints: tuple[UrdfJoint, ...]
     drives: tuple[Drive, ...]
     joint_names: tuple[str, ...]
     lower: tuple[float, ...]
@@ -56,12 +52,16 @@ class ChainDescription:
     velocity_limits: tuple[float, ...]
     is_revolute: tuple[bool, ...]
     robot_joints: frozenset[str]
-    urdf: str
 
     @property
     def mimics(self) -> list[str]:
         """Names of the chain's joints that mimic others."""
         return [joint.name for joint in self.joints if joint.mimic is not None]
+
+    @property
+    def urdf(self) -> str:
+        """A URDF of the chain alone, of bare links and joints."""
+        return chain_urdf(self.joints)
 
 
 def read_chain(urdf_filename: str, base: str, tip: str) -> ChainDescription:
@@ -77,13 +77,12 @@ def read_chain(urdf_filename: str, base: str, tip: str) -> ChainDescription:
         UnknownNameError: If a link is not known.
         ValueError: If the chain cannot be solved for; it names the joint or link.
     """
-    root = ElementTree.fromstring(Skeleton(urdf_filename).text())
-    links = [link.get("name", "") for link in root.findall("link")]
+    document = UrdfDocument(urdf_filename, not_xml="expected well-formed XML")
     for name in (base, tip):
-        if name not in links:
-            raise UnknownNameError("link", name, links)
-    robot = {element.get("name", ""): ChainJoint.from_xml(element) for element in root.findall("joint")}
-    joints = _between(robot, base, tip)
+        if name not in document.links:
+            raise UnknownNameError("link", name, document.links)
+    robot = document.joints
+    joints = _between(document, base, tip)
     names, drives = _drives(robot, joints)
     lower, upper = _limits(robot, joints, names, drives)
     return ChainDescription(
@@ -97,30 +96,28 @@ def read_chain(urdf_filename: str, base: str, tip: str) -> ChainDescription:
         velocity_limits=tuple(robot[name].max_velocity for name in names),
         is_revolute=tuple(robot[name].is_revolute for name in names),
         robot_joints=frozenset(robot),
-        urdf=_urdf(joints),
     )
 
 
-def _between(robot: dict[str, ChainJoint], base: str, tip: str) -> list[ChainJoint]:
-    above = {joint.child: joint for joint in robot.values()}
-    joints: list[ChainJoint] = []
-    link, passed = tip, [tip]
-    while link != base:
-        joint = above.get(link)
-        if joint is None or joint.parent in passed:
-            raise ValueError(f"'{tip}' does not hang on '{base}'; above it are {', '.join(passed[1:]) or 'no links'}")
-        if not joint.is_moving and joint.type != "fixed":
+def _between(document: UrdfDocument, base: str, tip: str) -> list[UrdfJoint]:
+    joints: list[UrdfJoint] = []
+    above = document.joints_above(tip)
+    while (joints[-1].parent if joints else tip) != base:
+        name, kind, _ = next(above, ("", "", ""))
+        if not name:
+            passed = ", ".join(joint.parent for joint in joints) or "no links"
+            raise ValueError(f"'{tip}' does not hang on '{base}'; above it are {passed}")
+        joint = document.joints[name]
+        if not joint.is_moving and kind != "fixed":
             kinds = "only revolute, continuous, prismatic and fixed ones are solved for"
-            raise ValueError(f"'{tip}' hangs on '{joint.name}', a {joint.type} joint; {kinds}")
-        joints.insert(0, joint)
-        link = joint.parent
-        passed.append(link)
+            raise ValueError(f"'{tip}' hangs on '{name}', a {kind} joint; {kinds}")
+        joints.append(joint)
     if not any(joint.is_moving for joint in joints):
         raise ValueError(f"no joint moves '{tip}' in '{base}'")
-    return joints
+    return joints[::-1]
 
 
-def _drives(robot: dict[str, ChainJoint], joints: Sequence[ChainJoint]) -> tuple[list[str], list[Drive]]:
+def _drives(robot: Mapping[str, UrdfJoint], joints: Sequence[UrdfJoint]) -> tuple[list[str], list[Drive]]:
     """Returns the joints to solve for, and what moves each joint of the chain."""
     names: list[str] = []
     drives = []
@@ -137,7 +134,7 @@ def _drives(robot: dict[str, ChainJoint], joints: Sequence[ChainJoint]) -> tuple
 
 
 def _limits(
-    robot: dict[str, ChainJoint], joints: Sequence[ChainJoint], names: Sequence[str], drives: Sequence[Drive]
+    robot: Mapping[str, UrdfJoint], joints: Sequence[UrdfJoint], names: Sequence[str], drives: Sequence[Drive]
 ) -> tuple[list[float], list[float]]:
     """Returns limits of the joints to solve for, within which joints that mimic them are within theirs too."""
     lower, upper = [robot[name].lower for name in names], [robot[name].upper for name in names]
@@ -148,11 +145,3 @@ def _limits(
         if lower[i] > upper[i]:
             raise ValueError(f"joint '{joint.name}' leaves '{names[i]}', which it mimics, no position within limits")
     return lower, upper
-
-
-def _urdf(joints: Sequence[ChainJoint]) -> str:
-    chain = ElementTree.Element("robot", name="chain")
-    for link in (joints[0].parent, *(joint.child for joint in joints)):
-        ElementTree.SubElement(chain, "link", name=link)
-    chain.extend(joint.to_xml() for joint in joints)
-    return ElementTree.tostring(chain, encoding="unicode")

@@ -12,15 +12,14 @@ from pydantic import ValidationInfo, model_validator
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.schema import ConfigModel, KeyedError, Text
-from ik_ros.limits import Limits, StartLimits
 from ik_ros.problem import IKProblem, IKSolution
-from ik_ros.solver import Solver
+from ik_ros.solver import Solver, StartLimits
 from rpbi.config.asset_files import ExistingFile
+from rpbi.kinematics.limits import Limits
 from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
 from .description import ChainDescription, read_chain
-from .forward_kinematics import Chain
-from .goal import Goal
+from .kdl import Goal, KdlChain
 
 
 class ChainConfig(ConfigModel):
@@ -67,7 +66,7 @@ class ChainSolver(Solver):
 
     def __init__(self, config: ChainConfig) -> None:
         self.description: ChainDescription = read_chain(config.urdf_filename, config.base_link, config.tip_link)
-        self.chain = Chain(self.description)
+        self.chain = KdlChain(self.description)
         self.joint_names = self.description.joint_names
         self.base_frame = self.description.base
         self.velocity_limits = self.description.velocity_limits
@@ -127,7 +126,9 @@ class ChainSolver(Solver):
 
     def is_beyond_reach(self, problem: IKProblem) -> bool:
         """Tells whether the target is farther away than the chain is long."""
-        return problem.target is not None and not self.chain.may_reach(problem.target, problem.position_tolerance)
+        if problem.target is None:
+            return False
+        return not self.chain.reach.covers(problem.target.position, math.hypot(*problem.position_tolerance))
 
     def _start(self, given: Mapping[str, float]) -> list[float]:
         """Returns n positions within limits [rad or m]."""
@@ -138,15 +139,10 @@ class ChainSolver(Solver):
         return self._start_limits.wrap_to_limits([given.get(name, position) for name, position in middle])
 
     def _in_words(self, problem: IKProblem, goal: Goal, residual: Residual) -> str:
-        with_angle = not goal.any_orientation
-        angle = f" and {residual.orientation_rad:.3g} rad" if with_angle else ""
-        tip, target = self.description.tip, "its target" if goal.is_point else "the tolerances of its target"
-        if residual.size <= 1.0:
-            return f"'{tip}' is within {residual.position_m * 1e3:.3g} mm{angle} of {target}"
-        enough = f"{POSITION_TOLERANCE_M * 1e3:g} mm"
-        enough += f" and {ORIENTATION_TOLERANCE_RAD:g} rad" if with_angle else ""
-        far = "; it is farther away than the chain is long" if self.is_beyond_reach(problem) else ""
-        return f"'{tip}' misses {target} by {residual.position_m * 1e3:.4g} mm{angle}; {enough} would do{far}"
+        target = "its target" if goal.is_point else "the tolerances of its target"
+        words = residual.in_words(self.description.tip, not goal.any_orientation, target)
+        is_far = residual.size > 1.0 and self.is_beyond_reach(problem)
+        return words + ("; it is farther away than the chain is long" if is_far else "")
 
 
 def refuse_mimics(description: ChainDescription, config: ChainConfig, solver: str) -> None:
@@ -158,3 +154,22 @@ def refuse_mimics(description: ChainDescription, config: ChainConfig, solver: st
     if mimics := description.mimics:
         message = f"{', '.join(mimics)}: '{solver}' cannot solve for joints that mimic others; 'kdl' can"
         raise ConfigError([Problem(config.urdf_filename, "", message)])
+
+
+def refuse_boxes(problem: IKProblem, solver: str, may_turn: bool = False) -> None:
+    """Refuses tolerances that are larger than what counts as reached anyway.
+
+    Args:
+        problem: The question.
+        solver: Name of the solver that cannot make use of them.
+        may_turn: Whether it can make use of those for rotations.
+
+    Raises:
+        ValueError: If there are some; it names the field.
+    """
+    limits = [("position_tolerance", POSITION_TOLERANCE_M), ("rotation_tolerance", ORIENTATION_TOLERANCE_RAD)]
+    for name, most in limits[:1] if may_turn else limits:
+        values = getattr(problem, name)
+        if max(values) > most:
+            advice = "the solver 'kdl' makes use of them"
+            raise ValueError(f"{name}: '{solver}' takes none above {most:g}, got {values}; {advice}")

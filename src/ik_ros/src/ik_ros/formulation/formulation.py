@@ -8,12 +8,12 @@ from typing import Annotated, Any, NamedTuple, cast
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, UnknownNameError
+from custom_ros_tools.plugins import find_in_table
 from custom_ros_tools.schema import ConfigModel, Count, KeyedError, ListOf, Position, Quat, Switch, Text
 from ik_ros.shape import ShapeConfig
 from ik_ros.tasks import TASKS
 from rpbi.config.asset_files import ExistingFile
 from rpbi.geometry import Pose
-from rpbi.plugins import find_in_table
 
 from .frame_task import FrameTask
 from .robot import Robot

@@ -12,7 +12,7 @@ import pinocchio as pin
 from custom_ros_tools.errors import UnknownNameError
 from custom_ros_tools.schema import KeyedError, ListOf, Text
 from ik_ros.problem import IKProblem
-from rpbi.geometry import Pose
+from rpbi.geometry import Pose, normalized
 from rpbi.kinematics.residual import Residual
 
 from .robot import Robot, to_se3
@@ -75,9 +75,7 @@ class FrameTask(Task):
         if len(values) != 7 or math.hypot(*values[3:]) < 1e-6:
             raise ValueError(f"expected {self.goal_words}, got {list(values)}")
         x, y, z, *quaternion = values
-        norm = math.hypot(*quaternion)
-        qx, qy, qz, qw = (component / norm for component in quaternion)
-        return Pose((x, y, z), (qx, qy, qz, qw))
+        return Pose((x, y, z), normalized(quaternion))
 
     def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
         """See `Task`."""

@@ -4,53 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
-from ik_ros.limits import Limits
 from ik_ros.shape import ShapeConfig
 from rpbi.geometry import Pose
-from rpbi.urdf.document import read_urdf
+from rpbi.kinematics.limits import Limits
+from rpbi.urdf.document import MOVING, UrdfDocument
 
 from .clearance import RobotShape
-
-
-def read_plain(urdf_path: str) -> tuple[str, dict[str, str]]:
-    """Reads a robot description in which every joint with one axis shall have one number in Pinocchio.
-
-    Args:
-        urdf_path: The description.
-
-    Returns:
-        Its text, with limits, which mean none, for joints that turn without end; and the type of each joint by name.
-
-    Raises:
-        ConfigError: If it cannot be read.
-    """
-    try:
-        root = ElementTree.fromstring(read_urdf(urdf_path))
-    except ElementTree.ParseError as error:
-        raise ConfigError([Problem(urdf_path, "", f"is not XML: {error}")]) from None
-    except OSError as error:
-        raise ConfigError([Problem(urdf_path, "", (error.strerror or str(error)).lower())]) from None
-    types = {joint.get("name", ""): _make_plain(joint) for joint in root.findall("joint")}
-    return ElementTree.tostring(root, encoding="unicode"), types
-
-
-def _make_plain(joint: ElementTree.Element) -> str:
-    """Makes a joint that turns without end one with limits, which has one number in Pinocchio; returns its type."""
-    kind = joint.get("type", "")
-    if kind == "continuous":
-        joint.set("type", "revolute")
-        limit = joint.find("limit")
-        if limit is None:
-            limit = ElementTree.SubElement(joint, "limit", effort="0", velocity="0")
-        limit.set("lower", "0")
-        limit.set("upper", "0")
-    return kind
 
 
 def to_se3(pose: Pose) -> Any:
@@ -101,9 +65,11 @@ class Robot:
     def __init__(
         self, urdf_path: str, floating: bool = False, joints: Sequence[str] = (), base: str | None = None
     ) -> None:
-        urdf, types = read_plain(urdf_path)
+        document = UrdfDocument(urdf_path)
+        types = document.joint_types
         try:
-            self.model = pin.buildModelFromXML(urdf, *([pin.JointModelFreeFlyer()] if floating else []))
+            root = [pin.JointModelFreeFlyer()] if floating else []
+            self.model = pin.buildModelFromXML(document.with_limited_joints(), *root)
         except ValueError as error:
             raise ConfigError([Problem(urdf_path, "", f"Pinocchio cannot load it: {error}")]) from None
         self.data = self.model.createData()
@@ -111,7 +77,7 @@ class Robot:
         base_joints = 2 if floating else 1  # the world, and the root's own
         self.all_joints = tuple(self.model.names)[base_joints:]
         for name in self.all_joints:
-            if types[name] not in ("revolute", "continuous", "prismatic"):
+            if types[name] not in MOVING:
                 raise ConfigError([Problem(urdf_path, name, f"expected a joint of one axis, got a {types[name]} one")])
         self._still = frozenset(types) - frozenset(self.all_joints)
         self.links = tuple(frame.name for frame in self.model.frames if frame.type == pin.BODY)

@@ -13,8 +13,7 @@ from custom_ros_tools.joint_values import JointValues
 from ik_ros.msg import IKProblem as IKProblemMessage
 from ik_ros.msg import TaskGoal, TracIKProblem
 from ik_ros.msg import Waypoint as WaypointMessage
-from ik_ros.problem import IKProblem, IKSolution, JointPositions, Vector, Waypoint
-from ik_ros.problem import JointTrajectory as Trajectory
+from ik_ros.problem import IKProblem, IKSolution, JointPositions, SampledTrajectory, Vector, Waypoint
 from rpbi.geometry import Pose
 
 
@@ -93,7 +92,7 @@ def solution_message(solution: IKSolution) -> JointState:
     return JointState(name=list(solution.joint_names), position=list(solution.positions))
 
 
-def trajectory_message(joint_names: tuple[str, ...], trajectory: Trajectory | None) -> JointTrajectory:
+def trajectory_message(joint_names: tuple[str, ...], trajectory: SampledTrajectory | None) -> JointTrajectory:
     """Returns a trajectory as a message, to be followed from when it arrives; without one, it is empty."""
     if trajectory is None:
         return JointTrajectory()

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from custom_ros_tools.schema import Count, Positive
-from ik_ros.chain.goal import Goal
+from ik_ros.chain.kdl import Goal
 from ik_ros.problem import IKProblem
 
 from .kdl import KdlConfig, KdlSolver

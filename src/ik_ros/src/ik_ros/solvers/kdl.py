@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 import PyKDL
 
 from custom_ros_tools.schema import Count
-from ik_ros.chain.descent import levenberg_marquardt
-from ik_ros.chain.goal import Goal
+from ik_ros.chain.kdl import Goal
+from ik_ros.chain.levenberg_marquardt import levenberg_marquardt
 from ik_ros.chain.solver import ChainConfig, ChainSolver
 from ik_ros.problem import IKProblem
 
@@ -102,10 +102,8 @@ class KdlSolver(ChainSolver):
 
     def _starts(self, problem: IKProblem, start: list[float], restarts: int) -> Iterator[list[float]]:
         """Tells where to start: where it was asked for, and then at random."""
-        yield start
-        generator = random.Random(problem.seed)
-        for _ in range(min(restarts, RESTARTS_BEYOND_REACH) if self.is_beyond_reach(problem) else restarts):
-            yield self.limits.random(generator, start)
+        most = min(restarts, RESTARTS_BEYOND_REACH) if self.is_beyond_reach(problem) else restarts
+        return self.limits.starts(start, random.Random(problem.seed), most)
 
     def _nearest(self, goal: Goal, first: Sequence[float], near: Sequence[float]) -> tuple[list[float], bool]:
         """Returns where KDL gets to from `first`, brought into limits, and whether it arrived but for the limits."""

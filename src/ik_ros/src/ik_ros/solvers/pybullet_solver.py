@@ -9,12 +9,12 @@ from pydantic import model_validator
 
 from custom_ros_tools.schema import Count, KeyedError, ListOf, NonNegative
 from ik_ros.chain.description import read_chain
-from ik_ros.chain.goal import Goal, refuse_boxes
-from ik_ros.chain.solver import ChainConfig, ChainSolver, refuse_mimics
+from ik_ros.chain.kdl import Goal
+from ik_ros.chain.solver import ChainConfig, ChainSolver, refuse_boxes, refuse_mimics
 from ik_ros.problem import IKProblem
-from rpbi.kinematics import IKProblem as PybulletProblem
 from rpbi.kinematics import Kinematics
-from rpbi.urdf.document import write_description
+from rpbi.kinematics.problem import PybulletProblem
+from rpbi.urdf.files import write_description
 
 
 class PybulletConfig(ChainConfig):
@@ -69,8 +69,9 @@ class PybulletSolver(ChainSolver):
         refuse_mimics(self.description, config, "pybullet")
         self._options = config.options
         self._kinematics = Kinematics(write_description(self.description.urdf))
-        limits = self._kinematics.limits.narrowed(PybulletProblem(config.tip_link, (0.0, 0.0, 0.0), **self._options))
-        self.use_limits(limits.lower.tolist(), limits.upper.tolist())
+        question = PybulletProblem(config.tip_link, (0.0, 0.0, 0.0), **self._options)
+        limits = question.narrowed(self._kinematics.limits, self.joint_names)
+        self.use_limits(limits.lower, limits.upper)
 
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
         """Returns the first solution, else the best that was found; see `ChainSolver`.

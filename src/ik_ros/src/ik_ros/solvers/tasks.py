@@ -10,9 +10,8 @@ import numpy as np
 
 from custom_ros_tools.errors import MissingDependency, UnknownNameError
 from custom_ros_tools.schema import KeyedError
-from ik_ros.limits import StartLimits
 from ik_ros.problem import IKProblem, IKSolution
-from ik_ros.solver import Solver
+from ik_ros.solver import Solver, StartLimits
 from rpbi.kinematics.residual import Residual
 
 try:
@@ -21,9 +20,9 @@ try:
 except ImportError as error:
     raise MissingDependency(error.name or "pinocchio", "./rpbi setup ik") from None
 
-from ik_ros.formulation.descent import Candidate, Descent, Iterate
 from ik_ros.formulation.formulation import Formulation, TaskSet
 from ik_ros.formulation.frame_task import FrameTask
+from ik_ros.formulation.gauss_newton import Candidate, GaussNewton, Iterate
 from ik_ros.formulation.robot import from_base, to_se3
 
 AIM = 0.1
@@ -62,7 +61,7 @@ class TasksSolver(Solver):
         self.lower, self.upper = tuple(robot.lower.tolist()), tuple(robot.upper.tolist())
         self.velocity_limits = tuple(robot.max_velocity.tolist())
         self.base_frame = self.tasks.base_frame
-        self._descent = Descent(robot, list(self.tasks.parts.values()))
+        self._gauss_newton = GaussNewton(robot, list(self.tasks.parts.values()))
         self._names = list(self.tasks.parts)
         self._required = [
             (i, name, part.task) for i, (name, part) in enumerate(self.tasks.parts.items()) if part.is_required
@@ -123,7 +122,7 @@ class TasksSolver(Solver):
             except ValueError as error:
                 key = "target" if name == main else f"goals: {name}"
                 raise ValueError(f"{key}: {error}") from None
-        self._descent.begin()
+        self._gauss_newton.begin()
 
     def _search(self, problem: IKProblem, start: np.ndarray) -> Candidate:
         """Returns what was found from the first start that leads to a solution, else the best of all."""
@@ -165,7 +164,7 @@ class TasksSolver(Solver):
         best: Candidate | None = None
         sizes: list[float] = []
         merits: list[float] = []
-        for tried in self._descent(first):
+        for tried in self._gauss_newton(first):
             found = self._judged(tried)
             sizes.append(found.size)
             merits.append(tried.merit)

@@ -11,8 +11,8 @@ from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, MissingDependency, Problem
 from custom_ros_tools.schema import Count, Positive, Unit
-from ik_ros.chain.goal import Goal, refuse_boxes
-from ik_ros.chain.solver import ChainConfig, ChainSolver, refuse_mimics
+from ik_ros.chain.kdl import Goal
+from ik_ros.chain.solver import ChainConfig, ChainSolver, refuse_boxes, refuse_mimics
 from ik_ros.problem import IKProblem
 
 try:
@@ -73,9 +73,8 @@ class TracIkSolver(ChainSolver):
         """
         refuse_boxes(problem, "trac_ik")
         target = (*goal.frame.p, *goal.frame.M.GetQuaternion())
-        generator = random.Random(problem.seed)
-        for attempt in range(1 if self.is_beyond_reach(problem) else 1 + self._restarts):
-            first = self.limits.random(generator, start) if attempt else start
+        restarts = 0 if self.is_beyond_reach(problem) else self._restarts
+        for first in self.limits.starts(start, random.Random(problem.seed), restarts):
             status, *q = pytracik.ik(self._trac_ik, first, *target).tolist()
             if status >= 0:
                 return [q]

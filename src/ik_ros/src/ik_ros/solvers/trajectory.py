@@ -12,8 +12,8 @@ from functools import lru_cache
 import numpy as np
 
 from custom_ros_tools.errors import MissingDependency
-from ik_ros.chain.goal import Goal
-from ik_ros.problem import IKProblem, IKSolution, JointTrajectory, Waypoint
+from ik_ros.chain.kdl import Goal
+from ik_ros.problem import IKProblem, IKSolution, SampledTrajectory, Waypoint
 from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
 from .kdl import KdlSolver
@@ -214,10 +214,10 @@ class TrajectorySolver(KdlSolver):
                 problems.append(f"'{self.joint_names[i]}' {needs}")
         return problems
 
-    def _sampled(self, spline: Spline, points: np.ndarray, duration_s: float) -> JointTrajectory:
+    def _sampled(self, spline: Spline, points: np.ndarray, duration_s: float) -> SampledTrajectory:
         times = np.linspace(0.0, 1.0, max(1, math.ceil(duration_s / self._config.sample_s)) + 1)
         positions, velocities = spline.basis(times) @ points, spline.basis(times, 1) @ points / duration_s
-        return JointTrajectory(
+        return SampledTrajectory(
             times_s=tuple((times * duration_s).tolist()),
             positions=tuple(map(tuple, np.clip(positions, self.lower, self.upper).tolist())),
             velocities=tuple(map(tuple, velocities.tolist())),

@@ -9,8 +9,8 @@ import casadi
 import numpy as np
 
 from ik_ros.chain.description import ChainDescription
-from ik_ros.chain.joint import ChainJoint
 from rpbi.geometry import Pose
+from rpbi.urdf.document import UrdfJoint
 
 
 class ForwardKinematics:
@@ -62,7 +62,7 @@ def rotation_vector(rotation: Any) -> Any:
     return 2.0 * casadi.atan2(sine, w) / sine * v
 
 
-def _motion(joint: ChainJoint, q: Any) -> tuple[Any, Any]:
+def _motion(joint: UrdfJoint, q: Any) -> tuple[Any, Any]:
     """Returns how a joint turns and shifts what it carries, in its own frame."""
     axis = np.array(joint.axis)
     if not joint.is_revolute:

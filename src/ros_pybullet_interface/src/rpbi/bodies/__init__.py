@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-from rpbi.bodies.robots.mobile_robot import MobileRobot
-from rpbi.bodies.robots.robot import Robot
-from rpbi.bodies.robots.visual_robot import VisualRobot
-from rpbi.plugins import find_class, full_name
+from custom_ros_tools.plugins import ClassTable, find_class
 
 from .body import Body
 from .body_config import BodyConfig
-from .collision import CollisionObject
-from .dynamic import DynamicObject
-from .soft import SoftObject
-from .urdf_object import UrdfObject
-from .visual import VisualObject
 
-BODY_TYPES: dict[str, type[Body]] = {
-    "visual": VisualObject,
-    "collision": CollisionObject,
-    "dynamic": DynamicObject,
-    "robot": Robot,
-    "mobile_robot": MobileRobot,
-    "visual_robot": VisualRobot,
-    "urdf": UrdfObject,
-    "soft": SoftObject,
-}
-"""In the order in which a world loads them; soft bodies may be tied to any of the others."""
+BODY_TYPES = ClassTable(
+    {
+        "visual": "rpbi.bodies.visual:VisualObject",
+        "collision": "rpbi.bodies.collision:CollisionObject",
+        "dynamic": "rpbi.bodies.dynamic:DynamicObject",
+        "robot": "rpbi.bodies.robots.robot:Robot",
+        "mobile_robot": "rpbi.bodies.robots.mobile_robot:MobileRobot",
+        "visual_robot": "rpbi.bodies.robots.visual_robot:VisualRobot",
+        "urdf": "rpbi.bodies.urdf_object:UrdfObject",
+        "soft": "rpbi.bodies.soft:SoftObject",
+    }
+)
+"""In the order in which a world loads them; soft bodies may be attached to any of the others."""
 
 
 def body_class(kind: str) -> type[Body]:
@@ -37,26 +31,13 @@ def body_class(kind: str) -> type[Body]:
     Raises:
         ValueError: If there is none.
     """
-    return BODY_TYPES[kind] if kind in BODY_TYPES else find_class(kind, Body)
+    found: type[Body] = BODY_TYPES[kind] if kind in BODY_TYPES else find_class(kind, Body)
+    return found
 
 
 def kind_of(body: Body) -> str:
     """Returns the type of a body, by which `body_class` finds its class."""
-    return next((kind for kind, each in BODY_TYPES.items() if each is type(body)), full_name(body))
+    return BODY_TYPES.name_of(type(body))
 
 
-__all__ = [
-    "BODY_TYPES",
-    "Body",
-    "BodyConfig",
-    "CollisionObject",
-    "DynamicObject",
-    "MobileRobot",
-    "Robot",
-    "SoftObject",
-    "UrdfObject",
-    "VisualObject",
-    "VisualRobot",
-    "body_class",
-    "kind_of",
-]
+__all__ = ["BODY_TYPES", "Body", "BodyConfig", "body_class", "kind_of"]

@@ -9,13 +9,12 @@ from typing import Any, ClassVar
 import pybullet
 
 from custom_ros_tools.errors import PhysicsError
+from custom_ros_tools.schema import ConfigModel
 from rpbi.engine.client import Client
 from rpbi.engine.inputs import Input
 from rpbi.geometry import Pose, Twist, cross, minus, plus
 from rpbi.samples import BodyState
 from rpbi.sensors.sensor import Sensor
-
-from .body_config import BodyConfig
 
 
 class Body:
@@ -30,7 +29,7 @@ class Body:
         body_id: PyBullet's id of it, valid as long as it exists.
     """
 
-    Config: ClassVar[type[BodyConfig]]
+    Config: ClassVar[type[ConfigModel]]
     is_soft: ClassVar[bool] = False
     """Whether it has neither links nor a fixed shape."""
     section: ClassVar[str] = "objects"

@@ -8,10 +8,11 @@ from typing import Annotated, Any, Self
 from pydantic import AfterValidator, Field, ValidationInfo, WithJsonSchema, model_validator
 
 from custom_ros_tools.errors import ConfigError
+from custom_ros_tools.plugins import find_class
 from custom_ros_tools.schema import ConfigModel, Expects, InnerProblemsError, KeyedError, ListOf, Name
 from custom_ros_tools.schema.type_names import shown
 from rpbi.config.sensors import SensorConfig
-from rpbi.plugins import config_of, find_class
+from rpbi.plugins import config_of
 from rpbi.sensors.body_sensor import BodySensor
 
 

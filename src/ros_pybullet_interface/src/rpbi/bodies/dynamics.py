@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import pybullet
 
 from custom_ros_tools.errors import PhysicsError, UnknownNameError
 from rpbi.config.pybullet_models import ChangeDynamics
 
-if TYPE_CHECKING:
-    from .body import Body
+from .body import Body
 
 
 class LinkDynamics(NamedTuple):

@@ -19,7 +19,7 @@ from rpbi.samples import BodyState
 from rpbi.sensors.contact_arrows import contact_sensors
 from rpbi.sensors.sensor import Sensor
 from rpbi.sensors.surface import SurfaceSensor
-from rpbi.urdf.document import deformable_meshes
+from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.loading import load_urdf
 
 from .body import Body
@@ -163,8 +163,9 @@ def _load(pb: Client, config: SoftObjectConfig) -> int:
             raise ConfigError([Problem(config.name, "loadSoftBody", f"PyBullet could not load it: {error}")]) from None
     assert config.loadURDF is not None  # the model demands one of both
     urdf = config.loadURDF.fileName
-    problems = [fault for mesh in deformable_meshes(urdf) for fault in soft_mesh_problems(mesh)]
-    if not deformable_meshes(urdf):
+    files = UrdfDocument(urdf).deformable_meshes()
+    problems = [fault for mesh in files for fault in soft_mesh_problems(mesh)]
+    if not files:
         problems = [f"{urdf}: expected a <deformable> with a mesh; rigid objects belong to the list `urdfs`"]
     _refuse_problems(config.name, [("loadURDF.fileName", problems)])
     return load_urdf(pb, config.name, config.loadURDF.kwargs())

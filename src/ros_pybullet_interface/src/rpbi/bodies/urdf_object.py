@@ -17,7 +17,7 @@ from rpbi.engine.inputs import Input, PoseInput
 from rpbi.sensors.contact_arrows import contact_sensors
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
-from rpbi.urdf.document import deformable_meshes
+from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.loading import load_urdf
 
 from .body import Body
@@ -103,7 +103,7 @@ class UrdfObject(Body):
 def _refuse_soft(config: UrdfObjectConfig) -> None:
     file = config.loadURDF.fileName
     try:
-        is_soft = bool(deformable_meshes(file))
+        is_soft = bool(UrdfDocument(file).deformable_meshes())
     except (ConfigError, OSError):
         return  # loading it tells what is wrong
     if is_soft:

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 from custom_ros_tools.errors import ConfigError, Problem, hint
+from custom_ros_tools.plugins import find_class
 from custom_ros_tools.schema import ConfigModel
 from rpbi.bodies.body import Body
 from rpbi.bodies.body_config import BodyConfig
-from rpbi.plugins import config_of, find_class
+from rpbi.plugins import config_of
 
 from .legacy import modernise
 

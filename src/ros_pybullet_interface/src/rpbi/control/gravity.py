@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
+from rpbi.config.pybullet_models import LoadURDF
 from rpbi.engine.client import Client
-from rpbi.geometry import Vector
-from rpbi.urdf.document import resolve_meshes
-
-if TYPE_CHECKING:
-    from rpbi.bodies.robots.jointed import JointedBody
+from rpbi.geometry import Pose, Vector
+from rpbi.urdf.files import resolve_meshes
+from rpbi.urdf.joints import JointModel
 
 
 class GravityModel:
@@ -19,32 +18,38 @@ class GravityModel:
     turned instead.
 
     Args:
-        robot: The robot. What is attached to it, or was changed in it since it was loaded, is not known here.
+        world: The client that the robot lives in.
+        model: Its joints.
+        load: How it was loaded. What is attached to it, or was changed in it since, is not known here.
     """
 
-    def __init__(self, robot: JointedBody) -> None:
-        self._robot = robot
-        self._driven = [joint.index for joint in robot.model.driven]
+    def __init__(self, world: Client, model: JointModel, load: LoadURDF) -> None:
+        self._load_arguments = load.kwargs()
+        self._driven = [joint.index for joint in model.driven]
         self._zeros = [0.0] * len(self._driven)
-        world = robot.pb.getPhysicsEngineParameters()
-        self._gravity = tuple(world[f"gravityAcceleration{axis}"] for axis in "XYZ")
+        engine = world.getPhysicsEngineParameters()
+        self._gravity = tuple(engine[f"gravityAcceleration{axis}"] for axis in "XYZ")
         self._gravity_in_base: Vector | None = None
         self._pb: Client | None = None  # made when it is needed first: the renderer's copy of the robot never does
         self._body_id = -1
 
-    def efforts(self) -> dict[int, float]:
-        """Returns the efforts [N m or N] by joint index that balance gravity where the robot is."""
+    def efforts(self, base: Pose, positions: Mapping[int, float]) -> dict[int, float]:
+        """Returns the efforts [N m or N] by joint index that balance gravity.
+
+        Args:
+            base: Pose of the root link in the world.
+            positions: Positions [rad or m] of the driven joints by index, in the order of the model.
+        """
         if not self._driven:
             return {}
         if self._pb is None:
             self._pb = self._load()
-        quat = self._robot.base_pose().quat_xyzw
-        gravity = self._pb.rotateVector(self._pb.invertTransform((0.0, 0.0, 0.0), quat)[1], self._gravity)
+        to_base = self._pb.invertTransform((0.0, 0.0, 0.0), base.quat_xyzw)[1]
+        gravity = self._pb.rotateVector(to_base, self._gravity)
         if gravity != self._gravity_in_base:
             self._pb.setGravity(*gravity)
             self._gravity_in_base = gravity
-        positions = list(self._robot.joint_positions().values())
-        torques = self._pb.calculateInverseDynamics(self._body_id, positions, self._zeros, self._zeros)
+        torques = self._pb.calculateInverseDynamics(self._body_id, list(positions.values()), self._zeros, self._zeros)
         return dict(zip(self._driven, torques))
 
     def close(self) -> None:
@@ -55,7 +60,7 @@ class GravityModel:
 
     def _load(self) -> Client:
         pb = Client()
-        arguments = self._robot.config.loadURDF.kwargs()
+        arguments = dict(self._load_arguments)
         for key in ("basePosition", "baseOrientation", "useFixedBase", "useMaximalCoordinates"):
             arguments.pop(key, None)
         arguments["fileName"] = resolve_meshes(arguments["fileName"])

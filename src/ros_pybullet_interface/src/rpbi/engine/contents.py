@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from custom_ros_tools.errors import ConfigError, PhysicsError, PluginError, Problem, UnknownNameError
+from custom_ros_tools.plugins import find_class
 from rpbi.bodies import Body, BodyConfig
 from rpbi.config.loading import LoadedWorld
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.config.sensors import FIRST_TOPIC_NAME, RgbdSensorConfig
-from rpbi.plugins import blaming, find_class
-from rpbi.sensors import BodySensor, RgbdSensor
+from rpbi.plugins import blaming
+from rpbi.sensors import BodySensor
 from rpbi.sensors.contacts import ContactReader
-from rpbi.sensors.sensor import Sensor
+from rpbi.sensors.rgbd import RgbdSensor
+from rpbi.sensors.sensor import SensedWorld, Sensor
 
 from .client import Client
 from .clock import Clock
 from .inputs import Input
 from .load_log import LogEntry, apply
 from .sensor_schedule import SensorSchedule
-
-if TYPE_CHECKING:
-    from rpbi.world import World
 
 
 def sensors_and_inputs(body: Body, config: BodyConfig) -> tuple[tuple[Sensor, ...], Mapping[str, Input]]:
@@ -64,7 +63,7 @@ class WorldContents:
         log: All that was done to the world.
     """
 
-    def __init__(self, pb: Client, clock: Clock, world: World) -> None:
+    def __init__(self, pb: Client, clock: Clock, world: SensedWorld) -> None:
         self._pb = pb
         self._clock = clock
         self._world = world

@@ -1,4 +1,4 @@
-"""The joints between a robot's base and one of its links."""
+"""The joints between a robot's base and one of its links, as PyBullet moves them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rpbi.engine.client import Client
-from rpbi.geometry import Pose, Quaternion, Vector
-from rpbi.urdf.document import write_description
+from rpbi.geometry import Pose, Quaternion
+from rpbi.urdf.files import write_description
 from rpbi.urdf.joints import Joint
 
+from .limits import Reach
 from .residual import Residual
 
 
@@ -24,7 +25,7 @@ class Target(NamedTuple):
         quat_xyzw: Its orientation in the base, a unit quaternion; None: any.
     """
 
-    position: Vector
+    position: Sequence[float]
     quat_xyzw: Quaternion | None
 
 
@@ -33,15 +34,14 @@ class Chain:
 
     Args:
         pb: A private client.
-        urdf: What is between the root and the link, see `Skeleton.chain`.
+        urdf: What is between the root and the link, see `UrdfDocument.bare`.
         scaling: PyBullet's `globalScaling`.
         link_name: The link.
         joint_names: The n joints of the robot that a motor can move.
 
     Attributes:
         members: Where the m joints are among the n.
-        anchor: Where the first of them is in the base [m].
-        reach_m: No position of the joints brings the link farther from the anchor than this [m].
+        reach: How far they bring the link.
     """
 
     def __init__(self, pb: Client, urdf: str, scaling: float, link_name: str, joint_names: Sequence[str]) -> None:
@@ -57,9 +57,7 @@ class Chain:
             pb.getLinkState(self.body_id, index, computeForwardKinematics=True)[4]
             for index in (*self._joint_indices, self.link_index)
         ]
-        self.anchor: Vector = knots[0]
-        travel = [max(abs(joint.lower), abs(joint.upper)) for joint in driven if not joint.is_revolute]
-        self.reach_m: float = sum(map(math.dist, knots, knots[1:])) + sum(travel)
+        self.reach = Reach.of(knots[0], map(math.dist, knots, knots[1:]), driven)
 
     def set(self, q: np.ndarray) -> None:
         """Puts the joints at m positions [rad or m]."""
@@ -83,8 +81,9 @@ class Chain:
             way += [x * scale, y * scale, z * scale]
         return np.array(way)
 
-    def residual(self, target: Target) -> Residual:
-        """Returns how far the link is from the target."""
+    def residual(self, target: Target, q: np.ndarray) -> Residual:
+        """Returns how far the link is from the target at m positions [rad or m]."""
+        self.set(q)
         way = self.error(target).tolist()
         return Residual(math.hypot(*way[:3]), math.hypot(*way[3:]))
 

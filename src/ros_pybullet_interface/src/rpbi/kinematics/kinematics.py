@@ -13,15 +13,14 @@ import pybullet
 
 from custom_ros_tools.errors import PhysicsError, UnknownNameError
 from rpbi.engine.client import Client
-from rpbi.geometry import Pose
-from rpbi.urdf.document import write_description
+from rpbi.geometry import Pose, normalized
+from rpbi.urdf.document import MOVING, UrdfDocument
+from rpbi.urdf.files import write_description
 from rpbi.urdf.joints import Joint
-from rpbi.urdf.skeleton import Skeleton
 
 from .chain import Chain, Target
-from .joint_limits import JointLimits
-from .problem import IKProblem, IKSolution
-from .residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
+from .limits import Limits
+from .problem import PybulletProblem, PybulletSolution
 from .search import Search
 
 
@@ -46,7 +45,7 @@ class Kinematics:
     """
 
     def __init__(self, urdf_path: str, scaling: float = 1.0, flags: int = 0) -> None:
-        self._skeleton = Skeleton(urdf_path)
+        self._document = UrdfDocument(urdf_path, not_xml="expected well-formed XML")
         self._scaling = scaling
         self._lock = threading.Lock()
         self._pb = Client(pybullet.DIRECT)
@@ -59,7 +58,8 @@ class Kinematics:
         self._links = [joint.link for joint in joints]
         driven = [joint for joint in joints if joint.is_driven]
         self.joint_names = tuple(joint.name for joint in driven)
-        self.limits = JointLimits(driven)
+        lower, upper = [joint.lower for joint in driven], [joint.upper for joint in driven]
+        self.limits = Limits(lower, upper, [joint.is_revolute for joint in driven])
         self._chains: dict[str, Chain] = {}
 
     def close(self) -> None:
@@ -87,7 +87,7 @@ class Kinematics:
             chain.set(np.array(positions, dtype=float)[chain.members])
             return chain.pose()
 
-    def solve(self, problem: IKProblem) -> IKSolution:
+    def solve(self, problem: PybulletProblem) -> PybulletSolution:
         """Looks for joint positions that bring a link to a target; the same problem has the same answer.
 
         It takes the first solution that it finds, from the start that was given or else from random ones, and gives up
@@ -101,17 +101,19 @@ class Kinematics:
             PhysicsError: If it was closed.
         """
         problem.check_lengths(self.joint_names)
-        limits = self.limits.narrowed(problem)
+        limits = problem.narrowed(self.limits, self.joint_names)
         positions = np.zeros(len(self.joint_names))
         if start := problem.currentPosition or problem.resetPoses:
             positions[:] = start
+        quat = problem.targetOrientation
+        target = Target(problem.targetPosition, normalized(quat) if quat else None)
         with self._open():
             chain = self._chain(problem.link_name)
-            search = Search(chain, _target(problem), limits.of(chain.members), problem, positions[chain.members])
+            search = Search(chain, target, limits.of(chain.members), problem, positions[chain.members].tolist())
             positions[chain.members], residual = search.run()
-        return IKSolution(
+        return PybulletSolution(
             success=residual.size <= 1.0,
-            message=_in_words(problem, residual),
+            message=residual.in_words(problem.link_name, bool(quat)),
             joint_names=self.joint_names,
             positions=tuple(positions.tolist()),
             chain=tuple(self.joint_names[i] for i in chain.members),
@@ -135,7 +137,7 @@ class Kinematics:
         """Returns all joints in the order in which PyBullet loads them."""
         pb = self._pb
         body_id = pb.loadURDF(
-            write_description(self._skeleton.text()), useFixedBase=True, globalScaling=self._scaling, flags=flags
+            write_description(self._document.bare()), useFixedBase=True, globalScaling=self._scaling, flags=flags
         )
         joints = [Joint.from_info(pb.getJointInfo(body_id, i)) for i in range(pb.getNumJoints(body_id))]
         self._root_link = pb.getBodyInfo(body_id)[0].decode()
@@ -154,27 +156,12 @@ class Kinematics:
         if link_name not in self._links:
             raise UnknownNameError("link", link_name, self._links)
         if link_name not in self._chains:
-            try:
-                urdf = self._skeleton.chain(link_name)
-            except ValueError as error:
-                raise ValueError(f"link_name: {error}") from None
+            links = [link_name]
+            for joint, kind, parent in self._document.joints_above(link_name):
+                if kind not in (*MOVING, "fixed"):
+                    only = "only revolute and prismatic ones are solved for"
+                    raise ValueError(f"link_name: '{link_name}' hangs on '{joint}', a {kind} joint; {only}")
+                links.append(parent)
+            urdf = self._document.bare(links)
             self._chains[link_name] = Chain(self._pb, urdf, self._scaling, link_name, self.joint_names)
         return self._chains[link_name]
-
-
-def _target(problem: IKProblem) -> Target:
-    x, y, z = problem.targetPosition
-    if not problem.targetOrientation:
-        return Target((x, y, z), None)
-    norm = math.hypot(*problem.targetOrientation)
-    qx, qy, qz, qw = (component / norm for component in problem.targetOrientation)
-    return Target((x, y, z), (qx, qy, qz, qw))
-
-
-def _in_words(problem: IKProblem, residual: Residual) -> str:
-    angle = f" and {residual.orientation_rad:.3g} rad" if problem.targetOrientation else ""
-    if residual.size <= 1.0:
-        return f"'{problem.link_name}' is within {residual.position_m * 1e3:.3g} mm{angle} of its target"
-    tolerance = f"{POSITION_TOLERANCE_M * 1e3:g} mm" + (f" and {ORIENTATION_TOLERANCE_RAD:g} rad" if angle else "")
-    missed = f"'{problem.link_name}' misses its target by {residual.position_m * 1e3:.4g} mm{angle}"
-    return f"{missed}; {tolerance} would do"

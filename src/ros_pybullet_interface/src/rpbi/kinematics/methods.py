@@ -1,4 +1,4 @@
-"""Methods that say where to go from a configuration: damped and selectively damped least squares."""
+"""Methods that say where to go from a configuration: to the target, or along its solutions to a rest posture."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import pybullet
 
 from .chain import Chain, Target
+from .limits import Limits
 
 
 class Step(Protocol):
@@ -120,3 +121,73 @@ def _directions(jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarra
 def _clamped(step: np.ndarray, largest: float) -> np.ndarray:
     size = np.abs(step).max()
     return step * (largest / size) if size > largest else step
+
+
+POSTURE_STEPS = 60
+LARGEST_POSTURE_STEP = 0.2
+"""Most that a joint of weight 1 moves in one step [rad or m]."""
+DONE = 1e-3
+"""Size of the step of such a joint at which little is left to gain [rad or m]."""
+POSTURE_DAMPING = 1e-6
+"""Keeps the pseudo-inverse finite where the link cannot move in all directions."""
+
+
+def towards_posture(
+    chain: Chain, target: Target, limits: Limits, rest: np.ndarray, ranges: np.ndarray, q: np.ndarray, size: float
+) -> np.ndarray:
+    """Slides along all solutions of a problem to the one nearest to a rest posture.
+
+    A gradient projection: each step goes towards the posture as far as it leaves the link alone, and mends what the
+    last one spoiled (Liegeois, IEEE Transactions on Systems, Man, and Cybernetics 7(12), 1977).
+
+    Args:
+        chain: The link.
+        target: Where it is and shall stay.
+        limits: Limits of its m joints.
+        rest: m positions of the posture [rad or m].
+        ranges: m weights, 1 at most: a joint may be as far from its rest as its range is wide.
+        q: m positions of the solution to start from.
+        size: Residual that a solution may have, see `Residual.size`.
+
+    Returns:
+        The best solution that was found; `q` itself if there is none that is nearer.
+    """
+    best, best_cost = q, _cost(q, rest, ranges)
+    least, most = np.array(limits.lower), np.array(limits.upper)
+    for _ in range(POSTURE_STEPS):
+        chain.set(q)
+        error = chain.error(target)
+        scaled = chain.jacobian(q, len(error)) * ranges
+        step = _step(scaled, error, (rest - q) / ranges, (least - q) / ranges, (most - q) / ranges)
+        q = np.clip(q + step * ranges, least, most)
+        cost = _cost(q, rest, ranges)
+        if cost < best_cost and chain.residual(target, q).size <= size:
+            best, best_cost = q, cost
+        if np.abs(step).max() < DONE:
+            break
+    return best
+
+
+def _cost(q: np.ndarray, rest: np.ndarray, ranges: np.ndarray) -> float:
+    return float(np.sum(((q - rest) / ranges) ** 2))
+
+
+def _step(
+    jacobian: np.ndarray, error: np.ndarray, wish: np.ndarray, lower: np.ndarray, upper: np.ndarray
+) -> np.ndarray:
+    """Returns the step that undoes the error and is nearest to the one wished for; joints stop at their limits."""
+    step = np.zeros(len(wish))
+    free = np.ones(len(wish), dtype=bool)
+    for _ in range(len(wish)):
+        J = jacobian[:, free]
+        inverse = J.T @ np.linalg.inv(J @ J.T + POSTURE_DAMPING * np.eye(len(J)))
+        rest = error - jacobian[:, ~free] @ step[~free]
+        mended, wished = inverse @ rest, wish[free] - inverse @ (J @ wish[free])
+        most = np.abs(wished).max(initial=0.0)
+        step[free] = mended + wished * min(1.0, LARGEST_POSTURE_STEP / most if most else 1.0)
+        beyond = free & ((step < lower) | (step > upper))
+        if not beyond.any():
+            break
+        step[beyond] = np.clip(step, lower, upper)[beyond]
+        free = free & ~beyond
+    return step

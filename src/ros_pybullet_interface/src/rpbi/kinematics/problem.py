@@ -1,4 +1,4 @@
-"""Questions to inverse kinematics, and answers."""
+"""Problems of inverse kinematics as PyBullet has them, and their solutions."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import pybullet
 
+from .limits import Limits
+
 SOLVERS = (pybullet.IK_DLS, pybullet.IK_SDLS)
 LARGEST = 1e9
 """Largest number that is taken, whatever it means; squares of larger ones are soon beyond what a float can hold."""
@@ -16,7 +18,7 @@ _PER_JOINT = (*_NULL_SPACE, "jointDamping", "currentPosition")
 
 
 @dataclass(frozen=True)
-class IKProblem:
+class PybulletProblem:
     """Where a link of a robot shall be, and how to get it there.
 
     The fields are those of the message `CalculateInverseKinematicsProblem`, but for the frame. "Each joint" is each
@@ -89,13 +91,32 @@ class IKProblem:
                 expected = f"{len(joint_names)} values, one for each of {', '.join(joint_names)}"
                 raise ValueError(f"{field}: expected {expected}; got {length}")
 
+    def narrowed(self, limits: Limits, joint_names: Sequence[str]) -> Limits:
+        """Returns limits of joints with those of the problem, if it has any, inside them.
+
+        A lower limit above the upper one means none, as it does in PyBullet, where the URDF has none either.
+
+        Raises:
+            ValueError: If a joint is left without any position; it names the joint.
+        """
+        lower, upper = list(limits.lower), list(limits.upper)
+        for i, (name, least, most) in enumerate(zip(joint_names, self.lowerLimits, self.upperLimits)):
+            if least > most and (lower[i], upper[i]) == (-math.inf, math.inf):
+                continue
+            urdf = f"the URDF has {lower[i]:g} to {upper[i]:g}"
+            lower[i], upper[i] = max(least, lower[i]), min(most, upper[i])
+            if lower[i] > upper[i]:
+                message = f"no position of '{name}' is within {least:g} to {most:g} ({urdf})"
+                raise ValueError(f"lowerLimits, upperLimits: {message}")
+        return Limits(lower, upper, limits.is_revolute)
+
 
 def _shown(values: Sequence[float]) -> str:
     return f"({', '.join(f'{value:g}' for value in values)})"
 
 
 @dataclass(frozen=True)
-class IKSolution:
+class PybulletSolution:
     """Where inverse kinematics got to.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""How far a pose is from where it should be."""
+"""How far a pose is from its target."""
 
 from __future__ import annotations
 
@@ -25,3 +25,17 @@ class Residual(NamedTuple):
     def size(self) -> float:
         """The larger of both in tolerances: up to 1, the target counts as reached."""
         return max(self.position_m / POSITION_TOLERANCE_M, self.orientation_rad / ORIENTATION_TOLERANCE_RAD)
+
+    def in_words(self, link: str, has_orientation: bool, target: str = "its target") -> str:
+        """Returns whether a link has reached its target, and how far off it is.
+
+        Args:
+            link: Name of the link.
+            has_orientation: Whether an orientation is asked for.
+            target: What the link is off.
+        """
+        angle = f" and {self.orientation_rad:.3g} rad" if has_orientation else ""
+        if self.size <= 1.0:
+            return f"'{link}' is within {self.position_m * 1e3:.3g} mm{angle} of {target}"
+        enough = f"{POSITION_TOLERANCE_M * 1e3:g} mm" + (f" and {ORIENTATION_TOLERANCE_RAD:g} rad" if angle else "")
+        return f"'{link}' misses {target} by {self.position_m * 1e3:.4g} mm{angle}; {enough} would do"

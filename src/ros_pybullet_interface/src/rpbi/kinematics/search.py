@@ -10,10 +10,9 @@ import numpy as np
 import pybullet
 
 from .chain import Chain, Target
-from .joint_limits import TURN, JointLimits
-from .methods import DampedLeastSquares, SelectivelyDampedLeastSquares, Step
-from .posture import towards_posture
-from .problem import IKProblem
+from .limits import TURN, Limits
+from .methods import DampedLeastSquares, SelectivelyDampedLeastSquares, Step, towards_posture
+from .problem import PybulletProblem
 from .residual import POSITION_TOLERANCE_M, Residual
 
 RANDOM_STARTS = 50
@@ -53,7 +52,7 @@ class Search:
     """
 
     def __init__(
-        self, chain: Chain, target: Target, limits: JointLimits, problem: IKProblem, current: np.ndarray
+        self, chain: Chain, target: Target, limits: Limits, problem: PybulletProblem, current: Sequence[float]
     ) -> None:
         self._chain, self._target, self._limits, self._problem = chain, target, limits, problem
         self._current, _ = limits.wrap_to_limits(current, current)
@@ -74,14 +73,15 @@ class Search:
             weights = np.maximum(ranges / ranges.max(), LEAST_WEIGHT)
             most = max(residual.size, self._threshold)
             q = towards_posture(self._chain, self._target, self._limits, self._rest, weights, q, most)
-            residual = self._residual(q)
+            residual = self._chain.residual(self._target, q)
         return q, residual
 
     def _solution(self) -> tuple[np.ndarray, Residual]:
         """Returns the best positions from the first start that leads to the target, else the best of all."""
-        best, least = self._current, self._residual(self._current)
+        best = np.array(self._current)
+        least = self._chain.residual(self._target, best)
         for step, start in self._starts():
-            for q, residual in self._descent(step, start):
+            for q, residual in self._descent(step, np.array(start)):
                 if residual.size < least.size:
                     best, least = q, residual
                 if least.size <= self._threshold:
@@ -90,25 +90,24 @@ class Search:
                 break
         return best, least
 
-    def _starts(self) -> Iterator[tuple[Step, np.ndarray]]:
-        """Tells where to start: at the rest posture, where the robot is, and then at random, with the faster solver."""
-        if not len(self._current):
+    def _starts(self) -> Iterator[tuple[Step, list[float]]]:
+        """Yields where to start: at the rest posture, where the robot is, and then at random, with the faster step."""
+        if not self._current:
             return
         if len(self._rest):
-            yield self._asked_step, self._limits.wrap_to_limits(self._rest, self._current)[0]
-        yield self._asked_step, self._current
-        generator = np.random.default_rng(SEED)
-        beyond_reach = math.dist(self._target.position, self._chain.anchor) > self._chain.reach_m
-        for _ in range(RANDOM_STARTS_BEYOND_REACH if beyond_reach else RANDOM_STARTS):
-            yield self._fast_step, self._limits.random(generator, self._current)
+            yield self._asked_step, self._limits.wrap_to_limits(self._rest.tolist(), self._current)[0]
+        is_reachable = self._chain.reach.covers(self._target.position)
+        restarts = RANDOM_STARTS if is_reachable else RANDOM_STARTS_BEYOND_REACH
+        for i, start in enumerate(self._limits.starts(self._current, np.random.default_rng(SEED), restarts)):
+            yield (self._fast_step if i else self._asked_step), start
 
     def _descent(self, step: Step, q: np.ndarray) -> Iterator[tuple[np.ndarray, Residual]]:
-        """Goes from a start towards the target, and tells each stage on the way.
+        """Goes from a start towards the target, and yields each stage on the way.
 
         A joint that ran into a limit is left there for one stage, so that the others make up for it.
         """
-        limits, last = self._limits, math.inf
-        frozen = stuck = limits.lower == limits.upper
+        last = math.inf
+        frozen = stuck = np.equal(self._limits.lower, self._limits.upper)
         for_this_start = self._problem.maxNumIterations or ITERATIONS_A_START
         while (iterations := min(ITERATIONS_A_STAGE, for_this_start, self._iterations_left)) > 0:
             for_this_start -= iterations
@@ -116,17 +115,14 @@ class Search:
             moved = step(q, frozen, iterations)
             if not np.isfinite(moved).all():
                 return
-            q, stopped = limits.wrap_to_limits(moved, self._current)
-            residual = self._residual(q)
+            inside, stopped = self._limits.wrap_to_limits(moved.tolist(), self._current)
+            q = np.array(inside)
+            residual = self._chain.residual(self._target, q)
             yield q, residual
             time.sleep(BREAK_S)
-            if residual.size > 0.5 * last and not stopped.any():
+            if residual.size > 0.5 * last and not any(stopped):
                 return
             frozen, last = stuck | stopped, residual.size
-
-    def _residual(self, q: np.ndarray) -> Residual:
-        self._chain.set(q)
-        return self._chain.residual(self._target)
 
     def _of_chain(self, values: Sequence[float]) -> np.ndarray:
         """Returns what a field of the problem has for the joints of the chain, if it has anything."""

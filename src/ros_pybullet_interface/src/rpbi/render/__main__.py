@@ -22,8 +22,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="rpbi.render")
     parser.add_argument("--socket", type=int, required=True, help="file descriptor of the connection")
     parser.add_argument("--sink", required=True, help="module:factory of what takes the frames")
+    parser.add_argument("--keep-priority", action="store_true", help="do not give way to others, such as physics")
     arguments, _ = parser.parse_known_args()
-    give_way()
+    if not arguments.keep_priority:
+        give_way()
     # Ctrl-C goes to the whole process group; the simulator decides when we end.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     channel = Channel(socket.socket(fileno=arguments.socket))

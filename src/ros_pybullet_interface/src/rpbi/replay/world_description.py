@@ -13,7 +13,7 @@ import pybullet
 
 from custom_ros_tools.errors import ConfigError, Problem
 from rpbi.config.loading import LoadedWorld, ObjectConfig
-from rpbi.urdf.document import is_temporary, write_description
+from rpbi.urdf.files import is_temporary, write_description
 from rpbi.world import World
 
 from .recorded_values import from_text, to_text

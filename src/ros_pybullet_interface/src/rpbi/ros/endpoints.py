@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import rospy
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
+from custom_ros_tools.plugins import find, full_name
 from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
 from rpbi.bodies import Body
-from rpbi.plugins import find, full_name
 
 Owners = Callable[[Body], Sequence[str]]
 """Returns what stands for `{name}` in the names of what a body has by a row; nothing if it has it not."""

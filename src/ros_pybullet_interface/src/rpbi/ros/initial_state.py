@@ -12,7 +12,7 @@ from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import ConfigModel
 from rpbi.bodies.robots.robot_config import RobotConfig
 from rpbi.config.loading import LoadedWorld
-from rpbi.urdf.document import joint_types
+from rpbi.urdf.document import UrdfDocument
 
 TIMEOUT_S = 5.0
 """How long to wait for joint states [s] of wall time."""
@@ -54,7 +54,7 @@ def with_initial_state(config: ConfigModel, file: str) -> ConfigModel:
     if len(message.name) != len(message.position):
         counts = f"{len(message.name)} names, {len(message.position)} positions"
         raise _problem(file, f"expected a position for each name on {topic}, got {counts}")
-    types = joint_types(config.loadURDF.fileName)
+    types = UrdfDocument(config.loadURDF.fileName).joint_types
     measured = {name: value for name, value in zip(message.name, message.position) if name in types}
     if not measured:
         raise _problem(file, f"expected joints {', '.join(types)} on {topic}, got {', '.join(message.name) or 'none'}")

@@ -9,10 +9,10 @@ import rospy
 from sensor_msgs.msg import JointState
 
 from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.plugins import full_name
 from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
 from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Twist
-from rpbi.plugins import full_name
 from rpbi.urdf.joints import JointTarget, WrongQuantityError
 from rpbi.world import World
 

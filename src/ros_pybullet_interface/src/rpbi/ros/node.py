@@ -21,7 +21,7 @@ from rpbi.ros.publishers.sample_publishers import SamplePublishers
 from rpbi.ros.publishers.world_markers import WorldMarkers
 from rpbi.ros.services.node_services import NODE_SERVICES, NodeContext
 from rpbi.ros.window.topics import WindowTopics
-from rpbi.urdf.document import write_description
+from rpbi.urdf.files import write_description
 from rpbi.world import World
 
 from .endpoints import serve

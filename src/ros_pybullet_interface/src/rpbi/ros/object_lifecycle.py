@@ -11,7 +11,7 @@ from rpbi.config.sensors import RgbdSensorConfig
 from rpbi.ros.publishers.sample_publishers import SamplePublishers
 from rpbi.ros.publishers.topics import FastTopic
 from rpbi.ros.services.body_endpoints import BodyEndpoints
-from rpbi.sensors import RgbdSensor
+from rpbi.sensors.rgbd import RgbdSensor
 
 from .initial_state import with_initial_state
 from .inputs import Inputs

@@ -15,10 +15,11 @@ from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
 from custom_ros_tools.errors import InterfaceError, PluginError
+from custom_ros_tools.plugins import cause_of, full_name
 from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
 from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Pose
-from rpbi.plugins import cause_of, full_name, is_foreign
+from rpbi.plugins import is_foreign
 
 from .headers import world_frame
 

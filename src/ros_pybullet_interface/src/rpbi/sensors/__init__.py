@@ -2,44 +2,24 @@
 
 from __future__ import annotations
 
+from custom_ros_tools.plugins import ClassTable
 from rpbi.config.sensors import SensorConfig
 
-from .base_state import BaseStateSensor
 from .body_sensor import BodySensor
-from .contact_arrows import ContactArrowsSensor
-from .contacts import ContactsSensor
-from .force_torque import ForceTorqueSensor
-from .joint_state import JointStateSensor
-from .link_pose import LinkPoseSensor
-from .rgbd import RgbdSensor
 from .sensor import Sensor
-from .surface import SurfaceSensor
-from .trajectory_state import TrajectoryStateSensor
 
-SENSOR_TYPES: dict[str, type[Sensor]] = {
-    "joint_state": JointStateSensor,
-    "link_pose": LinkPoseSensor,
-    "base_state": BaseStateSensor,
-    "force_torque": ForceTorqueSensor,
-    "trajectory_state": TrajectoryStateSensor,
-    "contacts": ContactsSensor,
-    "contact_arrows": ContactArrowsSensor,
-    "surface": SurfaceSensor,
-    "rgbd": RgbdSensor,
-}
+SENSOR_TYPES = ClassTable(
+    {
+        "joint_state": "rpbi.sensors.joint_state:JointStateSensor",
+        "link_pose": "rpbi.sensors.link_pose:LinkPoseSensor",
+        "base_state": "rpbi.sensors.base_state:BaseStateSensor",
+        "force_torque": "rpbi.sensors.force_torque:ForceTorqueSensor",
+        "trajectory_state": "rpbi.sensors.trajectory_state:TrajectoryStateSensor",
+        "contacts": "rpbi.sensors.contacts:ContactsSensor",
+        "contact_arrows": "rpbi.sensors.contact_arrows:ContactArrowsSensor",
+        "surface": "rpbi.sensors.surface:SurfaceSensor",
+        "rgbd": "rpbi.sensors.rgbd:RgbdSensor",
+    }
+)
 
-__all__ = [
-    "SENSOR_TYPES",
-    "BaseStateSensor",
-    "BodySensor",
-    "ContactArrowsSensor",
-    "ContactsSensor",
-    "ForceTorqueSensor",
-    "JointStateSensor",
-    "LinkPoseSensor",
-    "RgbdSensor",
-    "Sensor",
-    "SensorConfig",
-    "SurfaceSensor",
-    "TrajectoryStateSensor",
-]
+__all__ = ["SENSOR_TYPES", "BodySensor", "Sensor", "SensorConfig"]

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from custom_ros_tools.errors import PhysicsError
+from rpbi.bodies.body import Body
 from rpbi.samples import BaseStateSample
 
 from .sensor import Sensor
-
-if TYPE_CHECKING:
-    from rpbi.bodies.robots.jointed import JointedBody
 
 
 class BaseStateSensor(Sensor):
@@ -24,7 +21,7 @@ class BaseStateSensor(Sensor):
 
     sample_type = BaseStateSample
 
-    def __init__(self, robot: JointedBody, hz: float) -> None:
+    def __init__(self, robot: Body, hz: float) -> None:
         super().__init__(robot.name, hz)
         self._robot = robot
         self._frame = f"rpbi/{robot.name}/{robot.root_link}"

@@ -9,7 +9,7 @@ from rpbi.config.sensors import SensorConfig
 from .sensor import Sensor
 
 if TYPE_CHECKING:
-    from rpbi.bodies.body import Body
+    from rpbi.bodies.body import Body  # whose configuration asks for this class
 
 
 class BodySensor(Sensor):

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from rpbi.bodies.body import Body
 from rpbi.config.sensors import ContactsConfig
 from rpbi.geometry import plus, scaled
 from rpbi.samples import ContactArrowsSample
 
 from .contacts import ContactsSensor
 from .sensor import Sensor
-
-if TYPE_CHECKING:
-    from rpbi.bodies.body import Body
 
 
 class ContactArrowsSensor(Sensor):

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from custom_ros_tools.errors import PhysicsError
+from rpbi.bodies.body import Body
 from rpbi.engine.client import Client
 from rpbi.geometry import scaled
 from rpbi.samples import ContactPoint, ContactsSample
 
-from .sensor import Sensor
-
-if TYPE_CHECKING:
-    from rpbi.bodies.body import Body
-    from rpbi.world import World
+from .sensor import SensedWorld, Sensor
 
 
 class ContactReader:
@@ -91,7 +88,7 @@ class ContactsSensor(Sensor):
         self._body = body
         self._reader: ContactReader | None = None
 
-    def enter(self, world: World) -> None:
+    def enter(self, world: SensedWorld) -> None:
         """Takes what the world knows of all contacts."""
         self._reader = world.contacts
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import zlib
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from custom_ros_tools.errors import PhysicsError
+from rpbi.bodies.body import Body
 from rpbi.config.sensors import ForceTorqueConfig
 from rpbi.geometry import Vector, cross, minus, plus, rotated_back, scaled
 from rpbi.samples import WrenchSample
@@ -18,9 +18,6 @@ from rpbi.urdf.subtree import LinkStates, Subtree
 
 from .filters import LowPass, SeededNoise, Zeroing
 from .sensor import Sensor
-
-if TYPE_CHECKING:
-    from rpbi.bodies.robots.jointed import JointedBody
 
 
 class ForceTorqueSensor(Sensor):
@@ -41,7 +38,7 @@ class ForceTorqueSensor(Sensor):
     Config = ForceTorqueConfig
     sample_type = WrenchSample
 
-    def __init__(self, robot: JointedBody, joint: Joint, config: ForceTorqueConfig, default_hz: float) -> None:
+    def __init__(self, robot: Body, joint: Joint, config: ForceTorqueConfig, default_hz: float) -> None:
         super().__init__(f"{robot.name}/{joint.name}", config.hz or default_hz)
         self.joint = joint
         self.frame_id = config.frame_id or f"rpbi/{robot.name}/{joint.link}"

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from custom_ros_tools.errors import PhysicsError
+from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.samples import JointStateSample
 
 from .sensor import Sensor
-
-if TYPE_CHECKING:
-    from rpbi.bodies.robots.jointed import JointedBody
 
 
 class JointStateSensor(Sensor):

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from custom_ros_tools.errors import PhysicsError
+from rpbi.bodies.body import Body
 from rpbi.geometry import Pose
 from rpbi.samples import LinkPoseSample
 
 from .sensor import Sensor
-
-if TYPE_CHECKING:
-    from rpbi.bodies.body import Body
 
 
 class LinkPoseSensor(Sensor):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
+from rpbi.bodies.body import Body
 from rpbi.config.sensors import RgbdSensorConfig
 from rpbi.engine.clock import Clock
 from rpbi.engine.inputs import Input, PoseInput
@@ -12,9 +12,6 @@ from rpbi.geometry import Pose
 from rpbi.samples import SceneSample
 
 from .sensor import Sensor
-
-if TYPE_CHECKING:
-    from rpbi.bodies.body import Body
 
 
 class RgbdSensor(Sensor):

@@ -4,12 +4,31 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
+from rpbi.engine.client import Client
+from rpbi.engine.clock import Clock
 from rpbi.engine.inputs import Input
 
-if TYPE_CHECKING:
-    from rpbi.world import World
+
+class SensedWorld(Protocol):
+    """What a sensor may ask of its world, which is a `World`.
+
+    Attributes:
+        pb: The client that it lives in.
+        clock: Its clock.
+    """
+
+    pb: Client
+    clock: Clock
+
+    @property
+    def bodies(self) -> Mapping[str, Any]:
+        """All bodies by name."""
+
+    @property
+    def contacts(self) -> Any:
+        """Who touches whom, a `ContactReader`."""
 
 
 class Sensor(ABC):
@@ -31,7 +50,7 @@ class Sensor(ABC):
         self.name = name
         self.hz = hz
 
-    def enter(self, world: World) -> None:  # noqa: B027 (most sensors need nothing but their body)
+    def enter(self, world: SensedWorld) -> None:  # noqa: B027 (most sensors need nothing but their body)
         """Gets to know the world that it is in, before it is read for the first time."""
 
     @abstractmethod

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from custom_ros_tools.errors import PhysicsError
+from rpbi.bodies.body import Body
 from rpbi.samples import SurfaceSample
 
 from .sensor import Sensor
-
-if TYPE_CHECKING:
-    from rpbi.bodies.body import Body
 
 
 class SurfaceSensor(Sensor):

@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from rpbi.control.joint_drive import JointDrive
 from rpbi.control.trajectories.controller_state import ControllerState
+from rpbi.control.trajectories.follower import TrajectoryFollower
 
 from .sensor import Sensor
-
-if TYPE_CHECKING:
-    from rpbi.bodies.robots.robot import Robot
-    from rpbi.control.trajectories.follower import TrajectoryFollower
 
 
 class TrajectoryStateSensor(Sensor):
     """Where the joints of a robot's follower of trajectories are to be, and where they are.
 
     Args:
-        robot: The robot.
+        drive: Drives the joints of the robot.
         follower: Its follower.
     """
 
     sample_type = ControllerState
 
-    def __init__(self, robot: Robot, follower: TrajectoryFollower) -> None:
-        super().__init__(robot.name, follower.config.state_publish_rate)
-        self._dt_s = robot.dt_s
+    def __init__(self, drive: JointDrive, follower: TrajectoryFollower) -> None:
+        super().__init__(drive.name, follower.config.state_publish_rate)
+        self._dt_s = drive.dt_s
         self._follower = follower
 
     def read(self, tick: int) -> ControllerState:

@@ -1,172 +1,322 @@
-"""Robot description files."""
+"""The one place where the XML of a URDF is parsed, into plain data, and written."""
 
 from __future__ import annotations
 
-import atexit
-import hashlib
+import copy
+import math
 import re
-import tempfile
-import xml.etree.ElementTree as ElementTree
-from functools import lru_cache
+from collections.abc import Iterator, Sequence
+from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
-from custom_ros_tools.config import replace_package
 from custom_ros_tools.errors import ConfigError, Problem
+from rpbi.geometry import Vector
 
-_FILENAME = re.compile(
-    r"""(?P<before><(?:mesh|texture)\b[^>]*?\bfilename\s*=\s*)(?P<quote>["'])(?P<path>.*?)(?P=quote)"""
-)
-_NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""Characters that XML 1.0 does not allow (https://www.w3.org/TR/xml/#charsets); PyBullet does not mind them."""
-_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
-_PACKAGE = "package://"
+from .files import COMMENT, NOT_XML, mesh_file
 
-
-@lru_cache(maxsize=1)
-def _folder() -> Path:
-    """Returns a folder for this process's rewritten files; it goes when the process ends."""
-    folder = tempfile.TemporaryDirectory(prefix="rpbi-urdf-")
-    atexit.register(folder.cleanup)
-    return Path(folder.name)
+MOVING = ("revolute", "continuous", "prismatic")
+"""Types of joints with one axis, which kinematics are solved for."""
+_ROBOT = re.compile(r"<robot\b.*</robot\s*>", re.DOTALL)
+_ZERO: Vector = (0.0, 0.0, 0.0)
 
 
-def read_urdf(path: str) -> str:
-    """Returns the text of a URDF file without its comments, and without characters that XML does not allow."""
-    return _COMMENT.sub("", _NOT_XML.sub("", Path(path).read_text(encoding="utf-8")))
+class Mimic(NamedTuple):
+    """That a joint follows another: its position is `multiplier` times that of the other, plus `offset`."""
+
+    joint: str
+    multiplier: float
+    offset: float
 
 
-def resolve_meshes(path: str) -> str:
-    """Makes the meshes of a URDF file loadable by PyBullet, which knows nothing of ROS packages.
+class UrdfJoint(NamedTuple):
+    """A joint as a URDF describes it.
+
+    Attributes:
+        name: Its name.
+        type: Its type, such as `revolute`.
+        parent: The link it is fixed to.
+        child: The link that it moves.
+        xyz: Its position in the parent link [m].
+        rpy: Its rotation there, about the parent's x, y and z one after the other [rad].
+        axis: Unit vector, in the joint's frame.
+        lower: Lower limit [rad or m], -inf if there is none.
+        upper: Upper limit [rad or m], inf if there is none.
+        max_velocity: Largest speed [rad/s or m/s], inf if there is none.
+        mimic: The joint that it follows, if any.
+    """
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    xyz: Vector = _ZERO
+    rpy: Vector = _ZERO
+    axis: Vector = (1.0, 0.0, 0.0)
+    lower: float = -math.inf
+    upper: float = math.inf
+    max_velocity: float = math.inf
+    mimic: Mimic | None = None
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether it has one axis to move about or along."""
+        return self.type in MOVING
+
+    @property
+    def is_revolute(self) -> bool:
+        """Whether it turns about its axis."""
+        return self.type != "prismatic"
+
+
+class UrdfDocument:
+    """The links and joints of a URDF file.
+
+    As PyBullet does, it ignores text around the robot and characters that XML does not allow.
 
     Args:
-        path: The URDF file.
+        path: The file, for messages; the meshes it names need not be there.
+        source: The file to read in its place.
+        not_xml: What messages say of a file that is not well-formed.
 
-    Returns:
-        The file itself if it needs nothing, else that of a copy in which every `package://` path, and with them
-        every relative one, is absolute.
+    Attributes:
+        tag: The element at the top, `robot` in a URDF.
+        links: Names of all links.
+        joint_types: Type of each joint by name, such as `revolute` or `fixed`.
+        meshes: The meshes of links, as the file names them.
 
     Raises:
-        ConfigError: If a mesh belongs to an unknown package or does not exist.
+        ConfigError: If it cannot be read or is not well-formed.
     """
-    source = Path(path)
-    text = read_urdf(path)
-    if "package://" not in text:
-        return path
-    problems: list[Problem] = []
 
-    def absolute(match: re.Match[str]) -> str:
+    def __init__(self, path: str, source: str | None = None, not_xml: str = "is not XML") -> None:
+        self.path, self._source = path, Path(source or path)
         try:
-            resolved = _mesh_file(match["path"], source)
-        except ConfigError as error:
-            problems.extend(error.problems)
-            return match[0]
-        return f"{match['before']}{match['quote']}{resolved}{match['quote']}"
+            self._root = _parse(self._source.read_text(encoding="utf-8", errors="replace"))
+        except OSError as error:
+            raise ConfigError([Problem(path, "", (error.strerror or str(error)).lower())]) from None
+        except ElementTree.ParseError as error:
+            raise ConfigError([Problem(path, "", f"{not_xml}: {error}")]) from None
+        self.tag = self._root.tag
+        self._joints = self._root.findall("joint")
+        self.links = [link.get("name", "") for link in self._root.findall("link")]
+        self.joint_types = {joint.get("name", ""): joint.get("type", "") for joint in self._joints}
+        self.meshes = list(dict.fromkeys(mesh.get("filename", "") for mesh in self._root.iter("mesh")))
 
-    resolved_text = _FILENAME.sub(absolute, text)
-    if problems:
-        raise ConfigError(problems)
-    return _write(source.stem, resolved_text)
+    @cached_property
+    def joints(self) -> dict[str, UrdfJoint]:
+        """All joints by name.
+
+        Raises:
+            ValueError: If a value makes no sense; it names the joint.
+        """
+        return {joint.name: joint for joint in map(_read_joint, self._joints)}
+
+    @property
+    def is_soft(self) -> bool:
+        """Whether it describes a soft body."""
+        return self._root.find("deformable") is not None
+
+    def deformable_meshes(self) -> list[str]:
+        """Returns the files that its soft body is made of; none if it describes none.
+
+        Raises:
+            ConfigError: If a mesh does not exist.
+        """
+        names = [part.get("filename") for deformable in self._root.findall("deformable") for part in deformable]
+        return [str(mesh_file(name, self._source)) for name in dict.fromkeys(names) if name]
+
+    def joints_above(self, link: str) -> Iterator[tuple[str, str, str]]:
+        """Yields name, type and parent link of each joint between a link and the root, from the link upwards."""
+        above = {_end(joint, "child"): joint for joint in self._joints}
+        while (joint := above.pop(link, None)) is not None:
+            link = _end(joint, "parent")
+            yield joint.get("name", ""), joint.get("type", ""), link
+
+    def bare(self, links: Sequence[str] | None = None) -> str:
+        """Returns a URDF without shapes, of all or some links and the joints between them.
+
+        It loads in half a millisecond where meshes take up to some hundred. Every link has unit mass at its own frame,
+        so that PyBullet's frames of mass centres are the links' frames.
+
+        Args:
+            links: The links; None: all.
+        """
+        kept = [name for name in self.links if links is None or name in links]
+        ends = {*kept}
+        joints = [one for one in self._joints if links is None or {_end(one, "parent"), _end(one, "child")} <= ends]
+        bare = [_element("link", _inertial("1"), name=name) for name in kept]
+        return _text(_element("robot", *bare, *joints, **self._root.attrib))
+
+    def with_limited_joints(self) -> str:
+        """Returns all of it, with limits from 0 to 0, which mean none, for joints that turn without end.
+
+        So each of them has one number in Pinocchio, which else has two for it, sine and cosine.
+        """
+        root = copy.deepcopy(self._root)
+        for joint in root.findall("joint"):
+            if joint.get("type") == "continuous":
+                joint.set("type", "revolute")
+                if joint.find("limit") is None:
+                    joint.append(_element("limit", effort="0", velocity="0"))
+                for limit in joint.iterfind("limit"):
+                    limit.attrib.update(lower="0", upper="0")
+        return _text(root)
+
+    def root_link(self) -> str:
+        """Returns the name of the link that everything else hangs on.
+
+        Raises:
+            ConfigError: If there is not one link that is no joint's child.
+        """
+        children = {_end(joint, "child") for joint in self._joints}
+        roots = [link for link in self.links if link not in children]
+        if len(roots) != 1:
+            message = f"expected one link that is no joint's child, found {', '.join(roots) or 'none'}"
+            raise ConfigError([Problem(self.path, "", message)])
+        return roots[0]
+
+    def mounted_on(self, joints: Sequence[UrdfJoint]) -> str:
+        """Returns all of it with a chain of massless links above the root, and with absolute names of meshes.
+
+        Args:
+            joints: The joints of the chain, from its fixed end to the root.
+        """
+        robot = copy.deepcopy(self._root)
+        for element in robot.iterfind(".//*[@filename]"):  # meshes and textures
+            element.set("filename", self._found(element.get("filename", "")))
+        root = next(link for link in robot.findall("link") if link.get("name") == joints[-1].child)
+        if root.find("inertial") is None:
+            root.append(_inertial("0"))  # PyBullet gives 1 kg to any link without, unless it is the fixed one
+        robot.remove(root)
+        links = [_element("link", _inertial("0"), name=joint.parent) for joint in joints]
+        robot[:0] = [*links, root]  # in order, in case of URDF_MAINTAIN_LINK_ORDER
+        robot.extend(map(_joint_element, joints))
+        return _text(robot)
+
+    def _found(self, name: str) -> str:
+        """Returns where PyBullet finds a file that the URDF names: beside it or in a folder above."""
+        files = (folder / name for folder in self._source.absolute().parents)
+        return next((str(file) for file in files if file.is_file()), name)
 
 
-def write_description(text: str) -> str:
-    """Writes a robot description that has no file, such as that of the parameter server, into one of its own.
-
-    Returns:
-        The file, which lasts as long as the process.
-    """
-    return _write("robot_description", text)
+def chain_urdf(joints: Sequence[UrdfJoint]) -> str:
+    """Returns a URDF of a chain of joints with bare links, from its base to its tip."""
+    links = [_element("link", name=name) for name in (joints[0].parent, *(joint.child for joint in joints))]
+    return _text(_element("robot", *links, *map(_joint_element, joints), name="chain"))
 
 
-def is_temporary(path: str) -> bool:
-    """Tells whether a file is one of this module's, which go when the process ends."""
-    return Path(path).parent == _folder()
+def _parse(text: str) -> Element:
+    text = COMMENT.sub(lambda comment: _blank(comment[0]), NOT_XML.sub("", text))
+    robot = _ROBOT.search(text)
+    return ElementTree.fromstring(_blank(text[: robot.start()]) + robot[0] if robot else text)
 
 
-def description_for_ros(path: str) -> str:
-    """Returns a URDF file as ROS wants it, which does not know where the file is.
+def _blank(text: str) -> str:
+    """Returns as many spaces, so that messages of the parser have the file's lines and columns."""
+    return re.sub(r"\S", " ", text)
 
-    Args:
-        path: The file.
 
-    Returns:
-        Its text, with relative mesh paths as `file://` addresses; paths of ROS packages stay.
+def _read_joint(element: Element) -> UrdfJoint:
+    """Reads a joint; as in PyBullet, lower limits that are not below the upper ones mean that there are none.
 
     Raises:
-        ConfigError: If a mesh belongs to an unknown package.
+        ValueError: If a value makes no sense; it names the joint.
     """
-    source = Path(path)
+    name, kind = element.get("name", ""), element.get("type", "")
+    lower, upper, speed = (_number(element, "limit", key, "0") for key in ("lower", "upper", "velocity"))
+    if kind == "continuous" or not lower < upper:
+        lower, upper = -math.inf, math.inf
+    x, y, z = _vector(element, "axis", "xyz", "1 0 0")
+    length = math.hypot(x, y, z)
+    if kind in MOVING and length < 1e-6:
+        raise ValueError(f"joint '{name}': axis: must not be zero")
+    return UrdfJoint(
+        name=name,
+        type=kind,
+        parent=_end(element, "parent"),
+        child=_end(element, "child"),
+        xyz=_vector(element, "origin", "xyz", "0 0 0"),
+        rpy=_vector(element, "origin", "rpy", "0 0 0"),
+        axis=(x / length, y / length, z / length) if length else (1.0, 0.0, 0.0),
+        lower=lower,
+        upper=upper,
+        max_velocity=speed if speed > 0.0 else math.inf,
+        mimic=_mimic(element),
+    )
 
-    def address(match: re.Match[str]) -> str:
-        mesh = match["path"]
-        if "://" in mesh and not _is_of_unknown_package(mesh):
-            return match[0]
-        file = _mesh_file(mesh, source) if _is_of_unknown_package(mesh) else source.parent / mesh
-        return f"{match['before']}{match['quote']}file://{file.resolve()}{match['quote']}"
 
-    return _FILENAME.sub(address, read_urdf(path))
+def _mimic(element: Element) -> Mimic | None:
+    if element.find("mimic") is None:
+        return None
+    multiplier = _number(element, "mimic", "multiplier", "1")
+    if multiplier == 0.0:
+        raise ValueError(f"joint '{element.get('name', '')}': mimic.multiplier: must not be 0")
+    return Mimic(_attribute(element, "mimic", "joint"), multiplier, _number(element, "mimic", "offset", "0"))
 
 
-def joint_types(path: str) -> dict[str, str]:
-    """Returns the type of each joint in a URDF file by name, such as `revolute` or `fixed`.
+def _end(joint: Element, end: str) -> str:
+    """Returns the link at an end of a joint, `parent` or `child`."""
+    return _attribute(joint, end, "link")
 
-    Raises:
-        ConfigError: If the file is not XML.
-    """
+
+def _attribute(element: Element, part: str, key: str, default: str = "") -> str:
+    found = element.find(part)
+    return default if found is None else found.get(key, default)
+
+
+def _number(joint: Element, part: str, key: str, default: str) -> float:
+    return _numbers(joint, part, key, default)[0]
+
+
+def _vector(joint: Element, part: str, key: str, default: str) -> Vector:
+    x, y, z = _numbers(joint, part, key, default)
+    return x, y, z
+
+
+def _numbers(joint: Element, part: str, key: str, default: str) -> list[float]:
+    """Returns the finite numbers of an attribute, as many as the default has."""
+    text, count = _attribute(joint, part, key, default), len(default.split())
     try:
-        joints = ElementTree.fromstring(read_urdf(path)).iterfind("joint")
-    except ElementTree.ParseError as error:
-        raise ConfigError([Problem(path, "", f"is not XML: {error}")]) from None
-    return {joint.get("name", ""): joint.get("type", "") for joint in joints}
+        values = [float(word) for word in text.split()]
+    except ValueError:
+        values = []
+    if len(values) != count or not all(map(math.isfinite, values)):
+        numbers = "a finite number" if count == 1 else f"{count} finite numbers"
+        raise ValueError(f"joint '{joint.get('name', '')}': {part}.{key}: expected {numbers}, got '{text}'")
+    return values
 
 
-def deformable_meshes(path: str) -> list[str]:
-    """Returns the files that the soft body of a URDF file is made of; none if it describes none.
-
-    Raises:
-        ConfigError: If the file is not XML, or a mesh does not exist.
-    """
-    try:
-        deformables = ElementTree.parse(path).getroot().findall("deformable")
-    except (ElementTree.ParseError, OSError) as error:
-        raise ConfigError([Problem(path, "", f"is not XML: {error}")]) from None
-    names = [part.get("filename") for deformable in deformables for part in deformable]
-    return [str(_mesh_file(name, Path(path))) for name in dict.fromkeys(names) if name]
-
-
-def _mesh_file(mesh: str, source: Path) -> Path:
-    """Returns the file of a mesh.
-
-    Args:
-        mesh: What the URDF says.
-        source: The URDF file.
-
-    Raises:
-        ConfigError: If it belongs to an unknown package or does not exist.
-    """
-    if _is_of_unknown_package(mesh):
-        # PyBullet takes package://FOLDER/FILE for a folder beside the URDF or above it, and its own robots use that.
-        files = (folder / mesh.removeprefix(_PACKAGE) for folder in source.resolve().parents)
-        found = next((file for file in files if file.is_file()), None)
-        if found is not None:
-            return found
-    try:
-        file = source.parent / replace_package(mesh)
-    except ConfigError as error:
-        raise ConfigError([Problem(str(source), mesh, problem.message) for problem in error.problems]) from None
-    if not file.is_file():
-        raise ConfigError([Problem(str(source), mesh, f"no such file: {file}")])
-    return file
+def _joint_element(joint: UrdfJoint) -> Element:
+    """Returns a joint with what counts for positions."""
+    unlimited = joint.lower == -math.inf
+    parts = [_element("parent", link=joint.parent), _element("child", link=joint.child)]
+    parts.append(_element("origin", xyz=_words(joint.xyz), rpy=_words(joint.rpy)))
+    if joint.is_moving:
+        lower, upper = (1.0, -1.0) if unlimited else (joint.lower, joint.upper)
+        parts.append(_element("axis", xyz=_words(joint.axis)))
+        parts.append(_element("limit", lower=repr(lower), upper=repr(upper), effort="0", velocity="0"))
+    kind = "continuous" if unlimited and joint.type == "revolute" else joint.type
+    return _element("joint", *parts, name=joint.name, type=kind)
 
 
-def _is_of_unknown_package(mesh: str) -> bool:
-    try:
-        replace_package(mesh)
-    except ConfigError:
-        return mesh.startswith(_PACKAGE)
-    return False
+def _inertial(mass: str) -> Element:
+    """Returns a mass [kg], and as much inertia about each axis [kg m^2], at the link's frame."""
+    inertia = {"ixx": mass, "iyy": mass, "izz": mass, "ixy": "0", "ixz": "0", "iyz": "0"}
+    return _element("inertial", _element("mass", value=mass), _element("inertia", **inertia))
 
 
-def _write(stem: str, text: str) -> str:
-    path = _folder() / f"{stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}.urdf"
-    path.write_text(text, encoding="utf-8")
-    return str(path)
+def _element(tag: str, /, *parts: Element, **attributes: str) -> Element:
+    element = Element(tag, attributes)
+    element.extend(parts)
+    return element
+
+
+def _words(vector: Vector) -> str:
+    return " ".join(map(repr, vector))
+
+
+def _text(element: Element) -> str:
+    return ElementTree.tostring(element, encoding="unicode")

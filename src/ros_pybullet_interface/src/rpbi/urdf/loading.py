@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import pybullet
 
@@ -13,7 +12,8 @@ from custom_ros_tools.errors import ConfigError, Problem
 from rpbi.config.asset_files import ROBOT_DESCRIPTION
 from rpbi.engine.client import Client
 
-from .document import resolve_meshes
+from .document import UrdfDocument
+from .files import resolve_meshes
 
 MESH_FORMATS = (".obj", ".stl", ".dae", ".cdf")
 
@@ -30,17 +30,15 @@ def urdf_problems(path: str) -> list[str]:
     if path == ROBOT_DESCRIPTION:
         return [f"there is no parameter '{ROBOT_DESCRIPTION}'"]
     try:
-        root = ElementTree.parse(path).getroot()
-    except OSError as error:
-        return [f"{path}: {(error.strerror or str(error)).lower()}"]
-    except ElementTree.ParseError as error:
-        return [f"{path} is not XML: {error}"]
-    if root.tag != "robot":
-        return [f"{path}: expected <robot> at the top, got <{root.tag}>"]
-    if root.find("link") is None and root.find("deformable") is None:
+        document = UrdfDocument(path)
+    except ConfigError as error:
+        return [str(error).replace(": is not XML", " is not XML")]
+    if document.tag != "robot":
+        return [f"{path}: expected <robot> at the top, got <{document.tag}>"]
+    if not document.links and not document.is_soft:
         return [f"{path}: the robot has no <link>"]
     problems = []
-    for mesh in dict.fromkeys(element.get("filename", "") for element in root.iter("mesh")):
+    for mesh in document.meshes:
         if Path(mesh).suffix.lower() not in MESH_FORMATS:
             problems.append(f"{path}: mesh '{mesh}' is none of {', '.join(MESH_FORMATS)}")
         elif not any((folder / mesh).is_file() for folder in Path(path).absolute().parents):
@@ -69,7 +67,7 @@ def load_urdf(
     try:
         return int(pb.loadURDF(**{**arguments, "fileName": prepare(file)}))
     except ConfigError as error:
-        messages = [f"{problem.key}: {problem.message}" for problem in error.problems]
+        messages = [f"{problem.key or file}: {problem.message}" for problem in error.problems]
     except (pybullet.error, OSError, UnicodeDecodeError) as error:
         messages = urdf_problems(file) or [f"PyBullet could not load it: {error}"]
     raise ConfigError([Problem(name, "loadURDF.fileName", message) for message in messages])

@@ -2,7 +2,7 @@
 
 rospy would shut down inside the signal handler, wherever the program happens to be. If that is inside a lock that the
 shutdown needs too, the process hangs for good; and also if anybody opens or closes a topic meanwhile. So SIGINT stays
-blocked (see `custom_ros_tools.node`), and is waited for where it is safe to act on it, in a thread. Child processes
+blocked (see `custom_ros_tools.ros.node`), and is waited for where it is safe to act on it, in a thread. Child processes
 inherit the block, which leaves their end to this process.
 """
 
@@ -56,7 +56,7 @@ def run_node(
 ) -> None:
     """Runs a node until it is interrupted; what is wrong with its configuration ends it with 1.
 
-    The program is one that `custom_ros_tools.node.run` runs.
+    The program is one that `custom_ros_tools.ros.node.run` runs.
 
     Args:
         name: The node's name unless it is given another one.

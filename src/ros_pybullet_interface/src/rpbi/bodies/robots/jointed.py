@@ -16,7 +16,7 @@ from rpbi.sensors.base_state import BaseStateSensor
 from rpbi.sensors.force_torque import ForceTorqueSensor
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
-from rpbi.urdf.document import resolve_meshes
+from rpbi.urdf.files import resolve_meshes
 from rpbi.urdf.joints import Joint, JointModel, JointTarget
 from rpbi.urdf.loading import load_urdf
 

@@ -33,7 +33,7 @@ class MobileRobot(Robot):
     def __init__(self, pb: Client, config: RobotConfig) -> None:
         super().__init__(pb, config)
         assert config.planar_base is not None  # `claims` has seen it
-        self.planar_base = PlanarBase(pb, self.body_id, config.planar_base, self.dt_s)
+        self.planar_base = PlanarBase(pb, self.body_id, config.planar_base, self.drive.dt_s)
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:

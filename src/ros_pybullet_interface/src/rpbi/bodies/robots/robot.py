@@ -11,6 +11,7 @@ import pybullet
 
 from custom_ros_tools.errors import Problem, UnknownNameError
 from rpbi.control.gravity import GravityModel
+from rpbi.control.joint_drive import JointDrive
 from rpbi.control.limit_reports import LimitReports
 from rpbi.control.motion import JointMotion, Motion
 from rpbi.control.motors import Command, Motors
@@ -47,7 +48,6 @@ class Robot(JointedBody):
         super().__init__(pb, config)
         assert config.setJointMotorControlArray is not None  # the model demands it
         mode = config.setJointMotorControlArray.controlMode
-        self.dt_s: float = pb.getPhysicsEngineParameters()["fixedTimeStep"]
         self.motors = Motors(
             pb,
             self.body_id,
@@ -57,17 +57,16 @@ class Robot(JointedBody):
             LimitReports(self.name),
             config.enforce_effort_limits,
             config.target_timeout_s,
-            self.dt_s,
+            pb.getPhysicsEngineParameters()["fixedTimeStep"],
         )
+        self.drive = JointDrive(self.name, pb, self.body_id, self.model, self.motors)
         self.force_torque_sensors = tuple(
             ForceTorqueSensor(self, self.model[each.joint], each, config.joint_state_publisher_hz)
             for each in config.enabled_joint_force_torque_sensors
         )
-        self.motion: Motion | None = None
         follower = config.joint_trajectory_controller
-        self.follower = None if follower is None else TrajectoryFollower(self, follower)
-        self._has_begun = False
-        self._gravity = GravityModel(self) if config.gravity_compensation else None
+        self.follower = None if follower is None else TrajectoryFollower(self.drive, follower)
+        self._gravity = GravityModel(pb, self.model, config.loadURDF) if config.gravity_compensation else None
         if config.resetBaseVelocity is not None and self.has_fixed_base:
             log.warning("%s: resetBaseVelocity: has no effect: the base is fixed (useFixedBase is set)", self.name)
         elif config.resetBaseVelocity is not None:
@@ -83,7 +82,7 @@ class Robot(JointedBody):
     def sensors(self) -> tuple[Sensor, ...]:
         """Joint states, force-torque sensors, the follower's state and contacts, beside link poses."""
         joint_states = JointStateSensor(self, self.config.joint_state_publisher_hz)
-        trajectory = () if self.follower is None else (TrajectoryStateSensor(self, self.follower),)
+        trajectory = () if self.follower is None else (TrajectoryStateSensor(self.drive, self.follower),)
         contacts = contact_sensors(self, self.config.contacts)
         return (joint_states, *self.force_torque_sensors, *trajectory, *contacts, *super().sensors())
 
@@ -94,31 +93,23 @@ class Robot(JointedBody):
 
     def before_step(self, tick: int) -> None:
         """Follows the motion, lets targets expire and applies efforts."""
-        if self.motion is not None:
-            self._advance(self.motion, tick)
+        self.drive.advance(tick)
         if self._gravity is not None and self.motors.mode == pybullet.TORQUE_CONTROL:
-            self.motors.set_feed_forward(self._gravity.efforts())
+            self.motors.set_feed_forward(self._gravity.efforts(self.base_pose(), self.joint_positions()))
         self.motors.before_step(tick)
 
-    def run(self, motion: Motion) -> None:
-        """Starts a motion; one that runs is ended with a reason.
+    @property
+    def motion(self) -> Motion | None:
+        """The motion that runs, if any."""
+        return self.drive.motion
 
-        Raises:
-            ValueError: If the robot is under torque control.
-        """
-        if self.motors.mode == pybullet.TORQUE_CONTROL:
-            raise ValueError("the robot is under TORQUE_CONTROL, where nothing holds it to a position")
-        self.halt("a newer motion replaced it")
-        self.motion, self._has_begun = motion, False
+    def run(self, motion: Motion) -> None:
+        """Starts a motion, see `JointDrive.run`."""
+        self.drive.run(motion)
 
     def halt(self, reason: str) -> None:
         """Ends the motion that runs, if any; its joints hold where they are."""
-        if self.motion is not None:
-            measured = self.joint_motion()
-            self.motion.halt(reason, measured)
-            for index in self.motion.joints:
-                self.motors.track(index, measured[index][0], 0.0)
-            self._end_motion(self.motion)
+        self.drive.halt(reason)
 
     def pause(self, reason: str) -> None:
         """Ends the motion that runs, unless it can wait until the world runs again."""
@@ -150,9 +141,7 @@ class Robot(JointedBody):
 
     def joint_motion(self) -> JointMotion:
         """Returns measured position [rad or m] and velocity [rad/s or m/s] of each driven joint by index."""
-        indices = [joint.index for joint in self.model.driven]
-        states = self.pb.getJointStates(self.body_id, indices) if indices else ()
-        return {index: (state[0], state[1]) for index, state in zip(indices, states)}
+        return self.drive.measured()
 
     def remove(self) -> None:
         """Takes the robot out of the world; a motion that runs is ended."""
@@ -160,20 +149,6 @@ class Robot(JointedBody):
         if self._gravity is not None:
             self._gravity.close()
         super().remove()
-
-    def _advance(self, motion: Motion, tick: int) -> None:
-        measured = self.joint_motion()
-        if not self._has_begun:
-            motion.begin(tick * self.dt_s, measured)
-            self._has_begun = True
-        for index, (position, velocity) in motion.advance((tick + 1) * self.dt_s, measured).items():
-            self.motors.track(index, position, velocity)
-        if motion.is_over:
-            self._end_motion(motion)
-
-    def _end_motion(self, motion: Motion) -> None:
-        self.motion = None
-        self.motors.release(motion.joints)
 
     def _check_target(self, target: JointTarget) -> Command:
         command = self.motors.check(target)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import pybullet
 
+from rpbi.control.joint_drive import JointDrive
 from rpbi.control.motion import JointMotion
 from rpbi.engine.clock import NS_PER_S, Clock, Schedule
 
@@ -17,9 +18,6 @@ from .motion import TrajectoryMotion, stopping
 from .request import ErrorCode, GoalTolerances, TrajectoryRefusedError, TrajectoryRequest
 from .tolerances import Tolerances, resolved_tolerances
 from .trajectory import Knot, State, Trajectory
-
-if TYPE_CHECKING:
-    from rpbi.bodies.robots.robot import Robot
 
 
 class CheckedRequest(NamedTuple):
@@ -40,14 +38,14 @@ class TrajectoryFollower:
     """Has a robot follow trajectories, one after the other or spliced into each other.
 
     Args:
-        robot: The robot.
+        drive: Drives the joints of the robot.
         config: Which joints, and how far they may be off.
     """
 
-    def __init__(self, robot: Robot, config: JointTrajectoryControllerConfig) -> None:
+    def __init__(self, drive: JointDrive, config: JointTrajectoryControllerConfig) -> None:
         self.config = config
-        self._robot = robot
-        driven = {joint.name: joint for joint in robot.model.driven}
+        self._drive = drive
+        driven = {joint.name: joint for joint in drive.model.driven}
         self._joints = driven if config.joints is None else {name: driven[name] for name in config.joints}
         self._by_index = {joint.index: joint for joint in self._joints.values()}
 
@@ -96,7 +94,7 @@ class TrajectoryFollower:
         _check_time(request, start_s, from_s)
         running = self._running
         trajectories = {} if running is None else {i: each.since(now_s) for i, each in running.trajectories.items()}
-        measured = self._robot.joint_motion()
+        measured = self._drive.measured()
         for joint_trajectory in request.joint_trajectories:
             index = joint_trajectory.joint.index
             current = trajectories.get(index) or Trajectory([Knot(now_s, measured[index][:1])])
@@ -120,17 +118,17 @@ class TrajectoryFollower:
         running = self._running
         if running is None or motion not in (None, running):
             return
-        trajectories = self._stopping(clock.time_s, self._robot.joint_motion(), running.joints)
+        trajectories = self._stopping(clock.time_s, self._drive.measured(), running.joints)
         self._run(TrajectoryMotion(self._by_index, trajectories, clock.time_s), reason)
 
     def state(self, time_s: float) -> ControllerState:
         """Returns where the joints are to be and where they are, at the world's time now [s]."""
-        return self._state(time_s, self._robot.joint_motion())
+        return self._state(time_s, self._drive.measured())
 
     def _state(self, time_s: float, measured: JointMotion) -> ControllerState:
         running = self._running
         return ControllerState(
-            self._robot.name,
+            self._drive.name,
             self.joint_names,
             self.desired(time_s),
             tuple(measured[index][0] for index in self._by_index),
@@ -142,9 +140,9 @@ class TrajectoryFollower:
         """Returns where the joints are to be at a time of the world's [s], as far as it is known now."""
         running = self._running
         trajectories = {} if running is None else running.trajectories
-        held: Mapping[int, float] = self._robot.motors.targets
-        if self._robot.motors.mode != pybullet.POSITION_CONTROL:
-            held = {index: position for index, (position, _) in self._robot.joint_motion().items()}
+        held: Mapping[int, float] = self._drive.motors.targets
+        if self._drive.motors.mode != pybullet.POSITION_CONTROL:
+            held = {index: position for index, (position, _) in self._drive.measured().items()}
         states = [
             trajectories[index].sample(time_s) if index in trajectories else State((held[index],), (0.0,), (0.0,))
             for index in self._by_index
@@ -153,7 +151,7 @@ class TrajectoryFollower:
 
     @property
     def _running(self) -> TrajectoryMotion | None:
-        motion = self._robot.motion
+        motion = self._drive.motion
         return motion if isinstance(motion, TrajectoryMotion) else None
 
     @property
@@ -184,7 +182,7 @@ class TrajectoryFollower:
         if running is not None:
             running.preempt(reason)
         try:
-            self._robot.run(motion)
+            self._drive.run(motion)
         except ValueError as error:
             raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, str(error)) from None
 

@@ -10,7 +10,7 @@ from custom_ros_tools.errors import UnknownNameError
 from rpbi.urdf.joints import Joint
 
 from .polynomial import Polynomial, derivative, value_bounds, value_range
-from .request import ErrorCode, TrajectoryRefusedError, TrajectoryRequest, Waypoint
+from .request import ErrorCode, TrajectoryPoint, TrajectoryRefusedError, TrajectoryRequest
 from .trajectory import Knot, Trajectory
 
 CURVE_SPEED_SLACK = 1.05
@@ -104,7 +104,7 @@ def validate_trajectory(
     return tuple(joint_trajectories)
 
 
-def _knot(point: Waypoint, column: int) -> Knot:
+def _knot(point: TrajectoryPoint, column: int) -> Knot:
     return Knot(
         point.time_s,
         (point.positions[column],),
@@ -147,7 +147,7 @@ def _check_points(request: TrajectoryRequest) -> None:
                     raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, message)
 
 
-def _check_limits(joint: Joint, number: int, point: Waypoint, column: int) -> None:
+def _check_limits(joint: Joint, number: int, point: TrajectoryPoint, column: int) -> None:
     position = point.positions[column]
     if not joint.allows(position):
         raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, f"point {number}: {joint.limit_violation(position)}")

@@ -37,7 +37,7 @@ class TrajectoryRefusedError(InterfaceError):
         return self.message
 
 
-class Waypoint(NamedTuple):
+class TrajectoryPoint(NamedTuple):
     """Where n joints are to be at one time.
 
     Attributes:
@@ -75,7 +75,7 @@ class TrajectoryRequest(NamedTuple):
     """
 
     joint_names: tuple[str, ...]
-    points: tuple[Waypoint, ...]
+    points: tuple[TrajectoryPoint, ...]
     stamp_ns: int = 0
 
 

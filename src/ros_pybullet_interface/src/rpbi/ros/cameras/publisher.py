@@ -16,7 +16,7 @@ from rpbi.render.depth import DepthNoise
 from rpbi.render.frame import Camera
 from rpbi.render.priority import take_part
 from rpbi.samples import SceneSample
-from rpbi.sensors import RgbdSensor
+from rpbi.sensors.rgbd import RgbdSensor
 from rpbi.world import World
 
 from .image_publisher import SINK, sink_arguments
@@ -37,12 +37,14 @@ class ScenePublisher:
         self._sensors: Mapping[str, RgbdSensor] = {}
         self._synchronous: tuple[RgbdSensor, ...] = ()
         self._awaited: list[SceneSample] = []
+        # A window without a graphics card takes all that there is, and would leave an idle process nothing
+        priority = ["--keep-priority"] if world.window else []
         self._renderer = RenderClient(
             (),
             world.log,
             lambda: {name: body.body_id for name, body in world.bodies.items()},
             SINK,
-            sink_arguments(rospy.get_name(), sys.argv),
+            [*priority, *sink_arguments(rospy.get_name(), sys.argv)],
         )
 
     def poll(self) -> None:

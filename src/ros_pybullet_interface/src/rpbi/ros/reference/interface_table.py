@@ -19,7 +19,7 @@ from rpbi.ros.services.body_endpoints import BODY_SERVICES, BODY_TOPICS
 from rpbi.ros.services.node_services import NODE_SERVICES
 from rpbi.ros.window.debug_camera import GET, RESET
 from rpbi.ros.window.topics import published_topics
-from rpbi.sensors import LinkPoseSensor
+from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.world import World
 
 PUBLISHES = "publishes"

@@ -14,7 +14,7 @@ from ros_pybullet_interface.srv import CalculateInverseKinematicsRequest
 from rpbi.bodies import Body
 from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.geometry import Pose
-from rpbi.kinematics import IKProblem, IKSolution
+from rpbi.kinematics import IKProblem, PybulletSolution
 from rpbi.ros.headers import to_ros_time
 from rpbi.ros.services.body_context import BodyContext
 from rpbi.urdf.joints import JointTarget
@@ -105,7 +105,7 @@ def residual_of_robot(context: BodyContext, message: CalculateInverseKinematicsP
     return LinkResidual(math.dist(pose.position, message.targetPosition), angle)
 
 
-def solve_for_robot(context: BodyContext, message: CalculateInverseKinematicsProblem) -> IKSolution:
+def solve_for_robot(context: BodyContext, message: CalculateInverseKinematicsProblem) -> PybulletSolution:
     """Solves a problem of which the target is in the world, for where the robot is now.
 
     The search starts at the message's `currentPosition`, or else where the robot's joints are. Any thread but that of
@@ -131,7 +131,7 @@ def solve_for_robot(context: BodyContext, message: CalculateInverseKinematicsPro
     return robot.kinematics.solve(in_base)
 
 
-def _velocities(problem: CalculateInverseKinematicsProblem, solution: IKSolution) -> list[float]:
+def _velocities(problem: CalculateInverseKinematicsProblem, solution: PybulletSolution) -> list[float]:
     """Returns the velocities [rad/s or m/s] that lead to the solution in the time given, none without a start or time.
 
     Raises:

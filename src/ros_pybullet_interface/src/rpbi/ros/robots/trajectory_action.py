@@ -16,7 +16,7 @@ from actionlib.server_goal_handle import ServerGoalHandle
 from actionlib_msgs.msg import GoalStatus
 
 from custom_ros_tools.errors import InterfaceError
-from rpbi.bodies import Robot
+from rpbi.bodies.robots.robot import Robot
 from rpbi.control.trajectories.controller_state import ControllerState
 from rpbi.control.trajectories.motion import TrajectoryMotion
 from rpbi.control.trajectories.request import ErrorCode, TrajectoryRefusedError

@@ -7,7 +7,8 @@ from typing import Any
 
 from trajectory_msgs.msg import JointTrajectory
 
-from rpbi.bodies import Body, Robot
+from rpbi.bodies import Body
+from rpbi.bodies.robots.robot import Robot
 from rpbi.control.trajectories.trajectory import State
 from rpbi.engine.actions import RecordedTrajectory
 from rpbi.engine.clock import NS_PER_S

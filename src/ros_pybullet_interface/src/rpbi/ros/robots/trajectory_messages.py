@@ -9,7 +9,7 @@ import genpy
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from rpbi.control.trajectories.controller_state import ControllerState
-from rpbi.control.trajectories.request import GoalTolerances, JointTolerance, TrajectoryRequest, Waypoint
+from rpbi.control.trajectories.request import GoalTolerances, JointTolerance, TrajectoryPoint, TrajectoryRequest
 from rpbi.ros.headers import to_ros_time
 
 try:
@@ -27,7 +27,7 @@ CONTROLLER = "joint_trajectory_controller"
 def trajectory_request(message: JointTrajectory) -> TrajectoryRequest:
     """Returns what a message asks for; efforts beside the positions are not looked at."""
     points = tuple(
-        Waypoint(
+        TrajectoryPoint(
             point.time_from_start.to_sec(), tuple(point.positions), tuple(point.velocities), tuple(point.accelerations)
         )
         for point in message.points

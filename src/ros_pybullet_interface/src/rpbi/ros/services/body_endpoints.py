@@ -20,8 +20,9 @@ from ros_pybullet_interface.srv import (
     RobotInfo,
     SetJointState,
 )
-from rpbi.bodies import Body, Robot
+from rpbi.bodies import Body
 from rpbi.bodies.robots.jointed import JointedBody
+from rpbi.bodies.robots.robot import Robot
 from rpbi.engine.inputs import PoseInput, check_pose
 from rpbi.geometry import Pose
 from rpbi.ros.endpoints import Answer, Service, Topic, of, serve, subscribe

@@ -30,8 +30,14 @@ from ros_pybullet_interface.srv import (
     StepNRequest,
 )
 from ros_pybullet_interface.srv import ChangeDynamics as ChangeDynamicsService
-from rpbi.bodies import BODY_TYPES, CollisionObject, DynamicObject, Robot, SoftObject, UrdfObject, VisualObject, kind_of
+from rpbi.bodies import BODY_TYPES, kind_of
+from rpbi.bodies.collision import CollisionObject
+from rpbi.bodies.dynamic import DynamicObject
 from rpbi.bodies.dynamics import LinkDynamics, difference
+from rpbi.bodies.robots.robot import Robot
+from rpbi.bodies.soft import SoftObject
+from rpbi.bodies.urdf_object import UrdfObject
+from rpbi.bodies.visual import VisualObject
 from rpbi.config.asset_files import find_file
 from rpbi.config.loading import load_object, type_of
 from rpbi.config.object_entry import FILE, parse_object_entry

@@ -1,0 +1,157 @@
+"""A chain of joints and its goal in the Orocos Kinematics and Dynamics Library, which takes a microsecond a call."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import PyKDL
+
+from ik_ros.problem import IKProblem
+from rpbi.geometry import Pose
+from rpbi.kinematics.limits import Reach
+from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
+
+from .description import ChainDescription
+
+
+class KdlChain:
+    """Where the tip of a chain is, and how it moves; one thread at a time.
+
+    Args:
+        description: The chain.
+
+    Attributes:
+        kdl: KDL's chain; its m joints are those that are not fixed.
+        is_plain: Whether the m joints are the n variables, since none mimics another.
+        reach: How far they bring the tip.
+    """
+
+    def __init__(self, description: ChainDescription) -> None:
+        self._drives = description.drives
+        self.is_plain = [drive.variable for drive in self._drives] == list(range(len(self._drives))) and (
+            not description.mimics
+        )
+        self.kdl = _kdl_chain(description)
+        moving = [joint for joint in description.joints if joint.is_moving]
+        self._positions = PyKDL.JntArray(len(self._drives))
+        self._frame = PyKDL.Frame()
+        self._jacobian = PyKDL.Jacobian(len(self._drives))
+        self._to_frame = PyKDL.ChainFkSolverPos_recursive(self.kdl)
+        self._to_jacobian = PyKDL.ChainJntToJacSolver(self.kdl)
+        self._variables = np.zeros((len(self._drives), len(description.joint_names)))
+        for joint, drive in enumerate(self._drives):
+            self._variables[joint, drive.variable] = drive.multiplier
+        x, y, z = self.kdl.getSegment(0).getJoint().JointOrigin()
+        carried = description.joints[description.joints.index(moving[0]) + 1 :]
+        self.reach = Reach.of((x, y, z), [math.hypot(*joint.xyz) for joint in carried], moving)
+
+    def frame(self, q: Sequence[float]) -> PyKDL.Frame:
+        """Returns the pose of the tip in the base, valid until the next call.
+
+        Args:
+            q: n positions [rad or m].
+        """
+        self._set(q)
+        self._to_frame.JntToCart(self._positions, self._frame)
+        return self._frame
+
+    def pose(self, q: Sequence[float]) -> Pose:
+        """Returns the pose of the tip in the base."""
+        frame = self.frame(q)
+        x, y, z = frame.p
+        return Pose((x, y, z), frame.M.GetQuaternion())
+
+    def jacobian(self, q: Sequence[float]) -> np.ndarray:
+        """Returns how the tip moves with the joints, in the base: 6 x n, 3 rows [m], 3 rows of a rotation [rad]."""
+        self._set(q)
+        self._to_jacobian.JntToJac(self._positions, self._jacobian)
+        joints = range(len(self._drives))
+        values = [self._jacobian[row, joint] for row in range(6) for joint in joints]
+        jacobian = np.array(values).reshape(6, len(self._drives))
+        return jacobian if self.is_plain else jacobian @ self._variables
+
+    def _set(self, q: Sequence[float]) -> None:
+        positions = self._positions
+        if self.is_plain:
+            for i, position in enumerate(q):
+                positions[i] = position
+        else:
+            for i, drive in enumerate(self._drives):
+                positions[i] = drive.multiplier * q[drive.variable] + drive.offset
+
+
+class Goal:
+    """A target with a box of tolerances around it.
+
+    Args:
+        problem: The question.
+
+    Attributes:
+        frame: The target in the base.
+        inverse: The base in the target.
+        tolerance: How far off the link may be: 3 ways along the axes of the target [m], and 3 components of the
+            rotation vector from the target to the link, in the target [rad]; inf where any will do.
+        is_point: Whether the box is no larger than what counts as reached anyway.
+
+    Raises:
+        ValueError: If the problem has no target.
+    """
+
+    def __init__(self, problem: IKProblem) -> None:
+        if problem.target is None:
+            raise ValueError("target: missing; this solver moves one link to a pose")
+        position, quat_xyzw = problem.target
+        self.frame = PyKDL.Frame(PyKDL.Rotation.Quaternion(*quat_xyzw), PyKDL.Vector(*position))
+        self.inverse = self.frame.Inverse()
+        turns = (math.inf if angle >= math.pi else angle for angle in problem.rotation_tolerance)
+        self.tolerance = (*problem.position_tolerance, *turns)
+        self.is_point = (
+            max(problem.position_tolerance) <= POSITION_TOLERANCE_M
+            and max(problem.rotation_tolerance) <= ORIENTATION_TOLERANCE_RAD
+        )
+
+    @property
+    def any_orientation(self) -> bool:
+        """Whether the link may be turned as it likes."""
+        return min(self.tolerance[3:]) == math.inf
+
+    def off(self, frame: PyKDL.Frame) -> list[float]:
+        """Returns how far a link is off: 3 ways [m] and a rotation vector [rad], in the target.
+
+        Args:
+            frame: Where the link is in the base.
+        """
+        difference = self.inverse * frame
+        p, turn = difference.p, difference.M.GetRot()
+        return [p[0], p[1], p[2], turn[0], turn[1], turn[2]]
+
+    def beyond(self, off: list[float]) -> list[float]:
+        """Returns what of these 6 values is beyond the tolerances."""
+        return [math.copysign(max(abs(value) - tolerance, 0.0), value) for value, tolerance in zip(off, self.tolerance)]
+
+    def residual(self, frame: PyKDL.Frame) -> Residual:
+        """Returns how far a link is off beyond the tolerances.
+
+        Args:
+            frame: Where the link is in the base.
+        """
+        x, y, z, rx, ry, rz = self.beyond(self.off(frame))
+        return Residual(math.hypot(x, y, z), math.hypot(rx, ry, rz))
+
+
+def _kdl_chain(description: ChainDescription) -> PyKDL.Chain:
+    chain = PyKDL.Chain()
+    fixed = PyKDL.Frame()  # of the joint's parent link in the link that the last moving joint moves
+    for joint in description.joints:
+        origin = fixed * PyKDL.Frame(PyKDL.Rotation.RPY(*joint.rpy), PyKDL.Vector(*joint.xyz))
+        if not joint.is_moving:
+            fixed = origin
+            continue
+        kind = PyKDL.Joint.RotAxis if joint.is_revolute else PyKDL.Joint.TransAxis
+        kdl_joint = PyKDL.Joint(joint.name, origin.p, origin.M * PyKDL.Vector(*joint.axis), kind)
+        chain.addSegment(PyKDL.Segment(joint.child, kdl_joint, origin))
+        fixed = PyKDL.Frame()
+    chain.addSegment(PyKDL.Segment(description.tip, PyKDL.Joint(PyKDL.Joint.Fixed), fixed))
+    return chain

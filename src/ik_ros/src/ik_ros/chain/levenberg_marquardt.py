@@ -1,0 +1,101 @@
+"""The method of Levenberg and Marquardt, within limits and tolerances."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import PyKDL
+
+from rpbi.kinematics.limits import Limits
+
+from .kdl import Goal, KdlChain
+
+ITERATIONS = 60
+LEVER_M = 0.1
+"""A turn counts as much as a way, of this lever: 0.01 rad are like 1 mm."""
+DONE_M = 1e-5
+"""Residual at which to stop [m]."""
+LARGEST_STEP = 1.0
+"""Most that a joint moves in one iteration [rad or m]."""
+LEAST_DAMPING, FIRST_DAMPING, LARGEST_DAMPING = 1e-9, 1e-4, 1e2
+STALLED = 0.99
+"""If the squared residual keeps more than this part of itself, little is left to gain..."""
+PATIENCE = 3
+"""... and after so many such iterations the descent ends."""
+
+
+def levenberg_marquardt(chain: KdlChain, goal: Goal, limits: Limits, start: Sequence[float]) -> list[float]:
+    """Goes from a start towards a goal, and never beyond limits.
+
+    It minimises how far the link is off beyond its tolerances. Joints that are at a limit and would leave it stand
+    still for that iteration.
+
+    Args:
+        chain: The chain.
+        goal: Where its tip shall be.
+        limits: Limits of the n joints.
+        start: n positions within limits [rad or m].
+
+    Returns:
+        The n best positions that were found [rad or m].
+    """
+    lower, upper = np.array(limits.lower), np.array(limits.upper)
+    to_target = _matrix(goal.inverse.M)
+    q = np.array(start)
+    error, turn = _error(chain, goal, q)
+    cost, damping, patience = float(error @ error), FIRST_DAMPING, PATIENCE
+    for _ in range(ITERATIONS):
+        if cost <= DONE_M**2 or patience == 0 or damping > LARGEST_DAMPING:
+            break
+        jacobian = _jacobian(chain, q, to_target, turn)
+        jacobian[error == 0.0] = 0.0  # within its tolerance: let it go
+        gradient = jacobian.T @ error
+        free = ~(((q <= lower) & (gradient > 0.0)) | ((q >= upper) & (gradient < 0.0)))
+        if not free.any():
+            break
+        jacobian = jacobian[:, free]
+        square = jacobian.T @ jacobian
+        while damping <= LARGEST_DAMPING:
+            step = np.zeros(len(q))
+            step[free] = -np.linalg.solve(square + damping * np.eye(len(square)), gradient[free])
+            step *= min(1.0, LARGEST_STEP / max(np.abs(step).max(), 1e-12))
+            moved = np.clip(q + step, lower, upper)
+            moved_error, moved_turn = _error(chain, goal, moved)
+            moved_cost = float(moved_error @ moved_error)
+            if moved_cost < cost:
+                patience = PATIENCE if moved_cost < STALLED * cost else patience - 1
+                q, error, turn, cost = moved, moved_error, moved_turn, moved_cost
+                damping = max(0.2 * damping, LEAST_DAMPING)
+                break
+            damping *= 5.0
+    return list(q.tolist())
+
+
+def _error(chain: KdlChain, goal: Goal, q: np.ndarray) -> tuple[np.ndarray, list[float]]:
+    """Returns what is beyond the tolerances [m], and the rotation vector from target to link [rad]."""
+    off = goal.off(chain.frame(q.tolist()))
+    error = np.array(goal.beyond(off))
+    error[3:] *= LEVER_M
+    return error, off[3:]
+
+
+def _jacobian(chain: KdlChain, q: np.ndarray, to_target: np.ndarray, turn: Sequence[float]) -> np.ndarray:
+    """Returns how the error changes with the joints, tolerances aside, 6 x n.
+
+    A rotation vector does not change by the angular velocity alone: that is multiplied by the inverse of the left
+    Jacobian of SO(3) (Barfoot, State Estimation for Robotics, 2017, section 7.1.5).
+    """
+    x, y, z = turn
+    angle = math.hypot(x, y, z)
+    half = 0.5 * angle
+    factor = (1.0 - half / math.tan(half)) / angle**2 if angle > 1e-4 else 1.0 / 12.0
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    to_vector = np.eye(3) - 0.5 * cross + factor * cross @ cross
+    jacobian = chain.jacobian(q.tolist())
+    return np.vstack((to_target @ jacobian[:3], LEVER_M * to_vector @ to_target @ jacobian[3:]))
+
+
+def _matrix(rotation: PyKDL.Rotation) -> np.ndarray:
+    return np.array([[rotation[row, column] for column in range(3)] for row in range(3)])

@@ -1,0 +1,144 @@
+"""URDF files as PyBullet and ROS can read them."""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import re
+import tempfile
+from functools import lru_cache
+from pathlib import Path
+
+from custom_ros_tools.config import replace_package
+from custom_ros_tools.errors import ConfigError, Problem
+
+_FILENAME = re.compile(
+    r"""(?P<before><(?:mesh|texture)\b[^>]*?\bfilename\s*=\s*)(?P<quote>["'])(?P<path>.*?)(?P=quote)"""
+)
+NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""Characters that XML 1.0 does not allow (https://www.w3.org/TR/xml/#charsets); PyBullet does not mind them."""
+COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+_PACKAGE = "package://"
+
+
+@lru_cache(maxsize=1)
+def _folder() -> Path:
+    """Returns a folder for this process's rewritten files; it goes when the process ends."""
+    folder = tempfile.TemporaryDirectory(prefix="rpbi-urdf-")
+    atexit.register(folder.cleanup)
+    return Path(folder.name)
+
+
+def _read(path: Path) -> str:
+    """Returns the text of a URDF file without its comments, and without characters that XML does not allow."""
+    return COMMENT.sub("", NOT_XML.sub("", path.read_text(encoding="utf-8")))
+
+
+def resolve_meshes(path: str) -> str:
+    """Makes the meshes of a URDF file loadable by PyBullet, which knows nothing of ROS packages.
+
+    Args:
+        path: The URDF file.
+
+    Returns:
+        The file itself if it needs nothing, else that of a copy in which every `package://` path, and with them
+        every relative one, is absolute.
+
+    Raises:
+        ConfigError: If a mesh belongs to an unknown package or does not exist.
+    """
+    source = Path(path)
+    text = _read(source)
+    if _PACKAGE not in text:
+        return path
+    problems: list[Problem] = []
+
+    def absolute(match: re.Match[str]) -> str:
+        try:
+            resolved = mesh_file(match["path"], source)
+        except ConfigError as error:
+            problems.extend(error.problems)
+            return match[0]
+        return f"{match['before']}{match['quote']}{resolved}{match['quote']}"
+
+    resolved_text = _FILENAME.sub(absolute, text)
+    if problems:
+        raise ConfigError(problems)
+    return _write(source.stem, resolved_text)
+
+
+def write_description(text: str) -> str:
+    """Writes a robot description that has no file, such as that of the parameter server, into one of its own.
+
+    Returns:
+        The file, which lasts as long as the process.
+    """
+    return _write("robot_description", text)
+
+
+def is_temporary(path: str) -> bool:
+    """Tells whether a file is one of this module's, which go when the process ends."""
+    return Path(path).parent == _folder()
+
+
+def description_for_ros(path: str) -> str:
+    """Returns a URDF file as ROS wants it, which does not know where the file is.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Its text, with relative mesh paths as `file://` addresses; paths of ROS packages stay.
+
+    Raises:
+        ConfigError: If a mesh belongs to an unknown package.
+    """
+    source = Path(path)
+
+    def address(match: re.Match[str]) -> str:
+        mesh = match["path"]
+        if "://" in mesh and not _is_of_unknown_package(mesh):
+            return match[0]
+        file = mesh_file(mesh, source) if _is_of_unknown_package(mesh) else source.parent / mesh
+        return f"{match['before']}{match['quote']}file://{file.resolve()}{match['quote']}"
+
+    return _FILENAME.sub(address, _read(source))
+
+
+def mesh_file(mesh: str, source: Path) -> Path:
+    """Returns the file of a mesh.
+
+    Args:
+        mesh: What the URDF says.
+        source: The URDF file.
+
+    Raises:
+        ConfigError: If it belongs to an unknown package or does not exist.
+    """
+    if _is_of_unknown_package(mesh):
+        # PyBullet takes package://FOLDER/FILE for a folder beside the URDF or above it, and its own robots use that.
+        files = (folder / mesh.removeprefix(_PACKAGE) for folder in source.resolve().parents)
+        found = next((file for file in files if file.is_file()), None)
+        if found is not None:
+            return found
+    try:
+        file = source.parent / replace_package(mesh)
+    except ConfigError as error:
+        raise ConfigError([Problem(str(source), mesh, problem.message) for problem in error.problems]) from None
+    if not file.is_file():
+        raise ConfigError([Problem(str(source), mesh, f"no such file: {file}")])
+    return file
+
+
+def _is_of_unknown_package(mesh: str) -> bool:
+    try:
+        replace_package(mesh)
+    except ConfigError:
+        return mesh.startswith(_PACKAGE)
+    return False
+
+
+def _write(stem: str, text: str) -> str:
+    path = _folder() / f"{stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}.urdf"
+    path.write_text(text, encoding="utf-8")
+    return str(path)

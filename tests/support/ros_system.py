@@ -1,0 +1,215 @@
+"""Real nodes for tests: starts them, listens to them, calls them and sees to it that none is left."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import rosgraph
+import roslib.packages
+import rospy
+import yaml
+
+from ros_pybullet_interface.srv import ListObjects
+
+SUPPORT = Path(__file__).resolve().parent
+"""Where the tests' helpers are, and programs that tests start."""
+
+
+def support_on_path() -> dict[str, str]:
+    """Returns the environment in which other processes import the tests' helpers."""
+    return {"PYTHONPATH": os.pathsep.join((os.environ.get("PYTHONPATH", ""), str(SUPPORT)))}
+
+
+def wait_until(condition: Callable[[], Any], what: str, timeout_s: float = 60.0, every_s: float = 0.02) -> Any:
+    """Waits until a condition holds and returns its value; errors of a master that is not up yet count as no."""
+    end_s = time.monotonic() + timeout_s
+    while True:
+        try:
+            value = condition()
+        except (OSError, rosgraph.MasterException, rospy.ROSException):
+            value = None
+        if value:
+            return value
+        if time.monotonic() > end_s:
+            raise TimeoutError(f"it did not come about within {timeout_s:g} s that {what}")
+        time.sleep(every_s)
+
+
+FOREIGN = ("rostopic",)
+"""Programs of rospy's that sometimes hang on Ctrl-C, and have nothing to finish."""
+
+
+def stop_group(process: subprocess.Popen, timeout_s: float = 60.0) -> int:
+    """Ends a process and its children as Ctrl-C would; returns its exit code.
+
+    Raises:
+        TimeoutError: If it did not end by itself.
+    """
+    if process.poll() is None:
+        is_foreign = isinstance(process.args, list) and process.args[0] in FOREIGN
+        os.killpg(process.pid, signal.SIGKILL if is_foreign else signal.SIGINT)
+    try:
+        return process.wait(timeout_s)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        raise TimeoutError(f"{process.args} did not end on Ctrl-C") from None
+
+
+class Listener:
+    """Keeps the messages of a topic with the wall time of their arrival [s]."""
+
+    def __init__(self, topic: str, message_type: type) -> None:
+        self.messages: list[Any] = []
+        self.arrival_s: list[float] = []
+        self._subscriber = rospy.Subscriber(topic, message_type, self._take, queue_size=10000, tcp_nodelay=True)
+
+    def _take(self, message: Any) -> None:
+        self.arrival_s.append(time.monotonic())
+        self.messages.append(message)
+
+    def wait_for(self, count: int = 1, timeout_s: float = 60.0) -> list[Any]:
+        """Waits until so many messages have come and returns all."""
+        wait_until(lambda: len(self.messages) >= count, f"{count} messages came on {self.topic}", timeout_s)
+        return self.messages
+
+    @property
+    def topic(self) -> str:
+        """The topic's full name."""
+        return self._subscriber.resolved_name
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether somebody publishes it and we are connected."""
+        return bool(self._subscriber.get_num_connections() > 0)
+
+    @property
+    def stamps_ns(self) -> list[int]:
+        """Stamps of the messages' headers [ns]."""
+        return [message.header.stamp.to_nsec() for message in self.messages]
+
+    def close(self) -> None:
+        """Listens no more."""
+        self._subscriber.unregister()
+
+
+class RosSystem:
+    """Nodes of one test, on the tests' own master."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.processes: list[subprocess.Popen] = []
+        self._listeners: list[Listener] = []
+        self._lock = threading.Lock()
+        if not rospy.core.is_initialized():
+            rospy.init_node("tests", anonymous=True, disable_rostime=True, disable_signals=True)
+        rospy.set_param("/use_sim_time", False)
+        self._parameters = set(rospy.get_param_names())
+
+    def start(self, command: Sequence[str], log: str | None = None, **environment: str) -> subprocess.Popen:
+        """Starts a program in a process group of its own; its output goes to `output(process)`."""
+        if command[0] == "rosrun":
+            command = [find_executable(command[1], command[2]), *command[3:]]
+        path = self.folder / (log or f"{len(self.processes)}.log")
+        with open(path, "w") as file:
+            process = subprocess.Popen(
+                command,
+                stdout=file,
+                stderr=subprocess.STDOUT,
+                stdin=subprocess.DEVNULL,
+                start_new_session=True,
+                env={**os.environ, "PYTHONUNBUFFERED": "1", **environment},
+            )
+        process.log_path = path  # type: ignore[attr-defined]
+        self.processes.append(process)
+        return process
+
+    def start_program(self, name: str, *arguments: str, **environment: str) -> subprocess.Popen:
+        """Starts one of the programs that stand beside this module."""
+        return self.start([sys.executable, str(SUPPORT / name), *arguments], **environment)
+
+    def output(self, process: subprocess.Popen) -> str:
+        """Returns what a program has printed so far."""
+        return process.log_path.read_text(errors="replace")  # type: ignore[attr-defined]
+
+    def simulator(
+        self,
+        world: dict[str, Any],
+        use_sim_time: bool = False,
+        wait: bool = True,
+        namespace: str = "/",
+        **environment: str,
+    ) -> subprocess.Popen:
+        """Starts the simulator node with a main configuration and waits until it is up."""
+        rospy.set_param("/use_sim_time", use_sim_time)
+        name = f"{namespace}ros_pybullet_interface"
+        rospy.set_param(f"{name}/config", world)
+        service = f"{namespace}rpbi/list_objects"
+        before = _provider(service)  # one that was killed is still registered
+        process = self.start(
+            ["rosrun", "ros_pybullet_interface", "ros_pybullet_interface_node.py", f"__ns:={namespace}"], **environment
+        )
+        if wait:
+            wait_until(
+                lambda: process.poll() is not None or _provider(service) not in (None, before),
+                "the node serves",
+            )
+            assert process.poll() is None, self.output(process)
+            self.call(service, ListObjects)  # its loop answers, and runs when all topics and services are there
+        return process
+
+    def listen(self, topic: str, message_type: type) -> Listener:
+        """Listens to a topic until the test ends."""
+        listener = Listener(topic, message_type)
+        self._listeners.append(listener)
+        return listener
+
+    def call(self, service: str, service_type: type, *arguments: Any, **fields: Any) -> Any:
+        """Calls a service."""
+        rospy.wait_for_service(service, timeout=60.0)
+        return rospy.ServiceProxy(service, service_type)(*arguments, **fields)
+
+    def write_yaml(self, name: str, data: dict[str, Any]) -> str:
+        """Writes a YAML file into the test's folder and returns its path."""
+        path = self.folder / name
+        path.write_text(yaml.safe_dump(data))
+        return str(path)
+
+    def close(self) -> None:
+        """Ends all that was started; a program that does not end by itself fails the test."""
+        for listener in self._listeners:
+            listener.close()
+        late = []
+        for process in reversed(self.processes):
+            try:
+                stop_group(process)
+            except TimeoutError as error:
+                late.append(f"{error}:\n{self.output(process)}")
+        rospy.set_param("/use_sim_time", False)
+        for name in set(rospy.get_param_names()) - self._parameters:  # launch files leave theirs behind
+            rospy.delete_param(name)
+        if late:
+            raise AssertionError("\n".join(late))
+
+
+@cache
+def find_executable(package: str, name: str) -> str:
+    """Returns the path of what `rosrun` would run, without the processes by which `rosrun` finds it."""
+    return str(roslib.packages.find_node(package, name)[0])
+
+
+def _provider(service: str) -> str | None:
+    """Returns where a service is served, None if nowhere."""
+    try:
+        return str(rosgraph.Master("/tests").lookupService(service))
+    except rosgraph.MasterError:
+        return None

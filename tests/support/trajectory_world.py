@@ -1,0 +1,110 @@
+"""A world with an arm that follows trajectories, and a client of its action."""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import actionlib
+import rospy
+from node_world import main_config
+from ros_system import wait_until
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from worlds import iiwa
+
+JOINTS = [f"lbr_iiwa_joint_{number}" for number in range(1, 8)]
+CONTROLLER = "/rpbi/iiwa/joint_trajectory_controller"
+HOME = {"initial_joint_position": {"lbr_iiwa_joint_2": 30.0, "lbr_iiwa_joint_4": -60.0}}
+START = [0.0, math.radians(30.0), 0.0, math.radians(-60.0), 0.0, 0.0, 0.0]
+
+
+def open_world(
+    ros: Any,
+    control_msgs: str,
+    folder: Path,
+    use_sim_time: bool = True,
+    controller: dict[str, Any] | None = None,
+    **main: Any,
+) -> SimpleNamespace:
+    """Starts a world with an iiwa that follows trajectories; returns what tests talk to.
+
+    Args:
+        ros: The nodes of the test.
+        control_msgs: Where that package is.
+        folder: Where files go.
+        use_sim_time: Whether stamps are simulated time.
+        controller: Keys of the controller.
+        **main: Keys of the main file.
+    """
+    from control_msgs.msg import FollowJointTrajectoryAction
+
+    robot = iiwa(joint_trajectory_controller=controller or {}, joint_state_publisher_hz=1000, **HOME)
+    paths = f"{control_msgs}:{os.environ.get('PYTHONPATH', '')}"
+    process = ros.simulator(main_config(folder, robots=(robot,), **main), use_sim_time=use_sim_time, PYTHONPATH=paths)
+    states = ros.listen("/rpbi/iiwa/joint_states", JointState)
+    rospy.set_param("actionlib_client_pub_queue_size", 1000)  # else a burst of more than 10 goals loses some
+    client = actionlib.ActionClient(f"{CONTROLLER}/follow_joint_trajectory", FollowJointTrajectoryAction)
+    assert client.wait_for_server(rospy.Duration(20.0))
+    states.wait_for(1)
+    return SimpleNamespace(ros=ros, states=states, client=client, process=process)
+
+
+class Goal:
+    """A goal that was sent, what has come back of it, and how to wait for its end."""
+
+    def __init__(self, robot: SimpleNamespace, trajectory: JointTrajectory, **fields: Any) -> None:
+        from control_msgs.msg import FollowJointTrajectoryGoal
+
+        self.feedback: list[Any] = []
+        self._done = threading.Event()
+        goal = FollowJointTrajectoryGoal(trajectory=trajectory, **fields)
+        self.handle = robot.client.send_goal(goal, self._on_transition, lambda _, fed: self.feedback.append(fed))
+
+    def _on_transition(self, handle: Any) -> None:
+        if handle.get_comm_state() == actionlib.CommState.DONE:
+            self._done.set()
+
+    def wait(self) -> tuple[int, int, str]:
+        """Waits for the end; returns the status, the error code and the error string."""
+        assert self._done.wait(60.0), "the goal was not answered"
+        result = self.handle.get_result()
+        return self.handle.get_terminal_state(), result.error_code, result.error_string
+
+    def wait_until_it_moves(self) -> None:
+        wait_until(lambda: len(self.feedback) > 3, "the goal is being followed")
+
+
+def trajectory(
+    *points: tuple[float, list[float]], names: list[str] = JOINTS, velocity: bool = True, stamp: Any = None
+) -> JointTrajectory:
+    """Returns a trajectory through (time [s], positions [rad]); at rest at each of them unless told otherwise."""
+    message = JointTrajectory(joint_names=names)
+    for time_s, positions in points:
+        point = JointTrajectoryPoint(positions=positions, time_from_start=rospy.Duration.from_sec(time_s))
+        point.velocities = [0.0] * len(positions) if velocity else []
+        message.points.append(point)
+    if stamp is not None:
+        message.header.stamp = stamp
+    return message
+
+
+def moved(by: float, joint: int = 0) -> list[float]:
+    """Returns the start positions with one joint moved [rad]."""
+    return [position + by * (index == joint) for index, position in enumerate(START)]
+
+
+def tolerance(name: str, **limits: float) -> Any:
+    from control_msgs.msg import JointTolerance
+
+    return JointTolerance(name=name, **limits)
+
+
+def stands(states: Any, count: int = 100) -> bool:
+    """Tells whether the robot has not moved over the last messages [1 kHz]."""
+    last = states.messages[-count:]
+    return len(last) == count and all(abs(v) < 1e-3 for message in last for v in message.velocity)

@@ -1,0 +1,42 @@
+"""Plugin for pytest: which worker runs which tests, and in which order."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+TESTS = Path(__file__).resolve().parents[1]
+FIRST = ("ros/ik_ros", "ros/rpbi_examples", "gui", "ros")
+"""Folders whose files take long: they are begun first, so that no worker is left alone with one at the end."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Brings the folders into their order; within, everything stays as it is."""
+
+    def rank(item: pytest.Item) -> int:
+        matches = (number for number, folder in enumerate(FIRST) if item.path.is_relative_to(TESTS / folder))
+        return next(matches, len(FIRST))
+
+    items.sort(key=rank)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """Returns how many workers `-n auto` means: one more than processors, since tests of ROS often wait."""
+    files = [argument.split("::")[0] for argument in config.args]
+    wanted = (os.cpu_count() or 1) + 1
+    if all(Path(file).is_file() for file in files):
+        wanted = min(wanted, len(set(files)))
+    return wanted if wanted > 1 else 0
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Returns a scheduler that gives out whole files in their order, since the tests of a file share simulators."""
+    from xdist.scheduler import LoadFileScheduling
+
+    config.option.loadscopereorder = False
+    return LoadFileScheduling(config, log)

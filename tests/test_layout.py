@@ -1,0 +1,137 @@
+"""The layout that a stranger finds his way in: no circles, small folders, one place for what is told once.
+
+Each rule is a function that names file and rule of whatever breaks it; the last tests break each rule in a copy.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from import_graph import ImportGraph
+
+ROOT = Path(__file__).resolve().parent.parent
+MOST_MODULES = 12
+MOST_SMALL = 25
+SMALL_LINES = 80
+TABLES = ("rpbi.bodies", "rpbi.sensors", "ik_ros.solvers", "ik_ros.tasks")
+"""Packages whose classes have a file each, whoever imports them."""
+ONE_PLACE = {
+    "rospy's private parts": r"\.impl\b",
+    "the XML of URDFs": r"ElementTree|\betree\b|\blxml\b",
+    "class IKProblem": r"^class IKProblem\b",
+    "class IKSolution": r"^class IKSolution\b",
+    "class Chain": r"^class Chain\b",
+    "class Waypoint": r"^class Waypoint\b",
+}
+"""What stands in one library file only, and how it is recognised."""
+
+
+def graph_of(src: Path) -> ImportGraph:
+    return ImportGraph(*sorted(src.glob("*/src")))
+
+
+def circles(src: Path) -> list[str]:
+    return [f"circle of imports: {', '.join(circle)}" for circle in graph_of(src).circles()]
+
+
+def crowded_folders(src: Path) -> list[str]:
+    return [
+        f"{package}: at most {MOST_MODULES} modules a folder, there are {len(paths)}: "
+        + ", ".join(str(path.relative_to(src)) for path in paths)
+        for package, paths in graph_of(src).crowded_folders(MOST_MODULES).items()
+    ]
+
+
+def small_modules(src: Path) -> list[str]:
+    small = graph_of(src).small_with_one_importer(SMALL_LINES)
+    small = [name for name in small if not name.startswith(tuple(f"{table}." for table in TABLES))]
+    if len(small) <= MOST_SMALL:
+        return []
+    rule = f"at most {MOST_SMALL} modules of {SMALL_LINES} lines or less may have a single importer"
+    return [f"{rule}, there are {len(small)}: {', '.join(small)}"]
+
+
+def ros_in_the_core(src: Path) -> list[str]:
+    """Modules outside of `ros` folders that import from one; those that interface.md documents are all they hold."""
+    graph = graph_of(src)
+    return [
+        f"{name} imports {target}, which needs ROS"
+        for name, targets in graph.imports.items()
+        for target in sorted(targets)
+        if ".ros." in f".{target}." and ".ros." not in f".{name}." and name not in DOCUMENTED
+    ]
+
+
+DOCUMENTED = {
+    "custom_ros_tools.keyboard",
+    "custom_ros_tools.robot",
+    "custom_ros_tools.ros_comm",
+    "custom_ros_tools.tf",
+    "rpbi.ros_node",
+    "rpbi_utils",
+}
+"""Import paths of the release's Python API, which lead into `ros` folders."""
+
+
+def repeated(src: Path) -> list[str]:
+    files = {name: path.read_text() for name, path in graph_of(src).files.items()}
+    found = {
+        what: [name for name, text in files.items() if re.search(pattern, text, re.MULTILINE)]
+        for what, pattern in ONE_PLACE.items()
+    }
+    return [f"{what} belongs into one file, found in {names}" for what, names in found.items() if len(names) != 1]
+
+
+RULES: tuple[Callable[[Path], list[str]], ...] = (
+    circles,
+    crowded_folders,
+    small_modules,
+    ros_in_the_core,
+    repeated,
+)
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
+def test_layout_keeps(rule):
+    assert rule(ROOT / "src") == []
+
+
+RPBI = "ros_pybullet_interface/src/rpbi"
+BREAKS = {
+    circles: (
+        {"engine/clock.py": "from .mailbox import Mailbox", "engine/mailbox.py": "from .clock import Clock"},
+        "engine.clock",
+    ),
+    crowded_folders: ({f"sensors/more_{i}.py": "" for i in range(13)}, "rpbi/sensors/more_12.py"),
+    small_modules: (
+        {f"replay/part_{i}.py": "" for i in range(26)}
+        | {"replay/session.py": "\n".join(f"import rpbi.replay.part_{i}" for i in range(26))},
+        "rpbi.replay.part_0",
+    ),
+    ros_in_the_core: ({"engine/pacer.py": "def late():\n    from rpbi.ros.node import main"}, "rpbi.engine.pacer"),
+    repeated: ({"engine/pacer.py": "import xml.etree.ElementTree"}, "rpbi.engine.pacer"),
+}
+"""What to add to which files, so that a rule is broken; and what the message names."""
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
+def test_a_broken_rule_is_told_with_its_file(rule, tmp_path):
+    src = tmp_path / "src"
+    for package in ("custom_ros_tools", "ros_pybullet_interface", "ik_ros"):
+        shutil.copytree(ROOT / "src" / package / "src", src / package / "src")
+    additions, named = BREAKS[rule]
+    for name, text in additions.items():
+        with open(src / RPBI / name, "a") as file:
+            file.write(f"\n{text}\n")
+    told = rule(src)
+    assert len(told) == 1 and named in told[0], told
+
+
+def test_imports_for_typing_and_inside_functions_count(tmp_path):
+    (tmp_path / "a.py").write_text("from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from b import x\n")
+    (tmp_path / "b.py").write_text("def late():\n    import a\n")
+    assert ImportGraph(tmp_path).circles() == [["a", "b"]]

@@ -1,0 +1,70 @@
+"""What the packages' package.xml files declare is what the packages use, and is to be had."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import re
+import subprocess
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+import rospkg
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = sorted(path.parent for path in (*ROOT.glob("src/*/package.xml"), *ROOT.glob("templates/*/package.xml")))
+OF_ROS = re.compile(r"ros(?!pkg)[a-z_]*|tf2?(_\w+)?|gen(py|msg)|actionlib|interactive_markers|\w+_(msgs|srvs)")
+"""Python modules of ROS packages, which Debian ships without package.xml in part."""
+NOT_IN_DEBIAN = {
+    "control_msgs",  # optional: trajectory actions are there if the user has it
+    "depth_image_proc", "nodelet",  # optional: off unless the user asks
+}  # fmt: skip
+
+
+def _declared(package: Path) -> set[str]:
+    tree = ElementTree.parse(package / "package.xml")
+    return {str(node.text) for node in tree.iter() if node.tag.endswith("depend")}
+
+
+def _imported(package: Path) -> set[str]:
+    names: set[str] = set()
+    for path in (package / "src").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                names |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                names.add(node.module.split(".")[0])
+    return names
+
+
+def _launched(package: Path) -> set[str]:
+    text = "".join(path.read_text() for path in package.glob("launch/**/*.launch"))
+    return set(re.findall(r'(?:\bpkg="|\$\(find )(\w+)', text))
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.name)
+def test_every_ros_package_that_is_used_is_declared(package: Path) -> None:
+    known = set(rospkg.RosPack().list())
+    imported = {name for name in _imported(package) if name in known or OF_ROS.fullmatch(name)}
+    used = imported | _launched(package)
+    assert used - _declared(package) - {package.name} - NOT_IN_DEBIAN == set()
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.name)
+def test_every_dependency_is_a_ros_package_or_one_of_debian(package: Path) -> None:
+    """The keys of rosdep for Debian's Python packages are the packages' own names."""
+    others = _declared(package) - set(rospkg.RosPack().list())
+    others = {name for name in others if not (OF_ROS.fullmatch(name) and importlib.util.find_spec(name))}
+    answer = subprocess.run(["dpkg-query", "-W", *others], capture_output=True, text=True)
+    assert answer.returncode == 0, answer.stderr
+
+
+def test_packages_agree_on_who_maintains_them_and_under_which_licence() -> None:
+    def facts(package: Path) -> tuple[str | None, ...]:
+        tree = ElementTree.parse(package / "package.xml")
+        return (tree.findtext("maintainer"), tree.findtext("license"), tree.findtext("version"))
+
+    own = {facts(package) for package in PACKAGES if package.parent.name == "src"}
+    assert {(name, licence) for name, licence, _ in own} == {("ROS-PyBullet Interface developers", "LGPL-3.0-or-later")}
+    assert len(own) == 1
