@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from rpbi.ros.publishers.commands import COMMANDS, DESCRIPTION
-from rpbi.ros.publishers.state import STATE
-from rpbi.ros.publishers.status import CLOCK, DIAGNOSTICS, STATUS
+from rpbi.ros.publishers.status import CLOCK, DIAGNOSTICS, STATE, STATUS
 from rpbi.ros.publishers.world_markers import MARKERS
 
 NODE_TOPICS = (STATUS, STATE, COMMANDS, DESCRIPTION, MARKERS, DIAGNOSTICS, CLOCK)

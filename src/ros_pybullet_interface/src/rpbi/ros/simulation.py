@@ -13,8 +13,7 @@ from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
 from rpbi.engine.pacer import Pacer
 from rpbi.ros.publishers.commands import CommandPublisher
 from rpbi.ros.publishers.sample_publishers import SamplePublishers, TickPublisher
-from rpbi.ros.publishers.state import StatePublisher
-from rpbi.ros.publishers.status import StatusPublisher
+from rpbi.ros.publishers.status import StatePublisher, StatusPublisher
 from rpbi.world import World
 
 log = logging.getLogger(__name__)
@@ -130,7 +129,7 @@ class Simulation:
         self._refuse_while_moving()
         self._failure = None
         self._status.publish(True)
-        self._take_last_tick()
+        self._take_tick(is_last=True)
         self._status.publish(False)
         return self.world.clock.tick, self.world.clock.stamp_ns
 
@@ -200,10 +199,10 @@ class Simulation:
     def _move(self) -> None:
         if self._burst is not None:
             self._advance_burst(self._burst)
-        elif self.running:
-            self._advance()
-        else:
+        elif not self.running:
             self._idle()
+        elif self._pacer.is_due():
+            self._take_tick()
 
     def _publish(self) -> None:
         self._status.spin(self.running, self._burst is not None)
@@ -211,19 +210,11 @@ class Simulation:
         self._commands.spin()
         flush_buffered_sockets()
 
-    def _advance(self) -> None:
-        if self._pacer.is_due():
-            self._take_tick()
-
-    def _take_tick(self) -> None:
+    def _take_tick(self, is_last: bool = False) -> None:
+        """Goes one tick on; of the last one before standing still everything is published, whatever is due."""
         self._before_tick()
-        self._publishers.publish_tick(self.world.step())
-        self._state.take_tick()
-
-    def _take_last_tick(self) -> None:
-        """Goes one tick on before standing still: all of it is published, whatever is due."""
-        self._before_tick()
-        self._publishers.publish_all(self.world.step())
+        publish = self._publishers.publish_all if is_last else self._publishers.publish_tick
+        publish(self.world.step())
         self._state.take_tick()
 
     def _advance_burst(self, burst: StepBurst) -> None:
@@ -232,7 +223,7 @@ class Simulation:
             self._take_tick()
             burst.left -= 1
         if burst.left == 1:
-            self._take_last_tick()
+            self._take_tick(is_last=True)
             burst.left = 0
             self._end_burst()
             self._status.publish(False)
