@@ -3,4 +3,4 @@
 
 from custom_ros_tools.ros.node import run
 
-run("rpbi_examples.ros.basic_robot_example:main")
+run("rpbi_examples.ros.moving_robots:basic_robot_example")

@@ -3,4 +3,4 @@
 
 from custom_ros_tools.ros.node import run
 
-run("rpbi_examples.ros.dual_arm_example:main")
+run("rpbi_examples.ros.moving_robots:dual_arm_example")

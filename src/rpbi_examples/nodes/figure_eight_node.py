@@ -3,4 +3,4 @@
 
 from custom_ros_tools.ros.node import run
 
-run("rpbi_examples.ros.figure_eight:main")
+run("rpbi_examples.ros.moving_frames:figure_eight")

@@ -3,4 +3,4 @@
 
 from custom_ros_tools.ros.node import run
 
-run("rpbi_examples.ros.orbit:main")
+run("rpbi_examples.ros.moving_frames:orbit")

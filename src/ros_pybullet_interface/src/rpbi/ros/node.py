@@ -14,7 +14,6 @@ import rospy
 from custom_ros_tools.errors import ConfigError, PhysicsError, Problem
 from custom_ros_tools.ros.lifecycle.kept_parameters import kept_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from rpbi.bodies import BODY_TYPES
 from rpbi.config.asset_files import ROBOT_DESCRIPTION
 from rpbi.config.loading import load_world_dict
 from rpbi.ros.publishers.sample_publishers import SamplePublishers
@@ -74,7 +73,7 @@ class SimulatorNode:
     def __init__(self) -> None:
         urdf = parameter_above("robot_description")
         description = None if urdf is None else write_description(urdf)
-        loaded = load_world_dict(config_parameter(), "~config", BODY_TYPES, description)
+        loaded = load_world_dict(config_parameter(), "~config", description)
         loaded = start_where_robots_are(loaded)
         config = loaded.config
         use_prefix(config.tf_prefix)

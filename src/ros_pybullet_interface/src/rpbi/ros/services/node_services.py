@@ -30,7 +30,7 @@ from ros_pybullet_interface.srv import (
     StepNRequest,
 )
 from ros_pybullet_interface.srv import ChangeDynamics as ChangeDynamicsService
-from rpbi.bodies import BODY_TYPES, kind_of
+from rpbi.bodies import kind_of
 from rpbi.bodies.collision import CollisionObject
 from rpbi.bodies.dynamic import DynamicObject
 from rpbi.bodies.dynamics import LinkDynamics, difference
@@ -131,8 +131,8 @@ def _add_object(node: NodeContext, request: AddPybulletObjectRequest) -> Answer:
             known = ", ".join(f"{number} ({name})" for number, name in OBJECT_TYPES.items())
             raise InterfaceError(f"object_type: expected one of {known}; got {asked.object_type}")
         data, file, path = _read_object(node, asked)
-        kind = type_of(section, data, BODY_TYPES)
-        config = load_object(kind, data, file, BODY_TYPES, {**node.loading, "file": path})
+        kind = type_of(section, data)
+        config = load_object(kind, data, file, {**node.loading, "file": path})
         node.objects.add(kind, config, file)
     except InterfaceError:
         raise
