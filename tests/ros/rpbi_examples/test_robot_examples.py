@@ -111,6 +111,7 @@ def test_panda_swings(ros):
     wait_until(lambda: abs(states.messages[-1].position[index] - first.position[index]) > 0.3, "it moves")
 
 
+@pytest.mark.quick
 def test_kuka_holds_still_until_it_is_told_to_move(ros):
     launch(ros, "run_kuka")
     states = ros.listen("/rpbi/kuka_lwr/joint_states", JointState)

@@ -93,7 +93,7 @@ def _demo(arguments: argparse.Namespace) -> int:
             time.sleep(arguments.seconds)
     _say("reading the bag")
     summary = _report(bag, expected_hz, arguments.seconds, out)
-    print(demo_report.as_text(summary))
+    print(demo_report.as_text(summary), flush=True)
     _say(f"\nwritten to {out}: {', '.join(sorted(path.name for path in out.iterdir()))}")
     for line in demo_report.slow_lines(summary, CAMERA_TOPICS, REQUIRED_TOPICS, WORLD):
         _say(f"SLOW: {line}")
