@@ -14,6 +14,7 @@ import rospy
 from node_world import main_config
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from worlds import iiwa
 
@@ -49,9 +50,19 @@ def open_world(
     states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     rospy.set_param("actionlib_client_pub_queue_size", 1000)  # else a burst of more than 10 goals loses some
     client = actionlib.ActionClient(f"{CONTROLLER}/follow_joint_trajectory", FollowJointTrajectoryAction)
-    assert client.wait_for_server(rospy.Duration(20.0))
+    assert client.wait_for_server(rospy.Duration(60.0))
     states.wait_for(1)
     return SimpleNamespace(ros=ros, states=states, client=client, process=process)
+
+
+def begin_anew(robot: SimpleNamespace) -> None:
+    """Resets the world of `open_world`, and has it run if it stands still."""
+    answer = robot.ros.call("/rpbi/reset", Trigger)
+    assert answer.success, answer.message
+    robot.ros.call("/rpbi/start", Trigger)
+    assert robot.client.wait_for_server(rospy.Duration(60.0))
+    robot.states.messages.clear()
+    robot.states.wait_for(1)
 
 
 class Goal:

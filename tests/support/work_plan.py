@@ -13,14 +13,32 @@ FIRST = ("ros/ik_ros", "ros/rpbi_examples", "gui", "ros")
 """Folders whose files take long: they are begun first, so that no worker is left alone with one at the end."""
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Brings the folders into their order; within, everything stays as it is."""
+QUICK_FOLDERS = ("unit", "sim")
+"""Folders all of whose tests are quick, as those of the top are; elsewhere those with the mark."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Knows `--quick`."""
+    parser.addoption("--quick", action="store_true", help="unit, sim and one test of each ROS path, for every day")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leaves out what is not asked for and brings the folders into their order; within, everything stays as it is."""
+    if config.getoption("quick"):
+        slow = [item for item in items if not _is_quick(item)]
+        config.hook.pytest_deselected(items=slow)
+        items[:] = [item for item in items if _is_quick(item)]
 
     def rank(item: pytest.Item) -> int:
         matches = (number for number, folder in enumerate(FIRST) if item.path.is_relative_to(TESTS / folder))
         return next(matches, len(FIRST))
 
     items.sort(key=rank)
+
+
+def _is_quick(item: pytest.Item) -> bool:
+    is_all_quick = any(item.path.is_relative_to(TESTS / folder) for folder in QUICK_FOLDERS)
+    return is_all_quick or item.path.parent == TESTS or item.get_closest_marker("quick") is not None
 
 
 @pytest.hookimpl(optionalhook=True)

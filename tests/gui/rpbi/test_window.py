@@ -26,6 +26,7 @@ CAMERA = {
 }
 
 
+@pytest.mark.quick
 def test_window_looks_where_the_config_says_and_shows_what_it_says(ros, screen, start):
     target = np.array(CAMERA["cameraTargetPosition"])
     aside = target + [0.5, 0.2, 0.3]

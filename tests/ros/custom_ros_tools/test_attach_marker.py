@@ -36,6 +36,7 @@ def test_names_of_types_and_actions_are_the_constants_of_the_message():
         assert {name: getattr(Marker, name) for name in constants} == constants
 
 
+@pytest.mark.quick
 def test_marker_is_that_of_the_configuration(ros):
     start(ros, CUP)
     [marker] = ros.listen("/cup/marker", Marker).wait_for(1)[:1]

@@ -25,6 +25,7 @@ def topic(request, ros):
     publisher.unregister()
 
 
+@pytest.mark.quick
 def test_message_is_put_into_the_order_asked_for():
     STATE.header.frame_id = "arm"
     ordered = resolve_joint_order(STATE, ["c", "a"])

@@ -42,6 +42,7 @@ def test_without_the_message_it_is_told_what_to_install(without_keyboard):
         KeyDownSubscriber({})
 
 
+@pytest.mark.quick
 def test_each_key_calls_its_function_and_others_call_none(ros, with_keyboard):
     from keyboard.msg import Key
 

@@ -41,6 +41,7 @@ def test_what_is_opened_and_closed_while_the_master_is_away(ros, tmp_path, secon
     assert way == "hangs" or "/old_parameter" not in names
 
 
+@pytest.mark.quick
 def test_a_master_that_ends_while_a_node_starts_is_told_in_one_line(ros, second_master):
     node = ros.start_program("loses_its_master.py", str(second_master.process.pid), **second_master.environment)
     assert node.wait(60.0) == 1

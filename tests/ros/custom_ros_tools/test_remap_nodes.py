@@ -44,6 +44,7 @@ def repeat(publisher: rospy.Publisher, message: Any, condition: Callable[[], Any
     wait_until(lambda: publisher.publish(message) or condition(), what)
 
 
+@pytest.mark.quick
 def test_numbers_come_in_the_order_of_the_configuration(ros, start):
     start(ARRAY_NODE, config={"joint_names": ["c", "a"], "field": "velocity"}, start_on_init=True)
     numbers = ros.listen("joint_states/floatarray", Float64MultiArray)

@@ -13,6 +13,7 @@ from custom_ros_tools.ros import services as service_proxies
 from custom_ros_tools.ros_comm import ToggleService, get_srv_handler, get_srv_handlers
 
 
+@pytest.mark.quick
 def test_toggle_service_calls_the_right_handler_and_answers_what_it_returns(ros):
     service = ToggleService("/lamp", lambda: (True, "shines"), lambda: (False, "was dark"))
     for to, expected in ((True, (True, "shines")), (False, (False, "was dark"))):

@@ -57,6 +57,7 @@ def test_transform_of_the_arguments_is_told_with_new_stamps(ros, executable, rot
     assert stamps == sorted(set(stamps)) and stamps[0] > rospy.Time(0)
 
 
+@pytest.mark.quick
 def test_service_replaces_the_transform(ros):
     start(ros, *"0 0 0 0 0 0 world box".split())
     heard = ros.listen("/tf", TFMessage)

@@ -30,6 +30,7 @@ def tf(ros) -> Iterator[TfInterface]:
     interface.tf_broadcaster.pub_tf.unregister()
 
 
+@pytest.mark.quick
 def test_transform_that_is_told_can_be_asked_for(tf):
     tf.set_tf("world", "box", [1, 2, 3], [0, 0, 1, 1])
     position, quat = tf.wait_for_tf("world", "box", timeout=10)

@@ -52,6 +52,7 @@ def wait_until_none_comes(problems, meanwhile=lambda: None):
     wait_until(none_comes, "problems stop")
 
 
+@pytest.mark.quick
 def test_target_start_tolerances_and_previous_solutions_come_together(ros, target):
     start_setup(ros, **FRAMES, init_bx=0.01, max_num_prev_solutions=2, seed=7, hz=100.0)
     problems = ros.listen("ik", IKProblem)

@@ -92,6 +92,7 @@ def test_problem_that_makes_no_sense_is_refused_and_the_next_one_solved(ros, wro
         send_until(ik, problem(BENT), targets)
 
 
+@pytest.mark.quick
 def test_problems_of_the_release_are_taken_on_the_same_topic_and_by_service(ros):
     start_solver(ros, "trac_ik")
     targets = ros.listen("joint_states/target", JointState)

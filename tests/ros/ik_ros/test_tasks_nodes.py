@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import pytest
 import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion
 from ik_nodes import CHAIN, HOME, JOINTS, forward, start_at, start_node
@@ -17,6 +18,7 @@ TALOS = Path(__file__).resolve().parents[3] / "src/rpbi_examples/configs/ik_talo
 BENT = (0.3, 0.6, 0.2, -1.2, 0.1, 0.8, 0.4)
 
 
+@pytest.mark.quick
 def test_talos_reaches_with_its_formulation_from_parameters(ros):
     start_node(ros, "ik_solver_node.py", "tasks", "ik/solver/tasks/solve", **load_config(str(TALOS)))
     solve = rospy.ServiceProxy("ik/solver/tasks/solve", SolveIK)

@@ -37,3 +37,23 @@ def start(ros: Any, control_msgs: str, tmp_path: Path) -> Callable[..., Any]:
     from trajectory_world import open_world
 
     return partial(open_world, ros, control_msgs, tmp_path)
+
+
+@pytest.fixture(scope="module")
+def shared_robot(module_ros: Any, control_msgs: str, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """The world behind `robot`."""
+    from trajectory_world import open_world
+
+    return open_world(module_ros, control_msgs, tmp_path_factory.mktemp("shared"))
+
+
+@pytest.fixture
+def robot(shared_robot: Any) -> Any:
+    """A running world with an arm that follows trajectories, as it was at its start; one node for the tests of a file.
+
+    Tests that start nodes of their own stand in other files, since those would take the name of this one.
+    """
+    from trajectory_world import begin_anew
+
+    begin_anew(shared_robot)
+    return shared_robot

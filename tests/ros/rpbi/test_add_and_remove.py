@@ -94,6 +94,7 @@ f 2 3 4
 """
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("kind", "config", "type_name"),
     [

@@ -18,7 +18,7 @@ from tf2_msgs.msg import TFMessage
 from worlds import FLOOR, ball, iiwa
 
 from ros_pybullet_interface.msg import PybulletObject
-from rpbi.ros.tf_listener import fault_in
+from rpbi.ros.tf_follower import fault_in
 
 TOPIC = "/rpbi/iiwa/joint_states/target"
 JOINT = "lbr_iiwa_joint_4"
@@ -96,6 +96,7 @@ REFUSALS = {
 }
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("case", REFUSALS)
 def test_a_refusal_names_topic_and_reason(ros, node, case):
     message, reason = REFUSALS[case]

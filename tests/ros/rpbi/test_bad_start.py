@@ -48,6 +48,7 @@ def _broken(tmp_path, text, name="broken.yaml"):
     return str(tmp_path / name)
 
 
+@pytest.mark.quick
 def test_every_fault_of_every_file_is_told_with_file_key_expected_and_got(fails, tmp_path):
     config = main_config(
         tmp_path,

@@ -65,6 +65,7 @@ def test_the_state_of_a_base_is_an_odometry_at_its_rate(ros):
     assert max(abs(gap - 1e9 / HZ) for gap in gaps) <= tick_ns
 
 
+@pytest.mark.quick
 def test_commands_drive_it_and_without_them_it_brakes(ros):
     states = _start(ros, planar_base={"cmd_vel_timeout_s": 1.0})
     with publishing("/rpbi/mobile/cmd_vel", Twist) as commands:

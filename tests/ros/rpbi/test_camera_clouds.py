@@ -27,6 +27,7 @@ def topics_of_cameras():
     return {name for name, kind in rospy.get_published_topics() if kind.startswith("sensor_msgs/") and "image" in name}
 
 
+@pytest.mark.quick
 def test_cloud_is_organised_and_agrees_with_the_images_of_its_frame(ros):
     listeners = [ros.listen(CLOUD, PointCloud2), ros.listen(DEPTH, Image), ros.listen(COLOUR, Image)]
     ros.simulator(box_world(ros, rgbd_sensor={**CAMERA, "pointcloud": True}), use_sim_time=True)

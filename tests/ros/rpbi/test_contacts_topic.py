@@ -24,6 +24,7 @@ def node(module_ros):
     return module_ros.simulator(config, use_sim_time=True)
 
 
+@pytest.mark.quick
 def test_contacts_of_a_resting_box_carry_its_weight(ros, node):
     messages = ros.listen("/rpbi/box/contacts", Contacts)
     wait_until(lambda: messages.messages and messages.messages[-1].header.stamp.to_sec() > 1.0, "a second has passed")

@@ -46,6 +46,7 @@ def change(ros, name, dynamics):
     return ros.call("/rpbi/change_pybullet_object_dynamics", ChangeObjectDynamics, name, dynamics)
 
 
+@pytest.mark.quick
 def test_what_is_got_edited_and_sent_back_is_what_changes(ros, simulator):
     for name in ("crate", "iiwa/lbr_iiwa_link_7"):
         dynamics = get(ros, name)

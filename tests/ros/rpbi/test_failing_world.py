@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 
+import pytest
 from camera_world import CAMERA, box_world
 from mobile_base import mobile_base
 from node_world import Rosout, add, main_config, objects, registrations, remove
@@ -69,6 +70,7 @@ def test_services_of_a_robot_never_answer_that_it_is_unknown_because_of_a_reset(
     assert not [answer for answer in answers if "unknown" in answer]
 
 
+@pytest.mark.quick
 def test_what_a_reset_could_not_load_is_gone_and_can_be_added_again(ros, tmp_path):
     config = mobile_base(tmp_path)
     name, urdf = config["name"], tmp_path / "mobile_base.urdf"

@@ -42,6 +42,7 @@ def forces(messages):
     return np.array([[m.wrench.force.x, m.wrench.force.y, m.wrench.force.z] for m in messages])
 
 
+@pytest.mark.quick
 def test_each_sensor_has_a_topic_with_its_rate_and_frame(ros, simulator):
     expected = {
         JOINT: (5, "rpbi/iiwa/lbr_iiwa_link_7"),

@@ -82,6 +82,7 @@ def test_ctrl_c_in_every_state(ros, tmp_path, state, simulated):
     _interrupt(ros, process)
 
 
+@pytest.mark.quick
 def test_sigterm_and_a_second_ctrl_c_are_no_worse(ros, tmp_path):
     process = ros.simulator(_config(tmp_path))
     os.killpg(process.pid, signal.SIGTERM)

@@ -25,6 +25,7 @@ def node(ros, tmp_path):
     return ros.simulator(main_config(tmp_path, connect=CONNECT, **KEYS))
 
 
+@pytest.mark.quick
 def test_keys_of_the_window_are_warned_of_once_and_open_nothing(ros, node):
     output = ros.output(node)
     keys = "enable_keyboard_publisher, enable_mouse_publisher, publish_visualizer_image_hz, connect.options --mp4="

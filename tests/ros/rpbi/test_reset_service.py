@@ -91,6 +91,7 @@ def test_time_goes_on_and_the_world_stays_running_or_stopped(ros, start, running
         assert ros.call("/rpbi/get_state_hash", GetStateHash).tick == 0
 
 
+@pytest.mark.quick
 def test_the_same_state_follows_every_reset(ros, start):
     start(start_pybullet_after_initialization=False)
     hashes = []

@@ -95,6 +95,7 @@ def _moved(positions, by=0.3):
     return [position + by for position in positions]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("robot", ["arm", "shown"])
 def test_the_target_is_in_the_world_and_the_answer_names_all_joints_in_order(ros, node, kinematics, robot):
     goal = BASE @ kinematics.forward(_moved(ELBOW), LINK)

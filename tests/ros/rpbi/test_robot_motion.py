@@ -74,6 +74,7 @@ def now(states) -> dict[str, float]:
     return dict(zip(message.name, message.position))
 
 
+@pytest.mark.quick
 def test_a_robot_moves_to_a_joint_state_and_answers_when_it_is_there(ros, states):
     answer = move(ros, 0.5, j1=0.4, j4=-1.2)
     assert answer.success, answer.message

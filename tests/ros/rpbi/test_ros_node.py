@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 
+import pytest
+
 SCRIPT = """
 from rpbi.ros_node import RosNode
 from sensor_msgs.msg import JointState
@@ -38,6 +40,7 @@ node.spin()
 """
 
 
+@pytest.mark.quick
 def test_script_of_the_release_finds_everything_under_its_name(ros):
     from ros_system import stop_group, wait_until
 

@@ -69,6 +69,7 @@ def test_a_step_is_refused_while_running(ros, simulator):
     assert "running" in answer.message and "stop" in answer.message
 
 
+@pytest.mark.quick
 def test_a_step_goes_one_tick_on_and_everything_of_that_tick_arrives(ros, simulator):
     ros.call("/rpbi/stop", Trigger)
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)

@@ -27,6 +27,7 @@ def heights(marker):
     return np.array([point.z for point in marker.points])
 
 
+@pytest.mark.quick
 def test_its_surface_is_a_list_of_triangles_in_the_world(ros, node):
     surface = ros.listen("/rpbi/jelly/surface", Marker)
     wait_until(lambda: surface.messages and heights(surface.messages[-1]).min() < 0.02, "it has fallen")

@@ -23,6 +23,7 @@ def start(ros, tmp_path):
     return open_world
 
 
+@pytest.mark.quick
 def test_it_tells_where_the_world_is_and_how_fast(ros, start):
     states = start(real_time_factor=0.5)
     state = wait_until(lambda: [each for each in states.messages if each.real_time_factor], "the factor is known")[-1]

@@ -51,6 +51,7 @@ def _is_stepping(ros):
     return "stepping" in ros.call("/rpbi/step", Trigger).message
 
 
+@pytest.mark.quick
 def test_every_tick_is_told_and_counted(ros, stopped):
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     joint_states.wait_for(1)

@@ -64,6 +64,7 @@ def simulator(ros, node):
     return node
 
 
+@pytest.mark.quick
 def test_topics_and_services_have_their_documented_names_and_types(ros, simulator):
     types = dict(rosgraph.Master("/tests").getTopicTypes())
     assert {topic: types.get(topic) for topic in DOCUMENTED_TYPES} == DOCUMENTED_TYPES
@@ -86,6 +87,7 @@ def test_rates_are_those_asked_for_in_simulated_time(ros, simulator):
     assert _gaps(stamps["rpbi/iiwa/lbr_iiwa_link_7"]) == {50_000_000}
 
 
+@pytest.mark.quick
 def test_joint_states_tell_all_joints_with_values_of_one_length(ros, simulator):
     message = ros.listen("/rpbi/iiwa/joint_states", JointState).wait_for(1)[0]
     assert message.header.frame_id == ""
@@ -94,6 +96,7 @@ def test_joint_states_tell_all_joints_with_values_of_one_length(ros, simulator):
     assert message.position[1] == pytest.approx(math.radians(30.0), abs=0.01)
 
 
+@pytest.mark.quick
 def test_tf_has_all_links_and_objects_in_the_world_frame(ros, simulator):
     tf = ros.listen("/tf", TFMessage)
     frames = {f"rpbi/iiwa/lbr_iiwa_link_{number}" for number in range(8)} | {"rpbi/ball"}

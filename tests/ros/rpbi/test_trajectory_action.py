@@ -1,27 +1,21 @@
-"""The action of a follower of trajectories, driven by actionlib's own client from another process."""
+"""Goals, commands and targets for a robot that follows trajectories, all in one world that is reset between them."""
 
 from __future__ import annotations
 
 import math
-import os
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 import rospy
-from actionlib_msgs.msg import GoalStatus
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from node_world import Rosout, publishing
 from ros_system import wait_until
-from trajectory_world import JOINTS, START, Goal, moved, open_world, stands, tolerance, trajectory
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+from trajectory_world import CONTROLLER, JOINTS, START, Goal, moved, stands, tolerance, trajectory
 
+from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import JointTrajectoryControllerState
-
-
-@pytest.fixture(scope="module")
-def refusing(module_ros: Any, control_msgs: str, tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
-    """One world that all bad goals are sent to."""
-    robot = open_world(module_ros, control_msgs, tmp_path_factory.mktemp("refusing"))
-    wait_until(lambda: stands(robot.states), "the arm stands")
-    return robot
 
 
 def test_types_are_the_public_ones(control_msgs):
@@ -33,8 +27,7 @@ def test_types_are_the_public_ones(control_msgs):
     assert PublicState._md5sum == JointTrajectoryControllerState._md5sum == "10817c60c2486ef6b33e97dcd87f4474"
 
 
-def test_goal_is_reached_with_joints_in_any_order(start):
-    robot = start()
+def test_goal_is_reached_with_joints_in_any_order(robot):
     order = [3, 0, 1, 2, 6, 5, 4]
     goal_positions = [0.4, 0.2, -0.3, -0.9, 0.3, -0.4, 0.5]
     middle = [(a + b) / 2 for a, b in zip(START, goal_positions)]
@@ -43,39 +36,15 @@ def test_goal_is_reached_with_joints_in_any_order(start):
     goal = Goal(robot, message)
     status, code, text = goal.wait()
     assert (status, code) == (GoalStatus.SUCCEEDED, 0), text
-    reached = dict(zip(robot.states.messages[-1].name, robot.states.messages[-1].position))
-    assert [reached[name] for name in JOINTS] == pytest.approx(goal_positions, abs=1e-3)
+
+    def reached():
+        position = dict(zip(robot.states.messages[-1].name, robot.states.messages[-1].position))
+        return [position[name] for name in JOINTS] == pytest.approx(goal_positions, abs=1e-3)
+
+    wait_until(reached, "joint states tell that it is there")
 
 
-def test_client_with_simulated_time_is_served_in_it(start, control_msgs):
-    robot = start(real_time_factor=3)
-    paths = f"{control_msgs}:{os.environ.get('PYTHONPATH', '')}"
-    arguments = [str(value) for value in (3.0, *moved(0.5))]
-    client = robot.ros.start_program("trajectory_client.py", *arguments, PYTHONPATH=paths)
-    assert client.wait(60.0) == 0, robot.ros.output(client)
-    printed = robot.ros.output(client)
-    assert f"state {GoalStatus.SUCCEEDED}, code 0, took " in printed
-    assert float(printed.split()[-1]) > 2.9  # by the wall clock it is a second
-
-
-def test_feedback_comes_at_its_rate_of_simulated_time_and_tells_where_the_joints_are_to_be(start):
-    robot = start(controller={"action_monitor_rate": 10})
-    goal = Goal(robot, trajectory((1.5, moved(0.6))))
-    assert goal.wait()[0] == GoalStatus.SUCCEEDED
-    stamps_ns = [message.header.stamp.to_nsec() for message in goal.feedback]
-    assert len(stamps_ns) in (14, 15, 16)
-    assert {round((b - a) / 1e6) for a, b in zip(stamps_ns, stamps_ns[1:])} <= {99, 100, 101}
-    for message in goal.feedback:
-        assert message.joint_names == JOINTS
-        assert message.error.positions[0] == pytest.approx(
-            message.desired.positions[0] - message.actual.positions[0], abs=1e-12
-        )
-        assert abs(message.error.positions[0]) < 2e-3
-    assert goal.feedback[7].desired.velocities[0] > 0.3  # the middle of a cubic from rest to rest
-
-
-def test_new_goal_preempts_the_old_one_and_goes_on_without_a_jerk(start):
-    robot = start()
+def test_new_goal_preempts_the_old_one_and_goes_on_without_a_jerk(robot):
     first = Goal(robot, trajectory((4.0, moved(1.2))))
     first.wait_until_it_moves()
     second = Goal(robot, trajectory((2.0, moved(-0.3))))
@@ -83,13 +52,12 @@ def test_new_goal_preempts_the_old_one_and_goes_on_without_a_jerk(start):
     assert status == GoalStatus.PREEMPTED and "newer trajectory" in text
     status, code, text = second.wait()
     assert (status, code) == (GoalStatus.SUCCEEDED, 0), text
+    wait_until(lambda: robot.states.messages[-1].position[0] == pytest.approx(-0.3, abs=1e-3), "it is there")
     velocity = [message.velocity[0] for message in robot.states.messages]
     assert max(abs(b - a) for a, b in zip(velocity, velocity[1:])) < 0.05
-    assert robot.states.messages[-1].position[0] == pytest.approx(-0.3, abs=1e-3)
 
 
-def test_cancelled_goal_makes_the_arm_hold(start):
-    robot = start()
+def test_cancelled_goal_makes_the_arm_hold(robot):
     goal = Goal(robot, trajectory((4.0, moved(1.2))))
     goal.wait_until_it_moves()
     goal.handle.cancel()
@@ -99,8 +67,7 @@ def test_cancelled_goal_makes_the_arm_hold(start):
     assert 0.0 < robot.states.messages[-1].position[0] < 1.0
 
 
-def test_arm_stops_when_it_is_off_its_path_and_says_so(start):
-    robot = start()
+def test_arm_stops_when_it_is_off_its_path_and_says_so(robot):
     goal = Goal(robot, trajectory((4.0, moved(1.2))), path_tolerance=[tolerance("lbr_iiwa_joint_1", position=1e-9)])
     status, code, text = goal.wait()
     assert (status, code) == (GoalStatus.ABORTED, -4)
@@ -109,8 +76,7 @@ def test_arm_stops_when_it_is_off_its_path_and_says_so(start):
     assert robot.states.messages[-1].position[0] < 0.5
 
 
-def test_goal_that_is_missed_for_its_time_is_aborted(start):
-    robot = start()
+def test_goal_that_is_missed_for_its_time_is_aborted(robot):
     goal = Goal(
         robot,
         trajectory((0.5, moved(0.2))),
@@ -137,10 +103,107 @@ def test_goal_that_is_missed_for_its_time_is_aborted(start):
     ],
     ids=["unknown", "missing", "limit", "nan", "times", "length", "speed", "no time", "old"],
 )
-def test_bad_goal_is_refused_before_anything_moves(refusing, message, code, text):
-    goal = Goal(refusing, message)
+def test_bad_goal_is_refused_before_anything_moves(robot, message, code, text):
+    wait_until(lambda: stands(robot.states), "the arm stands")
+    goal = Goal(robot, message)
     status, error_code, error_string = goal.wait()
     assert (status, error_code) == (GoalStatus.REJECTED, code)
     assert text in error_string
     assert goal.handle.get_goal_status_text() == error_string
-    assert stands(refusing.states)
+    assert stands(robot.states)
+
+
+def test_command_replaces_a_goal_and_an_empty_one_makes_the_arm_hold(robot):
+    goal = Goal(robot, trajectory((5.0, moved(1.2))))
+    goal.wait_until_it_moves()
+    with publishing(f"{CONTROLLER}/command", JointTrajectory) as command:
+        command.publish(trajectory((4.0, moved(-1.2))))
+        status, _, text = goal.wait()
+        assert status == GoalStatus.PREEMPTED and "newer trajectory" in text
+        wait_until(lambda: robot.states.messages[-1].velocity[0] < -0.1, "it moves back")
+        command.publish(JointTrajectory())
+        wait_until(lambda: stands(robot.states), "the arm stands")
+    assert -1.0 < robot.states.messages[-1].position[0]
+
+
+def test_bad_command_is_named_and_changes_nothing(robot):
+    log = Rosout(robot.ros)
+    goal = Goal(robot, trajectory((1.5, moved(0.5))))
+    goal.wait_until_it_moves()
+    with publishing(f"{CONTROLLER}/command", JointTrajectory) as command:
+        command.publish(trajectory((1.0, moved(9.0))))
+        log.wait_for([f"{CONTROLLER}/command", "'lbr_iiwa_joint_1' must be within"])
+    assert goal.wait()[0] == GoalStatus.SUCCEEDED
+
+
+def test_targets_of_joints_that_a_trajectory_drives_are_refused_until_it_has_ended(robot):
+    log = Rosout(robot.ros)
+    goal = Goal(robot, trajectory((1.5, moved(0.5))))
+    goal.wait_until_it_moves()
+    with publishing("/rpbi/iiwa/joint_states/target", JointState) as target:
+        target.publish(JointState(name=["lbr_iiwa_joint_1"], position=[-1.0]))
+        log.wait_for(["a motion drives lbr_iiwa_joint_1"])
+        assert goal.wait()[0] == GoalStatus.SUCCEEDED
+        target.publish(JointState(name=["lbr_iiwa_joint_1"], position=[-0.2]))
+        wait_until(lambda: robot.states.messages[-1].position[0] < -0.19, "it follows targets again")
+
+
+def test_each_of_many_goals_has_its_answer(robot):
+    # The last one alone is short: no other may arrive before the next one comes
+    durations_s = [20.0] * 59 + [0.5]
+    goals = [Goal(robot, trajectory((time_s, moved(0.01 * n)))) for n, time_s in enumerate(durations_s)]
+    *others, last = [goal.wait()[0] for goal in goals]
+    assert last == GoalStatus.SUCCEEDED
+    assert set(others) == {GoalStatus.PREEMPTED}
+
+
+def test_stopped_world_freezes_the_goal(robot):
+    goal = Goal(robot, trajectory((1.5, moved(0.6))))
+    goal.wait_until_it_moves()
+    assert robot.ros.call("/rpbi/stop", Trigger).success
+    frozen = robot.states.messages[-1].position[0]
+    fed = len(goal.feedback)
+    steps = [robot.ros.call("/rpbi/step", Trigger).success for _ in range(20)]
+    assert all(steps)
+    wait_until(lambda: robot.states.messages[-1].position[0] > frozen, "it moves by steps")
+    assert robot.states.messages[-1].position[0] < frozen + 0.03
+    assert len(goal.feedback) <= fed + 2
+    assert goal.handle.get_goal_status() == GoalStatus.ACTIVE
+    assert robot.ros.call("/rpbi/start", Trigger).success
+    status, code, text = goal.wait()
+    assert (status, code) == (GoalStatus.SUCCEEDED, 0), text
+
+
+def test_status_and_results_have_the_stamps_of_the_world(robot):
+    statuses = robot.ros.listen(f"{CONTROLLER}/follow_joint_trajectory/status", GoalStatusArray)
+    for message in list(statuses.wait_for(3)):
+        assert message.header.stamp.to_sec() < 1e6, "a wall stamp"
+
+
+def test_query_tells_where_the_joints_will_be(robot):
+    from control_msgs.srv import QueryTrajectoryState
+
+    stamp = robot.states.messages[-1].header.stamp + rospy.Duration.from_sec(2.0)
+    goal = Goal(robot, trajectory((2.0, moved(0.8)), stamp=stamp))
+    wait_until(lambda: goal.handle.get_goal_status() == GoalStatus.ACTIVE, "the goal is accepted")
+    answer = robot.ros.call(f"{CONTROLLER}/query_state", QueryTrajectoryState, stamp + rospy.Duration.from_sec(1.0))
+    assert list(answer.name) == JOINTS
+    assert answer.position[0] == pytest.approx(0.4, abs=2e-3)  # the middle of a cubic from rest to rest
+    assert answer.velocity[0] == pytest.approx(0.6, abs=2e-3)  # 3/2 of the mean
+    assert list(answer.position[1:]) == pytest.approx(START[1:], abs=1e-3)
+
+
+def test_goal_is_refused_under_torque_control(robot):
+    assert robot.ros.call("/rpbi/iiwa/set_control_mode", SetString, "TORQUE_CONTROL").success
+    status, code, text = Goal(robot, trajectory((1.0, moved(0.3)))).wait()
+    assert (status, code) == (GoalStatus.REJECTED, -1)
+    assert "TORQUE_CONTROL" in text
+
+
+def test_changing_the_control_mode_aborts_the_goal(robot):
+    goal = Goal(robot, trajectory((5.0, moved(0.3))))
+    goal.wait_until_it_moves()
+    assert robot.ros.call("/rpbi/iiwa/set_control_mode", SetString, "VELOCITY_CONTROL").success
+    status, code, text = goal.wait()
+    assert (status, code) == (GoalStatus.ABORTED, -1) and "control mode was changed" in text
+    assert Goal(robot, trajectory((0.5, moved(0.2)))).wait()[0] == GoalStatus.SUCCEEDED

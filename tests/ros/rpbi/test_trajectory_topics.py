@@ -7,20 +7,45 @@ import subprocess
 
 import pytest
 import rospy
-from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from actionlib_msgs.msg import GoalStatus
 from node_world import Rosout, add, count, main_config, publishing, registrations, remove
 from ros_system import stop_group, wait_until
-from sensor_msgs.msg import JointState
-from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
-from trajectory_world import CONTROLLER, HOME, JOINTS, START, Goal, moved, stands, trajectory
+from trajectory_world import CONTROLLER, HOME, JOINTS, Goal, moved, trajectory
 from worlds import iiwa, write_world
 
-from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import JointTrajectoryControllerState, PybulletObject
 from rpbi.engine.pacer import MAX_DEBT_S
 
 
+def test_client_with_simulated_time_is_served_in_it(start, control_msgs):
+    robot = start(real_time_factor=3)
+    paths = f"{control_msgs}:{os.environ.get('PYTHONPATH', '')}"
+    arguments = [str(value) for value in (3.0, *moved(0.5))]
+    client = robot.ros.start_program("trajectory_client.py", *arguments, PYTHONPATH=paths)
+    assert client.wait(60.0) == 0, robot.ros.output(client)
+    printed = robot.ros.output(client)
+    assert f"state {GoalStatus.SUCCEEDED}, code 0, took " in printed
+    assert float(printed.split()[-1]) > 2.9  # by the wall clock it is a second
+
+
+def test_feedback_comes_at_its_rate_of_simulated_time_and_tells_where_the_joints_are_to_be(start):
+    robot = start(controller={"action_monitor_rate": 10})
+    goal = Goal(robot, trajectory((1.5, moved(0.6))))
+    assert goal.wait()[0] == GoalStatus.SUCCEEDED
+    stamps_ns = [message.header.stamp.to_nsec() for message in goal.feedback]
+    assert len(stamps_ns) in (14, 15, 16)
+    assert {round((b - a) / 1e6) for a, b in zip(stamps_ns, stamps_ns[1:])} <= {99, 100, 101}
+    for message in goal.feedback:
+        assert message.joint_names == JOINTS
+        assert message.error.positions[0] == pytest.approx(
+            message.desired.positions[0] - message.actual.positions[0], abs=1e-12
+        )
+        assert abs(message.error.positions[0]) < 2e-3
+    assert goal.feedback[7].desired.velocities[0] > 0.3  # the middle of a cubic from rest to rest
+
+
+@pytest.mark.quick
 def test_without_control_msgs_there_are_topics_and_the_log_tells_what_is_missing(ros, tmp_path):
     log = Rosout(ros)
     robot = iiwa(joint_trajectory_controller={"state_publish_rate": 100}, **HOME)
@@ -59,44 +84,6 @@ def test_robot_without_the_key_has_none_of_it(ros, tmp_path):
     assert not [name for _, name in registrations() if "joint_trajectory_controller" in name]
 
 
-def test_command_replaces_a_goal_and_an_empty_one_makes_the_arm_hold(start):
-    robot = start()
-    goal = Goal(robot, trajectory((5.0, moved(1.2))))
-    goal.wait_until_it_moves()
-    with publishing(f"{CONTROLLER}/command", JointTrajectory) as command:
-        command.publish(trajectory((4.0, moved(-1.2))))
-        status, _, text = goal.wait()
-        assert status == GoalStatus.PREEMPTED and "newer trajectory" in text
-        wait_until(lambda: robot.states.messages[-1].velocity[0] < -0.1, "it moves back")
-        command.publish(JointTrajectory())
-        wait_until(lambda: stands(robot.states), "the arm stands")
-    assert -1.0 < robot.states.messages[-1].position[0]
-
-
-def test_bad_command_is_named_and_changes_nothing(start):
-    robot = start()
-    log = Rosout(robot.ros)
-    goal = Goal(robot, trajectory((1.5, moved(0.5))))
-    goal.wait_until_it_moves()
-    with publishing(f"{CONTROLLER}/command", JointTrajectory) as command:
-        command.publish(trajectory((1.0, moved(9.0))))
-        log.wait_for([f"{CONTROLLER}/command", "'lbr_iiwa_joint_1' must be within"])
-    assert goal.wait()[0] == GoalStatus.SUCCEEDED
-
-
-def test_targets_of_joints_that_a_trajectory_drives_are_refused_until_it_has_ended(start):
-    robot = start()
-    log = Rosout(robot.ros)
-    goal = Goal(robot, trajectory((1.5, moved(0.5))))
-    goal.wait_until_it_moves()
-    with publishing("/rpbi/iiwa/joint_states/target", JointState) as target:
-        target.publish(JointState(name=["lbr_iiwa_joint_1"], position=[-1.0]))
-        log.wait_for(["a motion drives lbr_iiwa_joint_1"])
-        assert goal.wait()[0] == GoalStatus.SUCCEEDED
-        target.publish(JointState(name=["lbr_iiwa_joint_1"], position=[-0.2]))
-        wait_until(lambda: robot.states.messages[-1].position[0] < -0.19, "it follows targets again")
-
-
 def test_removed_robot_answers_its_goal_and_leaves_nothing_behind(start):
     robot = start()
     goal = Goal(robot, trajectory((20.0, moved(1.2))))
@@ -122,16 +109,6 @@ def test_robots_that_come_and_go_leave_no_threads_behind(start):
     wait_until(lambda: count(robot.process.pid, "task") <= first + 2, f"of {last} threads about {first} stay")
 
 
-def test_each_of_many_goals_has_its_answer(start):
-    robot = start()
-    # The last one alone is short: no other may arrive before the next one comes
-    durations_s = [20.0] * 59 + [0.5]
-    goals = [Goal(robot, trajectory((time_s, moved(0.01 * n)))) for n, time_s in enumerate(durations_s)]
-    *others, last = [goal.wait()[0] for goal in goals]
-    assert last == GoalStatus.SUCCEEDED
-    assert set(others) == {GoalStatus.PREEMPTED}
-
-
 def test_node_that_ends_in_the_middle_of_a_goal_ends_cleanly(start):
     robot = start()
     goal = Goal(robot, trajectory((20.0, moved(1.2))))
@@ -140,24 +117,6 @@ def test_node_that_ends_in_the_middle_of_a_goal_ends_cleanly(start):
     status, _, text = goal.wait()
     assert status == GoalStatus.ABORTED and "the simulation ended" in text
     assert "Traceback" not in robot.ros.output(robot.process)
-
-
-def test_stopped_world_freezes_the_goal(start):
-    robot = start()
-    goal = Goal(robot, trajectory((1.5, moved(0.6))))
-    goal.wait_until_it_moves()
-    assert robot.ros.call("/rpbi/stop", Trigger).success
-    frozen = robot.states.messages[-1].position[0]
-    fed = len(goal.feedback)
-    steps = [robot.ros.call("/rpbi/step", Trigger).success for _ in range(20)]
-    assert all(steps)
-    wait_until(lambda: robot.states.messages[-1].position[0] > frozen, "it moves by steps")
-    assert robot.states.messages[-1].position[0] < frozen + 0.03
-    assert len(goal.feedback) <= fed + 2
-    assert goal.handle.get_goal_status() == GoalStatus.ACTIVE
-    assert robot.ros.call("/rpbi/start", Trigger).success
-    status, code, text = goal.wait()
-    assert (status, code) == (GoalStatus.SUCCEEDED, 0), text
 
 
 def test_goal_of_a_stopped_world_can_be_cancelled(start):
@@ -197,42 +156,3 @@ def test_trajectory_takes_its_time_in_the_world_whatever_the_wall_clock_says(sta
         assert stamp_s - stamps_s[0] == pytest.approx(t - since_start_s[0], abs=1e-6)
         cubic = 3 * t**2 - 2 * t**3  # from rest to rest in 1 s
         assert message.desired.positions[0] == pytest.approx(0.5 * cubic, abs=2e-3)
-
-
-def test_status_and_results_have_the_stamps_of_the_world(start):
-    robot = start()
-    statuses = robot.ros.listen(f"{CONTROLLER}/follow_joint_trajectory/status", GoalStatusArray)
-    for message in list(statuses.wait_for(3)):
-        assert message.header.stamp.to_sec() < 1e6, "a wall stamp"
-
-
-def test_query_tells_where_the_joints_will_be(start):
-    from control_msgs.srv import QueryTrajectoryState
-
-    robot = start()
-    stamp = robot.states.messages[-1].header.stamp + rospy.Duration.from_sec(2.0)
-    goal = Goal(robot, trajectory((2.0, moved(0.8)), stamp=stamp))
-    wait_until(lambda: goal.handle.get_goal_status() == GoalStatus.ACTIVE, "the goal is accepted")
-    answer = robot.ros.call(f"{CONTROLLER}/query_state", QueryTrajectoryState, stamp + rospy.Duration.from_sec(1.0))
-    assert list(answer.name) == JOINTS
-    assert answer.position[0] == pytest.approx(0.4, abs=2e-3)  # the middle of a cubic from rest to rest
-    assert answer.velocity[0] == pytest.approx(0.6, abs=2e-3)  # 3/2 of the mean
-    assert list(answer.position[1:]) == pytest.approx(START[1:], abs=1e-3)
-
-
-def test_goal_is_refused_under_torque_control(start):
-    robot = start()
-    assert robot.ros.call("/rpbi/iiwa/set_control_mode", SetString, "TORQUE_CONTROL").success
-    status, code, text = Goal(robot, trajectory((1.0, moved(0.3)))).wait()
-    assert (status, code) == (GoalStatus.REJECTED, -1)
-    assert "TORQUE_CONTROL" in text
-
-
-def test_changing_the_control_mode_aborts_the_goal(start):
-    robot = start()
-    goal = Goal(robot, trajectory((5.0, moved(0.3))))
-    goal.wait_until_it_moves()
-    assert robot.ros.call("/rpbi/iiwa/set_control_mode", SetString, "VELOCITY_CONTROL").success
-    status, code, text = goal.wait()
-    assert (status, code) == (GoalStatus.ABORTED, -1) and "control mode was changed" in text
-    assert Goal(robot, trajectory((0.5, moved(0.2)))).wait()[0] == GoalStatus.SUCCEEDED

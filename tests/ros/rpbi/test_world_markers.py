@@ -61,6 +61,7 @@ def place(pose):
     return position.x, position.y, position.z, quat.x, quat.y, quat.z, quat.w
 
 
+@pytest.mark.quick
 def test_every_body_has_markers_that_are_locked_to_the_frame_of_its_link(start):
     following = {**MARK, "name": "follower", "object_tf": {"tf_id": "somewhere"}}
     told = iiwa("told", broadcast_link_states=True)

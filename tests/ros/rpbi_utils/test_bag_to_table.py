@@ -31,6 +31,7 @@ def bag(write_bag: WriteBag) -> Path:
     return write_bag([*states, ("/target", Float64(1.5)), ("/image", Image(data=b"\0\1"))], name="run.bag")
 
 
+@pytest.mark.quick
 def test_each_topic_becomes_a_parquet_file_beside_the_bag_and_is_listed(bag: Path) -> None:
     done = _run(bag)
     assert done.returncode == 0, done.stderr

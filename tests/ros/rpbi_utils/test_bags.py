@@ -112,6 +112,7 @@ def _is_same(cell: Any, expected: Any) -> bool:
     return bool(cell == expected)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("type_name", TYPES)
 def test_tables_say_what_the_messages_say(type_name: str, write_bag: Callable[..., Path]) -> None:
     message_class = roslib.message.get_message_class(type_name)

@@ -80,6 +80,7 @@ class Counter:
             self.last += 1
 
 
+@pytest.mark.quick
 def test_all_that_is_published_inside_is_in_the_bag_on_every_topic(ros: Any, tmp_path: Path) -> None:
     topics = [f"/counted_{index}" for index in range(5)]
     with Counter(topics) as counter:

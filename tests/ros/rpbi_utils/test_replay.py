@@ -125,6 +125,7 @@ def bag(ros_master, tmp_path_factory):
         ros.close()
 
 
+@pytest.mark.quick
 def test_a_session_is_the_same_in_a_new_process(bag):
     done = _replay(bag)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -16,6 +16,7 @@ from rpbi_utils import topic_report
 WriteBag = Callable[..., Path]
 
 
+@pytest.mark.quick
 def test_rates_and_gaps_are_measured_by_stamps_and_sizes_are_those_of_the_messages(
     write_bag: WriteBag,
 ) -> None:

@@ -510,7 +510,7 @@ time.sleep(60)
 
 
 def test_renderer_ends_when_the_simulator_is_killed(tmp_path):
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])}
     simulator = subprocess.Popen(
         [sys.executable, "-c", ORPHAN, str(tmp_path)], stdout=subprocess.PIPE, text=True, env=environment
     )

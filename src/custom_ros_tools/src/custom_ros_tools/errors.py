@@ -12,14 +12,14 @@ from dataclasses import dataclass
 
 
 def closest(name: str, known: Iterable[str]) -> str | None:
-    """Return the known name that looks most like `name`, or None when none is near (case is ignored)."""
+    """Returns the known name that looks most like `name`, or None when none is near (case is ignored)."""
     by_lower_case = {candidate.lower(): candidate for candidate in known}
     match = difflib.get_close_matches(name.lower(), by_lower_case, n=1)
     return by_lower_case[match[0]] if match else None
 
 
 def hint(name: str, known: Iterable[str]) -> str:
-    """Return `"; did you mean 'x'?"`, or the list of known names, to be put after "unknown ..."."""
+    """Returns `"; did you mean 'x'?"`, or the list of known names, to be put after "unknown ..."."""
     names = sorted(set(known))
     match = closest(name, names)
     if match is not None:

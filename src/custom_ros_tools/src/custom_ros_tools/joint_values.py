@@ -54,7 +54,7 @@ class JointValues:
         velocity: Iterable[float] | None = None,
         effort: Iterable[float] | None = None,
     ) -> JointValues:
-        """Return checked values; None stands for a quantity that is not given.
+        """Returns checked values; None stands for a quantity that is not given.
 
         Raises:
             ValueError: If lengths differ, a joint is named twice or a value is not finite.
@@ -73,7 +73,7 @@ class JointValues:
         return cls(joints, *values)
 
     def in_order(self, names: Sequence[str], ns: str = "") -> JointValues:
-        """Return the values of some joints in the order asked for; a quantity that is not given stays so.
+        """Returns the values of some joints in the order asked for; a quantity that is not given stays so.
 
         Args:
             names: The joints, which the result names as they are named here.

@@ -25,7 +25,7 @@ SMALLEST_NORM = 1e-6
 
 
 def finite_vector(values: ArrayLike, length: int, name: str) -> Array:
-    """Return values as a vector, shape (length,).
+    """Returns values as a vector, shape (length,).
 
     Raises:
         ValueError: If there are more or fewer, or one is not finite; it calls them by `name`.
@@ -39,7 +39,7 @@ def finite_vector(values: ArrayLike, length: int, name: str) -> Array:
 
 
 def unit_quat(quat_xyzw: ArrayLike) -> Array:
-    """Return a quaternion x, y, z, w of length 1.
+    """Returns a quaternion x, y, z, w of length 1.
 
     Raises:
         ValueError: If it has not four finite numbers or is zero.
@@ -52,7 +52,7 @@ def unit_quat(quat_xyzw: ArrayLike) -> Array:
 
 
 def quat_of(orientation: ArrayLike, in_deg: bool = False) -> Array:
-    """Return an orientation as a unit quaternion x, y, z, w.
+    """Returns an orientation as a unit quaternion x, y, z, w.
 
     Args:
         orientation: Either roll, pitch, yaw or a quaternion x, y, z, w.
@@ -71,7 +71,7 @@ def quat_of(orientation: ArrayLike, in_deg: bool = False) -> Array:
 
 
 def rpy_of(quat_xyzw: ArrayLike) -> Array:
-    """Return roll, pitch, yaw [rad] of a quaternion x, y, z, w; pitch is within -pi/2 and pi/2.
+    """Returns roll, pitch, yaw [rad] of a quaternion x, y, z, w; pitch is within -pi/2 and pi/2.
 
     Raises:
         ValueError: If it has not four finite numbers or is zero.
@@ -80,7 +80,7 @@ def rpy_of(quat_xyzw: ArrayLike) -> Array:
 
 
 def matrix_of(position: ArrayLike, quat_xyzw: ArrayLike) -> Array:
-    """Return a pose as homogeneous matrix, shape (4, 4).
+    """Returns a pose as homogeneous matrix, shape (4, 4).
 
     Args:
         position: x, y, z [m].
@@ -96,7 +96,7 @@ def matrix_of(position: ArrayLike, quat_xyzw: ArrayLike) -> Array:
 
 
 def pose_of(matrix: ArrayLike) -> tuple[Array, Array]:
-    """Return position [m] and unit quaternion x, y, z, w of a homogeneous matrix, shape (4, 4).
+    """Returns position [m] and unit quaternion x, y, z, w of a homogeneous matrix, shape (4, 4).
 
     Raises:
         ValueError: If it is no rigid transform, rounding aside.
@@ -136,7 +136,7 @@ class StaticTransform(ConfigModel):
 
     @classmethod
     def from_arguments(cls, arguments: Sequence[str]) -> StaticTransform:
-        """Read `x y z roll pitch yaw PARENT CHILD` or `x y z qx qy qz qw PARENT CHILD` [m, rad].
+        """Reads `x y z roll pitch yaw PARENT CHILD` or `x y z qx qy qz qw PARENT CHILD` [m, rad].
 
         Args:
             arguments: Those of the command, without its name and without ROS remappings.
