@@ -1,7 +1,5 @@
 """Configuration files: paths with ROS packages in them, and YAML that is safe to load."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Hashable, Mapping

@@ -3,8 +3,6 @@
 Each takes data and writes its own sentence, so that the wording lives in one place.
 """
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager

@@ -1,7 +1,5 @@
 """What the nodes of this package take as private parameters and in `~config`."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field

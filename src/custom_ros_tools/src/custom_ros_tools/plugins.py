@@ -1,7 +1,5 @@
 """Classes of other packages, named as `module:Class`."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 import traceback

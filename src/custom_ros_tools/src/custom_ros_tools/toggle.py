@@ -1,7 +1,5 @@
 """Something that is switched on and off."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """What every solver has to do, as tests for pytest; derive from `SolverConformance` to try a solver of your own."""
 
-from __future__ import annotations
-
 import math
 import os
 import pickle

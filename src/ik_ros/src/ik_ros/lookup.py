@@ -1,7 +1,5 @@
 """From the name of a solver to the solver."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, cast
 

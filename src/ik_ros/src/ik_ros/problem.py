@@ -1,7 +1,5 @@
 """Questions to inverse kinematics and answers, the same for every solver."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

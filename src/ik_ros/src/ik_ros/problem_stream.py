@@ -1,7 +1,5 @@
 """Problems that follow each other, and targets without jumps."""
 
-from __future__ import annotations
-
 import dataclasses
 import time
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """JSON Schemas of the YAML files that solver nodes load as their parameters."""
 
-from __future__ import annotations
-
 import argparse
 from contextlib import suppress
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What every solver of inverse kinematics is."""
 
-from __future__ import annotations
-
 import logging
 from abc import ABC, abstractmethod
 from collections.abc import Sequence

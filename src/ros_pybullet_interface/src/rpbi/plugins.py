@@ -1,7 +1,5 @@
 """What classes of other packages must have, and errors that name them when they fail."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """What sensors return: immutable values, all SI units, poses in `rpbi/world` unless said otherwise."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from .geometry import Pose, Quaternion, Twist, Vector, plus, scaled

@@ -1,7 +1,5 @@
 """PyBullet's own window: its keys and mouse, where it looks from, and what it shows."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """What the demo writes about its recording: tables, pictures and a summary."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Collection, Mapping
 from pathlib import Path

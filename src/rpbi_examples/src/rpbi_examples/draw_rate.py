@@ -1,7 +1,5 @@
 """How many images of a world this machine draws: what limits its cameras, with neither physics nor ROS beside."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess

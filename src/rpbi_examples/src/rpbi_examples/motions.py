@@ -1,7 +1,5 @@
 """How things in the examples move: a figure eight, circles, an orbit, a route and joints that swing."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Ends programs that do not end by themselves, together with what they started."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

@@ -1,7 +1,5 @@
 """What can go wrong with bags and recordings; every one of them is an `InterfaceError`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from custom_ros_tools.errors import InterfaceError

@@ -6,8 +6,6 @@ padding; strings and variable-length arrays are preceded by their length as uint
 two 32-bit integers.
 """
 
-from __future__ import annotations
-
 import struct
 from typing import Any, NamedTuple
 

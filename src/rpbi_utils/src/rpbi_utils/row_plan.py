@@ -1,7 +1,5 @@
 """Which rows and columns a message becomes: one row a message, save for the types listed in `PLANS`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Serialised messages to pandas tables, many at a time and free of ROS; and tables to files."""
 
-from __future__ import annotations
-
 import logging
 import re
 from collections import Counter

@@ -1,7 +1,5 @@
 """Sending without threads and without waiting."""
 
-from __future__ import annotations
-
 import socket
 import threading
 from collections import deque

@@ -1,7 +1,5 @@
 """Joint states as messages: in the order that is asked for, published, kept."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Calls functions when keys are pressed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any

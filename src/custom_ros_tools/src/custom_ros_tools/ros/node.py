@@ -1,7 +1,5 @@
 """What the programs of nodes call; it imports nothing that starts a thread."""
 
-from __future__ import annotations
-
 import pkgutil
 import signal
 

@@ -1,7 +1,5 @@
 """Services: one that switches on and off, and proxies that wait for theirs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 import rospy

@@ -1,7 +1,5 @@
 """TF in one object: tell it, ask it, wait for it, convert it."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Transforms as messages: from and to vectors, and repeated on /tf."""
 
-from __future__ import annotations
-
 import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion, Transform, TransformStamped, Vector3
 from numpy.typing import ArrayLike

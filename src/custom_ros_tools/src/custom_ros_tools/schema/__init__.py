@@ -3,8 +3,6 @@
 A model states its keys, units and limits once; validation, error messages and the JSON Schema follow from it.
 """
 
-from __future__ import annotations
-
 import copy
 import math
 import re

@@ -1,7 +1,5 @@
 """What the fields of a configuration model may be annotated with, beside pydantic's own."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar

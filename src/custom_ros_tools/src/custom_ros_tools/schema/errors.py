@@ -1,7 +1,5 @@
 """From pydantic's errors to `Problem`s that name the key, the unit and what to write instead."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any

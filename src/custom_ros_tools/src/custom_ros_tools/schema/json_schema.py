@@ -6,8 +6,6 @@ references to `$defs`; a description beside a reference is that of the key. The 
 usual one, the others are taken too.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Words for what a value has to be and for what it is."""
 
-from __future__ import annotations
-
 import math
 import re
 import reprlib

@@ -1,7 +1,5 @@
 """What lies between two links of a robot, read from its URDF."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """A chain of joints and its goal in the Orocos Kinematics and Dynamics Library, which takes a microsecond a call."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """The method of Levenberg and Marquardt, within limits and tolerances."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

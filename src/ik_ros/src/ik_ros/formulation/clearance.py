@@ -1,7 +1,5 @@
 """Distances between simple shapes."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

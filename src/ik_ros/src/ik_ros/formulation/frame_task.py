@@ -1,7 +1,5 @@
 """Tasks about the pose of a link."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, ClassVar, Literal

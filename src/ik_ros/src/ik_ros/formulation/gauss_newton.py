@@ -1,7 +1,5 @@
 """The way from one configuration to a better one, by quadratic programs."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Tasks about positions of joints."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """A robot as Pinocchio sees it."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 

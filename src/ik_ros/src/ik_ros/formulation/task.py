@@ -1,7 +1,5 @@
 """What every task of a formulation is."""
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence

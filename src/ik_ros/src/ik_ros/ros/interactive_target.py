@@ -1,7 +1,5 @@
 """`interactive_target_node.py`: a TF frame that is dragged and turned in RViz."""
 
-from __future__ import annotations
-
 import math
 
 from interactive_markers.interactive_marker_server import InteractiveMarkerServer

@@ -1,7 +1,5 @@
 """Problems and solutions as messages."""
 
-from __future__ import annotations
-
 import rospy
 from geometry_msgs.msg import Point, Quaternion, Transform, Vector3
 from geometry_msgs.msg import Pose as PoseMessage

@@ -1,7 +1,5 @@
 """`ik_setup_node.py pybullet` with `~config`: problems for the inverse kinematics of a simulated robot."""
 
-from __future__ import annotations
-
 import rospy
 from sensor_msgs.msg import JointState
 

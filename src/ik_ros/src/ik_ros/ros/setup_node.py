@@ -1,7 +1,5 @@
 """`ik_setup_node.py SOLVER`: TF, joint states, tolerances and goals in, problems of inverse kinematics out."""
 
-from __future__ import annotations
-
 import threading
 from collections import deque
 from collections.abc import Callable

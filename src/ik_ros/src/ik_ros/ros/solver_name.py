@@ -1,7 +1,5 @@
 """What the name of a solver is in ROS: the argument of its nodes, and part of their names and topics."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 

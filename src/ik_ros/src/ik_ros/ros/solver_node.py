@@ -1,7 +1,5 @@
 """`ik_solver_node.py SOLVER`: problems of inverse kinematics in, joint targets out."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """TF that is known to be up to date, and the frame that a solver takes poses in."""
 
-from __future__ import annotations
-
 import dataclasses
 import time
 

@@ -1,7 +1,5 @@
 """`tf_to_floatarray_node.py`: a transform as bare numbers, for instance as the goal of a task."""
 
-from __future__ import annotations
-
 import rospy
 from std_msgs.msg import Float64MultiArray
 

@@ -3,8 +3,6 @@
 A user's own one needs no line: `"their_package.module:Class"` serves wherever a name does.
 """
 
-from __future__ import annotations
-
 SOLVERS: dict[str, str] = {
     "kdl": "ik_ros.solvers.kdl:KdlSolver",
     "pybullet": "ik_ros.solvers.pybullet_solver:PybulletSolver",

@@ -1,7 +1,5 @@
 """Not one solution but many: elbow up, elbow down, the wrist flipped; the best of them first."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Annotated, Literal

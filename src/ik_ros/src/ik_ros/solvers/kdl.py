@@ -1,7 +1,5 @@
 """The default: the Orocos Kinematics and Dynamics Library, started again and again, within limits and tolerances."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Iterator, Sequence

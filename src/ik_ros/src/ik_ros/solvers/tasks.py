@@ -1,7 +1,5 @@
 """The user's own problem formulation: weighted costs and hard constraints, solved by quadratic programs in sequence."""
 
-from __future__ import annotations
-
 import random
 import threading
 from collections.abc import Iterator, Sequence

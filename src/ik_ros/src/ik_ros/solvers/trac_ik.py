@@ -1,7 +1,5 @@
 """TRAC-IK: two solvers race, one that knows limits from the start and one that gets unstuck (Beeson and Ames, 2015)."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Sequence

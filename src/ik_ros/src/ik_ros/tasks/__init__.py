@@ -3,8 +3,6 @@
 A user's own one needs no line: `"their_package.module:Class"` serves wherever a type does.
 """
 
-from __future__ import annotations
-
 TASKS: dict[str, str] = {
     "frame_pose": "ik_ros.tasks.frame_pose:FramePose",
     "frame_position": "ik_ros.tasks.frame_position:FramePosition",

@@ -1,7 +1,5 @@
 """How fast the speed of joints may change from one solution to the next."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

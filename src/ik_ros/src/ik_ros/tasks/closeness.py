@@ -1,7 +1,5 @@
 """Staying where the robot was."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where the centre of mass is."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Literal
 

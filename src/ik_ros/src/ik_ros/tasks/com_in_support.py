@@ -1,7 +1,5 @@
 """Balance: the centre of mass stays over what the robot stands on."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Distance between links, and between links and obstacles."""
 
-from __future__ import annotations
-
 import numpy as np
 from pydantic import Field
 

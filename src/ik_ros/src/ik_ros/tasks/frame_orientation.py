@@ -1,7 +1,5 @@
 """The orientation of a link."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from ik_ros.formulation.frame_task import FrameTask

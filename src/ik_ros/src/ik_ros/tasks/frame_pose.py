@@ -1,7 +1,5 @@
 """The pose of a link."""
 
-from __future__ import annotations
-
 from ik_ros.formulation.frame_task import FrameTask
 
 

@@ -1,7 +1,5 @@
 """Limits of joints, narrower than those of the URDF."""
 
-from __future__ import annotations
-
 from pydantic import Field
 
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Positive

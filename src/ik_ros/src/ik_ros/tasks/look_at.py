@@ -1,7 +1,5 @@
 """Where a link looks."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

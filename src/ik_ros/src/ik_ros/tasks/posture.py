@@ -1,7 +1,5 @@
 """A posture that is preferred."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The nonlinear program that shapes splines of joints."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Splines for joints, whose control points bound them."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.interpolate import BSpline
 

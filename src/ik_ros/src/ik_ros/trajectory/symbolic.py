@@ -1,7 +1,5 @@
 """Link poses of a chain and their distances to obstacles in CasADi; Pinocchio's wheel has no bindings to it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The types of bodies; a new one is a class in a file of its own and a line here."""
 
-from __future__ import annotations
-
 from custom_ros_tools.plugins import ClassTable, find_class
 
 from .body import Body

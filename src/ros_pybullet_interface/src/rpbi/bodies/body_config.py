@@ -1,7 +1,5 @@
 """What YAML says of every body."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Any, Self
 

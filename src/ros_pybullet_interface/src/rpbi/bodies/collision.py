@@ -1,7 +1,5 @@
 """Collision objects: felt by others, moved by nobody but TF."""
 
-from __future__ import annotations
-
 from pydantic import Field
 
 from rpbi.config.pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ObjectTf

@@ -1,7 +1,5 @@
 """Dynamic objects: moved by physics."""
 
-from __future__ import annotations
-
 from pydantic import Field
 
 from custom_ros_tools.schema import HzOrOff, Position, Positive, Quat

@@ -1,7 +1,5 @@
 """How bodies and links behave in contact and motion: reading it, and changing it while the world runs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """What is wrong with meshes that PyBullet would take without a word."""
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Iterator

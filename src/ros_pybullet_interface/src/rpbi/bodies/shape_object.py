@@ -1,7 +1,5 @@
 """Objects made of one visual and perhaps one collision shape."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """URDF objects: things with links and joints, but without motors."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Mapping
 

@@ -1,7 +1,5 @@
 """Visual objects: seen, never felt."""
 
-from __future__ import annotations
-
 from pydantic import Field
 
 from rpbi.config.pybullet_models import CreateCollisionShape, CreateVisualShape, ObjectTf

@@ -1,7 +1,5 @@
 """What of bodies can be seen, and where."""
 
-from __future__ import annotations
-
 import enum
 import math
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """Files that a configuration names: where they are looked for, and field types that insist on them."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Keys of older worlds that still load: other spellings, and keys without effect."""
 
-from __future__ import annotations
-
 import copy
 import logging
 from collections.abc import Mapping

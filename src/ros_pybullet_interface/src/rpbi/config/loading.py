@@ -1,7 +1,5 @@
 """Reading a world: the main YAML file and all files that it names, with all of their problems at once."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
 from collections.abc import Iterator, Mapping

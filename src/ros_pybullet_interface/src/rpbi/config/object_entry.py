@@ -1,7 +1,5 @@
 """Entries of the main file's lists: files of objects, and instances of one file that differ in some keys."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple

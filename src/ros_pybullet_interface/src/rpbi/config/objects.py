@@ -1,7 +1,5 @@
 """One object of a world: its type and its validated configuration."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """PyBullet's constants by name, as YAML files say them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import reduce

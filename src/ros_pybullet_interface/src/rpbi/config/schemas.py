@@ -1,7 +1,5 @@
 """JSON Schemas of all YAML files that a world is made of."""
 
-from __future__ import annotations
-
 import copy
 
 from custom_ros_tools.schema import ConfigModel

@@ -1,7 +1,5 @@
 """The torques that hold a robot against gravity."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from rpbi.config.pybullet_models import LoadURDF

@@ -1,7 +1,5 @@
 """Drives the joints of one robot: its motors, and the motion that sets their targets."""
 
-from __future__ import annotations
-
 import pybullet
 
 from rpbi.engine.client import Client

@@ -1,7 +1,5 @@
 """Reports of joints beyond their limits, which do not flood."""
 
-from __future__ import annotations
-
 import logging
 import time
 

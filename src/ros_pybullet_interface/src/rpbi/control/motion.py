@@ -1,7 +1,5 @@
 """Motions: what drives some joints of a robot from tick to tick until it ends."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from concurrent.futures import Future

@@ -1,7 +1,5 @@
 """A base that drives over the ground in any direction, as omnidirectional wheels do."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Motions to a goal in a given time."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from rpbi.control.trajectories.trajectory import Trajectory, minimum_jerk

@@ -1,7 +1,5 @@
 """One connection to PyBullet."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Integer simulated time: ticks, nanoseconds, and when a rate is due."""
 
-from __future__ import annotations
-
 import time
 from fractions import Fraction
 

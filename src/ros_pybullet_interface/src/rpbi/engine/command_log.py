@@ -1,7 +1,5 @@
 """What enters a world after its start, by tick."""
 
-from __future__ import annotations
-
 from collections import deque
 from typing import Any, NamedTuple
 

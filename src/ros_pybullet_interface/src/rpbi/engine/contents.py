@@ -1,7 +1,5 @@
 """What is in a world, and how it came there."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The log of all that came into a world, and its replay."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from itertools import chain

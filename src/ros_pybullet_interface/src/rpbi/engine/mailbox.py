@@ -1,7 +1,5 @@
 """Notes from other threads to the one thread that owns PyBullet."""
 
-from __future__ import annotations
-
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping

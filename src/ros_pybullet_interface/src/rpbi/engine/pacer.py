@@ -1,7 +1,5 @@
 """Keeps ticks in step with the wall clock."""
 
-from __future__ import annotations
-
 import time
 
 MAX_DEBT_S = 0.25

@@ -1,7 +1,5 @@
 """All sensors of a world, and when each is due."""
 
-from __future__ import annotations
-
 import heapq
 import logging
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """A short text that two worlds share if, and as good as only if, all in them is at the same place to the last bit."""
 
-from __future__ import annotations
-
 import hashlib
 import struct
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The joints between a robot's base and one of its links, as PyBullet moves them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

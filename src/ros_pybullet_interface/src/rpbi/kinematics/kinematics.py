@@ -1,7 +1,5 @@
 """Forward and inverse kinematics of one robot."""
 
-from __future__ import annotations
-
 import math
 import threading
 import weakref

@@ -1,7 +1,5 @@
 """Methods that say where to go from a configuration: to the target, or along its solutions to a rest posture."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

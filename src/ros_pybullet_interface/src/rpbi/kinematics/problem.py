@@ -1,7 +1,5 @@
 """Problems of inverse kinematics as PyBullet has them, and their solutions."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """How far a pose is from its target."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 POSITION_TOLERANCE_M = 1e-3

@@ -1,7 +1,5 @@
 """The search for a solution: from one start after the other, until one leads to the target."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """The page of all YAML files and their keys."""
 
-from __future__ import annotations
-
 from collections.abc import Container, Iterator, Mapping
 from typing import Any, NamedTuple
 

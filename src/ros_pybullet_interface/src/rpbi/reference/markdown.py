@@ -1,7 +1,5 @@
 """Pieces of Markdown, as GitHub shows it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 

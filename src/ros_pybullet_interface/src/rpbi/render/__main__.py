@@ -3,8 +3,6 @@
 The simulator starts it. Further arguments are the sink's, who finds them in `sys.argv`.
 """
 
-from __future__ import annotations
-
 import argparse
 import logging
 import signal

@@ -6,8 +6,6 @@ the *centre* of the first pixel, the image spans [-0.5, width - 0.5] x [-0.5, he
 without offset has its principal point at ((width - 1) / 2, (height - 1) / 2).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Python objects over a socket, without ever waiting for the other side."""
 
-from __future__ import annotations
-
 import pickle
 import select
 import socket

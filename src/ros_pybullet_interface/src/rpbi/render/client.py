@@ -1,7 +1,5 @@
 """The simulator's side of the renderer process."""
 
-from __future__ import annotations
-
 import logging
 import os
 import signal

@@ -1,7 +1,5 @@
 """What becomes of depth images: noise and point clouds."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -7,8 +7,6 @@ shares the shaders and textures that the plugin has already made, and whatever i
 this thread goes to its surface.
 """
 
-from __future__ import annotations
-
 import ctypes
 import logging
 from ctypes import c_char_p, c_int, c_uint, c_void_p

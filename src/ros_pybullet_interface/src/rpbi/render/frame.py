@@ -1,7 +1,5 @@
 """What the renderer process makes, and for whom."""
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol

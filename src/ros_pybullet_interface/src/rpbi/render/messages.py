@@ -1,7 +1,5 @@
 """What simulator and renderer process tell each other."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

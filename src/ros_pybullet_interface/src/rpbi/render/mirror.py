@@ -1,7 +1,5 @@
 """The renderer's own copy of the world."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterable, Mapping
 

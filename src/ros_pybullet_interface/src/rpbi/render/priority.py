@@ -1,7 +1,5 @@
 """When the renderer gets the processor."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 

@@ -1,7 +1,5 @@
 """The renderer process: takes scenes from the simulator, draws them and hands the frames to a sink."""
 
-from __future__ import annotations
-
 import faulthandler
 import logging
 import os

@@ -1,7 +1,5 @@
 """The renderers of PyBullet: the fast one by EGL, and the one in plain software that always works."""
 
-from __future__ import annotations
-
 import importlib.util
 import logging
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Values that enter a world as text that reads back exactly."""
 
-from __future__ import annotations
-
 import importlib
 import json
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Runs a recorded session again and compares the hashes of its states."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple

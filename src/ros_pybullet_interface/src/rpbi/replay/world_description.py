@@ -1,7 +1,5 @@
 """All that a world was built from, as text by which another process can build the same."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterator

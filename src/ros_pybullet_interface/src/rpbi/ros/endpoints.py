@@ -1,7 +1,5 @@
 """Rows of the tables of topics and services: by them the node opens its own, and reference pages list them."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Headers of messages: names of TF frames, and stamps of the world's clock."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import genpy

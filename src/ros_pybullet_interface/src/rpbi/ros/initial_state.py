@@ -1,7 +1,5 @@
 """Robots that start where another robot, for instance the real one, is at that time."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Inputs of the world from ROS: subscriptions and TF, by way of the mailbox."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import geometry_msgs.msg

@@ -1,7 +1,5 @@
 """The simulator node: a world with ROS around it."""
 
-from __future__ import annotations
-
 import logging
 import sys
 import threading

@@ -1,7 +1,5 @@
 """Topics and parameters that the node has whatever is in its world."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from rpbi.ros.publishers.commands import COMMANDS, DESCRIPTION

@@ -1,7 +1,5 @@
 """Objects that come and go while the node runs, in the world and in ROS."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Mapping
 from typing import Any

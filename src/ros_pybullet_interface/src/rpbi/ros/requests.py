@@ -1,7 +1,5 @@
 """Requests to the simulation thread that never wait for ever."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, wait

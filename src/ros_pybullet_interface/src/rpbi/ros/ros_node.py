@@ -1,7 +1,5 @@
 """rospy in one object, for scripts written in that manner."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import rospy

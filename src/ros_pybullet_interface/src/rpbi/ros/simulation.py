@@ -1,7 +1,5 @@
 """The simulation loop: requests, ticks, samples out, in step with the wall clock."""
 
-from __future__ import annotations
-
 import logging
 import threading
 import time

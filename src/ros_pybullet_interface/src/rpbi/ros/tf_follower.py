@@ -1,7 +1,5 @@
 """Follows TF frames: what they say goes into the world, and what is wrong with them is said now and then."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import threading

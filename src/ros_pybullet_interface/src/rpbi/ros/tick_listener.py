@@ -1,7 +1,5 @@
 """Waits for the messages of a tick, for programs that step a world and need what came of it."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Where the base of a robot is and how it moves."""
 
-from __future__ import annotations
-
 import math
 
 from custom_ros_tools.errors import PhysicsError

@@ -1,7 +1,5 @@
 """Contact forces as arrows, for RViz."""
 
-from __future__ import annotations
-
 from rpbi.bodies.body import Body
 from rpbi.config.sensors import ContactsConfig
 from rpbi.geometry import plus, scaled

@@ -1,7 +1,5 @@
 """Where bodies touch each other, and what they feel there."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Filters of measured values: low pass, noise and zero."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from concurrent.futures import Future

@@ -1,7 +1,5 @@
 """Force-torque sensors in the joints of a robot."""
 
-from __future__ import annotations
-
 import math
 import zlib
 

@@ -1,7 +1,5 @@
 """Joint states of a robot."""
 
-from __future__ import annotations
-
 import math
 
 from custom_ros_tools.errors import PhysicsError

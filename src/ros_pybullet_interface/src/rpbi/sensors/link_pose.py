@@ -1,7 +1,5 @@
 """Poses of a body and its links."""
 
-from __future__ import annotations
-
 import math
 
 from custom_ros_tools.errors import PhysicsError

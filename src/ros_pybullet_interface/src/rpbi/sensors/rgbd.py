@@ -1,7 +1,5 @@
 """RGB-D cameras, as far as the world is concerned: what they see, not how it looks."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from rpbi.bodies.body import Body

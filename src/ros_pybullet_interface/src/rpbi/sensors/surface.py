@@ -1,7 +1,5 @@
 """The surface of a soft body."""
 
-from __future__ import annotations
-
 import math
 
 from custom_ros_tools.errors import PhysicsError

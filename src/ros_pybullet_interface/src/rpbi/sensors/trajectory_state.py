@@ -1,7 +1,5 @@
 """How far a robot is with its trajectory."""
 
-from __future__ import annotations
-
 from rpbi.control.joint_drive import JointDrive
 from rpbi.control.trajectories.controller_state import ControllerState
 from rpbi.control.trajectories.follower import TrajectoryFollower

@@ -1,7 +1,5 @@
 """The one place where the XML of a URDF is parsed, into plain data, and written."""
 
-from __future__ import annotations
-
 import copy
 import math
 import re

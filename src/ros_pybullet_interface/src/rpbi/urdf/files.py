@@ -1,7 +1,5 @@
 """URDF files as PyBullet and ROS can read them."""
 
-from __future__ import annotations
-
 import atexit
 import hashlib
 import re

@@ -1,7 +1,5 @@
 """Loading a URDF into PyBullet, and what is wrong with one that cannot be loaded."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any

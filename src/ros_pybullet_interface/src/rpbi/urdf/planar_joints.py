@@ -1,7 +1,5 @@
 """Joints that let the root link of a robot description move in a plane."""
 
-from __future__ import annotations
-
 from .document import UrdfDocument, UrdfJoint
 from .files import resolve_meshes, write_description
 

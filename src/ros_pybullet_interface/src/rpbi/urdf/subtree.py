@@ -1,7 +1,5 @@
 """All links that hang on one joint: their momentum, their weight and what touches them."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from rpbi.engine.client import Client

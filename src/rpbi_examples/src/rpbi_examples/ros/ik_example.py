@@ -1,7 +1,5 @@
 """Takes an arm to the start of a figure eight and then has it track the figure, by a solver of `ik_ros`."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

@@ -1,7 +1,5 @@
 """TF frames that move: the camera's around the scene, and one in a figure eight."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import rospy

@@ -1,7 +1,5 @@
 """Nodes that move the robots of the examples by topics and services of the simulator."""
 
-from __future__ import annotations
-
 import math
 import sys
 

@@ -1,7 +1,5 @@
 """Throws a box into the world again and again."""
 
-from __future__ import annotations
-
 import rospy
 
 from custom_ros_tools.ros.lifecycle.run_node import run_node

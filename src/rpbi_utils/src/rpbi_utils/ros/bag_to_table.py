@@ -1,7 +1,5 @@
 """The command `bag_to_table`: a bag to one file a topic."""
 
-from __future__ import annotations
-
 import argparse
 import logging
 import sys

@@ -1,7 +1,5 @@
 """Bags to pandas tables."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The command `replay`: runs a recorded session again and compares its states."""
 
-from __future__ import annotations
-
 import argparse
 import logging
 import sys

@@ -1,7 +1,5 @@
 """What is in a bag and how regularly it came."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 

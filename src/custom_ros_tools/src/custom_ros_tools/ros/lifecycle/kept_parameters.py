@@ -1,7 +1,5 @@
 """Parameters that a node sets again at a ROS master that has lost them."""
 
-from __future__ import annotations
-
 import contextlib
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Keeps a node known to a ROS master that goes away and comes back with an empty memory."""
 
-from __future__ import annotations
-
 import contextlib
 import threading
 from typing import Any

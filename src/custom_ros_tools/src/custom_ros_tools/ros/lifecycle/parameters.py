@@ -1,7 +1,5 @@
 """Private parameters of a node, checked."""
 
-from __future__ import annotations
-
 from typing import TypeVar
 
 import rospy

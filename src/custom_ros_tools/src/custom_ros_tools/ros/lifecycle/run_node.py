@@ -6,8 +6,6 @@ blocked (see `custom_ros_tools.ros.node`), and is waited for where it is safe to
 inherit the block, which leaves their end to this process.
 """
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import os

@@ -1,7 +1,5 @@
 """Warnings that do not flood, by the wall clock: rospy's own throttle stands still when simulated time does."""
 
-from __future__ import annotations
-
 import threading
 import time
 

@@ -1,7 +1,5 @@
 """The ROS master, asked without waiting for ever."""
 
-from __future__ import annotations
-
 import http.client
 from typing import Any
 from xml.parsers.expat import ExpatError

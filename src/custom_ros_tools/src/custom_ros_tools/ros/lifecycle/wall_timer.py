@@ -1,7 +1,5 @@
 """Rates by the wall clock: they go on when simulated time stands still or has not begun."""
 
-from __future__ import annotations
-
 import threading
 import time
 import traceback

@@ -1,7 +1,5 @@
 """The node `attach_marker`: a marker at a fixed pose in a TF frame, for RViz."""
 
-from __future__ import annotations
-
 import logging
 
 import rospy

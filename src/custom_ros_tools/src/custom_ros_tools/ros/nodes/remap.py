@@ -1,7 +1,5 @@
 """The nodes that remap joint states: to another topic as they are, or as bare numbers for drivers that take those."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

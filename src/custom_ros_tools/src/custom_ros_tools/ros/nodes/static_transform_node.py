@@ -1,7 +1,5 @@
 """The node `resettable_static_transform_publisher`: a fixed transform that a service replaces."""
 
-from __future__ import annotations
-
 import sys
 
 import rospy

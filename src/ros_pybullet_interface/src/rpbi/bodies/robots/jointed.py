@@ -1,7 +1,5 @@
 """What robots that move and robots that are only shown have in common."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from functools import cached_property

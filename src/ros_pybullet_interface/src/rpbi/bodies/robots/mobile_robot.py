@@ -1,7 +1,5 @@
 """Mobile robots: robots whose base drives over the ground."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

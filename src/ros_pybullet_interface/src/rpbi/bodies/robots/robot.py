@@ -1,7 +1,5 @@
 """Robots: jointed bodies whose motors hold and follow targets."""
 
-from __future__ import annotations
-
 import logging
 import re
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Visual robots: shown where joint targets and TF say, felt by nobody."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

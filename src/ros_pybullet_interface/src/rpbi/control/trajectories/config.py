@@ -1,7 +1,5 @@
 """What a robot's YAML may say about following trajectories; names as in ros_controllers' JointTrajectoryController."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Annotated, Any
 

@@ -1,7 +1,5 @@
 """How far a robot is with its trajectory."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from .trajectory import State

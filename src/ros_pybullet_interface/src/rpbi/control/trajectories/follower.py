@@ -1,7 +1,5 @@
 """The follower of a robot's trajectories."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 

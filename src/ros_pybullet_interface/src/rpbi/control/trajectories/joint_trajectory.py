@@ -1,7 +1,5 @@
 """What a trajectory asks of single joints: checked against the robot, and joined to what the joints do already."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple

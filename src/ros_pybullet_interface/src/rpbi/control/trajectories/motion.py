@@ -1,7 +1,5 @@
 """Following trajectories tick by tick."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 from rpbi.control.motion import JointMotion, Motion

@@ -1,7 +1,5 @@
 """The polynomial that joins two knots of one joint, and how far and how fast it goes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

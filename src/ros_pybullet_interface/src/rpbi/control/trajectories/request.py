@@ -1,7 +1,5 @@
 """What is asked of a follower of trajectories, and why it may be refused."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from enum import IntEnum
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """How far joints may be off while they follow a trajectory."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import NamedTuple

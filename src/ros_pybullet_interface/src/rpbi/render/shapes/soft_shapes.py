@@ -1,7 +1,5 @@
 """Soft bodies in the renderer's copy of the world."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from rpbi.bodies import Body

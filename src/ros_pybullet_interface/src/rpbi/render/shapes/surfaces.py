@@ -1,7 +1,5 @@
 """Surfaces of simple bodies as triangles with normals."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

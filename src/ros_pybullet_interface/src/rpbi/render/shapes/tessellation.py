@@ -6,8 +6,6 @@ their place, made to measure. Of several transparent shapes from one file EGL dr
 its own.
 """
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Callable

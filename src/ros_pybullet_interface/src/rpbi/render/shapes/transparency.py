@@ -1,7 +1,5 @@
 """Which shapes of a renderer's client can be seen through."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import NamedTuple
 

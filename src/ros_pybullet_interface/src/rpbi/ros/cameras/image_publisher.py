@@ -1,7 +1,5 @@
 """The node that publishes camera images, inside the renderer process."""
 
-from __future__ import annotations
-
 import sys
 import time
 import warnings

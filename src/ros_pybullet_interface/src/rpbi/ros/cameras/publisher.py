@@ -1,7 +1,5 @@
 """Where scenes go: to the renderer process, which publishes the images."""
 
-from __future__ import annotations
-
 import sys
 import time
 import zlib

@@ -1,7 +1,5 @@
 """The topics of a camera, and what it sees as messages."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField

@@ -1,7 +1,5 @@
 """What a recording needs to be replayed: what the world was built from, and by tick what entered it since."""
 
-from __future__ import annotations
-
 import logging
 from collections import deque
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The publishers of a world's samples, and the order in which a tick goes out."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The topic of each type of samples, and the samples as messages."""
 
-from __future__ import annotations
-
 from geometry_msgs.msg import Point, Quaternion, Twist, Vector3, Wrench, WrenchStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState

@@ -1,7 +1,5 @@
 """How the simulation is doing: /clock, `rpbi/status`, `rpbi/state` and /diagnostics."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Where samples go: those of a sensor to a topic of its own, poses of links to TF."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

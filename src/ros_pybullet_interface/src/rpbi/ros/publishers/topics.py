@@ -1,7 +1,5 @@
 """Topics that carry the state of the world."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable
 from typing import Any

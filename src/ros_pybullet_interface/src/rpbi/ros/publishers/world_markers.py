@@ -1,7 +1,5 @@
 """The whole world as markers for RViz, which otherwise knows robots only."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 from urllib.parse import quote

@@ -1,7 +1,5 @@
 """Checks a world without a ROS master, and tells what it would offer."""
 
-from __future__ import annotations
-
 import argparse
 import logging
 import signal

@@ -1,7 +1,5 @@
 """The page of all topics, services, frames and parameters of the simulator."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 
 from rpbi.bodies import BODY_TYPES

@@ -1,7 +1,5 @@
 """Which topics and services a world has, without starting anything."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """A world of one body of each type, with all that it can have in ROS, for the pages that tell of it."""
 
-from __future__ import annotations
-
 import pybullet
 
 from rpbi.bodies import BODY_TYPES

@@ -1,7 +1,5 @@
 """Writes the JSON Schemas and the pages of the documentation that follow from the code."""
 
-from __future__ import annotations
-
 import argparse
 import re
 from pathlib import Path

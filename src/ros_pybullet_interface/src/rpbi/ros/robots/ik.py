@@ -1,7 +1,5 @@
 """Inverse kinematics of robots, as a service that answers and a topic that moves."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import fields, replace
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """What ROS learns of a robot: the parameter with its URDF, and the service that returns its joints."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Callable

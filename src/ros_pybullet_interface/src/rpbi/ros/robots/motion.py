@@ -1,7 +1,5 @@
 """Services that move a robot, in a given time or at once, and that change how it is controlled."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

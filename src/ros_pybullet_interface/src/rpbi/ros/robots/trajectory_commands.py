@@ -1,7 +1,5 @@
 """The plain topic and service of a follower of trajectories."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Trajectories and the states of their followers as messages; those of control_msgs where it is installed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

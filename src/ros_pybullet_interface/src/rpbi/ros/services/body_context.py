@@ -1,7 +1,5 @@
 """What a service, topic or other part of a body needs to reach it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
 

@@ -1,7 +1,5 @@
 """All that a body has in ROS beside its samples and inputs: tables, and how it is opened and closed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from concurrent.futures import wait
 from contextlib import ExitStack

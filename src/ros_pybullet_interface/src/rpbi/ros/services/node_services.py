@@ -3,8 +3,6 @@
 A handler never touches PyBullet, it asks the simulation thread.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Mapping
 from typing import Any, NamedTuple

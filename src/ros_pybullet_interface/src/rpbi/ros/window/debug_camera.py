@@ -1,7 +1,5 @@
 """Where PyBullet's window looks from: published, returned and changed."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import rospy

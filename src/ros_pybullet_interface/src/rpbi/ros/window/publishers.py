@@ -1,7 +1,5 @@
 """What happens in PyBullet's window, and what it shows, as topics."""
 
-from __future__ import annotations
-
 import struct
 import time
 from typing import IO

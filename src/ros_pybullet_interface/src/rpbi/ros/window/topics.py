@@ -1,7 +1,5 @@
 """All that PyBullet's window has in ROS."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterator
 
