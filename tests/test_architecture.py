@@ -172,7 +172,7 @@ def test_every_body_type_is_shown_in_an_example():
     from rpbi.config.loading import load_world
 
     worlds = (SRC / "rpbi_examples/configs").glob("*/config.yaml")
-    shown = {each.type for world in worlds for each in load_world(str(world), BODY_TYPES).objects}
+    shown = {each.type for world in worlds for each in load_world(str(world)).objects}
     assert shown == set(BODY_TYPES)
 
 

@@ -12,7 +12,7 @@ from std_msgs.msg import Header
 
 from rpbi.render.camera import Intrinsics, depth_in_metres
 from rpbi.render.depth import PointCloud
-from rpbi.ros.cameras.messages import cloud_message
+from rpbi.ros.cameras.topics import cloud_message
 
 
 def main() -> None:

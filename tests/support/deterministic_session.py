@@ -12,7 +12,6 @@ from pathlib import Path
 
 from worlds import FLOOR, ball, box, iiwa, write_world
 
-from rpbi.bodies import BODY_TYPES
 from rpbi.config.loading import load_object
 from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
@@ -63,7 +62,7 @@ def run(world: World, ticks: int = TICKS, visitors: bool = False) -> str:
             )
             world.put("iiwa/target", target)
         if visitors and tick % 500 == 100:
-            config = load_object("dynamic", ball("visitor", basePosition=[0.4, 0.1, 1.0]), "visitor.yaml", BODY_TYPES)
+            config = load_object("dynamic", ball("visitor", basePosition=[0.4, 0.1, 1.0]), "visitor.yaml")
             world.add("dynamic", config)
         if visitors and tick % 500 == 400:
             world.remove("visitor")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from std_msgs.msg import Float64
 
-from rpbi.ros.inputs import TopicInput
+from rpbi.ros.endpoints import Topic
 
-PUSH = TopicInput("rpbi/{name}/push", Float64, lambda message: message.data)
-PUSH_X = TopicInput("rpbi/{name}/push", Float64, lambda message: message.data.x)
+PUSH = Topic("rpbi/{name}/push", Float64, lambda message: message.data)
+PUSH_X = Topic("rpbi/{name}/push", Float64, lambda message: message.data.x)

@@ -16,7 +16,6 @@ import pybullet
 from mobile_base import mobile_base
 from worlds import FLOOR, ball, box, iiwa, write_world
 
-from rpbi.bodies import BODY_TYPES
 from rpbi.config.loading import load_object
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.control.trajectories.request import TrajectoryPoint as Point
@@ -110,7 +109,7 @@ class Script:
             name = f"visitor{self._count}"
             start = {"linearVelocity": [-3.0, draw.uniform(-1, 1), 0.0]}
             config = ball(name, 0.06, basePosition=[1.2, 0.0, draw.uniform(0.1, 0.8)], resetBaseVelocity=start)
-            world.add("dynamic", load_object("dynamic", config, "visitor.yaml", BODY_TYPES))
+            world.add("dynamic", load_object("dynamic", config, "visitor.yaml"))
             self._visitors.append(name)
         elif kind == 1 and self._visitors:
             world.remove(self._visitors.pop(draw.randrange(len(self._visitors))))

@@ -1,10 +1,6 @@
 #!/usr/bin/python3
 """Publishes a transform as numbers."""
 
-import signal
+from custom_ros_tools.ros.node import run
 
-signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # before any thread is; main() takes Ctrl-C
-
-from ik_ros.ros.tf_to_float_array import main  # noqa: E402
-
-main()
+run("ik_ros.ros.tf_to_float_array:main")

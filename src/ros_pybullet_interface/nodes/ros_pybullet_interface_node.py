@@ -1,10 +1,6 @@
 #!/usr/bin/python3
 """Runs the simulator node."""
 
-import signal
+from custom_ros_tools.ros.node import run
 
-signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # before any thread is; main() takes Ctrl-C
-
-from rpbi.ros.node import main  # noqa: E402
-
-main()
+run("rpbi.ros.node:main")

@@ -1,9 +1,6 @@
 #!/usr/bin/python3
 """Moves the joints of a robot one after the other."""
 
-import signal
+from custom_ros_tools.ros.node import run
 
-signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # before any thread starts
-from rpbi_examples.ros.basic_robot_example import main  # noqa: E402
-
-main()
+run("rpbi_examples.ros.moving_robots:basic_robot_example")

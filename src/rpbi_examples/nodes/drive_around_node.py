@@ -1,9 +1,6 @@
 #!/usr/bin/python3
 """Drives a mobile base along a route."""
 
-import signal
+from custom_ros_tools.ros.node import run
 
-signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # before any thread starts
-from rpbi_examples.ros.drive_around import main  # noqa: E402
-
-main()
+run("rpbi_examples.ros.moving_robots:drive_around")

@@ -1,9 +1,6 @@
 #!/usr/bin/python3
 """Draws mirrored circles with two arms."""
 
-import signal
+from custom_ros_tools.ros.node import run
 
-signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # before any thread starts
-from rpbi_examples.ros.dual_arm_example import main  # noqa: E402
-
-main()
+run("rpbi_examples.ros.moving_robots:dual_arm_example")

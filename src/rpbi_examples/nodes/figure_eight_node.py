@@ -1,9 +1,6 @@
 #!/usr/bin/python3
 """Moves a frame in a figure eight."""
 
-import signal
+from custom_ros_tools.ros.node import run
 
-signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # before any thread starts
-from rpbi_examples.ros.figure_eight import main  # noqa: E402
-
-main()
+run("rpbi_examples.ros.moving_frames:figure_eight")

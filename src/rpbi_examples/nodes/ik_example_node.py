@@ -1,9 +1,6 @@
 #!/usr/bin/python3
 """Has an arm track a figure eight by inverse kinematics."""
 
-import signal
+from custom_ros_tools.ros.node import run
 
-signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # before any thread starts
-from rpbi_examples.ros.ik_example import main  # noqa: E402
-
-main()
+run("rpbi_examples.ros.ik_example:main")

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Throws a box into the world again and again."""
 
-from rpbi_examples.ros.pybullet_objects_example import main
+from custom_ros_tools.ros.node import run
 
-main()
+run("rpbi_examples.ros.pybullet_objects_example:main")

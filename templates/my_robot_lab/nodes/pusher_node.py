@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Pushes parcels off the belt."""
 
-from my_robot_lab.ros.pusher import main
+from custom_ros_tools.ros.node import run
 
-main()
+run("my_robot_lab.ros.pusher:main")

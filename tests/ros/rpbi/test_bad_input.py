@@ -18,7 +18,7 @@ from tf2_msgs.msg import TFMessage
 from worlds import FLOOR, ball, iiwa
 
 from ros_pybullet_interface.msg import PybulletObject
-from rpbi.ros.tf_listener import fault_in
+from rpbi.ros.tf_follower import fault_in
 
 TOPIC = "/rpbi/iiwa/joint_states/target"
 JOINT = "lbr_iiwa_joint_4"

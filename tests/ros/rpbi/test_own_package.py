@@ -196,13 +196,13 @@ def _faulty(ros, tmp_path, **keys):
     ("keys", "line"),
     [
         ({"sensors": [{"name": "gauge", "type": "faulty_lab:Gauge", "hz": 10.0}]},
-         "faulty_lab:Gauge: ros_topic: missing, expected 'module:NAME' of the SampleTopic for its Number"),
+         "faulty_lab:Gauge: ros_topic: missing, expected 'module:NAME' of the Topic for its Number"),
         ({"sensors": [{"name": "gauge", "type": "faulty_lab:LostGauge", "hz": 10.0}]},
          "faulty_lab:LostGauge: ros_topic: 'faulty_lab' has no 'LOST_TOPIC'"),
         ({"sensors": [{"name": "gauge", "type": "faulty_lab:OddTopicGauge", "hz": 10.0}]},
-         "faulty_lab:OddTopicGauge: ros_topic: expected a rpbi.ros.publishers.sample_topics:SampleTopic in "
+         "faulty_lab:OddTopicGauge: ros_topic: expected a rpbi.ros.endpoints:Topic in "
          "'faulty_lab:NOT_A_CLASS'"),
-        ({"takes": "push"}, "faulty_lab:Thing._push: ros_topic: missing, expected 'module:NAME' of the TopicInput"),
+        ({"takes": "push"}, "faulty_lab:Thing._push: ros_topic: missing, expected 'module:NAME' of the Topic"),
         ({"fails": "init"}, "thing.yaml: faulty_lab:Thing failed in making 'thing': KeyError: 'no such key' ("),
     ],
 )  # fmt: skip

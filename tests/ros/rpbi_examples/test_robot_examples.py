@@ -16,7 +16,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from ros_pybullet_interface.srv import ResetJointState
-from rpbi_examples.circles import CENTRE, RADIUS
+from rpbi_examples.motions import CIRCLE_CENTRE, CIRCLE_RADIUS
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -56,15 +56,15 @@ def position() -> Callable[[str], tuple[float, float, float] | None]:
 def test_two_hands_draw_mirrored_circles(ros, position):
     launch(ros, "basic_example_dual_iiwa", real_time_factor=4)
     hands = {1.0: "rpbi/left/lbr_iiwa_link_7", -1.0: "rpbi/right/lbr_iiwa_link_7"}
-    x, y, z = CENTRE
+    x, y, z = CIRCLE_CENTRE
 
     def off(side: float) -> tuple[float, float] | None:
         """Returns how far a hand is from its circle, and where on it [m, rad]."""
         found = position(hands[side])
         if found is None:
             return None
-        dy, dz = side * found[1] - y, found[2] - z - RADIUS
-        return math.hypot(math.hypot(dy, dz) - RADIUS, found[0] - x), math.atan2(dy, -dz)
+        dy, dz = side * found[1] - y, found[2] - z - CIRCLE_RADIUS
+        return math.hypot(math.hypot(dy, dz) - CIRCLE_RADIUS, found[0] - x), math.atan2(dy, -dz)
 
     angles = set()
     both: list[float] = []

@@ -9,7 +9,6 @@ import pytest
 from worlds import FLOOR, ball, box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.bodies import BODY_TYPES
 from rpbi.config.loading import load_object
 from rpbi.geometry import Pose
 from rpbi.samples import ContactArrowsSample, ContactsSample
@@ -180,4 +179,4 @@ def test_without_the_key_there_are_none_and_a_visual_robot_has_none(build):
     assert run(build(box(basePosition=[0.0, 0.0, 0.1])), 10) == {}
     robot = {"name": "ghost", "loadURDF": {"fileName": "kuka_iiwa/model.urdf"}, "is_visual_robot": True}
     with pytest.raises(ConfigError, match="contacts: a visual robot touches nothing"):
-        load_object("visual_robot", {**robot, "contacts": {}}, "ghost.yaml", BODY_TYPES)
+        load_object("visual_robot", {**robot, "contacts": {}}, "ghost.yaml")

@@ -9,7 +9,7 @@ import yaml
 from worlds import FLOOR, box, write_world
 
 from custom_ros_tools.errors import ConfigError, PluginError
-from rpbi.bodies import BODY_TYPES, kind_of
+from rpbi.bodies import kind_of
 from rpbi.config.loading import load_object
 from rpbi.replay.recorded_values import from_text, to_text
 from rpbi.replay.world_description import WorldDescription, describe
@@ -51,7 +51,7 @@ def run(world, ticks):
 
 
 def add(world, kind, **keys):
-    return world.add(kind, load_object(kind, keys, "own.yaml", BODY_TYPES))
+    return world.add(kind, load_object(kind, keys, "own.yaml"))
 
 
 def thing(**keys):
@@ -117,7 +117,7 @@ def test_a_reset_and_a_fresh_world_are_the_same_to_the_last_bit(world, tmp_path)
 
 def test_a_world_and_what_comes_into_it_can_be_recorded(world):
     again = WorldDescription(describe(world)).build()
-    config = load_object(CONVEYOR, {**BELT, "name": "second", "sensors": [EYE]}, "second.yaml", BODY_TYPES)
+    config = load_object(CONVEYOR, {**BELT, "name": "second", "sensors": [EYE]}, "second.yaml")
     for each, given in ((world, config), (again, from_text(to_text(config)))):
         run(each, 300)
         each.add(CONVEYOR, given)
@@ -152,6 +152,10 @@ def test_a_world_and_what_comes_into_it_can_be_recorded(world):
         ({**BELT, "speed": "fast"}, r"belt.yaml: speed: expected a number \[m/s\], got text 'fast'"),
         (thing(sensors=3), r"thing.yaml: sensors: expected a list of sensors"),
         (thing(sensors=["eye"]), r"thing.yaml: sensors\[0\]: expected a mapping with 'type: module:Class'"),
+        (
+            thing(sensors=[{**EYE, "type": "contacts"}]),
+            r"sensors\[0\].type: expected a name like 'my_package.my_module:",
+        ),
         (thing(sensors=[{**EYE, "type": "nowhere:Eye"}]), r"thing.yaml: sensors\[0\].type: no module 'nowhere'"),
         (
             thing(sensors=[{**EYE, "type": CONVEYOR}]),

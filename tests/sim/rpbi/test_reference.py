@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from ik_ros.ros.write_schemas import schema_files
+from ik_ros.schemas import schema_files
 from rpbi.bodies import BODY_TYPES
 from rpbi.reference.markdown import link
 from rpbi.ros.headers import FRAMES

@@ -11,7 +11,6 @@ import pytest
 import scripted_session as script
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.bodies import BODY_TYPES
 from rpbi.config.loading import load_world
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.control.motors import Command
@@ -149,7 +148,7 @@ def test_values_read_back_to_the_last_bit(value):
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.rglob("config.yaml")), ids=lambda path: path.parent.name)
 def test_the_configuration_of_every_example_reads_back_as_it_was(path):
-    loaded = load_world(str(path), BODY_TYPES)
+    loaded = load_world(str(path))
     for config in (loaded.config, *(item.config for item in loaded.objects)):
         again = from_text(to_text(config))
         assert again == config

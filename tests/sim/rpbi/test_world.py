@@ -6,7 +6,6 @@ import pytest
 from worlds import FLOOR, ball, box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, PhysicsError, UnknownNameError
-from rpbi.bodies import BODY_TYPES
 from rpbi.config.loading import load_object
 from rpbi.geometry import Pose
 from rpbi.samples import JointStateSample, LinkPoseSample
@@ -28,7 +27,7 @@ def build(tmp_path):
 
 
 def _config(kind, data):
-    return load_object(kind, data, "test.yaml", BODY_TYPES)
+    return load_object(kind, data, "test.yaml")
 
 
 def _positions(world):

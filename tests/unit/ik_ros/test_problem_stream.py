@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 
 from custom_ros_tools.errors import UnknownNameError
-from ik_ros.joint_rate_limiter import JointRateLimiter, JointRateLimiterConfig
 from ik_ros.problem import IKProblem, IKSolution
-from ik_ros.problem_stream import LONGEST_PERIOD_S, ProblemStream
+from ik_ros.problem_stream import LONGEST_PERIOD_S, JointRateLimiter, JointRateLimiterConfig, ProblemStream
 from ik_ros.solver import Solver
 
 JOINTS = ("shoulder", "elbow")

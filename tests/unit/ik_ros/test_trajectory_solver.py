@@ -19,9 +19,9 @@ from custom_ros_tools.errors import ConfigError, UnknownNameError
 from ik_ros.lookup import make_solver
 from ik_ros.problem import IKProblem, IKSolution, SampledTrajectory, Waypoint
 from ik_ros.solvers.trajectory import KEPT_PROGRAMS, TrajectorySolver
-from ik_ros.trajectory.forward_kinematics import ForwardKinematics, rotation_vector
 from ik_ros.trajectory.program import Program
 from ik_ros.trajectory.spline import Spline
+from ik_ros.trajectory.symbolic import link_frames, rotation_vector
 from rpbi.geometry import Pose
 from rpbi.kinematics import Kinematics
 
@@ -275,7 +275,7 @@ def test_kinematics_for_casadi_agree_with_pybullet(urdf):
     base, tip = ends.get(urdf.split("/")[0], ("link_base", "link6"))
     solver = make_solver("kdl", {"urdf_filename": str(DATA / urdf), "base_link": base, "tip_link": tip})
     q = casadi.SX.sym("q", len(solver.joint_names))
-    frames = ForwardKinematics(solver.description).frames(q)
+    frames = link_frames(solver.description, q)
     forward = casadi.Function("forward", [q], list(frames[tip]))
     robot = Kinematics(str(DATA / urdf))
     generator = np.random.default_rng(0)

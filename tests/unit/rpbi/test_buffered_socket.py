@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from rpbi.ros.publishers.buffered_socket import BufferedSocket
+from custom_ros_tools.ros.buffered_socket import BufferedSocket
 
 
 @pytest.fixture

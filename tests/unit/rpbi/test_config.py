@@ -12,56 +12,18 @@ import pybullet
 import pybullet_data
 import pytest
 import yaml
-from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError
-from custom_ros_tools.schema import ConfigModel, Hz, Name
-from rpbi.config.loading import LoadedWorld, WorldConfig, load_object, load_world, load_world_dict
-from rpbi.config.pybullet_models import ChangeDynamics, CreateVisualShape, LoadURDF
+from rpbi.config.loading import LoadedWorld, load_object, load_world, load_world_dict
+from rpbi.config.objects import object_sections
+from rpbi.config.world import WorldConfig, main_file_model
 
-
-class BallConfig(ConfigModel):
-    """A body type of the tests."""
-
-    name: Name
-    createVisualShape: CreateVisualShape
-    changeDynamics: ChangeDynamics | None = None
-
-
-class ArmConfig(ConfigModel):
-    """Another one."""
-
-    name: Name
-    loadURDF: LoadURDF
-    joint_state_publisher_hz: Hz = Field(50.0, description="Rate.")
-    broadcast_link_states_hz: Hz = Field(50.0, description="Rate.")
-
-
-class Ball:
-    """Body class with what the loader asks of it."""
-
-    Config: type[ConfigModel] = BallConfig
-    section = "visual_objects"
-    is_soft = False
-
-    def claims(self, data: Any) -> bool:
-        return True
-
-
-class Arm:
-    """Body class with what the loader asks of it."""
-
-    Config: type[ConfigModel] = ArmConfig
-    section = "robots"
-    is_soft = False
-
-    def claims(self, data: Any) -> bool:
-        return True
-
-
-BODY_TYPES = {"visual": Ball(), "robot": Arm()}
-BALL = {"name": "ball", "createVisualShape": {"shapeType": "GEOM_SPHERE", "radius": 0.1}}
-ARM = {"name": "arm", "loadURDF": {"fileName": "kuka_iiwa/model.urdf"}}
+BALL: dict[str, Any] = {"name": "ball", "createVisualShape": {"shapeType": "GEOM_SPHERE", "radius": 0.1}}
+ARM: dict[str, Any] = {
+    "name": "arm",
+    "loadURDF": {"fileName": "kuka_iiwa/model.urdf"},
+    "setJointMotorControlArray": {"controlMode": "POSITION_CONTROL"},
+}
 
 
 @pytest.fixture
@@ -80,7 +42,7 @@ def write(path: Path, data: Any) -> str:
 
 def load(folder: Path, **main: Any) -> LoadedWorld:
     """Loads a world with this main file."""
-    return load_world(write(folder / "world.yaml", main), BODY_TYPES)
+    return load_world(write(folder / "world.yaml", main))
 
 
 def problems(folder: Path, **main: Any) -> list[str]:
@@ -142,16 +104,14 @@ def test_robot_description_is_a_word_until_a_file_stands_for_it(folder: Path) ->
     write(folder / "arm.yaml", {**ARM, "loadURDF": {"fileName": "robot_description"}})
     main = write(folder / "world.yaml", {"robots": ["arm.yaml"]})
     for file, expected in ((None, "robot_description"), ("/tmp/described.urdf", "/tmp/described.urdf")):
-        world = load_world(main, BODY_TYPES, robot_description=file)
+        world = load_world(main, robot_description=file)
         assert world.objects[0].config.loadURDF.fileName == expected  # type: ignore[attr-defined]
 
 
 def test_all_faults_of_all_files_are_told_at_once(folder: Path) -> None:
-    write(
-        folder / "arm.yaml",
-        {"name": "arm", "loadURDF": {"fileName": "none.urdf"}, "joint_state_publisher_hz": 0},
-    )
-    write(folder / "ball.yaml", {**BALL, "changeDynamics": {"lateralFrction": 1, "restitution": float("nan")}})
+    write(folder / "arm.yaml", {**ARM, "loadURDF": {"fileName": "none.urdf"}, "joint_state_publisher_hz": 0})
+    shape = {**BALL["createVisualShape"], "radius": float("nan"), "raduis": 1}
+    write(folder / "ball.yaml", {**BALL, "createVisualShape": shape})
     write(folder / "twin.yaml", {"name": "arm", "createVisualShape": {"shapeType": "GEOM_BX"}})
     (folder / "broken.yaml").write_text("name: [\n")
     data = pybullet_data.getDataPath()
@@ -166,12 +126,12 @@ def test_all_faults_of_all_files_are_told_at_once(folder: Path) -> None:
     ) == [
         "world.yaml: connect.connection_mode: unknown connection mode 'GIU'; did you mean 'GUI'?",
         "world.yaml: timeStep: expected a number [s], got text '1e-3': YAML reads 1e-3 as text: write 1.0e-3",
-        "world.yaml: visual_objects[4]: expected a file name, or a mapping with 'file' and the keys that differ; got 3",
         "world.yaml: rgbd_sensor.hz: must be > 0 [Hz], got -1",
         "world.yaml: rgbd_sensor.object_tf.tf_id: missing, expected a TF frame",
+        "world.yaml: visual_objects[4]: expected a file name, or a mapping with 'file' and the keys that differ; got 3",
         "world.yaml: setGravty: unknown key 'setGravty'; did you mean 'setGravity'?",
-        "ball.yaml: changeDynamics.restitution: must be a finite number, got .nan",
-        "ball.yaml: changeDynamics.lateralFrction: unknown key 'lateralFrction'; did you mean 'lateralFriction'?",
+        "ball.yaml: createVisualShape.radius: must be a finite number [m], got .nan",
+        "ball.yaml: createVisualShape.raduis: unknown key 'raduis'; did you mean 'radius'?",
         "twin.yaml: createVisualShape.shapeType: unknown shape type 'GEOM_BX'; did you mean 'GEOM_BOX'?",
         "broken.yaml: line 2, column 1: expected the node content, but found '<stream end>'",
         f"world.yaml: visual_objects[3]: no such file: missing.yaml (looked in {folder}, {data})",
@@ -232,7 +192,7 @@ def test_same_file_twice_is_a_name_taken(folder: Path) -> None:
 
 def test_world_from_the_parameter_server_has_no_file_name() -> None:
     with pytest.raises(ConfigError) as caught:
-        load_world_dict({"timeStep": 0, "robots": ["{zebra_robot}/a.yaml"]}, "~config", BODY_TYPES)
+        load_world_dict({"timeStep": 0, "robots": ["{zebra_robot}/a.yaml"]}, "~config")
     first, second = map(str, caught.value.problems)
     assert first == "~config: timeStep: must be > 0 [s], got 0"
     assert second.startswith("~config: robots[0]: unknown ROS package 'zebra_robot'")
@@ -240,23 +200,23 @@ def test_world_from_the_parameter_server_has_no_file_name() -> None:
 
 def test_parameter_that_is_no_mapping_is_refused() -> None:
     with pytest.raises(ConfigError, match="^~config: expected a mapping of keys to values, got str$"):
-        load_world_dict("text", "~config", BODY_TYPES)  # type: ignore[arg-type]
+        load_world_dict("text", "~config")  # type: ignore[arg-type]
 
 
 def test_missing_main_file_is_told(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=f"^{tmp_path}/none.yaml: no such file or directory$"):
-        load_world(f"{tmp_path}/none.yaml", BODY_TYPES)
+        load_world(f"{tmp_path}/none.yaml")
 
 
 def test_main_mapping_is_not_changed(folder: Path) -> None:
     data = {
         "gravity": -9.81,
-        "soft_objects": [],
+        "visual_objects": [],
         "setGravity": {"gravZ": -9.81},
         "robots": [f"{folder}/arm.yaml"],
     }
     before = copy.deepcopy(data)
-    load_world_dict(data, "~config", BODY_TYPES)
+    load_world_dict(data, "~config")
     assert data == before
 
 
@@ -275,13 +235,9 @@ def test_loaded_world_survives_pickling(folder: Path) -> None:
 
 
 def test_single_object_is_checked_like_one_of_the_world(tmp_path: Path) -> None:
-    data = {
-        "name": "world",
-        "joint_state_publisher_hz": "fast",
-        "loadURDF": {"fileName": "kuka_iiwa/model.urdf"},
-    }
+    data = {**ARM, "name": "world", "joint_state_publisher_hz": "fast"}
     with pytest.raises(ConfigError) as caught:
-        load_object("robot", data, "config", BODY_TYPES)
+        load_object("robot", data, "config")
     assert str(caught.value) == (
         "config: name: 'world' is reserved\nconfig: joint_state_publisher_hz: expected a number [Hz], got text 'fast'"
     )
@@ -289,11 +245,16 @@ def test_single_object_is_checked_like_one_of_the_world(tmp_path: Path) -> None:
 
 def test_unknown_type_of_object_is_named() -> None:
     with pytest.raises(ConfigError, match="config: type: unknown object type 'robt'; did you mean 'robot'?"):
-        load_object("robt", ARM, "config", BODY_TYPES)
+        load_object("robt", ARM, "config")
+
+
+def test_lists_in_what_was_recorded_of_an_older_world_are_ignored() -> None:
+    assert WorldConfig.model_validate({"timeStep": 0.01, "robots": ["arm.yaml"]}) == WorldConfig(timeStep=0.01)
 
 
 def test_every_key_of_the_main_file_has_a_description_and_a_schema() -> None:
-    whole = WorldConfig.model_json_schema()
+    whole = main_file_model(object_sections()).model_json_schema()
+    assert {"robots", "objects", "rgbd_sensors", "timeStep"} <= set(whole["properties"])
     for key, schema in whole["properties"].items():
         model = whole["$defs"].get(schema.get("$ref", "").rsplit("/", 1)[-1], {})
         assert schema.get("description", model.get("description", "")).endswith("."), key

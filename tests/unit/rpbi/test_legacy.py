@@ -21,7 +21,7 @@ ROBOT: dict[str, Any] = {
 
 def robot(**more: Any) -> ConfigModel:
     """Loads a robot with these further keys."""
-    return load_object("robot", {**ROBOT, **more}, "iiwa.yaml", BODY_TYPES)
+    return load_object("robot", {**ROBOT, **more}, "iiwa.yaml")
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def test_fault_in_an_old_spelling_is_told_as_the_user_spelt_it() -> None:
     ],
 )
 def test_key_without_effect_is_warned_of(caplog: pytest.LogCaptureFixture, main: dict[str, Any], told: str) -> None:
-    load_world_dict(main, "~config", BODY_TYPES)
+    load_world_dict(main, "~config")
     (message,) = caplog.messages
     assert message.startswith(told)
 

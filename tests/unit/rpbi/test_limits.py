@@ -70,7 +70,7 @@ def test_random_positions_fill_the_limits_and_are_near_where_there_are_none(gene
 
 
 def test_a_search_starts_where_it_is_told_and_then_at_random():
-    first, *others = LIMITS.starts([0.1, 0.2, 0.3, 0.4], random.Random(1), 3)
+    first, *others = LIMITS.starts([0.1, 0.2, 0.3, 0.4], 3, lambda: random.Random(1))
     assert first == [0.1, 0.2, 0.3, 0.4]
     assert others == [LIMITS.random(generator, first) for generator in [random.Random(1)] for _ in range(3)]
 

@@ -12,6 +12,7 @@ import pybullet_data
 import pytest
 
 from custom_ros_tools.errors import ConfigError
+from custom_ros_tools.schema.json_schema import Schema, json_schema, types_in
 from rpbi.config.pybullet_models import (
     ChangeDynamics,
     CreateCollisionShape,
@@ -98,19 +99,18 @@ def pb() -> Iterator[Client]:
     client.disconnect()
 
 
-def sample(schema: dict[str, Any]) -> Any:
+def sample(schema: Schema) -> Any:
     """Returns some value that fits the JSON Schema of a key."""
-    kinds = schema.get("anyOf", [schema])
-    kind = kinds[0]
-    if kind["type"] == "array":
-        return [sample(item) for item in kind["prefixItems"]]
-    return {"number": 0.5, "integer": 1, "boolean": True, "string": "x"}[kind["type"]]
+    kind = types_in(schema)[0]
+    if kind == "array":
+        return [sample(schema["items"])] * schema["minItems"]
+    return {"number": 0.5, "integer": 1, "boolean": True, "string": "x"}[kind]
 
 
 def cases() -> Iterator[Any]:
     """Yields every key of every model, with a value."""
     for model, samples in SAMPLES.items():
-        for key, schema in model.model_json_schema()["properties"].items():
+        for key, schema in json_schema(model, model.__name__)["properties"].items():
             value = samples[key] if key in samples else sample(schema)
             yield pytest.param(model, key, value, id=f"{model.__name__}.{key}")
 
@@ -265,7 +265,7 @@ def test_wrong_value_is_found_before_pybullet_is_called(
 
 def test_every_key_has_a_description() -> None:
     for model in (*SAMPLES, Connect, ObjectTf):
-        for key, schema in model.model_json_schema()["properties"].items():
+        for key, schema in json_schema(model, model.__name__)["properties"].items():
             assert schema.get("description", "").endswith("."), f"{model.__name__}.{key}"
 
 

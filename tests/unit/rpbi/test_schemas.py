@@ -12,18 +12,20 @@ from typing import Any
 import pytest
 import worlds
 import yaml
-from jsonschema import Draft7Validator
+from jsonschema import Draft7Validator, RefResolver
 
 from custom_ros_tools.errors import ConfigError
 from custom_ros_tools.node_configs import NODE_CONFIGS
-from custom_ros_tools.schema.json_schema import Schema, explained, json_schema
-from rpbi.bodies import BODY_TYPES
+from custom_ros_tools.schema.json_schema import Schema, explained, json_schema, resolved
 from rpbi.config.loading import load_object, load_world, load_world_dict, type_of
 from rpbi.config.schemas import kind_of, schemas, sections
 from rpbi.config.sensors import RgbdSensorConfig
 
 SRC = Path(__file__).resolve().parents[3] / "src"
 SCHEMAS = schemas()
+BESIDE = "file:///"
+STORE = {f"{BESIDE}{kind}.schema.json": schema for kind, schema in SCHEMAS.items()}
+"""The files as they stand beside each other in a folder."""
 SHIPPED = sorted(path for package in ("*/config", "*/configs") for path in SRC.glob(f"{package}/**/*.yaml"))
 MODELINE = re.compile(r"# yaml-language-server: \$schema=(\S+)")
 SECTION = {"collision": "collision_objects", "dynamic": "dynamic_objects", "soft": "soft_objects", "robot": "robots"}
@@ -34,19 +36,22 @@ CLOTH: dict[str, Any] = {"name": "cloth", "loadSoftBody": {"fileName": "cloth_z_
 
 def problems(kind: str, data: Any) -> list[str]:
     """Returns what a schema finds wrong with a file of a kind."""
-    validator = Draft7Validator(SCHEMAS[kind])
-    return [f"{'.'.join(map(str, each.absolute_path))}: {each.message}" for each in validator.iter_errors(data)]
+    resolver = RefResolver(f"{BESIDE}{kind}.schema.json", SCHEMAS[kind], store=STORE)
+    errors = list(Draft7Validator(SCHEMAS[kind], resolver=resolver).iter_errors(data))
+    for error in errors:
+        errors += error.context or ()  # what is wrong with each alternative
+    return [f"{'.'.join(map(str, each.absolute_path))}: {each.message}" for each in errors]
 
 
 def parse(kind: str, data: Any) -> None:
     """Validates a file of a kind the way a world does."""
     if kind == "world":
-        load_world_dict(data, "world.yaml", BODY_TYPES)
+        load_world_dict(data, "world.yaml")
     elif kind == "rgbd_sensor":
         RgbdSensorConfig.parse(data, "camera.yaml")
     else:
         (section,) = (each for each in sections() if kind_of(each) == kind)
-        load_object(type_of(section, data, BODY_TYPES), data, "object.yaml", BODY_TYPES)
+        load_object(type_of(section, data), data, "object.yaml")
 
 
 @pytest.mark.parametrize("kind", SCHEMAS)
@@ -62,8 +67,51 @@ def test_shipped_file_names_its_schema_in_the_first_line_and_holds_it(path: Path
     assert named, f"{path}: the first line should be '# yaml-language-server: $schema=PATH/KIND.schema.json'"
     schema = path.parent / named[1]
     assert schema.is_file(), f"{path}: there is no {named[1]}"
-    validator = Draft7Validator(json.loads(schema.read_text()))
-    assert [each.message for each in validator.iter_errors(yaml.safe_load(path.read_text()))] == []
+    assert faults(schema, yaml.safe_load(path.read_text())) == []
+
+
+def faults(schema: Path, data: Any) -> list[str]:
+    """Returns what a schema file finds wrong; files beside it are read where it refers to them."""
+    content = json.loads(schema.read_text())
+    validator = Draft7Validator(content, resolver=RefResolver(schema.as_uri(), content))
+    return [each.message for each in validator.iter_errors(data)]
+
+
+def mappings(data: Any) -> Iterator[dict[str, Any]]:
+    """Yields all mappings inside of a file."""
+    if isinstance(data, dict):
+        yield data
+        data = list(data.values())
+    for each in data if isinstance(data, list) else ():
+        yield from mappings(each)
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: f"{path.parent.name}/{path.name}")
+def test_shipped_file_with_a_wrong_key_anywhere_does_not_hold_its_schema(path: Path) -> None:
+    named = MODELINE.match(path.read_text())
+    assert named
+    data = yaml.safe_load(path.read_text())
+    count = 0
+    for mapping in mappings(data):
+        mapping["no such key"] = "some text"
+        assert faults(path.parent / named[1], data), f"nothing wrong with 'no such key' in {mapping}"
+        del mapping["no such key"]
+        count += 1
+    assert count > 0
+
+
+@pytest.mark.parametrize("path", sorted(SRC.glob("*/schema/*.json")), ids=lambda path: path.name)
+def test_schema_refers_to_itself_and_to_entries_of_files_beside_it_only(path: Path) -> None:
+    content = json.loads(path.read_text())
+    resolver = RefResolver(path.as_uri(), content)
+    for reference in {each["$ref"] for each in mappings(content) if isinstance(each.get("$ref"), str)}:
+        file, _, place = reference.partition("#")
+        assert not file or (path.name == "world.schema.json" and place == "/$defs/entry"), reference
+        assert resolver.resolve(reference)[1], reference
+
+
+def test_schema_of_the_main_file_is_small_since_it_refers_to_those_of_objects() -> None:
+    assert (SRC / "ros_pybullet_interface/schema/world.schema.json").stat().st_size < 40_000
 
 
 def test_shipped_files_name_the_schema_of_the_list_that_names_them() -> None:
@@ -98,7 +146,7 @@ def test_worlds_of_tests_hold_the_schemas(tmp_path: Path) -> None:
         robots=(worlds.iiwa(),),
         rgbd_sensor=CAMERA,
     )
-    load_world(path, BODY_TYPES)
+    load_world(path)
     main = yaml.safe_load(Path(path).read_text())
     assert problems("world", main) == []
     for section in ("collision_objects", "dynamic_objects", "robots"):
@@ -111,14 +159,16 @@ def without(data: dict[str, Any], key: str) -> dict[str, Any]:
     return {name: value for name, value in data.items() if name != key}
 
 
-def keys(schema: Schema, path: str = "") -> Iterator[tuple[str, Schema]]:
+def keys(schema: Schema, root: Schema, path: str = "") -> Iterator[tuple[str, Schema]]:
     """Yields all keys in a schema, with their paths."""
     for key, value in schema.get("properties", {}).items():
-        yield f"{path}{key}", value
-        yield from keys(value, f"{path}{key}.")
-    for inner in (*schema.get("anyOf", ()), schema.get("items"), schema.get("additionalProperties")):
-        if isinstance(inner, dict):
-            yield from keys(inner, path)
+        if isinstance(value, dict):
+            yield f"{path}{key}", {**resolved(value, root), **value}
+            yield from keys(resolved(value, root), root, f"{path}{key}.")
+    alternatives = (*schema.get("anyOf", ()), *schema.get("allOf", ()))
+    for inner in (*alternatives, schema.get("items"), schema.get("additionalProperties")):
+        if isinstance(inner, dict) and inner.get("$ref", "#").startswith("#") and "properties" not in inner:
+            yield from keys(resolved(inner, root), root, path)
 
 
 ACCEPTED: list[tuple[str, Any]] = [
@@ -181,7 +231,7 @@ VALUES = (
 def test_whatever_value_a_world_takes_for_a_key_the_schema_takes(kind: str, caplog: pytest.LogCaptureFixture) -> None:
     base = BASES[kind]
     refused, taken = [], 0
-    for path in [path for path, _ in keys(SCHEMAS[kind]) if not path.startswith(tuple(sections()))]:
+    for path in [path for path, _ in keys(SCHEMAS[kind], SCHEMAS[kind]) if not path.startswith(tuple(sections()))]:
         for value in VALUES:
             data = copy.deepcopy(base)
             *outer, key = path.split(".") if path not in SCHEMAS[kind]["properties"] else [path]
@@ -248,6 +298,15 @@ def test_instance_may_have_any_key_of_its_file_and_no_other() -> None:
     assert problems("world", {"robots": arms}) == []
     assert problems("world", {"robots": [{"file": "iiwa.yaml", "nmae": "left"}]})
     assert problems("world", {"robots": [{"file": "iiwa.yaml", "loadURDF": {"basePosition": [0, 1]}}]})
+    assert problems("robot", worlds.iiwa(file="iiwa.yaml")), "'file' is a key of entries only"
+
+
+def test_entry_requires_nothing_of_mappings_but_all_of_items_since_lists_are_replaced_as_a_whole() -> None:
+    for overrides in ({"loadURDF": {"flags": 0}}, {"object_tf": {"hz": 5}}, {"setJointMotorControlArray": {}}):
+        assert problems("world", {"robots": [{"file": "iiwa.yaml", **overrides}]}) == []
+        assert problems("robot", {**worlds.iiwa(), **overrides}), f"{overrides} without what its mapping requires"
+    for overrides in ({"sensors": [{"name": "a"}]}, {"enabled_joint_force_torque_sensors": [{"hz": 5}]}):
+        assert problems("world", {"robots": [{"file": "iiwa.yaml", **overrides}]})
 
 
 def test_objects_of_own_types_may_have_keys_that_nobody_here_knows() -> None:
@@ -263,6 +322,7 @@ def test_old_keys_are_marked_and_say_what_to_write() -> None:
     assert old["deprecated"] is True
     assert "write joint_state_publisher_hz" in old["deprecationMessage"]
     assert SCHEMAS["world"]["properties"]["setPhysicsEngineParameter"]["properties"]["fixedTimeStep"]["deprecated"]
+    assert problems("rgbd_sensor", {**CAMERA, "object_tf": {"tf_id": "a", "offset": [0, 0, 1]}}), "no old key there"
 
 
 ALL = {**SCHEMAS, **{node: json_schema(model, node) for node, model in NODE_CONFIGS.items()}}
@@ -270,10 +330,11 @@ ALL = {**SCHEMAS, **{node: json_schema(model, node) for node, model in NODE_CONF
 
 @pytest.mark.parametrize("kind", ALL)
 def test_every_key_is_explained_and_its_default_is_one_that_it_takes(kind: str) -> None:
-    for path, schema in keys(ALL[kind]):
+    for path, schema in keys(ALL[kind], ALL[kind]):
         assert schema.get("description", "").endswith("."), path
         if "default" in schema:
-            assert list(Draft7Validator(schema).iter_errors(schema["default"])) == [], path
+            validator = Draft7Validator(schema, resolver=RefResolver("", ALL[kind]))
+            assert list(validator.iter_errors(schema["default"])) == [], path
 
 
 def test_editors_are_told_unit_and_default_since_they_show_nothing_else() -> None:

@@ -8,23 +8,22 @@ import numpy as np
 import pytest
 
 from rpbi.render.camera import rotation_matrix
-from rpbi_examples import orbit
-from rpbi_examples.figure_eight import FigureEight
+from rpbi_examples.motions import TARGET_HEIGHT, FigureEight, camera_pose
 
 
 @pytest.mark.parametrize("time_s", [0.0, 3.0, 11.0])
 def test_orbiting_camera_looks_at_its_target_and_keeps_the_horizon_level(time_s):
-    position, quat_xyzw = orbit.camera_pose(time_s)
+    position, quat_xyzw = camera_pose(time_s)
     right, down, forward = rotation_matrix(quat_xyzw).T
-    towards = np.array([0.0, 0.0, orbit.TARGET_HEIGHT]) - position
+    towards = np.array([0.0, 0.0, TARGET_HEIGHT]) - position
     assert forward == pytest.approx(towards / np.linalg.norm(towards))
     assert right[2] == pytest.approx(0.0, abs=1e-9) and down[2] < 0.0
     assert math.hypot(*position[:2]) == pytest.approx(2.0) and position[2] == 1.5
 
 
 def test_orbit_takes_sixteen_seconds():
-    assert orbit.camera_pose(16.0)[0] == pytest.approx(orbit.camera_pose(0.0)[0])
-    assert orbit.camera_pose(8.0)[0][0] == pytest.approx(-orbit.camera_pose(0.0)[0][0])
+    assert camera_pose(16.0)[0] == pytest.approx(camera_pose(0.0)[0])
+    assert camera_pose(8.0)[0][0] == pytest.approx(-camera_pose(0.0)[0][0])
 
 
 def test_figure_eight_crosses_itself_in_the_middle_and_closes():

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from rpbi_examples.route import GAIN, SQUARE, PlanarPose, Route
+from rpbi_examples.motions import ROUTE_GAIN, SQUARE, PlanarPose, Route
 
 DT_S = 0.02
 
@@ -12,14 +12,14 @@ DT_S = 0.02
 def test_velocities_are_in_the_frame_of_the_base():
     goal = PlanarPose(1.0, 2.0, math.pi / 2.0)
     velocity = Route([goal]).velocity(PlanarPose(1.0, 1.0, math.pi / 2.0))  # looks at the goal
-    assert velocity == pytest.approx((GAIN, 0.0, 0.0))
+    assert velocity == pytest.approx((ROUTE_GAIN, 0.0, 0.0))
     velocity = Route([goal]).velocity(PlanarPose(1.0, 1.0, 0.0))  # has it to the left
-    assert velocity == pytest.approx((0.0, GAIN, GAIN * math.pi / 2.0))
+    assert velocity == pytest.approx((0.0, ROUTE_GAIN, ROUTE_GAIN * math.pi / 2.0))
 
 
 def test_it_turns_the_shorter_way():
     velocity = Route([PlanarPose(0.0, 0.0, -3.0)]).velocity(PlanarPose(0.0, 0.0, 3.0))
-    assert velocity.yaw == pytest.approx(GAIN * (2.0 * math.pi - 6.0))
+    assert velocity.yaw == pytest.approx(ROUTE_GAIN * (2.0 * math.pi - 6.0))
 
 
 def test_what_follows_the_velocities_passes_all_waypoints_again_and_again():

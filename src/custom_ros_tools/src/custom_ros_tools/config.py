@@ -18,13 +18,13 @@ _PACKAGE = re.compile(r"package://(?P<uri>[^/{}]+)|\{(?P<braces>[^{}]*)\}")
 
 
 def ros_package_path(package: str) -> str:
-    """Return the folder of a ROS package.
+    """Returns the folder of a ROS package.
 
     Args:
         package: Its name; looked for in ROS_PACKAGE_PATH.
 
     Raises:
-        ConfigError: if there is no such package.
+        ConfigError: If there is no such package.
     """
     packages = _packages(os.environ.get("ROS_PACKAGE_PATH", ""))
     try:
@@ -39,18 +39,18 @@ def ros_package_path(package: str) -> str:
 
 @lru_cache(maxsize=4)
 def _packages(search_path: str) -> rospkg.RosPack:
-    """Return what is known under one value of ROS_PACKAGE_PATH; reading it again would cost a crawl."""
+    """Returns what is known under one value of ROS_PACKAGE_PATH; reading it again would cost a crawl."""
     return rospkg.RosPack()
 
 
 def replace_package(path: str) -> str:
-    """Resolve `{package}/path` and `package://package/path`; the first package only, others stay as they are.
+    """Resolves `{package}/path` and `package://package/path`; the first package only, others stay as they are.
 
     Args:
         path: The path as the user wrote it.
 
     Raises:
-        ConfigError: if there is no such package.
+        ConfigError: If there is no such package.
     """
     match = _PACKAGE.search(path)
     if match is None:
@@ -60,13 +60,13 @@ def replace_package(path: str) -> str:
 
 
 def load_config(path: str) -> dict[str, Any]:
-    """Return the mapping in a YAML file.
+    """Returns the mapping in a YAML file.
 
     Args:
         path: The file; `{package}/path` and `package://package/path` are resolved.
 
     Raises:
-        ConfigError: if the file cannot be read or is not a YAML mapping; it names file, line and column.
+        ConfigError: If the file cannot be read or is not a YAML mapping; it names file, line and column.
     """
     try:
         text = Path(replace_package(path)).read_text(encoding="utf-8")
@@ -80,14 +80,14 @@ def load_config(path: str) -> dict[str, Any]:
 
 
 def load_configs(text: str, file: str = "text") -> dict[str, Any]:
-    """Return the mapping in a YAML text; an empty text is an empty mapping.
+    """Returns the mapping in a YAML text; an empty text is an empty mapping.
 
     Args:
         text: The YAML.
         file: What to call it in messages.
 
     Raises:
-        ConfigError: if it is not a YAML mapping, names a key twice, or asks for Python objects.
+        ConfigError: If it is not a YAML mapping, names a key twice, or asks for Python objects.
     """
     try:
         data = yaml.load(text, Loader=_StrictLoader)
@@ -106,7 +106,7 @@ def load_configs(text: str, file: str = "text") -> dict[str, Any]:
 
 
 def config_to_str(config: Mapping[str, Any]) -> str:
-    """Return a mapping as YAML text, in its own order; `load_configs` gives the same mapping back.
+    """Returns a mapping as YAML text, in its own order; `load_configs` gives the same mapping back.
 
     Args:
         config: Plain data: mappings, lists, numbers, texts, true, false and None.

@@ -23,11 +23,11 @@ class Toggle:
         self._lock = threading.Lock()
 
     def on(self) -> tuple[bool, str]:
-        """Switches it on; return whether that changed anything, and a message."""
+        """Switches it on; returns whether that changed anything, and a message."""
         return self._switch(True, self._start, "on")
 
     def off(self) -> tuple[bool, str]:
-        """Switches it off; return whether that changed anything, and a message."""
+        """Switches it off; returns whether that changed anything, and a message."""
         return self._switch(False, self._stop, "off")
 
     def _switch(self, to: bool, act: Callable[[], None], word: str) -> tuple[bool, str]:

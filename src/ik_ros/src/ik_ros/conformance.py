@@ -43,7 +43,7 @@ class SolverConformance:
 
     Attributes:
         solver_name: What `make_solver` is asked for: a name of the table, or `"their_package.module:Class"`.
-        options: Its options. `urdf_filename`, `base_link` and `tip_link` tell where `forward` finds the robot.
+        options: Its options. `urdf_filename`, `base_link` and `tip_link` are where `forward` finds the robot.
         least_share: The least share of reachable problems to be solved.
         reachable_problems: How many of those to try.
         random_problems: How many problems to try, reachable or not, of which only limits and finiteness count.
@@ -115,7 +115,7 @@ class SolverConformance:
 
     def check_shape(self, solution: IKSolution) -> None:
         """Checks what holds for every answer: order, length, finiteness, limits, words."""
-        assert solution.joint_names == self.solver.joint_names, "joints are told in another order"
+        assert solution.joint_names == self.solver.joint_names, "joints are in another order"
         assert len(solution.positions) == len(self.solver.joint_names), solution
         for positions in (solution.positions, *solution.alternatives):
             assert all(map(math.isfinite, positions)), f"not finite: {solution}"
@@ -127,8 +127,8 @@ class SolverConformance:
     def check_met(self, positions: Sequence[float], target: Pose) -> None:
         """Checks that positions bring the link to the target."""
         distance, angle = distances(self.forward(positions), target)
-        assert distance <= 1.01 * POSITION_TOLERANCE_M, f"told to be solved, and {distance:g} m off"
-        assert angle <= 1.01 * ORIENTATION_TOLERANCE_RAD, f"told to be solved, and {angle:g} rad off"
+        assert distance <= 1.01 * POSITION_TOLERANCE_M, f"said to be solved, and {distance:g} m off"
+        assert angle <= 1.01 * ORIENTATION_TOLERANCE_RAD, f"said to be solved, and {angle:g} rad off"
 
     # --- The tests.
 

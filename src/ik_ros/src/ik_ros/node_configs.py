@@ -23,7 +23,7 @@ from custom_ros_tools.schema import (
     Text,
 )
 
-from .joint_rate_limiter import JointRateLimiterConfig
+from .problem_stream import JointRateLimiterConfig
 
 
 class InteractiveTargetConfig(ConfigModel):
@@ -55,10 +55,10 @@ class RobotIKConfig(ConfigModel):
 
 
 class TargetParameters(ConfigModel):
-    """How often a target is told, and for how long it counts."""
+    """How often a target is published, and for how long it counts."""
 
-    hz: Hz = Field(50.0, description="How often it is told, in wall time.")
-    tf_timeout_s: Seconds = Field(0.5, description="How long it lasts when its TF stops; then nothing is told.")
+    hz: Hz = Field(50.0, description="How often it is published, in wall time.")
+    tf_timeout_s: Seconds = Field(0.5, description="How long it lasts when its TF stops; then nothing is published.")
 
 
 class SetupParameters(StartParameters, TargetParameters):
@@ -73,7 +73,7 @@ class SetupParameters(StartParameters, TargetParameters):
     init_bry: NonNegative = Field(0.0, description="The same about y [rad].")
     init_brz: NonNegative = Field(0.0, description="The same about z [rad].")
     goals: dict[Text, ListOf[float]] = Field({}, description="First goals of tasks that change, by task.")
-    max_num_prev_solutions: Count = Field(1, description="How many previous solutions a problem tells.")
+    max_num_prev_solutions: Count = Field(1, description="How many previous solutions a problem has.")
     seed: Count = Field(0, description="Of whatever is random in the solver.")
 
     @model_validator(mode="after")

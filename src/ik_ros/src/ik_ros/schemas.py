@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
+import argparse
+from contextlib import suppress
+from pathlib import Path
+
+from pydantic import create_model
+
 from custom_ros_tools.errors import MissingDependency
-from custom_ros_tools.schema.json_schema import Schema, json_schema
+from custom_ros_tools.schema.json_schema import (
+    DEFINITIONS,
+    Schema,
+    explained,
+    json_schema,
+    json_schemas,
+    schema_text,
+    with_definitions,
+)
 
 from .lookup import solver_class
 from .node_configs import SolverNodeParameters
 from .solvers import SOLVERS
+from .tasks import TASKS
 
+_OWN_TYPE = "own_type"
 LISTS_OF_TASKS = ("constraints", "costs")
 
 
@@ -16,31 +32,49 @@ def schemas() -> dict[str, Schema]:
     """Returns the schemas by solver, of those whose libraries are installed."""
     found = {}
     for name in SOLVERS:
-        try:
+        with suppress(MissingDependency):
             config = solver_class(name).Config
-        except MissingDependency:
-            continue
-        schema = json_schema(config, name)
-        node = json_schema(SolverNodeParameters, name)
-        if name == "tasks":
-            for key in LISTS_OF_TASKS:
-                schema["properties"][key]["items"] = {"anyOf": _tasks()}
-        found[name] = {**schema, "properties": {**schema["properties"], **node["properties"]}}
+            both = create_model(config.__name__, __base__=(config, SolverNodeParameters), __doc__=config.__doc__)
+            found[name] = json_schema(both, name)
+    if "tasks" in found:
+        definitions = {**found["tasks"].get(DEFINITIONS, {}), **_tasks()}
+        any_task = {"anyOf": [{"$ref": f"#/{DEFINITIONS}/{kind}"} for kind in (*TASKS, _OWN_TYPE)]}
+        for key in LISTS_OF_TASKS:
+            found["tasks"]["properties"][key]["items"] = any_task
+        found["tasks"] = with_definitions(found["tasks"], definitions)
     return found
 
 
-def _tasks() -> list[Schema]:
-    """Returns the schemas of the types of tasks, and one for types of others."""
+def _tasks() -> dict[str, Schema]:
+    """Returns the definitions of the types of tasks, one for types of others, and those that they refer to."""
     # Their classes need what the solver needs, which is not asked for before it is known to be there
     from ik_ros.formulation.formulation import task_class
 
-    from .tasks import TASKS
-
-    known = []
-    for kind in TASKS:
-        schema = json_schema(task_class(kind).Config, kind)
-        known.append({**schema, "properties": {**schema["properties"], "type": {"enum": [kind]}}})
-    for schema in known:
-        del schema["$schema"]
     own_type = {"type": "string", "pattern": r"^[\w.]+:\w+$"}
-    return [*known, {"type": "object", "properties": {"type": own_type}, "required": ["type"]}]
+    definitions: dict[str, Schema] = {
+        _OWN_TYPE: {"type": "object", "properties": {"type": own_type}, "required": ["type"]}
+    }
+    for kind, schema in json_schemas({kind: task_class(kind).Config for kind in TASKS}).items():
+        definitions |= schema.pop(DEFINITIONS, {})
+        schema["properties"] = {**schema["properties"], "type": {"enum": [kind]}}
+        definitions[kind] = {key: value for key, value in schema.items() if key != "$schema"}
+    return definitions
+
+
+def schema_files(root: Path) -> dict[Path, str]:
+    """Returns what the files should have.
+
+    Args:
+        root: The workspace.
+    """
+    folder = root / "src/ik_ros/schema"
+    return {folder / f"{name}.schema.json": schema_text(explained(schema)) for name, schema in schemas().items()}
+
+
+def main() -> None:
+    """Runs the command that writes the schemas anew."""
+    parser = argparse.ArgumentParser(description="Writes schemas anew.")
+    parser.add_argument("root", type=Path, help="the workspace")
+    for path, text in schema_files(parser.parse_args().root).items():
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)

@@ -19,8 +19,8 @@ _log = logging.getLogger(__name__)
 class Solver(ABC):
     """Solves problems of inverse kinematics for one robot.
 
-    A subclass is told by its `Config`, in YAML or as parameters of the solver's node. What cannot be solved is an
-    answer (`success` is false, and `message` says why); an exception means that the question makes no sense.
+    The options of a subclass are its `Config`, in YAML or as parameters of the solver's node. What cannot be solved is
+    an answer (`success` is false, and `message` says why); an exception means that the problem makes no sense.
 
     Attributes:
         Config: Model of its options.

@@ -24,7 +24,7 @@ from rpbi.engine.state_hash import state_hash
 from rpbi.sensors.rgbd import RgbdSensor
 from rpbi.sensors.sensor import Sensor
 
-from .bodies import BODY_TYPES, Body, BodyConfig
+from .bodies import Body, BodyConfig
 from .plugins import blame, blaming
 from .window import Window, check_recording
 
@@ -89,7 +89,7 @@ class World:
         Raises:
             ConfigError: If anything in the file, or in a file that it names, is wrong; it tells all of it at once.
         """
-        return cls(load_world(path, BODY_TYPES), **options)
+        return cls(load_world(path), **options)
 
     def add(self, kind: str, config: BodyConfig, file: str | None = None) -> Body:
         """Adds a body; when it raises, the world is as it was.

@@ -24,18 +24,8 @@ class BagError(InterfaceError):
         return f"{self.path}: {self.message}"
 
 
-class RecordingError(InterfaceError):
-    """A recording could not be started, or is not complete.
-
-    Args:
-        path: The bag that was to be written.
-        message: What is wrong, and what to do about it.
-    """
-
-    def __init__(self, path: Path, message: str) -> None:
-        self.path = path
-        self.message = message
-        super().__init__(path, message)
+class RecordingError(BagError):
+    """A recording of a bag could not be started, or is not complete."""
 
     def __str__(self) -> str:
-        return f"recording {self.path}: {self.message}"
+        return f"recording {super().__str__()}"

@@ -1,20 +1,27 @@
-"""Serialised messages to pandas tables, many at a time and free of ROS."""
+"""Serialised messages to pandas tables, many at a time and free of ROS; and tables to files."""
 
 from __future__ import annotations
 
 import logging
+import re
 from collections import Counter
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from .columns import Array, Pieces, read_leaf
-from .layout import BYTES
+from custom_ros_tools.errors import MissingDependency
+
+from .layout import BYTES, NUMBER_DTYPES, Leaf
 from .message_type import MessageType
 from .row_plan import INDEX, RECORD_TIME, STAMP, Columns, plan_rows
 
+Array = NDArray[Any]
+
+FORMATS = ("parquet", "csv")
 BATCH_MESSAGES = 16_384
 BATCH_BYTES = 32 * 1024 * 1024
 
@@ -56,7 +63,7 @@ class TableBuilder:
         self._time: list[Array] = []
         self._record_time: list[Array] = []
         self._message: list[Array] = []
-        self._columns: dict[str, Pieces] = {}
+        self._columns: dict[str, _Pieces] = {}
         self._notes: Counter[str] = Counter()
 
     def add(self, message_type: MessageType, raw: bytes, record_time_s: float) -> None:
@@ -129,12 +136,125 @@ class TableBuilder:
             if leaf.kind == BYTES and not self._keep_binary:
                 self._notes[f"'{name}' is binary or long: left out, unless asked for"] += len(indices)
                 continue
-            values = read_leaf(leaf, matrix)
+            values = _read_leaf(leaf, matrix)
             if name == STAMP:
                 time = np.where(values == 0.0, record_time, values)  # 0 is ROS for "no time"
             else:
-                self._columns.setdefault(name, Pieces()).append(self._rows, values)
+                self._columns.setdefault(name, _Pieces()).append(self._rows, values)
         self._time.append(time)
         self._record_time.append(record_time)
         self._message.append(self._messages + indices)
         self._rows += len(indices)
+
+
+def _read_leaf(leaf: Leaf, matrix: Array) -> Array:
+    """Reads the same value out of several messages.
+
+    Args:
+        leaf: Where it lies.
+        matrix: Messages of one layout, shape (n, size), uint8.
+
+    Returns:
+        Shape (n,): numbers of the field's own type, bool, float64 [s] for `time` and `duration`, `str` or
+        `bytes`.
+    """
+    start, stop = leaf.span
+    cells = np.ascontiguousarray(matrix[:, start:stop])
+    if leaf.kind in NUMBER_DTYPES:
+        numbers: Array = cells.view(NUMBER_DTYPES[leaf.kind])[:, 0]
+        return numbers.astype(bool) if leaf.kind == "bool" else numbers
+    if leaf.kind in ("time", "duration"):
+        seconds, nanoseconds = cells.view("<u4" if leaf.kind == "time" else "<i4").T
+        times: Array = seconds + nanoseconds / 1e9  # as `to_sec()` does it
+        return times
+    values: Array = np.empty(len(cells), object)
+    if leaf.kind == BYTES:
+        values[:] = [cell.tobytes() for cell in cells]
+    elif (cells == cells[0]).all():
+        values[:] = _text(cells[0])
+    else:
+        known: dict[bytes, str] = {}  # equal texts share their memory
+        values[:] = [known.setdefault(cell.tobytes(), _text(cell)) for cell in cells]
+    return values
+
+
+def _text(cell: Array) -> str:
+    return cell.tobytes().decode("utf-8", "replace")
+
+
+class _Pieces:
+    """A column in the making: runs of values, each from some row on."""
+
+    def __init__(self) -> None:
+        self._pieces: list[tuple[int, Array]] = []
+
+    def append(self, start: int, values: Array) -> None:
+        """Adds the values of the rows from `start` on."""
+        self._pieces.append((start, values))
+
+    def join(self, rows: int) -> Array:
+        """Returns the column, shape (rows,); where no value was added it is NaN, or None in text and bool."""
+        dtypes = {values.dtype for _, values in self._pieces}
+        is_mixed = len({"number" if dtype.kind in "iuf" else dtype.kind for dtype in dtypes}) > 1
+        dtype = np.dtype(object) if is_mixed else np.result_type(*dtypes)
+        if sum(len(values) for _, values in self._pieces) < rows:
+            if dtype.kind in "iu":
+                dtype = np.dtype(float)
+            elif dtype.kind == "b":
+                dtype = np.dtype(object)
+        column: Array = np.full(rows, None if dtype.kind == "O" else np.nan if dtype.kind == "f" else 0, dtype)
+        for start, values in self._pieces:
+            column[start : start + len(values)] = values
+        return column
+
+
+def file_stems(topics: Iterable[str]) -> dict[str, str]:
+    """Finds a file name for each topic: `/kuka/joint_states` becomes `kuka.joint_states`.
+
+    Names are made of letters, digits, `_`, `-` and `.`; where two would be the same, the second ends with
+    `-2`.
+    """
+    stems: dict[str, str] = {}
+    for topic in topics:
+        stem = re.sub(r"[^\w.-]", "_", topic.strip("/").replace("/", "."), flags=re.ASCII).strip(".") or "_"
+        number, unique = 1, stem
+        while unique in stems.values():
+            number += 1
+            unique = f"{stem}-{number}"
+        stems[topic] = unique
+    return stems
+
+
+def write_table(table: pd.DataFrame, path: Path) -> None:
+    """Writes a table with its index; the ending of the file, `.parquet` or `.csv`, says how.
+
+    A column of several types (two types of message on one topic) becomes text in a Parquet file.
+
+    Raises:
+        ValueError: If binary columns were to go into a text file.
+        MissingDependency: If fastparquet is not installed.
+        OSError: If the file cannot be written.
+    """
+    if path.suffix == ".csv":
+        binary = [name for name in table.columns if _encoding(table[name]) == "bytes"]
+        if binary:
+            raise ValueError(f"'{binary[0]}' is binary and cannot be written as CSV: use Parquet")
+        table.to_csv(path)
+        return
+    try:
+        import fastparquet  # noqa: F401  (slow to load, and not needed for CSV)
+    except ImportError as error:
+        raise MissingDependency("fastparquet", "pip install fastparquet, or write CSV") from error
+    encodings = {name: encoding for name in table.columns if (encoding := _encoding(table[name]))}
+    texts = {name: table[name].map(str, na_action="ignore") for name in encodings if encodings[name] == "utf8"}
+    table.assign(**texts).to_parquet(path, engine="fastparquet", object_encoding=encodings or "infer")
+
+
+def _encoding(column: pd.Series) -> str | None:
+    """Returns how Parquet is to hold a column of Python objects, or None for a column of numbers."""
+    if column.dtype != np.dtype(object):
+        return None
+    kinds = {type(value) for value in column if value is not None}
+    if kinds == {bool}:
+        return "bool"
+    return "bytes" if kinds == {bytes} else "utf8"

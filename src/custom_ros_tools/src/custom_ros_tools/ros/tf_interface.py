@@ -113,15 +113,8 @@ class TfInterface:
         """Returns a transform without frames; for the arguments see `pack_tf_msg`."""
         return transform_message(pos, quat, eul_deg)
 
-    @staticmethod
-    def tf_msg_to_pos(tf: Transform) -> Array:
-        """Returns the position x, y, z [m] of a Transform."""
-        return position_in(tf)
-
-    @staticmethod
-    def tf_msg_to_quat(tf: Transform) -> Array:
-        """Returns the unit quaternion x, y, z, w of a Transform."""
-        return quat_in(tf)
+    tf_msg_to_pos = staticmethod(position_in)
+    tf_msg_to_quat = staticmethod(quat_in)
 
     @staticmethod
     def tf_msg_to_eul(tf: Transform) -> Array:

@@ -1,15 +1,17 @@
-"""Transforms between ROS messages and vectors."""
+"""Transforms as messages: from and to vectors, and repeated on /tf."""
 
 from __future__ import annotations
 
-from geometry_msgs.msg import Point, Pose, Quaternion, Transform, Vector3
+import rospy
+from geometry_msgs.msg import Point, Pose, Quaternion, Transform, TransformStamped, Vector3
 from numpy.typing import ArrayLike
+from tf2_msgs.msg import TFMessage
 
 from custom_ros_tools.transforms import Array, finite_vector, quat_of, unit_quat
 
 
 def transform_message(position: ArrayLike, orientation: ArrayLike, in_deg: bool = False) -> Transform:
-    """Return a message.
+    """Returns a message.
 
     Args:
         position: x, y, z [m].
@@ -24,7 +26,7 @@ def transform_message(position: ArrayLike, orientation: ArrayLike, in_deg: bool 
 
 
 def checked(transform: Transform) -> Transform:
-    """Return a transform that came from outside, its quaternion normalised.
+    """Returns a transform that came from outside, its quaternion normalised.
 
     Raises:
         ValueError: If a number is not finite or the quaternion is zero.
@@ -33,18 +35,44 @@ def checked(transform: Transform) -> Transform:
 
 
 def position_in(transform: Transform) -> Array:
-    """Return the translation x, y, z [m]."""
+    """Returns the translation x, y, z [m]."""
     v = transform.translation
     return finite_vector((v.x, v.y, v.z), 3, "position")
 
 
 def quat_in(transform: Transform) -> Array:
-    """Return the rotation as a unit quaternion x, y, z, w."""
+    """Returns the rotation as a unit quaternion x, y, z, w."""
     q = transform.rotation
     return unit_quat((q.x, q.y, q.z, q.w))
 
 
 def as_pose(transform: Transform) -> Pose:
-    """Return the same as a pose message."""
+    """Returns the same as a pose message."""
     v = transform.translation
     return Pose(Point(v.x, v.y, v.z), transform.rotation)
+
+
+class TransformTopic:
+    """Sends one transform to /tf with the present stamp; nothing while that and the transform stay the same.
+
+    While simulated time stands still, the same stamp again would make each listener warn of a repeated one. Who comes
+    then gets the last one all the same, since the topic is latched.
+
+    Args:
+        parent: The parent frame.
+        child: The child frame.
+    """
+
+    def __init__(self, parent: str, child: str) -> None:
+        self._parent, self._child = parent, child
+        self._last: TransformStamped | None = None
+        self._publisher = rospy.Publisher("/tf", TFMessage, latch=True, queue_size=10)
+
+    def send(self, transform: Transform) -> None:
+        """Sends the pose of the child in the parent, as it is now."""
+        message = TransformStamped(child_frame_id=self._child, transform=transform)
+        message.header.frame_id = self._parent
+        message.header.stamp = rospy.Time.now()
+        if message != self._last:
+            self._last = message
+            self._publisher.publish(TFMessage([message]))

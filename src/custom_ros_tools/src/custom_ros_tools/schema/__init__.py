@@ -28,6 +28,7 @@ from .annotations import Expects as Expects
 from .annotations import InnerProblemsError as InnerProblemsError
 from .annotations import KeyedError as KeyedError
 from .annotations import Unit as Unit
+from .annotations import optional as optional
 from .errors import problems_of
 
 Model = TypeVar("Model", bound="ConfigModel")
@@ -47,7 +48,7 @@ class ConfigModel(BaseModel):
 
     @classmethod
     def parse(cls: type[Model], data: Mapping[str, Any], file: str, context: Mapping[str, Any] | None = None) -> Model:
-        """Validate what was read from a file.
+        """Validates what was read from a file.
 
         Args:
             data: The mapping; it is not changed and not kept.
@@ -55,7 +56,7 @@ class ConfigModel(BaseModel):
             context: What validators find in `info.context` beside `file`, such as the folders to search.
 
         Raises:
-            ConfigError: with one `Problem` for each fault.
+            ConfigError: With one `Problem` for each fault.
         """
         if not isinstance(data, Mapping):
             got = "nothing" if data is None else type(data).__name__
@@ -108,6 +109,7 @@ HzOrOff = Annotated[float, Field(ge=0), Unit("Hz")]
 Seconds = Annotated[float, Field(gt=0), Unit("s")]
 Pixels = Annotated[int, Field(gt=0, le=8192), Unit("px")]
 Metres = Annotated[float, Unit("m")]
+NonNegativeMetres = Annotated[float, Field(ge=0), Unit("m")]
 PositiveMetres = Annotated[float, Field(gt=0), Unit("m")]
 Kilograms = Annotated[float, Field(ge=0), Unit("kg")]
 Degrees = Annotated[float, Unit("deg")]
@@ -123,7 +125,11 @@ Rgb = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False)]
 ListOf = Annotated[tuple[Item, ...], Field(strict=False)]
 """A list of any length, kept as a tuple: `ListOf[float]`."""
 
-Switch = Annotated[bool, BeforeValidator(_switch), AlsoTakes({"type": "integer", "minimum": 0, "maximum": 1})]
+Switch = Annotated[
+    bool,
+    BeforeValidator(_switch),
+    WithJsonSchema({"type": ["boolean", "integer"], "minimum": 0, "maximum": 1}),
+]
 """True or false, which may be written 1 and 0 as PyBullet's users do."""
 Text = Annotated[str, Field(min_length=1)]
 Name = Annotated[

@@ -4,27 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, ClassVar
 
-from pydantic import GetJsonSchemaHandler
+from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
 from custom_ros_tools.errors import Problem
 
 
+def optional(description: str) -> Any:
+    """Returns the field of a key that may be left out and then is None."""
+    return Field(None, description=description)
+
+
 @dataclass(frozen=True)
-class Unit:
-    """Annotation that states the unit of a number, as in `Annotated[float, Unit("Hz")]`.
+class _Keyword:
+    """Annotation that adds a text to the JSON Schema, under a keyword of ours."""
 
-    Error messages show it in brackets and the JSON Schema carries it under `unit`.
-    """
-
-    name: str
+    text: str
+    keyword: ClassVar[str]
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        schema = handler(core)
-        schema["unit"] = self.name
-        return schema
+        return {**handler(core), self.keyword: self.text}
+
+
+class Unit(_Keyword):
+    """States the unit of a number, as in `Annotated[float, Unit("Hz")]`; error messages show it in brackets."""
+
+    keyword = "unit"
+
+
+class Expects(_Keyword):
+    """Says in words what a value has to be, where its type does not; of items of a list, what the list has to be."""
+
+    keyword = "expects"
 
 
 @dataclass(frozen=True, eq=False)  # typing wants a hash, which a mapping has not
@@ -39,33 +52,6 @@ class AlsoTakes:
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         return {"anyOf": [handler(core), dict(self.schema)]}
-
-
-@runtime_checkable
-class SaysWhatItWants(Protocol):
-    """Annotation that knows the words for "expected ..."; they go before those for the Python type."""
-
-    def in_words(self) -> str:
-        """Return what a value has to be, such as `"a file name"`."""
-
-
-@dataclass(frozen=True)
-class Expects:
-    """Annotation that says in words what a value has to be, where the Python type does not tell it.
-
-    The JSON Schema carries it under `expects`.
-    """
-
-    text: str
-
-    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        schema = handler(core)
-        schema["expects"] = self.text
-        return schema
-
-    def in_words(self) -> str:
-        """Return the text."""
-        return self.text
 
 
 class InnerProblemsError(ValueError):

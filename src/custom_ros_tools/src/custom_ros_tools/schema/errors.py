@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
-from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from custom_ros_tools.errors import Problem, hint
 
 from .annotations import InnerProblemsError, KeyedError
-from .type_names import TYPE_WORDS, expected, is_model, number_advice, parts_of, shown, unit_of
+from .json_schema import Schema, json_schema, mapping_in, resolved, unit_in
+from .type_names import TYPE_NAMES, number_advice, shown, type_name
 
 _BOUNDS = {
     "greater_than": ("gt", ">"),
@@ -22,20 +23,20 @@ _BOUNDS = {
 }
 _LENGTH_ERRORS = ("missing", "too_long", "too_short")
 _TYPE_ERRORS = {
-    "float_type": float,
-    "int_type": int,
-    "int_from_float": int,
-    "bool_type": bool,
-    "string_type": str,
-    "dict_type": dict,
-    "model_type": dict,
-    "model_attributes_type": dict,
-    "mapping_type": dict,
+    "float_type": "number",
+    "int_type": "integer",
+    "int_from_float": "integer",
+    "bool_type": "boolean",
+    "string_type": "string",
+    "dict_type": "object",
+    "model_type": "object",
+    "model_attributes_type": "object",
+    "mapping_type": "object",
 }
 
 
 def problems_of(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any], file: str) -> list[Problem]:
-    """Translate a validation error.
+    """Translates a validation error.
 
     Args:
         error: What pydantic raised.
@@ -50,14 +51,14 @@ def problems_of(error: ValidationError, model: type[BaseModel], data: Mapping[st
         if isinstance(error_raised, InnerProblemsError):
             inner = [(_joined(key_path(loc), each.key), each.message) for each in error_raised.problems]
         else:
-            inner = [_explain(details, loc, _field_at(model, loc), model)]
+            inner = [_explain(details, loc, _schema_of(model))]
         for key, message in inner:
             found.setdefault((key, message), Problem(file, key, message))
     return list(found.values())
 
 
 def key_path(loc: Sequence[str | int]) -> str:
-    """Return a location as `intrinsics.range[1]`."""
+    """Returns a location as `intrinsics.range[1]`."""
     text = ""
     for part in loc:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
@@ -69,7 +70,7 @@ def _joined(outer: str, inner: str) -> str:
 
 
 def _real_location(details: ErrorDetails, data: Any) -> tuple[str | int, ...]:
-    """Return the location without the labels that pydantic adds for unions, validators and dict keys."""
+    """Returns the location without the labels that pydantic adds for unions, validators and dict keys."""
     kept: list[str | int] = []
     here: Any = data
     for part in details["loc"]:
@@ -83,44 +84,48 @@ def _real_location(details: ErrorDetails, data: Any) -> tuple[str | int, ...]:
     return tuple(kept)
 
 
-def _field_at(model: type[BaseModel], loc: Sequence[str | int]) -> FieldInfo | None:
-    """Return the innermost declared field on the way to a location."""
-    here: type[BaseModel] | None = model
-    field = None
+@lru_cache(maxsize=100)
+def _schema_of(model: type[BaseModel]) -> Schema:
+    return json_schema(model, model.__name__)
+
+
+def _property_at(root: Schema, loc: Sequence[str | int]) -> Schema | None:
+    """Returns the schema of the innermost key on the way to a location; None if a key is unknown."""
+    found, here = None, root
     for part in loc:
-        if here is not None and isinstance(part, str) and part in here.model_fields:
-            field = here.model_fields[part]
-            here = next((t for t in parts_of(field.annotation) if is_model(t)), None)
-        elif isinstance(part, str) and (here is not None or field is None):
-            return None
-    return field
+        mapping = mapping_in(here, root)
+        if isinstance(part, str) and mapping is not None:
+            keys = resolved(mapping, root)
+            found = here = keys["properties"].get(part, keys.get("additionalProperties"))
+            if not isinstance(here, dict):
+                return None
+    return found
 
 
-def _explain(
-    details: ErrorDetails, loc: tuple[str | int, ...], field: FieldInfo | None, model: type[BaseModel]
-) -> tuple[str, str]:
-    """Return key path and message of one error."""
+def _explain(details: ErrorDetails, loc: tuple[str | int, ...], root: Schema) -> tuple[str, str]:
+    """Returns key path and message of one error."""
     kind, value, context = details["type"], details["input"], details.get("ctx", {})
-    unit = unit_of(field)
+    wanted = _property_at(root, loc)
+    unit = f" [{unit_in(wanted)}]" if wanted and unit_in(wanted) else ""
     error = context.get("error")
     if isinstance(error, KeyedError):
         return _joined(key_path(loc), error.key), error.message
     if kind in _LENGTH_ERRORS and isinstance(value, (list, tuple)):
         where = loc[:-1] if kind == "missing" else loc
         depth = len(where) - max((i + 1 for i, part in enumerate(where) if isinstance(part, str)), default=0)
-        return key_path(where), f"expected {expected(field, depth)}{unit}, got {len(value)}"
+        return key_path(where), f"expected {_expected(wanted, depth)}{unit}, got {len(value)}"
     if kind == "missing":
-        return key_path(loc), f"missing, expected {expected(field)}{unit}"
+        return key_path(loc), f"missing, expected {_expected(wanted)}{unit}"
     if kind in ("extra_forbidden", "invalid_key"):
-        return key_path(loc), f"unknown key '{loc[-1]}'{hint(str(loc[-1]), _siblings(model, loc))}"
+        return key_path(loc), f"unknown key '{loc[-1]}'{hint(str(loc[-1]), _siblings(root, loc))}"
     if isinstance(error, Exception):
         return key_path(loc), str(error)
-    message = f"{_rule(kind, context, field, unit)}, got {shown(value)}{number_advice(kind, value)}"
+    message = f"{_rule(kind, context, wanted, unit)}, got {shown(value)}{number_advice(kind, value)}"
     return key_path(loc), message
 
 
-def _rule(kind: str, context: Mapping[str, Any], field: FieldInfo | None, unit: str) -> str:
-    """Say what a value has to be."""
+def _rule(kind: str, context: Mapping[str, Any], wanted: Schema | None, unit: str) -> str:
+    """Says what a value has to be."""
     if kind in _BOUNDS:
         name, sign = _BOUNDS[kind]
         return f"must be {sign} {context[name]:g}{unit}"
@@ -129,14 +134,20 @@ def _rule(kind: str, context: Mapping[str, Any], field: FieldInfo | None, unit: 
     if kind == "literal_error":
         return f"must be {context['expected']}"
     if kind in _TYPE_ERRORS:
-        return f"expected {TYPE_WORDS[_TYPE_ERRORS[kind]]}{unit}"
-    return f"expected {expected(field)}{unit}"
+        return f"expected {TYPE_NAMES[_TYPE_ERRORS[kind]]}{unit}"
+    return f"expected {_expected(wanted)}{unit}"
 
 
-def _siblings(model: type[BaseModel], loc: Sequence[str | int]) -> list[str]:
-    """Return the keys that are allowed where an unknown one was found."""
-    here = model
-    for part in loc[:-1]:
-        if isinstance(part, str) and part in here.model_fields:
-            here = next((t for t in parts_of(here.model_fields[part].annotation) if is_model(t)), here)
-    return list(here.model_fields)
+def _expected(wanted: Schema | None, depth: int = 0) -> str:
+    """Says what a key wants, or at depth 1 what the items of its list have to be, and so on."""
+    if wanted is None:
+        return "another value"
+    for _ in range(depth):
+        wanted = next((each["items"] for each in (wanted, *wanted.get("anyOf", ())) if "items" in each), {})
+    return type_name(wanted)
+
+
+def _siblings(root: Schema, loc: Sequence[str | int]) -> list[str]:
+    """Returns the keys that are allowed where an unknown one was found."""
+    mapping = mapping_in(_property_at(root, loc[:-1]) or root, root)
+    return list(resolved(mapping, root)["properties"]) if mapping else []

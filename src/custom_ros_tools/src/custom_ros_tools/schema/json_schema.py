@@ -1,77 +1,185 @@
-"""JSON Schemas of configuration models, for editors: they complete, explain and check YAML while it is written.
+"""JSON Schemas of configuration models: editors check YAML by them, and error messages and reference pages follow.
 
-The dialect is draft-07, the newest that yaml-language-server understands.
+The dialect is draft-07, the newest that yaml-language-server understands. Beside what draft-07 has, `unit` states
+units, `kind` families of constants, and `expects` says in words what a value has to be. Models inside of models are
+references to `$defs`; a description beside a reference is that of the key. The first alternative of an `anyOf` is the
+usual one, the others are taken too.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pydantic import BaseModel
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaMode, models_json_schema
+from pydantic_core import core_schema
 
 Schema = dict[str, Any]
 
 DIALECT = "http://json-schema.org/draft-07/schema#"
-_LINE = 110
-"""Longest line that is not broken."""
-_MAPPINGS_OF_SCHEMAS = ("properties", "patternProperties")
-_ALTERNATIVES = ("anyOf", "oneOf")
-_FIRST_KEYS = ("$schema", "title", "description", "type", "kind", "expects", "unit", "default")
+DEFINITIONS = "$defs"
+NULL: Schema = {"type": "null"}
+_FOR_ALL_TYPES = {"anyOf", "enum", "const", "$ref"}
+"""Keywords that restrict values of whatever type."""
+
+
+class EditorSchema(GenerateJsonSchema):
+    """pydantic's generator, in draft-07 and without what editors would show for nothing."""
+
+    # What no schema can say is left to the model
+    ignored_warning_kinds = {"skipped-choice", "non-serializable-default"}
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        return False
+
+    def model_schema(self, schema: core_schema.ModelSchema) -> Schema:
+        result = super().model_schema(schema)
+        result.pop("title", None)
+        return result
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> Schema:
+        """Drops a default that says no more than that the key may be left out; editors would type it in."""
+        result = super().default_schema(schema)
+        if result.get("default") is None or isinstance(result["default"], dict):
+            result.pop("default", None)
+        return result
+
+    def tuple_schema(self, schema: core_schema.TupleSchema) -> Schema:
+        result = super().tuple_schema(schema)
+        if "prefixItems" in result:
+            items = result.pop("prefixItems")
+            result["items"] = items[0] if all(item == items[0] for item in items) else items
+        return result
+
+    def tagged_union_schema(self, schema: core_schema.TaggedUnionSchema) -> Schema:
+        return self.get_union_of_schemas([self.generate_inner(choice) for choice in schema["choices"].values()])
+
+    def get_union_of_schemas(self, schemas: list[Schema]) -> Schema:
+        """Merges schemas of different types into one: a keyword of draft-07 restricts values of one type only."""
+        types = [kind for each in schemas for kind in types_in(each)]
+        keywords = [key for each in schemas for key in each if key != "type"]
+        is_clear = all(map(types_in, schemas)) and not _FOR_ALL_TYPES.intersection(keywords)
+        if is_clear and len({*types, *keywords}) == len(types) + len(keywords):
+            return {**{key: value for each in schemas for key, value in each.items()}, "type": types}
+        first, *others = schemas
+        return {**first, "anyOf": [*first["anyOf"], *others]} if "anyOf" in first else {"anyOf": schemas}
+
+    def handle_invalid_for_json_schema(self, schema: Any, error_info: str) -> Schema:
+        return {}
 
 
 def json_schema(model: type[BaseModel], title: str) -> Schema:
     """Returns the schema of a YAML file.
 
-    It has no references, so that each key stands with all that is known of it. Beside what draft-07 has, `unit` states
-    units, `kind` families of constants, and `expects` says in words what a value has to be.
-
     Args:
         model: What the file is validated with.
         title: What it is, such as `"robot"`.
     """
-    raw = model.model_json_schema()
-    tree = _plain(raw, raw.get("$defs", {}))
-    return _ordered({"$schema": DIALECT, "title": title, **tree})
+    return json_schemas({title: model})[title]
+
+
+def json_schemas(models: Mapping[str, type[BaseModel]]) -> dict[str, Schema]:
+    """Returns the schemas of several YAML files, by title, in which the same mapping has the same name.
+
+    Args:
+        models: What the files are validated with, by title.
+    """
+    mode: JsonSchemaMode = "validation"
+    inputs = [(model, mode) for model in dict.fromkeys(models.values())]
+    references, common = models_json_schema(inputs, schema_generator=EditorSchema)
+    schemas = {}
+    for title, model in models.items():
+        content = resolved(references[model, mode], common)
+        schemas[title] = with_definitions({"$schema": DIALECT, "title": title, **content}, common[DEFINITIONS])
+    return schemas
+
+
+def with_definitions(schema: Schema, definitions: Mapping[str, Schema]) -> Schema:
+    """Returns a schema with those definitions that it refers to, so that it stands alone."""
+    content = {key: value for key, value in schema.items() if key != DEFINITIONS}
+    found: dict[str, Schema] = {}
+    waiting = [*references_in(content)]
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found[name] = definitions[name]
+            waiting += references_in(found[name])
+    return {**content, DEFINITIONS: dict(sorted(found.items()))} if found else content
+
+
+def references_in(value: Any) -> Iterator[str]:
+    """Yields the names of the definitions that are referred to anywhere in a schema."""
+    if isinstance(value, dict):
+        if "$ref" in value:
+            yield name_of(value)
+        value = list(value.values())
+    for each in value if isinstance(value, list) else ():
+        yield from references_in(each)
+
+
+def name_of(reference: Schema) -> str:
+    """Returns the name of the definition that a schema refers to."""
+    return str(reference["$ref"]).rsplit("/", 1)[-1]
+
+
+def resolved(schema: Schema, root: Schema) -> Schema:
+    """Returns a schema, or the definition that it refers to.
+
+    Args:
+        schema: The schema.
+        root: The schema of the file, which has the definitions.
+    """
+    return dict(root[DEFINITIONS][name_of(schema)]) if "$ref" in schema else schema
+
+
+def mapping_in(schema: Schema, root: Schema) -> Schema | None:
+    """Returns the mapping with keys of its own that a value is, or each item of a list; None if there is none.
+
+    Args:
+        schema: What the value may be; the mapping may be a reference.
+        root: The schema of the file, which has the definitions.
+    """
+    for each in (schema, *schema.get("anyOf", ())):
+        if "properties" in resolved(each, root):
+            return each
+    items = (each["items"] for each in (schema, *schema.get("anyOf", ())) if isinstance(each.get("items"), dict))
+    return next(filter(None, (mapping_in(each, root) for each in items)), None)
+
+
+def types_in(schema: Schema) -> list[str]:
+    """Returns the JSON types that a schema names."""
+    kinds = schema.get("type", [])
+    return [kinds] if isinstance(kinds, str) else list(kinds)
 
 
 def unit_in(schema: Schema) -> str | None:
     """Returns the unit of a value, or of the numbers in it; None if it has none."""
     if "unit" in schema:
         return str(schema["unit"])
-    inner = [schema["items"]] if isinstance(schema.get("items"), dict) else schema.get("anyOf", [])
-    return next(filter(None, map(unit_in, inner)), None)
+    inner = [*schema.get("anyOf", ()), *(schema.get(key) for key in ("items", "additionalProperties"))]
+    return next(filter(None, (unit_in(each) for each in inner if isinstance(each, dict))), None)
 
 
-def explained(schema: Schema) -> Schema:
-    """Returns a schema whose descriptions end with unit and default, since editors show nothing but these."""
-    result = {key: explained(value) if isinstance(value, dict) else value for key, value in schema.items()}
-    if "anyOf" in schema:
-        result["anyOf"] = [explained(each) for each in schema["anyOf"]]
-    for key, value in schema.get("properties", {}).items():
-        result["properties"][key] = _explained_property(value, result["properties"][key])
+def explained(value: Any) -> Any:
+    """Returns a schema whose descriptions end with unit and default, since editors show nothing but these.
+
+    The description of a key stands beside the reference among its alternatives too: else that of the mapping is shown.
+    """
+    if isinstance(value, list):
+        return [explained(each) for each in value]
+    if not isinstance(value, dict):
+        return value
+    result = {key: explained(each) for key, each in value.items()}
+    if isinstance(value.get("description"), str) and "deprecated" not in value:
+        unit = unit_in(value)
+        default = f"Default: {yaml_text(value['default'])}." if "default" in value else ""
+        text = " ".join(filter(None, (value["description"], f"[{unit}]" if unit else "", default)))
+        result["description"] = text
+        if "anyOf" in value:
+            result["anyOf"] = [{**each, "description": text} if "$ref" in each else each for each in result["anyOf"]]
     return result
-
-
-def without_required(schema: Schema) -> Schema:
-    """Returns a schema of the same keys of which none is required, nor any in mappings inside of them."""
-    result = {key: value for key, value in schema.items() if key != "required"}
-    if "properties" in schema:
-        result["properties"] = {key: without_required(value) for key, value in schema["properties"].items()}
-    if "anyOf" in schema:
-        result["anyOf"] = [without_required(each) for each in schema["anyOf"]]
-    return result
-
-
-def _explained_property(schema: Schema, result: Schema) -> Schema:
-    if "deprecated" in schema:
-        return result
-    unit = unit_in(schema)
-    parts = [schema.get("description", ""), f"[{unit}]" if unit else ""]
-    if "default" in schema:
-        parts.append(f"Default: {yaml_text(schema['default'])}.")
-    return {**result, "description": " ".join(filter(None, parts))}
 
 
 def yaml_text(value: Any) -> str:
@@ -87,78 +195,6 @@ def yaml_text(value: Any) -> str:
     return str(value)
 
 
-def _plain(schema: Schema, definitions: Mapping[str, Schema]) -> Schema:
-    """Returns a schema of pydantic without references, titles and what is newer than draft-07."""
-    if "$ref" in schema:
-        inner = definitions[schema["$ref"].removeprefix("#/$defs/")]
-        return _plain({**inner, **{key: value for key, value in schema.items() if key != "$ref"}}, definitions)
-    result: Schema = {}
-    for key, value in schema.items():
-        if key in ("$defs", "title"):
-            continue
-        if key in _MAPPINGS_OF_SCHEMAS:
-            result[key] = {name: _plain(each, definitions) for name, each in value.items()}
-        elif key in _ALTERNATIVES:
-            result["anyOf"] = [_plain(each, definitions) for each in value]
-        elif key == "prefixItems":
-            result["items"] = _one_for_all([_plain(each, definitions) for each in value])
-        elif isinstance(value, dict) and key != "default":
-            result[key] = _plain(value, definitions)
-        else:
-            result[key] = value
-    return _ordered(_without_idle_default(_with_flat_alternatives(result)))
-
-
-def _one_for_all(items: list[Schema]) -> Schema | list[Schema]:
-    """Returns the schema that all items of a list share, or those of each."""
-    return items[0] if all(item == items[0] for item in items) else items
-
-
-def _with_flat_alternatives(schema: Schema) -> Schema:
-    """Merges alternatives inside of alternatives, and a single one with null."""
-    if "anyOf" not in schema:
-        return schema
-    alternatives: list[Schema] = []
-    for each in schema["anyOf"]:
-        if "anyOf" not in each:
-            alternatives.append(each)
-            continue
-        alternatives += each["anyOf"]
-        schema = {**{key: value for key, value in each.items() if key != "anyOf"}, **schema}
-    others = [each for each in alternatives if each != {"type": "null"}]
-    has_null = len(others) < len(alternatives)
-    rest = {key: value for key, value in schema.items() if key != "anyOf"}
-    if has_null and len(others) == 1 and isinstance(others[0].get("type"), str) and "enum" not in others[0]:
-        return {**others[0], **rest, "type": [others[0]["type"], "null"]}
-    return {**rest, "anyOf": alternatives}
-
-
-def _ordered(schema: Schema) -> Schema:
-    """Puts first what a reader looks for first."""
-    return {key: schema[key] for key in (*_FIRST_KEYS, *sorted(schema)) if key in schema}
-
-
-def _without_idle_default(schema: Schema) -> Schema:
-    """Drops a default that says no more than that the key may be left out; editors would type it in."""
-    if schema.get("default", "") is None or isinstance(schema.get("default"), dict):
-        return {key: value for key, value in schema.items() if key != "default"}
-    return schema
-
-
 def schema_text(schema: Schema) -> str:
-    """Returns a schema as JSON for a file, with all that is short in one line."""
-    return _text(schema, "") + "\n"
-
-
-def _text(value: Any, indent: str) -> str:
-    short = json.dumps(value, ensure_ascii=False)
-    if not isinstance(value, (dict, list)) or len(indent) + len(short) <= _LINE:
-        return short
-    inner = indent + "  "
-    if isinstance(value, dict):
-        items = [f"{json.dumps(key)}: {_text(each, inner)}" for key, each in value.items()]
-        opening, closing = "{", "}"
-    else:
-        items = [_text(each, inner) for each in value]
-        opening, closing = "[", "]"
-    return f"{opening}\n{inner}" + f",\n{inner}".join(items) + f"\n{indent}{closing}"
+    """Returns a schema as JSON for a file."""
+    return json.dumps(schema, ensure_ascii=False, indent=1) + "\n"

@@ -1,26 +1,30 @@
-"""Words for what a field wants and for what it got."""
+"""Words for what a value has to be and for what it is."""
 
 from __future__ import annotations
 
 import math
 import re
 import reprlib
-import types
-from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from collections.abc import Mapping
+from typing import Any
 
-from pydantic import BaseModel
-from pydantic.fields import FieldInfo
+from .json_schema import NULL, Schema, types_in
 
-from .annotations import SaysWhatItWants, Unit
-
-TYPE_WORDS = {float: "a number", int: "a whole number", bool: "true or false", str: "text", dict: "a mapping"}
+TYPE_NAMES = {
+    "number": "a number",
+    "integer": "a whole number",
+    "boolean": "true or false",
+    "string": "text",
+    "array": "a list",
+    "object": "a mapping",
+}
+"""Words for the types of JSON."""
 _REPR = reprlib.Repr()
 _REPR.maxlevel = 2  # aliases can make a short YAML text unfold without end
 
 
 def shown(value: Any) -> str:
-    """Return a value as the user would have written it in YAML, shortened."""
+    """Returns a value as the user would have written it in YAML, shortened."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):
@@ -36,68 +40,69 @@ def shown(value: Any) -> str:
     return text if len(text) <= 80 else text[:77] + "..."
 
 
-def is_model(part: Any) -> bool:
-    """Tell whether a part of an annotation is a model."""
-    return isinstance(part, type) and issubclass(part, BaseModel)
-
-
-def parts_of(annotation: Any) -> Iterator[Any]:
-    """Yield an annotation and everything inside it: metadata, alternatives, item types."""
-    yield annotation
-    if isinstance(annotation, FieldInfo):
-        for extra in annotation.metadata:
-            yield from parts_of(extra)
-    elif get_origin(annotation) is not Literal:
-        for inner in get_args(annotation):
-            yield from parts_of(inner)
-
-
-def unit_of(field: FieldInfo | None) -> str:
-    """Return the unit of a field as ` [Hz]`, empty if it has none."""
-    if field is None:
-        return ""
-    if isinstance(field.json_schema_extra, dict) and "unit" in field.json_schema_extra:
-        return f" [{field.json_schema_extra['unit']}]"
-    units = (part.name for part in [*parts_of(field), *parts_of(field.annotation)] if isinstance(part, Unit))
-    return next((f" [{unit}]" for unit in units), "")
-
-
-def expected(field: FieldInfo | None, depth: int = 0) -> str:
-    """Say in words what a field wants.
+def type_name(schema: Schema, detailed: bool = False, plural: bool = False) -> str:
+    """Returns what a value has to be, such as `a list of 3 numbers`.
 
     Args:
-        field: The field.
-        depth: How many list indices deep; 1 asks about the items of the field's list.
+        schema: Its JSON Schema.
+        detailed: Whether bounds are told too, and what is taken beside the usual form.
+        plural: Whether it is said of several, as in `lists of 3 numbers`.
     """
-    if field is None:
-        return "another value"
-    for part in [*parts_of(field), *parts_of(field.annotation)]:
-        if isinstance(part, SaysWhatItWants):
-            return part.in_words()
-    annotation: Any = field.annotation
-    for _ in range(depth):
-        annotation = next((get_args(p)[0] for p in parts_of(annotation) if get_origin(p) in (tuple, list)), None)
-    return _in_words(annotation)
+    if "expects" in schema:
+        return str(schema["expects"])
+    if "kind" in schema:
+        kind, names = schema["kind"], constants_in(schema)
+        return f"{kind}s such as {'|'.join(names[:2])}" if "anyOf" in schema else f"a {kind} ({', '.join(names)})"
+    if "anyOf" in schema:
+        alternatives = schema["anyOf"] if detailed else schema["anyOf"][:1]
+        return " or ".join(dict.fromkeys(type_name(each, detailed, plural) for each in alternatives if each != NULL))
+    if "enum" in schema:
+        values = [str(each) for each in schema["enum"] if each is not None]
+        return f"{'one of ' if len(values) > 1 else ''}{', '.join(values)}"
+    kinds = [kind for kind in types_in(schema) if kind != "null"] or ["object" if "$ref" in schema else ""]
+    if "boolean" in kinds:
+        return TYPE_NAMES["boolean"]  # 0 and 1 are the same in other words
+    if plural and len(kinds) > 1:
+        return "values"
+    return " or ".join(_name_of_type(kind, schema, detailed, plural) for kind in kinds)
 
 
-def _in_words(annotation: Any, plural: bool = False) -> str:
-    origin = get_origin(annotation)
-    if origin is Annotated:
-        return _in_words(get_args(annotation)[0], plural)
-    if origin in (Union, types.UnionType):
-        return " or ".join(_in_words(a, plural) for a in get_args(annotation) if a is not type(None))
-    if origin is Literal:
-        return "one of " + ", ".join(map(str, get_args(annotation)))
-    if origin in (tuple, list):
-        items = get_args(annotation)
-        count = "" if Ellipsis in items or origin is list else f"{len(items)} "
-        return f"{'lists' if plural else 'a list'} of {count}{_in_words(items[0], plural=True)}"
-    singular = "a mapping" if is_model(annotation) or origin is dict else TYPE_WORDS.get(annotation, "a value")
-    return singular.removeprefix("a ") + "s" if plural and singular.startswith("a ") else singular
+def constants_in(schema: Schema) -> list[str]:
+    """Returns the names in a family of constants."""
+    names = schema["anyOf"][0]["enum"] if "anyOf" in schema else schema["enum"]
+    return [name for name in names if isinstance(name, str)]
+
+
+def _name_of_type(kind: str, schema: Schema, detailed: bool, plural: bool) -> str:
+    if kind == "array" and "items" in schema:
+        items = schema["items"][0] if isinstance(schema["items"], list) else schema["items"]
+        if "expects" in items:
+            return str(items["expects"])
+        count = f"{schema['minItems']} " if schema.get("minItems", 0) == schema.get("maxItems") else ""
+        return f"{'lists' if plural else 'a list'} of {count}{type_name(items, detailed, plural=True)}"
+    name = TYPE_NAMES.get(kind, "a value")
+    if plural:
+        name = f"{name[2:]}s" if name.startswith("a ") else name
+    if not detailed:
+        return name
+    values = schema.get("additionalProperties")
+    if kind == "object" and "properties" not in schema and isinstance(values, dict) and "type" in values:
+        return f"{name} of names to {type_name(values, detailed, plural=True)}"
+    bounds = _bounds(schema) if kind in ("number", "integer") else ""
+    return f"{name}{', each' if plural and bounds else ''} {bounds}".strip()
+
+
+def _bounds(schema: Schema) -> str:
+    if "minimum" in schema and "maximum" in schema:
+        return f"{schema['minimum']:g} to {schema['maximum']:g}"
+    signs = {"exclusiveMinimum": ">", "minimum": ">=", "exclusiveMaximum": "<", "maximum": "<="}
+    if "exclusiveMinimum" in schema:
+        signs.pop("minimum")
+    return ", ".join(f"{sign} {schema[key]:g}" for key, sign in signs.items() if key in schema)
 
 
 def number_advice(kind: str, value: Any) -> str:
-    """Say what to write where YAML took a number for text, as it does with 1e-3."""
+    """Says what to write where YAML took a number for text, as it does with 1e-3."""
     if kind not in ("float_type", "int_type") or not isinstance(value, str):
         return ""
     match = re.fullmatch(r"\s*([-+]?)(\d+|\d*\.\d*\d|\d+\.)[eE]([-+]?)(\d+)\s*", value)

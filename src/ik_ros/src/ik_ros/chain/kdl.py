@@ -34,7 +34,6 @@ class KdlChain:
             not description.mimics
         )
         self.kdl = _kdl_chain(description)
-        moving = [joint for joint in description.joints if joint.is_moving]
         self._positions = PyKDL.JntArray(len(self._drives))
         self._frame = PyKDL.Frame()
         self._jacobian = PyKDL.Jacobian(len(self._drives))
@@ -44,8 +43,8 @@ class KdlChain:
         for joint, drive in enumerate(self._drives):
             self._variables[joint, drive.variable] = drive.multiplier
         x, y, z = self.kdl.getSegment(0).getJoint().JointOrigin()
-        carried = description.joints[description.joints.index(moving[0]) + 1 :]
-        self.reach = Reach.of((x, y, z), [math.hypot(*joint.xyz) for joint in carried], moving)
+        carried = description.joints[description.joints.index(description.moving[0]) + 1 :]
+        self.reach = Reach.of((x, y, z), [math.hypot(*joint.xyz) for joint in carried], description.moving)
 
     def frame(self, q: Sequence[float]) -> PyKDL.Frame:
         """Returns the pose of the tip in the base, valid until the next call.
@@ -78,15 +77,15 @@ class KdlChain:
             for i, position in enumerate(q):
                 positions[i] = position
         else:
-            for i, drive in enumerate(self._drives):
-                positions[i] = drive.multiplier * q[drive.variable] + drive.offset
+            for i, (variable, multiplier, offset) in enumerate(self._drives):
+                positions[i] = multiplier * q[variable] + offset
 
 
 class Goal:
     """A target with a box of tolerances around it.
 
     Args:
-        problem: The question.
+        problem: The problem.
 
     Attributes:
         frame: The target in the base.

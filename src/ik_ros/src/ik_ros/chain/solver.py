@@ -6,9 +6,10 @@ import math
 import threading
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import ClassVar
 
-from pydantic import ValidationInfo, model_validator
+from pydantic import model_validator
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.schema import ConfigModel, KeyedError, Text
@@ -18,12 +19,12 @@ from rpbi.config.asset_files import ExistingFile
 from rpbi.kinematics.limits import Limits
 from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
-from .description import ChainDescription, read_chain
+from .description import ChainDescription
 from .kdl import Goal, KdlChain
 
 
 class ChainConfig(ConfigModel):
-    """What every solver of one link's pose is told.
+    """Options of every solver of one link's pose.
 
     Attributes:
         urdf_filename: The robot; `{package}/path` and `package://` are resolved.
@@ -35,10 +36,15 @@ class ChainConfig(ConfigModel):
     base_link: Text
     tip_link: Text
 
+    @cached_property
+    def chain(self) -> ChainDescription:
+        """What lies between the links."""
+        return ChainDescription(self.urdf_filename, self.base_link, self.tip_link)
+
     @model_validator(mode="after")
-    def _chain_can_be_solved_for(self, info: ValidationInfo) -> ChainConfig:
+    def _chain_can_be_solved_for(self) -> ChainConfig:
         try:
-            read_chain(self.urdf_filename, self.base_link, self.tip_link)
+            _ = self.chain
         except UnknownNameError as error:
             key = "base_link" if error.name == self.base_link else "tip_link"
             raise KeyedError(key, str(error)) from None
@@ -51,7 +57,7 @@ class ChainSolver(Solver):
     """Brings the tip of a chain of joints to a target.
 
     Any thread may call it; a lock inside lets one in at a time. A subclass only looks for positions: here they are
-    brought into limits, put into the chain and judged, so that success is told only where it is true.
+    brought into limits, put into the chain and judged, so that success is answered only where it is true.
 
     Args:
         config: Its options.
@@ -65,26 +71,25 @@ class ChainSolver(Solver):
     Config: ClassVar[type[ChainConfig]] = ChainConfig
 
     def __init__(self, config: ChainConfig) -> None:
-        self.description: ChainDescription = read_chain(config.urdf_filename, config.base_link, config.tip_link)
+        self.description = config.chain
         self.chain = KdlChain(self.description)
         self.joint_names = self.description.joint_names
         self.base_frame = self.description.base
         self.velocity_limits = self.description.velocity_limits
-        self.use_limits(self.description.lower, self.description.upper)
+        self.use_limits(self.description.limits)
         self._lock = threading.Lock()
 
-    def use_limits(self, lower: Sequence[float], upper: Sequence[float]) -> None:
-        """Sets the n limits of the joints [rad or m], -inf and inf where there are none."""
-        self.lower, self.upper = tuple(lower), tuple(upper)
-        self.limits = Limits(lower, upper, self.description.is_revolute)
-        self._start_limits = StartLimits(self.joint_names, self.limits)
+    def use_limits(self, limits: Limits) -> None:
+        """Sets the limits of the n joints."""
+        self.limits, self.lower, self.upper = limits, limits.lower, limits.upper
+        self._start_limits = StartLimits(self.joint_names, limits)
 
     @abstractmethod
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
         """Looks for joint positions.
 
         Args:
-            problem: The question.
+            problem: The problem.
             goal: Its target with tolerances.
             start: n positions within limits [rad or m].
 
@@ -125,7 +130,7 @@ class ChainSolver(Solver):
         return goal.residual(self.chain.frame(q))
 
     def is_beyond_reach(self, problem: IKProblem) -> bool:
-        """Tells whether the target is farther away than the chain is long."""
+        """Returns whether the target is farther away than the chain is long."""
         if problem.target is None:
             return False
         return not self.chain.reach.covers(problem.target.position, math.hypot(*problem.position_tolerance))
@@ -160,7 +165,7 @@ def refuse_boxes(problem: IKProblem, solver: str, may_turn: bool = False) -> Non
     """Refuses tolerances that are larger than what counts as reached anyway.
 
     Args:
-        problem: The question.
+        problem: The problem.
         solver: Name of the solver that cannot make use of them.
         may_turn: Whether it can make use of those for rotations.
 

@@ -64,7 +64,7 @@ class Formulation(ConfigModel):
         base_frame: What poses are expressed in: a link that no joint moves, by default the root; with a floating base
             any name.
         base_position: Where a floating root is when the search starts [m]; only if there is no constraint of type
-            `frame_pose`, since the first one of those tells.
+            `frame_pose`, since the first one of those decides.
         base_orientation: How it is turned then, quaternion x, y, z, w.
         joints: The joints to find positions for; without any, all that move. The others stay where the problem starts.
         start: Where joints start that a problem's start leaves out [rad or m]; else in the middle of their limits.
@@ -107,7 +107,7 @@ class Formulation(ConfigModel):
         return self
 
     def entries(self) -> Iterator[tuple[str, TaskConfig]]:
-        """Tells the key path and the options of each task."""
+        """Yields the key path and the options of each task."""
         for key in ("costs", "constraints"):
             for i, task in enumerate(getattr(self, key)):
                 yield f"{key}[{i}]", task
@@ -168,7 +168,7 @@ class TaskSet:
 
     @property
     def anchor(self) -> FrameTask | None:
-        """The first constraint that says where a link is, which tells where a floating base is."""
+        """The first constraint that says where a link is, and so where a floating base is."""
         poses = (part.task for part in self.parts.values() if part.is_hard and isinstance(part.task, FrameTask))
         return next((task for task in poses if task.is_complete), None)
 

@@ -23,7 +23,7 @@ AXES: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")
 
 
 class FrameTaskConfig(TaskConfig):
-    """What tasks about a link are told.
+    """Options of tasks about a link.
 
     Attributes:
         frame: The link.
@@ -37,12 +37,7 @@ class FrameTaskConfig(TaskConfig):
 
 
 class FrameTask(Task):
-    """Brings a link to a pose, or near it, along and about some or all axes of the goal.
-
-    Args:
-        config: Its options.
-        robot: The robot.
-    """
+    """Brings a link to a pose, or near it, along and about some or all axes of the goal."""
 
     Config = FrameTaskConfig
     available: ClassVar[tuple[str, ...]] = AXES
@@ -78,14 +73,13 @@ class FrameTask(Task):
         return Pose((x, y, z), normalized(quaternion))
 
     def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
-        """See `Task`."""
         pose = self._default if goal is None else self.pose_of(goal)
         if pose is None:
             raise ValueError("missing, neither the problem nor the formulation has one")
         self._set_goal(pose, (0.0,) * 6)
 
     def aim(self, problem: IKProblem) -> None:
-        """Takes over the target of a problem, with its tolerances, as the goal."""
+        """Takes the target of a problem, with its tolerances, as the goal."""
         if problem.target is not None:
             self._set_goal(problem.target, (*problem.position_tolerance, *problem.rotation_tolerance))
 
@@ -104,7 +98,6 @@ class FrameTask(Task):
         return Linearization(values[self._used], rows[self._used], self._lower, self._upper)
 
     def residual(self, beyond: np.ndarray) -> Residual:
-        """See `Task`."""
         off = beyond.tolist()
         return Residual(math.hypot(*off[: self._lengths]), math.hypot(*off[self._lengths :]))
 

@@ -34,7 +34,7 @@ class Candidate(NamedTuple):
 
     @property
     def rank(self) -> tuple[float, float]:
-        """What tells the better one: constraints first; all that are within tolerances are the same."""
+        """What decides which one is better: constraints first; all that are within tolerances are the same."""
         return max(self.hard_size, 1.0), max(self.size, 1.0)
 
 
@@ -76,7 +76,7 @@ class Iterate(NamedTuple):
 
 
 class GaussNewton:
-    """Goes to where the costs are low and the constraints hold, by Gauss-Newton steps.
+    """Minimises the costs such that the constraints hold, by Gauss-Newton steps.
 
     Each step minimises the weighted squares of the costs, linearised, and a damping, such that the linearised
     constraints and the limits of the joints hold. Constraints give way a little at a great price, so that there always
@@ -102,7 +102,7 @@ class GaussNewton:
         self.begin()
 
     def begin(self) -> None:
-        """Takes over what the tasks have been told of a new problem.
+        """Takes the bounds of the tasks for a new problem.
 
         Constraints on joints alone narrow the limits, and so hold to the last digit.
         """
@@ -115,7 +115,7 @@ class GaussNewton:
                 self.upper[i] = np.maximum(np.minimum(self.upper[i], upper), self.lower[i])
 
     def __call__(self, q: np.ndarray) -> Iterator[Iterate]:
-        """Tells each configuration on the way, also those that turn out to be worse.
+        """Yields each configuration on the way, also those that turn out to be worse.
 
         Args:
             q: Where it starts; joints beyond their limits start at them.

@@ -53,7 +53,7 @@ class JointTask(Task):
         """Returns k positions of each of a problem's previous solutions [rad or m], newest last.
 
         Args:
-            problem: The question.
+            problem: The problem.
             most: How many of the newest to return, if there are so many.
 
         Raises:
@@ -68,9 +68,7 @@ class JointTask(Task):
         return [np.array([solution[name] for name in names]) for _, solution in solutions]
 
     def rows(self, q: np.ndarray) -> Linearization:
-        """See `Task`."""
         return Linearization(self.robot.positions(q)[self.indices], self._jacobian, *self.bounds)
 
     def residual(self, beyond: np.ndarray) -> Residual:
-        """See `Task`."""
         return Residual(0.0, math.hypot(*beyond.tolist()))

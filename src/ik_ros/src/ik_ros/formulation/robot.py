@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -104,9 +104,7 @@ class Robot:
         Raises:
             UnknownNameError: If there is no such joint that moves.
         """
-        if name not in self.all_joints:
-            raise UnknownNameError("joint", name, self.all_joints)
-        return int(self.model.getJointId(name))
+        return int(self.model.getJointId(_known("joint", name, self.all_joints)))
 
     def moving(self, names: Iterable[str]) -> list[str]:
         """Returns those joints that move; fixed ones, and those that mimic others, do not by themselves.
@@ -125,9 +123,7 @@ class Robot:
         Raises:
             UnknownNameError: If it is none of them.
         """
-        if name not in self.joint_names:
-            raise UnknownNameError("joint", name, self.joint_names)
-        return self.joint_names.index(name)
+        return self.joint_names.index(_known("joint", name, self.joint_names))
 
     def link_id(self, name: str) -> int:
         """Returns Pinocchio's number of a link.
@@ -135,9 +131,7 @@ class Robot:
         Raises:
             UnknownNameError: If there is no such link.
         """
-        if name not in self.links:
-            raise UnknownNameError("link", name, self.links)
-        return int(self.model.getFrameId(name, pin.BODY))
+        return int(self.model.getFrameId(_known("link", name, self.links), pin.BODY))
 
     def add_shape(self, config: ShapeConfig) -> None:
         """Adds a shape.
@@ -154,9 +148,7 @@ class Robot:
         Raises:
             UnknownNameError: If there is no such shape.
         """
-        if name not in self._shapes:
-            raise UnknownNameError("shape", name, self._shapes)
-        return self._shapes[name]
+        return self._shapes[_known("shape", name, self._shapes)]
 
     def configuration(self, positions: Mapping[str, float]) -> np.ndarray:
         """Returns the configuration with some joints at given positions, and the others in the middle of their limits.
@@ -251,3 +243,14 @@ class Robot:
 
     def _of_free(self, jacobian: np.ndarray) -> np.ndarray:
         return jacobian if self._all_free else jacobian[:, self.free]
+
+
+def _known(kind: str, name: str, names: Collection[str]) -> str:
+    """Returns a name.
+
+    Raises:
+        UnknownNameError: If it is none of these.
+    """
+    if name not in names:
+        raise UnknownNameError(kind, name, names)
+    return name

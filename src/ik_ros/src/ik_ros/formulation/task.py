@@ -17,7 +17,7 @@ from .robot import Robot
 
 
 class TaskConfig(ConfigModel):
-    """What every task is told.
+    """Options of every task.
 
     Attributes:
         name: What problems and messages call it.
@@ -66,7 +66,7 @@ class Linearization(NamedTuple):
 class Task(ABC):
     """Something that a configuration shall fulfil: a cost to keep low, or a constraint to hold.
 
-    A subclass is told by its `Config`, in YAML. One thread at a time calls `begin`, and then `rows` for each
+    The options of a subclass are its `Config`, in YAML. One thread at a time calls `begin`, and then `rows` for each
     configuration that is tried.
 
     Args:
@@ -84,10 +84,10 @@ class Task(ABC):
         self.robot = robot
 
     def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
-        """Takes over what a problem says.
+        """Takes what a problem says of the task.
 
         Args:
-            problem: The question.
+            problem: The problem.
             goal: What it wants of this task; None: what the formulation says.
             q: The configuration where the search starts.
 

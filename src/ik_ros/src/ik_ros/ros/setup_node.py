@@ -12,7 +12,6 @@ from std_msgs.msg import Float64, Float64MultiArray, Header
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
-from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
 from custom_ros_tools.ros.lifecycle.wall_timer import WallTimer
 from custom_ros_tools.ros.services import ToggleService
@@ -24,7 +23,7 @@ from rpbi.geometry import Pose
 
 from .messages import positions_in, problem_message
 from .robot_ik_setup import RobotIKSetup
-from .solver_argument import solver_argument
+from .solver_name import run_for_solver, topics_of
 from .tf import FreshTf
 
 QUEUE_SIZE = 10
@@ -46,7 +45,7 @@ class SetupNode:
 
     def __init__(self, name: str) -> None:
         self._config = config = private_parameters(SetupParameters)
-        self._topics = f"ik/setup/{name.replace(':', '/').replace('.', '/')}"
+        self._topics = topics_of("setup", name)
         self._warn = ThrottledWarning()
         self._lock = threading.Lock()
         self._is_on = False
@@ -107,7 +106,7 @@ class SetupNode:
 
     def _take_tolerance(self, key: str, value: float) -> None:
         changed = {**self._tolerances, key: value}
-        _problem_with(tolerances=changed)
+        IKProblem(**_fields(changed))  # which checks them
         self._tolerances = changed
 
     def _take_goal(self, task: str, message: Float64MultiArray) -> None:
@@ -145,16 +144,10 @@ def _fields(tolerances: dict[str, float]) -> dict[str, tuple[float, ...]]:
     return {"position_tolerance": values[:3], "rotation_tolerance": values[3:]}
 
 
-def _problem_with(tolerances: dict[str, float]) -> IKProblem:
-    """Returns a problem, which checks the tolerances."""
-    return IKProblem(**_fields(tolerances))
-
-
 def main() -> None:
     """Runs the node."""
-    name = solver_argument("ik_setup_node.py")
 
-    def start() -> object:
+    def make(name: str) -> object:
         return RobotIKSetup() if name == "pybullet" and rospy.has_param("~config") else SetupNode(name)
 
-    run_node(f"ik_setup_{name.rpartition(':')[2]}", start, anonymous=True)
+    run_for_solver("setup", make)

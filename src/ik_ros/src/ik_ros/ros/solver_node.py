@@ -13,18 +13,16 @@ from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
-from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
 from custom_ros_tools.ros.services import ToggleService
 from custom_ros_tools.toggle import Toggle
-from ik_ros.joint_rate_limiter import JointRateLimiter
 from ik_ros.lookup import make_solver
 from ik_ros.msg import IKProblem as IKProblemMessage
 from ik_ros.msg import IKSolution as IKSolutionMessage
 from ik_ros.msg import TracIKProblem
 from ik_ros.node_configs import SolverNodeParameters
 from ik_ros.problem import IKProblem, IKSolution
-from ik_ros.problem_stream import ProblemStream
+from ik_ros.problem_stream import JointRateLimiter, ProblemStream
 from ik_ros.srv import (
     JointNames,
     JointNamesResponse,
@@ -37,7 +35,7 @@ from ik_ros.srv import (
 )
 
 from .messages import pose_message, problem_in, problem_in_trac_ik, solution_message, trajectory_message
-from .solver_argument import solver_argument
+from .solver_name import run_for_solver, topics_of
 from .tf import BaseFrame
 
 QUEUE_SIZE = 10
@@ -76,7 +74,7 @@ class SolverNode:
         solving = Toggle("solving", self._listen, self._listen_no_more)
         if own.start_on_init:
             solving.on()
-        services = f"ik/solver/{name.replace(':', '/').replace('.', '/')}"
+        services = topics_of("solver", name)
         ToggleService(f"{services}/toggle", solving.on, solving.off)
         rospy.Service(f"{services}/joint_names", JointNames, lambda _: JointNamesResponse(self._solver.joint_names))
         rospy.Service(f"{services}/solve", SolveIK, self._serve)
@@ -181,5 +179,4 @@ def _parameters() -> tuple[SolverNodeParameters, dict[str, object]]:
 
 def main() -> None:
     """Runs the node."""
-    name = solver_argument("ik_solver_node.py")
-    run_node(f"ik_solver_{name.rpartition(':')[2]}", lambda: SolverNode(name), anonymous=True)
+    run_for_solver("solver", SolverNode)

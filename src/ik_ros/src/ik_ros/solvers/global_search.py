@@ -10,6 +10,7 @@ from pydantic import Field
 
 from custom_ros_tools.schema import Count, Positive
 from ik_ros.chain.kdl import Goal
+from ik_ros.chain.levenberg_marquardt import levenberg_marquardt
 from ik_ros.problem import IKProblem
 
 from .kdl import KdlConfig, KdlSolver
@@ -26,7 +27,7 @@ class GlobalConfig(KdlConfig):
             [rad or m, root of the sum of squares]; or `middle_of_limits`, how far the joint that is nearest to a
             limit is from the middle, as a part of half its range.
         distinct: Two solutions are distinct if a joint differs by more than this [rad or m].
-        most: How many solutions to tell at most, the best one included.
+        most: How many solutions to return at most, the best one included.
     """
 
     restarts: Count = 100
@@ -39,9 +40,6 @@ class GlobalSolver(KdlSolver):
     """Random starts of `kdl`, and the distinct solutions that they lead to.
 
     Where joints are to spare, solutions are not separate: then it takes samples that are `distinct`.
-
-    Args:
-        config: Its options.
     """
 
     Config = GlobalConfig
@@ -59,7 +57,7 @@ class GlobalSolver(KdlSolver):
         found = [(self.residual(goal, q).size, q) for q in self.candidates(problem, goal, start, self._restarts)]
         solutions = sorted((self._cost(q, start), q) for size, q in found if size <= 1.0)
         if not solutions:
-            return [self.mended(goal, min(found)[1])]
+            return [levenberg_marquardt(self.chain, goal, self.limits, min(found)[1])]
         kept: list[list[float]] = []
         for _, q in solutions:
             if len(kept) < self._most and all(_difference(q, other) > self._distinct for other in kept):

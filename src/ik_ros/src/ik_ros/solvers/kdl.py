@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import PyKDL
 
@@ -45,9 +46,6 @@ class KdlSolver(ChainSolver):
     It goes from the start to the nearest solution. Where that is outside limits, random starts follow, after an own
     descent within limits if the start is near the target. That descent does all where there are tolerances, or joints
     that mimic others.
-
-    Args:
-        config: Its options.
     """
 
     Config = KdlConfig
@@ -69,13 +67,13 @@ class KdlSolver(ChainSolver):
                 best, least = q, size
             if least <= 1.0:
                 return [best]
-        return [self.mended(goal, best)]
+        return [levenberg_marquardt(self.chain, goal, self.limits, best)]
 
     def candidates(self, problem: IKProblem, goal: Goal, start: list[float], restarts: int) -> Iterator[list[float]]:
-        """Tells where each start leads, within limits.
+        """Yields where each start leads, within limits.
 
         Args:
-            problem: The question.
+            problem: The problem.
             goal: Its target with tolerances.
             start: The first n positions to start from [rad or m].
             restarts: How many random ones follow.
@@ -96,14 +94,10 @@ class KdlSolver(ChainSolver):
             if count == GIVE_UP_AFTER and not has_arrived:
                 return
 
-    def mended(self, goal: Goal, q: list[float]) -> list[float]:
-        """Returns positions as near to the goal as a descent within limits gets from these [rad or m]."""
-        return levenberg_marquardt(self.chain, goal, self.limits, q)
-
     def _starts(self, problem: IKProblem, start: list[float], restarts: int) -> Iterator[list[float]]:
-        """Tells where to start: where it was asked for, and then at random."""
+        """Returns where to start: where it was asked for, and then at random."""
         most = min(restarts, RESTARTS_BEYOND_REACH) if self.is_beyond_reach(problem) else restarts
-        return self.limits.starts(start, random.Random(problem.seed), most)
+        return self.limits.starts(start, most, partial(random.Random, problem.seed))
 
     def _nearest(self, goal: Goal, first: Sequence[float], near: Sequence[float]) -> tuple[list[float], bool]:
         """Returns where KDL gets to from `first`, brought into limits, and whether it arrived but for the limits."""

@@ -8,7 +8,6 @@ from typing import Any, Literal
 from pydantic import model_validator
 
 from custom_ros_tools.schema import Count, KeyedError, ListOf, NonNegative
-from ik_ros.chain.description import read_chain
 from ik_ros.chain.kdl import Goal
 from ik_ros.chain.solver import ChainConfig, ChainSolver, refuse_boxes, refuse_mimics
 from ik_ros.problem import IKProblem
@@ -34,9 +33,8 @@ class PybulletConfig(ChainConfig):
 
     @model_validator(mode="after")
     def _options_fit_the_chain(self) -> PybulletConfig:
-        description = read_chain(self.urdf_filename, self.base_link, self.tip_link)
         try:
-            PybulletProblem(self.tip_link, (0.0, 0.0, 0.0), **self.options).check_lengths(description.joint_names)
+            PybulletProblem(self.tip_link, (0.0, 0.0, 0.0), **self.options).check_lengths(self.chain.joint_names)
         except ValueError as error:
             key, _, message = str(error).partition(": ")
             raise KeyedError(key, message) from None
@@ -53,9 +51,6 @@ class PybulletSolver(ChainSolver):
 
     Its random starts are the same for all seeds.
 
-    Args:
-        config: Its options.
-
     Raises:
         ConfigError: If a joint of the chain mimics another; it names the joint.
         ValueError: If limits leave a joint no position.
@@ -70,8 +65,7 @@ class PybulletSolver(ChainSolver):
         self._options = config.options
         self._kinematics = Kinematics(write_description(self.description.urdf))
         question = PybulletProblem(config.tip_link, (0.0, 0.0, 0.0), **self._options)
-        limits = question.narrowed(self._kinematics.limits, self.joint_names)
-        self.use_limits(limits.lower, limits.upper)
+        self.use_limits(question.narrowed(self._kinematics.limits, self.joint_names))
 
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
         """Returns the first solution, else the best that was found; see `ChainSolver`.

@@ -101,7 +101,7 @@ class TasksSolver(Solver):
         return robot.with_positions(q, self._start_limits.wrap_to_limits(robot.positions(q).tolist()))
 
     def _begin(self, problem: IKProblem, start: np.ndarray) -> None:
-        """Tells all tasks what the problem wants of them."""
+        """Hands all tasks what the problem wants of them."""
         for solution in problem.previous:
             self.tasks.robot.moving(solution)
         for name in problem.goals:
@@ -176,7 +176,7 @@ class TasksSolver(Solver):
         return best
 
     def _is_at_its_end(self, sizes: Sequence[float], merits: Sequence[float], step: float) -> bool:
-        """Tells whether there is nothing more to be had from one start."""
+        """Returns whether there is nothing more to be had from one start."""
         if step < STANDSTILL or len(sizes) > self._config.iterations:
             return True
         if not self._has_wishes and sizes[-1] <= AIM:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Sequence
+from functools import partial
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -43,9 +44,6 @@ class TracIkSolver(ChainSolver):
 
     It is not deterministic: its two threads race, and where it ends depends on the clock.
 
-    Args:
-        config: Its options.
-
     Raises:
         ConfigError: If a joint of the chain mimics another, or slides without limits; it names the joint.
     """
@@ -74,7 +72,7 @@ class TracIkSolver(ChainSolver):
         refuse_boxes(problem, "trac_ik")
         target = (*goal.frame.p, *goal.frame.M.GetQuaternion())
         restarts = 0 if self.is_beyond_reach(problem) else self._restarts
-        for first in self.limits.starts(start, random.Random(problem.seed), restarts):
+        for first in self.limits.starts(start, restarts, partial(random.Random, problem.seed)):
             status, *q = pytracik.ik(self._trac_ik, first, *target).tolist()
             if status >= 0:
                 return [q]

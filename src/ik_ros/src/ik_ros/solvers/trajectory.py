@@ -8,27 +8,34 @@ import threading
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field, model_validator
 
-from custom_ros_tools.errors import MissingDependency
+from custom_ros_tools.errors import MissingDependency, UnknownNameError
+from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Positive, Seconds
 from ik_ros.chain.kdl import Goal
+from ik_ros.chain.solver import refuse_mimics
 from ik_ros.problem import IKProblem, IKSolution, SampledTrajectory, Waypoint
+from ik_ros.shape import ShapeConfig
 from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
-from .kdl import KdlSolver
+from .kdl import KdlConfig, KdlSolver
 
 try:
     import casadi
 except ImportError:
     raise MissingDependency("casadi", "./rpbi setup mpc") from None
 
-from ik_ros.trajectory.config import MOST_INTERVALS, MOST_WAYPOINTS, TrajectoryConfig, largest_rates
-from ik_ros.trajectory.forward_kinematics import ForwardKinematics, rotation_matrix
-from ik_ros.trajectory.obstacles import Obstacles
-from ik_ros.trajectory.program import Program, Question
+from ik_ros.trajectory.program import Program
 from ik_ros.trajectory.spline import Spline
+from ik_ros.trajectory.symbolic import link_frames, rotation_matrix, sphere_distances
 
+MOST_INTERVALS = 128
+"""Waypoints that follow each other faster than two intervals of the finest spline can hardly all be passed."""
+MOST_WAYPOINTS = MOST_INTERVALS // 2
+"""So there cannot be more, whatever their times."""
 MOST_SAMPLES = 100_000
 KEPT_PROGRAMS = 4
 """For so many numbers of waypoints programs stay compiled, those that were used last."""
@@ -40,13 +47,50 @@ SPARE = 1e-6
 """Speeds and accelerations are kept with this part to spare, for rounding."""
 
 
+class TrajectoryConfig(KdlConfig):
+    """Options of `trajectory`.
+
+    Attributes:
+        duration_s: Time to the target, for problems with a target and no waypoints [s].
+        intervals: How many polynomials each joint's spline has at least.
+        sample_s: Time between the positions of the answer [s].
+        velocity_limits: Largest speed of joints [rad/s or m/s]; joints that are left out have that of the URDF.
+        acceleration_limits: Largest acceleration of joints [rad/s^2 or m/s^2].
+        shapes: Spheres on links, and obstacles in the base.
+        clearance: How far all spheres stay away from all obstacles [m].
+        attempts: How often to look for another way, by other positions at the waypoints.
+    """
+
+    duration_s: Seconds = 2.0
+    intervals: Annotated[int, Field(ge=4, le=MOST_INTERVALS)] = 16
+    sample_s: Seconds = 0.02
+    velocity_limits: dict[str, Positive] = Field(default_factory=dict)
+    acceleration_limits: dict[str, Positive] = Field(default_factory=dict)
+    shapes: ListOf[ShapeConfig] = ()
+    clearance: NonNegative = 0.0
+    attempts: Annotated[int, Field(ge=1)] = 3
+
+    @model_validator(mode="after")
+    def _fits_the_chain(self) -> TrajectoryConfig:
+        chain = self.chain
+        refuse_mimics(chain, self, "trajectory")
+        for key in ("velocity_limits", "acceleration_limits"):
+            for name in getattr(self, key):
+                if name not in chain.joint_names:
+                    raise KeyedError(key, str(UnknownNameError("joint", name, chain.joint_names)))
+        links = [chain.base, *(joint.child for joint in chain.joints)]
+        for i, shape in enumerate(self.shapes):
+            if shape.link is not None and shape.link not in links:
+                raise KeyedError(f"shapes[{i}].link", str(UnknownNameError("link of the chain", shape.link, links)))
+            if shape.link is not None and shape.sphere is None:
+                raise KeyedError(f"shapes[{i}]", "shapes on links must be spheres; several can stand for one link")
+        return self
+
+
 class TrajectorySolver(KdlSolver):
     """Finds the smoothest motion from rest to rest that passes waypoints in time.
 
     KDL says which positions lead to the waypoints; from there on a nonlinear program shapes a spline for each joint.
-
-    Args:
-        config: Its options.
     """
 
     Config = TrajectoryConfig
@@ -55,13 +99,13 @@ class TrajectorySolver(KdlSolver):
     def __init__(self, config: TrajectoryConfig) -> None:
         super().__init__(config)
         self._config = config
-        self._kinematics = ForwardKinematics(self.description)
-        self._obstacles = Obstacles(config.shapes)
-        self._max_velocity, self._max_acceleration = largest_rates(config, self.description)
+        speeds = dict(zip(self.joint_names, self.velocity_limits)) | config.velocity_limits
+        accelerations = dict.fromkeys(self.joint_names, math.inf) | config.acceleration_limits
+        self._max_velocity, self._max_acceleration = np.array([*speeds.values()]), np.array([*accelerations.values()])
         self._compiled = lru_cache(KEPT_PROGRAMS)(self._compile)
         self._program_lock = threading.Lock()
         q = casadi.SX.sym("q", len(self.joint_names))
-        distances = self._obstacles.distances(self._kinematics.frames(q)) or [casadi.inf]
+        distances = sphere_distances(config.shapes, link_frames(self.description, q)) or [casadi.inf]
         self._distances = casadi.Function("distances", [q], [casadi.vertcat(*distances)])
 
     def solve(self, problem: IKProblem) -> IKSolution:
@@ -147,18 +191,15 @@ class TrajectorySolver(KdlSolver):
             tolerance = np.array((*problem.position_tolerance, *problem.rotation_tolerance))
             aim = AIM * np.array((POSITION_TOLERANCE_M,) * 3 + (ORIENTATION_TOLERANCE_RAD,) * 3)
             points, status = program.solve(
-                Question(
-                    start=np.array(start),
-                    poses=np.stack([_flat(waypoint) for waypoint in waypoints], axis=1),
-                    basis=spline.basis(times_s[1:] / duration_s),
-                    tolerance=np.where(np.array(goals[0].tolerance) < np.inf, tolerance + aim, np.inf),
-                    lower=np.array(self.lower),
-                    upper=np.array(self.upper),
-                    max_velocity=self._max_velocity * duration_s * (1.0 - SPARE),
-                    max_acceleration=self._max_acceleration * duration_s**2 * (1.0 - SPARE),
-                    clearance=self._config.clearance,
-                    guess=guess,
-                )
+                start=np.array(start),
+                poses=np.stack([_flat(waypoint) for waypoint in waypoints], axis=1),
+                basis=spline.basis(times_s[1:] / duration_s),
+                tolerance=np.where(np.array(goals[0].tolerance) < np.inf, tolerance + aim, np.inf),
+                limits=self.limits,
+                max_velocity=self._max_velocity * duration_s * (1.0 - SPARE),
+                max_acceleration=self._max_acceleration * duration_s**2 * (1.0 - SPARE),
+                clearance=self._config.clearance,
+                guess=guess,
             )
             nearest = self._nearest_m(spline.basis(_checks(spline)) @ points)
         passed = spline.basis(times_s[1:] / duration_s) @ points
@@ -194,22 +235,20 @@ class TrajectorySolver(KdlSolver):
         return Spline(intervals), self._compiled(intervals, len(times_s) - 1)
 
     def _compile(self, intervals: int, waypoints: int) -> Program:
-        return Program(self._kinematics, self._obstacles, len(self.joint_names), Spline(intervals), waypoints)
+        return Program(self.description, self._config.shapes, Spline(intervals), waypoints)
 
     def _nearest_m(self, q: np.ndarray) -> float:
         """Returns the least distance of all pairs in k x n positions; inf without any [m]."""
-        if not self._obstacles.pairs:
-            return math.inf
         return float(np.array(self._distances.map(len(q))(q.T)).min())
 
     def _too_fast(self, spline: Spline, points: np.ndarray, duration_s: float) -> list[str]:
-        """Tells where speeds or accelerations are beyond their limits, checked closely."""
+        """Returns where speeds or accelerations are beyond their limits, checked closely."""
         problems = []
         for order, most, per in ((1, self._max_velocity, "s"), (2, self._max_acceleration, "s^2")):
             values = np.abs(spline.basis(_checks(spline), order) @ points).max(axis=0) / duration_s**order
             i = int((values / most).argmax())
             if values[i] > most[i]:
-                unit = "rad" if self.description.is_revolute[i] else "m"
+                unit = "rad" if self.limits.is_revolute[i] else "m"
                 needs = f"needs {values[i]:.4g} {unit}/{per}, its limit is {most[i]:.4g}"
                 problems.append(f"'{self.joint_names[i]}' {needs}")
         return problems

@@ -15,7 +15,7 @@ from ik_ros.problem import IKProblem
 
 
 class AccelerationLimitsConfig(TaskConfig):
-    """What this task is told.
+    """Options of this task.
 
     Attributes:
         dt_s: Time between solutions [s].
@@ -28,12 +28,7 @@ class AccelerationLimitsConfig(TaskConfig):
 
 
 class AccelerationLimits(JointTask):
-    """Keeps joints near where the last two solutions lead; with one solution they start at rest, with none free.
-
-    Args:
-        config: Its options.
-        robot: The robot.
-    """
+    """Keeps joints near where the last two solutions lead; with one solution they start at rest, with none free."""
 
     Config = AccelerationLimitsConfig
 
@@ -42,7 +37,6 @@ class AccelerationLimits(JointTask):
         self._way = np.array(list(config.limits.values())) * config.dt_s**2
 
     def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
-        """See `Task`."""
         super().begin(problem, goal, q)
         known = self.previous(problem, 2)
         self.keep_near(2.0 * known[-1] - known[0] if known else None, self._way)

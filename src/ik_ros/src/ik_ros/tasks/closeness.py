@@ -13,18 +13,12 @@ from ik_ros.problem import IKProblem
 
 
 class Closeness(JointTask):
-    """Keeps joints near the previous solution of the problem; if it has none, near its start.
-
-    Args:
-        config: Its options.
-        robot: The robot.
-    """
+    """Keeps joints near the previous solution of the problem; if it has none, near its start."""
 
     def __init__(self, config: TaskConfig, robot: Robot) -> None:
         super().__init__(config, robot, robot.joint_names, "name")
 
     def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
-        """See `Task`."""
         super().begin(problem, goal, q)
         last = self.previous(problem, 1)
         self.bring_to(last[0] if last else self.robot.positions(q))

@@ -14,7 +14,7 @@ from ik_ros.problem import IKProblem
 
 
 class ComConfig(TaskConfig):
-    """What this task is told.
+    """Options of this task.
 
     Attributes:
         goal: Where it shall be, x, y, z in the base [m]; None: each problem says.
@@ -26,12 +26,7 @@ class ComConfig(TaskConfig):
 
 
 class Com(Task):
-    """Brings the centre of mass of the robot to a position.
-
-    Args:
-        config: Its options.
-        robot: The robot.
-    """
+    """Brings the centre of mass of the robot to a position."""
 
     Config = ComConfig
 
@@ -42,7 +37,6 @@ class Com(Task):
         self._goal = np.zeros(3)
 
     def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
-        """See `Task`."""
         position = self._default if goal is None else goal
         if position is None:
             raise ValueError("missing, neither the problem nor the formulation has one")
@@ -51,6 +45,5 @@ class Com(Task):
         self._goal = np.array(position)[self._used]
 
     def rows(self, q: np.ndarray) -> Linearization:
-        """See `Task`."""
         com, jacobian = self.robot.com(q)
         return Linearization(com[self._used], jacobian[self._used], self._goal, self._goal)

@@ -14,7 +14,7 @@ from ik_ros.formulation.task import Linearization, Task, TaskConfig
 
 
 class ComInSupportConfig(TaskConfig):
-    """What this task is told.
+    """Options of this task.
 
     Attributes:
         support: Points of links that stand on the ground, in the link [m], such as the corners of both soles.
@@ -30,10 +30,6 @@ class ComInSupport(Task):
 
     The polygon is the convex hull of the contact points where they are now; that it moves with them is left out of the
     Jacobian, since feet that stand are held by constraints of their own.
-
-    Args:
-        config: Its options.
-        robot: The robot.
     """
 
     Config = ComInSupportConfig

@@ -16,7 +16,7 @@ NEAR_M = 0.3
 
 
 class DistanceConfig(TaskConfig):
-    """What this task is told.
+    """Options of this task.
 
     Attributes:
         pairs: Names of two shapes each.
@@ -28,12 +28,7 @@ class DistanceConfig(TaskConfig):
 
 
 class Distance(Task):
-    """Keeps shapes of the formulation apart, in pairs; one of each pair at most is a box, and one at least moves.
-
-    Args:
-        config: Its options.
-        robot: The robot, which knows the shapes.
-    """
+    """Keeps shapes of the formulation apart, in pairs; one of each pair at most is a box, and one at least moves."""
 
     Config = DistanceConfig
 

@@ -15,7 +15,6 @@ class FrameOrientation(FrameTask):
     goal_words = "a quaternion (x, y, z, w) that is not zero"
 
     def pose_of(self, values: Sequence[float]) -> Pose:
-        """See `FrameTask`."""
         if len(values) != 4:
             raise ValueError(f"expected {self.goal_words}, got {list(values)}")
         return super().pose_of((0.0, 0.0, 0.0, *values))

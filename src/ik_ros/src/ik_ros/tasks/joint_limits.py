@@ -11,7 +11,7 @@ from ik_ros.formulation.task import TaskConfig
 
 
 class JointLimitsConfig(TaskConfig):
-    """What this task is told.
+    """Options of this task.
 
     Attributes:
         limits: Lower and upper limit of joints [rad or m].
@@ -24,12 +24,7 @@ class JointLimitsConfig(TaskConfig):
 
 
 class JointLimits(JointTask):
-    """Keeps joints within limits; those of the URDF are kept anyway.
-
-    Args:
-        config: Its options.
-        robot: The robot.
-    """
+    """Keeps joints within limits; those of the URDF are kept anyway."""
 
     Config = JointLimitsConfig
 

@@ -21,7 +21,7 @@ ZERO = np.zeros(2)
 
 
 class LookAtConfig(TaskConfig):
-    """What this task is told.
+    """Options of this task.
 
     Attributes:
         frame: The link.
@@ -35,12 +35,7 @@ class LookAtConfig(TaskConfig):
 
 
 class LookAt(Task):
-    """Turns an axis through a link's origin towards a point, such as that of a camera.
-
-    Args:
-        config: Its options.
-        robot: The robot.
-    """
+    """Turns an axis through a link's origin towards a point, such as that of a camera."""
 
     Config = LookAtConfig
 
@@ -62,7 +57,6 @@ class LookAt(Task):
         self._goal = np.zeros(3)
 
     def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
-        """See `Task`."""
         point = self._default if goal is None else goal
         if point is None:
             raise ValueError("missing, neither the problem nor the formulation has one")
@@ -94,5 +88,4 @@ class LookAt(Task):
         return Linearization(ratio * across, rows, ZERO, ZERO)
 
     def residual(self, beyond: np.ndarray) -> Residual:
-        """See `Task`."""
         return Residual(0.0, math.hypot(*beyond.tolist()))

@@ -14,7 +14,7 @@ from ik_ros.problem import IKProblem
 
 
 class PostureConfig(TaskConfig):
-    """What this task is told.
+    """Options of this task.
 
     Attributes:
         goal: Position of each joint that counts [rad or m].
@@ -24,12 +24,7 @@ class PostureConfig(TaskConfig):
 
 
 class Posture(JointTask):
-    """Brings joints to given positions; goals of problems have one for each, in the same order.
-
-    Args:
-        config: Its options.
-        robot: The robot.
-    """
+    """Brings joints to given positions; goals of problems have one for each, in the same order."""
 
     Config = PostureConfig
 
@@ -39,7 +34,6 @@ class Posture(JointTask):
         self.bring_to(self._default)
 
     def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
-        """See `Task`."""
         if goal is not None and len(goal) != len(self._default):
             raise ValueError(f"expected {len(self._default)} positions, got {len(goal)}")
         self.bring_to(self._default if goal is None else np.array(goal))

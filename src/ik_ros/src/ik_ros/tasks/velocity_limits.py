@@ -15,7 +15,7 @@ from ik_ros.problem import IKProblem
 
 
 class VelocityLimitsConfig(TaskConfig):
-    """What this task is told.
+    """Options of this task.
 
     Attributes:
         dt_s: Time from the previous solution to this one [s].
@@ -30,12 +30,7 @@ class VelocityLimitsConfig(TaskConfig):
 
 
 class VelocityLimits(JointTask):
-    """Keeps joints as near to the previous solution as their speed allows; without one, they are free.
-
-    Args:
-        config: Its options.
-        robot: The robot.
-    """
+    """Keeps joints as near to the previous solution as their speed allows; without one, they are free."""
 
     Config = VelocityLimitsConfig
 
@@ -45,7 +40,6 @@ class VelocityLimits(JointTask):
         self._way = speeds * config.factor * config.dt_s
 
     def begin(self, problem: IKProblem, goal: Sequence[float] | None, q: np.ndarray) -> None:
-        """See `Task`."""
         super().begin(problem, goal, q)
         last = self.previous(problem, 1)
         self.keep_near(last[0] if last else None, self._way)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
 import casadi
 import numpy as np
 
-from .forward_kinematics import ForwardKinematics, rotation_vector
-from .obstacles import Obstacles
+from ik_ros.chain.description import ChainDescription
+from ik_ros.shape import ShapeConfig
+from rpbi.kinematics.limits import Limits
+
 from .spline import Spline
+from .symbolic import link_frames, rotation_vector, sphere_distances
 
 SAMPLES = 2
 """At so many places in each interval of the spline, obstacles are looked at."""
@@ -31,54 +35,24 @@ OPTIONS: Any = {
 }
 
 
-class Question(NamedTuple):
-    """What a program is asked, over the time from 0 to 1, for n joints, m control points and w waypoints.
-
-    Attributes:
-        start: n positions where it begins, at rest [rad or m].
-        poses: Rotation (9 numbers, by columns) and position (3) of each waypoint, 12 x w.
-        basis: What each control point counts at each waypoint, w x m.
-        tolerance: How far off a waypoint the tip may be, along and about its axes: 6 numbers [m, rad].
-        lower: n lower limits [rad or m].
-        upper: n upper limits.
-        max_velocity: n largest speeds, per unit of time.
-        max_acceleration: n largest accelerations, per unit of time squared.
-        clearance: How far spheres stay away from obstacles [m].
-        guess: m x n control points to start from.
-    """
-
-    start: np.ndarray
-    poses: np.ndarray
-    basis: np.ndarray
-    tolerance: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    max_velocity: np.ndarray
-    max_acceleration: np.ndarray
-    clearance: float
-    guess: np.ndarray
-
-
 class Program:
     """Finds the smoothest splines that pass all waypoints within limits; Ipopt solves it.
 
     Args:
-        kinematics: The chain.
-        obstacles: What it has to stay away from.
-        joints: Number of joints.
+        chain: The chain.
+        shapes: Spheres on its links, and obstacles in the base that they have to stay away from.
         spline: The splines.
         waypoints: Number of waypoints.
     """
 
-    def __init__(
-        self, kinematics: ForwardKinematics, obstacles: Obstacles, joints: int, spline: Spline, waypoints: int
-    ) -> None:
-        self._spline, self._joints = spline, joints
+    def __init__(self, chain: ChainDescription, shapes: Sequence[ShapeConfig], spline: Spline, waypoints: int) -> None:
+        self._spline, self._joints = spline, len(chain.joint_names)
+        joints = self._joints
         points = casadi.MX.sym("points", spline.count, joints)
         poses = casadi.MX.sym("poses", 12, waypoints)
         basis = casadi.MX.sym("basis", waypoints, spline.count)
         q = casadi.SX.sym("q", joints)
-        frames = kinematics.frames(q)
+        frames = link_frames(chain, q)
         pose = casadi.SX.sym("pose", 12)
         rotation, position = list(frames.values())[-1]
         target = casadi.reshape(pose[:9], 3, 3)
@@ -86,12 +60,13 @@ class Program:
         to_off = casadi.Function("off", [q, pose], [off])
         postures = casadi.MX.sym("postures", joints, waypoints)  # unknowns too, so that the Hessian stays sparse
         passed = to_off.map(waypoints)(postures, poses)
-        self._pairs = len(obstacles.pairs)
+        distances = sphere_distances(shapes, frames)
+        self._pairs = len(distances)
         times = np.linspace(0.0, 1.0, SAMPLES * spline.intervals + 1)[1:]
         self._samples = len(times) if self._pairs else 0
         apart = []
         if self._pairs:
-            to_distances = casadi.Function("distances", [q], [casadi.vertcat(*obstacles.distances(frames))])
+            to_distances = casadi.Function("distances", [q], [casadi.vertcat(*distances)])
             sampled = _sparse(spline.basis(times)) @ points
             apart = [casadi.vec(to_distances.map(len(times))(sampled.T))]
         constraints = casadi.vertcat(
@@ -107,33 +82,60 @@ class Program:
         self._solve: Any = casadi.nlpsol("trajectory", "ipopt", nlp, OPTIONS)
         self._waypoints = waypoints
 
-    def solve(self, question: Question) -> tuple[np.ndarray, str]:
-        """Returns m x n control points within limits [rad or m], and how Ipopt says it went."""
+    def solve(
+        self,
+        *,
+        start: np.ndarray,
+        poses: np.ndarray,
+        basis: np.ndarray,
+        tolerance: np.ndarray,
+        limits: Limits,
+        max_velocity: np.ndarray,
+        max_acceleration: np.ndarray,
+        clearance: float,
+        guess: np.ndarray,
+    ) -> tuple[np.ndarray, str]:
+        """Solves it over the time from 0 to 1, for n joints, m control points and w waypoints.
+
+        Args:
+            start: n positions where it begins, at rest [rad or m].
+            poses: Rotation (9 numbers, by columns) and position (3) of each waypoint, 12 x w.
+            basis: What each control point counts at each waypoint, w x m.
+            tolerance: How far off a waypoint the tip may be, along and about its axes: 6 numbers [m, rad].
+            limits: Limits of the n joints.
+            max_velocity: n largest speeds, per unit of time.
+            max_acceleration: n largest accelerations, per unit of time squared.
+            clearance: How far spheres stay away from obstacles [m].
+            guess: m x n control points to start from.
+
+        Returns:
+            m x n control points within limits [rad or m], and how Ipopt says it went.
+        """
         count = self._spline.count
-        lower, upper = np.tile(question.lower, (count, 1)), np.tile(question.upper, (count, 1))
-        lower[:2] = upper[:2] = question.start  # two equal control points are an end at rest
-        speed = np.tile(question.max_velocity, (count - 1, 1))
+        lower, upper = (np.tile(ends, (count, 1)) for ends in (limits.lower, limits.upper))
+        lower[:2] = upper[:2] = start  # two equal control points are an end at rest
+        speed = np.tile(max_velocity, (count - 1, 1))
         speed[-1] = 0.0
-        change = np.tile(question.max_acceleration, (count - 2, 1))
-        tolerance = np.tile(question.tolerance, self._waypoints)
-        clearance = np.full(self._samples * self._pairs, question.clearance + SAFETY_M)
-        postures = (question.basis @ question.guess).ravel()
+        change = np.tile(max_acceleration, (count - 2, 1))
+        allowed = np.tile(tolerance, self._waypoints)
+        apart = np.full(self._samples * self._pairs, clearance + SAFETY_M)
+        postures = (basis @ guess).ravel()
         free = np.full(len(postures), np.inf)
-        most = np.concatenate((speed.T.ravel(), change.T.ravel(), 0.0 * postures, tolerance))
+        most = np.concatenate((speed.T.ravel(), change.T.ravel(), 0.0 * postures, allowed))
         answer = self._solve(
-            x0=np.concatenate((question.guess.T.ravel(), postures)),
-            p=np.concatenate((question.poses.T.ravel(), question.basis.T.ravel())),
+            x0=np.concatenate((guess.T.ravel(), postures)),
+            p=np.concatenate((poses.T.ravel(), basis.T.ravel())),
             lbx=np.concatenate((lower.T.ravel(), -free)),
             ubx=np.concatenate((upper.T.ravel(), free)),
-            lbg=np.concatenate((-most, clearance)),
-            ubg=np.concatenate((most, np.full(len(clearance), np.inf))),
+            lbg=np.concatenate((-most, apart)),
+            ubg=np.concatenate((most, np.full(len(apart), np.inf))),
         )
         points = np.array(answer["x"])[: count * self._joints].reshape(self._joints, count).T
         status = str(self._solve.stats()["return_status"])
         if not np.isfinite(points).all():
-            return np.tile(question.start, (count, 1)), status
+            return np.tile(start, (count, 1)), status
         points[-2] = points[-1]
-        return np.clip(points, question.lower, question.upper), status
+        return np.clip(points, limits.lower, limits.upper), status
 
 
 def _sparse(matrix: np.ndarray) -> casadi.DM:

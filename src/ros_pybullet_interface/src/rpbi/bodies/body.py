@@ -34,6 +34,9 @@ class Body:
     """Whether it has neither links nor a fixed shape."""
     section: ClassVar[str] = "objects"
     """The list of the main YAML file that names objects of this type; that of types from other packages, as a rule."""
+    example: ClassVar[Mapping[str, Any]] = {}
+    """Keys of a YAML, without its name, that asks for all that a body of this type can have in ROS, and follows the TF
+    frame `FRAME` if it can follow one. The reference pages are written from it."""
 
     def __init__(self, pb: Client, name: str, body_id: int) -> None:
         if body_id < 0:

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, Field, ValidationInfo, WithJsonSchema, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from custom_ros_tools.errors import ConfigError
-from custom_ros_tools.plugins import find_class
 from custom_ros_tools.schema import ConfigModel, Expects, InnerProblemsError, KeyedError, ListOf, Name
 from custom_ros_tools.schema.type_names import shown
 from rpbi.config.sensors import SensorConfig
 from rpbi.plugins import config_of
-from rpbi.sensors.body_sensor import BodySensor
+from rpbi.sensors import sensor_class
 
 
 def _sensor_config(entry: Any, info: ValidationInfo) -> SensorConfig:
@@ -24,7 +23,7 @@ def _sensor_config(entry: Any, info: ValidationInfo) -> SensorConfig:
     if not isinstance(kind, str):
         raise ValueError(f"expected a mapping with 'type: module:Class', 'name' and 'hz'; got {shown(entry)}")
     try:
-        model = config_of(find_class(kind, BodySensor), SensorConfig)
+        model = config_of(sensor_class(kind), SensorConfig)
     except ValueError as error:
         raise KeyedError("type", str(error)) from None
     context = info.context or {}
@@ -36,15 +35,8 @@ def _sensor_config(entry: Any, info: ValidationInfo) -> SensorConfig:
 
 SensorEntry = Annotated[
     Any,
-    AfterValidator(_sensor_config),
+    PlainValidator(_sensor_config, json_schema_input_type=SensorConfig),
     Expects("a list of sensors"),  # said of the list; what is wrong with an entry, the validator says
-    WithJsonSchema(
-        {
-            "type": "object",
-            "properties": SensorConfig.model_json_schema()["properties"],
-            "required": ["type", "name", "hz"],
-        }
-    ),
 ]
 """A sensor of another package: `{type: module:Class, name: NAME, hz: RATE, KEY: VALUE, ...}`."""
 

@@ -29,6 +29,12 @@ class CollisionObject(ShapeObject):
 
     Config = CollisionObjectConfig
     section = "collision_objects"
+    example = {
+        "createVisualShape": {"shapeType": "GEOM_SPHERE", "radius": 0.1},
+        "createCollisionShape": {"shapeType": "GEOM_SPHERE", "radius": 0.1},
+        "contacts": {},
+        "object_tf": {"tf_id": "FRAME"},
+    }
 
     def __init__(self, pb: Client, config: CollisionObjectConfig) -> None:
         super().__init__(

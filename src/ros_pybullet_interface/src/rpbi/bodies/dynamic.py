@@ -36,6 +36,14 @@ class DynamicObject(ShapeObject):
 
     Config = DynamicObjectConfig
     section = "dynamic_objects"
+    example = {
+        "createVisualShape": {"shapeType": "GEOM_SPHERE", "radius": 0.1},
+        "createCollisionShape": {"shapeType": "GEOM_SPHERE", "radius": 0.1},
+        "changeDynamics": {},
+        "baseMass": 1.0,
+        "broadcast_hz": 50.0,
+        "contacts": {},
+    }
 
     def __init__(self, pb: Client, config: DynamicObjectConfig) -> None:
         super().__init__(

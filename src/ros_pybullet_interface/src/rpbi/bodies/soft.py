@@ -63,6 +63,7 @@ class SoftObject(Body):
     Config = SoftObjectConfig
     section = "soft_objects"
     is_soft = True
+    example = {"loadSoftBody": {"fileName": "cloth_z_up.obj", "useMassSpring": True}, "contacts": {}}
 
     def __init__(self, pb: Client, config: SoftObjectConfig) -> None:
         if not pb.is_deformable:

@@ -48,6 +48,12 @@ class UrdfObject(Body):
 
     Config = UrdfObjectConfig
     section = "urdfs"
+    example = {
+        "loadURDF": {"fileName": "cube.urdf", "useFixedBase": True},
+        "broadcast_hz": 50.0,
+        "contacts": {},
+        "object_tf": {"tf_id": "FRAME"},
+    }
 
     def __init__(self, pb: Client, config: UrdfObjectConfig) -> None:
         _refuse_soft(config)

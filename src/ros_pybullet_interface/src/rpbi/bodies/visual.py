@@ -26,6 +26,7 @@ class VisualObject(ShapeObject):
 
     Config = VisualObjectConfig
     section = "visual_objects"
+    example = {"createVisualShape": {"shapeType": "GEOM_SPHERE", "radius": 0.1}, "object_tf": {"tf_id": "FRAME"}}
 
     def __init__(self, pb: Client, config: VisualObjectConfig) -> None:
         super().__init__(pb, config.name, config.createVisualShape, object_tf=config.object_tf)

@@ -23,7 +23,7 @@ ASSETS = "example-robot-data"
 
 
 def find_file(name: str, file: str, search_paths: Sequence[str] = ()) -> str:
-    """Return the absolute path of a file that a YAML file names.
+    """Returns the absolute path of a file that a YAML file names.
 
     Looked for beside the YAML file, in the search paths and in PyBullet's data, in this order.
 
@@ -33,7 +33,7 @@ def find_file(name: str, file: str, search_paths: Sequence[str] = ()) -> str:
         search_paths: Further folders.
 
     Raises:
-        ValueError: if there is no such file, or the package is unknown.
+        ValueError: If there is no such file, or the package is unknown.
     """
     path = _resolve_package(name)
     folders = [*search_paths, pybullet_data.getDataPath()]
@@ -63,14 +63,14 @@ def _existing_or_description(name: str, info: ValidationInfo) -> str:
 
 
 def find_folder(name: str, file: str) -> str:
-    """Return the absolute path of a folder that a YAML file names; `find_file` tells how.
+    """Returns the absolute path of a folder that a YAML file names; `find_file` tells how.
 
     Args:
         name: What the YAML file says; `pybullet_data_path` is the folder of PyBullet's data.
         file: The YAML file.
 
     Raises:
-        ValueError: if there is no such folder, or the package is unknown.
+        ValueError: If there is no such folder, or the package is unknown.
     """
     if name == PYBULLET_DATA_PATH:
         return str(pybullet_data.getDataPath())

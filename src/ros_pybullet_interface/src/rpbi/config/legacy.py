@@ -44,8 +44,14 @@ NO_EFFECT: dict[str, dict[str, str]] = {
 """By section: a key that older worlds carry and that does nothing here, and what to do instead."""
 
 
+def old_keys(section: str) -> dict[str, str]:
+    """Returns what to do about each key of older worlds, by key; `object_tf.offset` is inside of a mapping."""
+    spellings = {old: f"Old spelling: write {new}." for old, new in LEGACY_KEYS.get(section, {}).items()}
+    return {**spellings, **{key: f"No effect: {advice}." for key, advice in NO_EFFECT.get(section, {}).items()}}
+
+
 def modernise(section: str, data: Mapping[str, Any], file: str) -> tuple[dict[str, Any], dict[str, str], list[Problem]]:
-    """Bring a mapping up to date, with a logged warning for each key that was changed or has no effect.
+    """Brings a mapping up to date, with a logged warning for each key that was changed or has no effect.
 
     Args:
         section: `"main"`, or the list of the main file that names the object's file.
@@ -75,7 +81,7 @@ def modernise(section: str, data: Mapping[str, Any], file: str) -> tuple[dict[st
 
 
 def _take(data: dict[str, Any], key: str) -> Any:
-    """Remove a key, or one of an inner mapping (`object_tf.offset`), and return its value, None if absent."""
+    """Removes a key, or one of an inner mapping (`object_tf.offset`), and returns its value, None if absent."""
     if key in data:
         return data.pop(key)
     outer, _, inner = key.partition(".")

@@ -14,9 +14,9 @@ from custom_ros_tools.errors import ConfigError, Problem
 from .asset_files import ROBOT_DESCRIPTION, find_file, find_folder
 from .legacy import MAIN
 from .object_entry import ObjectEntry, parse_object_entry
-from .objects import BodyType, ObjectConfig, load_object, name_in, parse_section, sections_of, type_of
+from .objects import ObjectConfig, load_object, name_in, object_sections, parse_section, type_of
 from .sensors import FIRST_TOPIC_NAME, RgbdSensorConfig
-from .world import WorldConfig
+from .world import WorldConfig, main_file_model
 
 __all__ = ["LoadedWorld", "ObjectConfig", "WorldConfig", "load_object", "load_world", "load_world_dict", "type_of"]
 
@@ -55,38 +55,31 @@ class LoadedWorld:
     cameras: tuple[CameraConfig, ...] = ()
 
 
-def load_world(path: str, body_types: Mapping[str, BodyType], robot_description: str | None = None) -> LoadedWorld:
-    """Read a main YAML file and all files that it names.
+def load_world(path: str, robot_description: str | None = None) -> LoadedWorld:
+    """Reads a main YAML file and all files that it names.
 
     Args:
         path: The main file; `{package}/path` and `package://package/path` are resolved.
-        body_types: The classes of bodies by type, in the order of loading.
         robot_description: File that the word `robot_description` stands for; without it, the word stays.
 
     Raises:
-        ConfigError: with all problems of all files.
+        ConfigError: With all problems of all files.
     """
-    return _Reader(load_config(path), path, replace_package(path), body_types, robot_description).read()
+    return _Reader(load_config(path), path, replace_package(path), robot_description).read()
 
 
-def load_world_dict(
-    data: Mapping[str, Any],
-    file: str,
-    body_types: Mapping[str, BodyType],
-    robot_description: str | None = None,
-) -> LoadedWorld:
-    """Do the same as `load_world` with a main file that has been read already.
+def load_world_dict(data: Mapping[str, Any], file: str, robot_description: str | None = None) -> LoadedWorld:
+    """Does the same as `load_world` with a main file that has been read already.
 
     Args:
         data: What the main file says; it is not changed.
         file: Its name; `"~config"`, which has no folder, if it came from the parameter server.
-        body_types: The classes of bodies by type, in the order of loading.
         robot_description: File that the word `robot_description` stands for; without it, the word stays.
 
     Raises:
-        ConfigError: with all problems of all files.
+        ConfigError: With all problems of all files.
     """
-    return _Reader(data, file, file, body_types, robot_description).read()
+    return _Reader(data, file, file, robot_description).read()
 
 
 class _Reader:
@@ -96,47 +89,40 @@ class _Reader:
         data: What the main file says.
         file: Name of the main file, for messages.
         path: Where it is.
-        body_types: The classes of bodies by type.
         robot_description: File of the robot description, if there is one.
     """
 
-    def __init__(
-        self,
-        data: Mapping[str, Any],
-        file: str,
-        path: str,
-        body_types: Mapping[str, BodyType],
-        robot_description: str | None,
-    ) -> None:
+    def __init__(self, data: Mapping[str, Any], file: str, path: str, robot_description: str | None) -> None:
         self._data = data
         self._file = file
         self._path = path
-        self._body_types = body_types
         self._robot_description = robot_description
         self._problems: list[Problem] = []
         self._owner_of: dict[str, str] = {}
 
     def read(self) -> LoadedWorld:
-        """Return the world, or raise a ConfigError with all problems."""
+        """Returns the world, or raise a ConfigError with all problems."""
         try:
-            config = parse_section(MAIN, self._data, self._file, WorldConfig, {"file": self._path})
+            model = main_file_model(object_sections())
+            content = parse_section(MAIN, self._data, self._file, model, {"file": self._path})
         except ConfigError as error:
             self._problems += error.problems
         objects = tuple(self._objects()) if isinstance(self._data, Mapping) else ()
         further = tuple(self._further_cameras()) if isinstance(self._data, Mapping) else ()
         if self._problems:
             raise ConfigError(self._problems)
+        config = WorldConfig.from_main_file(content)
         first = () if config.rgbd_sensor is None else (CameraConfig(config.rgbd_sensor, self._file),)
         if config.step_pybullet_manually:
             log.info("%s: step_pybullet_manually: has no effect: every step is explicit", self._file)
         return LoadedWorld(config, objects, self._file, first + further)
 
     def _objects(self) -> Iterator[ObjectConfig]:
-        for section in sections_of(self._body_types):
+        for section in object_sections():
             for data, file, context in self._files(section):
                 with self._noting_problems(file):
-                    kind = type_of(section, data, self._body_types)
-                    yield ObjectConfig(kind, load_object(kind, data, file, self._body_types, context), file)
+                    kind = type_of(section, data)
+                    yield ObjectConfig(kind, load_object(kind, data, file, context), file)
         self._claim_name(self._data.get("rgbd_sensor"), self._file, "rgbd_sensor.name")
 
     def _further_cameras(self) -> Iterator[CameraConfig]:
@@ -150,7 +136,7 @@ class _Reader:
                 yield CameraConfig(RgbdSensorConfig.parse(data, file), file)
 
     def _files(self, section: str) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
-        """Yield what each file of a list says, what to call it, and the context of reading it; note its name."""
+        """Yields what each file of a list says, what to call it, and the context of reading it; notes its name."""
         search_paths = self._search_paths()
         for index, entry in _object_entries(self._data.get(section)):
             key = f"{section}[{index}]"
@@ -174,7 +160,7 @@ class _Reader:
             self._problems += [Problem(file, problem.key, problem.message) for problem in error.problems]
 
     def _claim_name(self, data: Any, file: str, key: str) -> None:
-        """Note the name of an object, so that no other has it."""
+        """Notes the name of an object, so that no other has it."""
         name = name_in(data)
         if name in self._owner_of:
             message = f"'{name}' is taken by {self._owner_of[name]}; names are unique in a world"
@@ -183,23 +169,17 @@ class _Reader:
             self._owner_of[name] = file
 
     def _search_paths(self) -> tuple[str, ...]:
-        """Return the search paths that exist, also when something else in the main file is wrong."""
+        """Returns the search paths that exist, also when something else in the main file is wrong."""
         given = self._data.get("setAdditionalSearchPath")
         found: list[str] = []
-        for _, name in _texts([given] if isinstance(given, str) else given):
+        for name in [given] if isinstance(given, str) else given if isinstance(given, (list, tuple)) else ():
             with contextlib.suppress(ValueError):  # it is reported with the main file
-                found.append(find_folder(name, self._path))
+                found += [find_folder(name, self._path)] if isinstance(name, str) and name else []
         return tuple(found)
 
 
 def _object_entries(given: Any) -> Iterator[tuple[int, ObjectEntry]]:
-    """Yield the entries of a list of objects with their indices; others are reported by the model."""
+    """Yields the entries of a list of objects with their indices; others are reported by the model."""
     for index, entry in enumerate(given if isinstance(given, (list, tuple)) else ()):
         with contextlib.suppress(ValueError):
             yield index, parse_object_entry(entry)
-
-
-def _texts(given: Any) -> list[tuple[int, str]]:
-    """Return the texts in a list with their indices; what is neither is reported by the model."""
-    entries = given if isinstance(given, (list, tuple)) else []
-    return [(index, entry) for index, entry in enumerate(entries) if isinstance(entry, str) and entry]

@@ -63,17 +63,11 @@ def _check(entry: Any) -> Any:
     return entry
 
 
-ObjectEntryYaml = Annotated[
+FILES = "a list of files"
+FileOrOverrides = Annotated[
     Any,
     AfterValidator(_check),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "string"},
-                {"type": "object", "properties": {FILE: {"type": "string"}}, "required": [FILE]},
-            ]
-        }
-    ),
-    Expects("a list of files"),  # said of the list; what is wrong with an entry, the validator says
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "object", "required": [FILE]}]}),
+    Expects(FILES),  # said of the list; what is wrong with an entry, the validator says
 ]
 """A file of an object, or `{file: FILE, KEY: VALUE, ...}`."""

@@ -5,13 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from custom_ros_tools.errors import ConfigError, Problem, hint
-from custom_ros_tools.plugins import find_class
 from custom_ros_tools.schema import ConfigModel
-from rpbi.bodies.body import Body
-from rpbi.bodies.body_config import BodyConfig
+from rpbi.bodies import BODY_TYPES, Body, BodyConfig, body_class
 from rpbi.plugins import config_of
 
 from .legacy import modernise
@@ -26,25 +24,6 @@ OWN_TYPES = Body.section
 """List of the main file for objects whose files tell their type themselves."""
 TYPE = "type"
 """Key of an object's file for that: a key of the table of body types, or `module:Class`."""
-
-
-class BodyType(Protocol):
-    """What this module asks of a class of bodies."""
-
-    @property
-    def Config(self) -> type[BodyConfig]:  # noqa: N802
-        """Model of its YAML file."""
-
-    @property
-    def section(self) -> str:
-        """List of the main file that names its files."""
-
-    @property
-    def is_soft(self) -> bool:
-        """Whether it may be tied to bodies of other types, which therefore come first."""
-
-    def claims(self, data: Mapping[str, Any], /) -> bool:
-        """Tells whether a YAML of that list is one of this type."""
 
 
 @dataclass(frozen=True)
@@ -62,55 +41,49 @@ class ObjectConfig:
     file: str
 
 
-def sections_of(body_types: Mapping[str, BodyType]) -> list[str]:
-    """Return the lists of the main file that name objects, in the order in which they are loaded."""
-    rigid = [body_type.section for body_type in body_types.values() if not body_type.is_soft]
-    soft = [body_type.section for body_type in body_types.values() if body_type.is_soft]
-    return list(dict.fromkeys([*rigid, OWN_TYPES, *soft]))
+def object_sections() -> dict[str, type[BodyConfig]]:
+    """Returns the lists of the main file that name objects, in the order of loading, each with its model."""
+    rigid: dict[str, type[BodyConfig]] = {}
+    soft: dict[str, type[BodyConfig]] = {}
+    for body_type in BODY_TYPES.values():
+        (soft if body_type.is_soft else rigid).setdefault(body_type.section, body_type.Config)
+    return {**rigid, OWN_TYPES: BodyConfig, **soft}
 
 
-def type_of(section: str, data: Any, body_types: Mapping[str, BodyType]) -> str:
-    """Return the type of an object: what it says itself, else what the list of the main file says that names it.
+def type_of(section: str, data: Any) -> str:
+    """Returns the type of an object: what it says itself, else what the list of the main file says that names it.
 
     Args:
         section: The list, such as `robots`.
         data: What the object's file says; if it is no mapping, any type of the list will do to say so.
-        body_types: The classes of bodies by type.
     """
     given = data.get(TYPE) if isinstance(data, Mapping) else None
     if given is not None or section == OWN_TYPES:
         return str(given or "")
-    of_section = [kind for kind, body_type in body_types.items() if body_type.section == section]
+    of_section = [kind for kind, body_type in BODY_TYPES.items() if body_type.section == section]
     if isinstance(data, Mapping):
-        return next((kind for kind in of_section if body_types[kind].claims(data)), of_section[0])
+        return next((kind for kind in of_section if BODY_TYPES[kind].claims(data)), of_section[0])
     return of_section[0]
 
 
-def load_object(
-    kind: str,
-    data: Mapping[str, Any],
-    file: str,
-    body_types: Mapping[str, BodyType],
-    context: Mapping[str, Any] | None = None,
-) -> BodyConfig:
-    """Validate one object.
+def load_object(kind: str, data: Mapping[str, Any], file: str, context: Mapping[str, Any] | None = None) -> BodyConfig:
+    """Validates one object.
 
     Args:
-        kind: Key of its class in `body_types`, or `module:Class`.
+        kind: Key of BODY_TYPES, or `module:Class`.
         data: What its file says; it is not changed.
         file: Name of that file.
-        body_types: The classes of bodies by type.
         context: For files: `file` (the path, if `file` is not it), `search_paths`, `robot_description`.
 
     Raises:
-        ConfigError: with all of its problems; one of them may be that there is no such type.
+        ConfigError: With all of its problems; one of them may be that there is no such type.
     """
     problems = [Problem(file, "name", f"'{RESERVED_NAME}' is reserved")] if name_in(data) == RESERVED_NAME else []
     try:
-        body_type = _body_type(kind, file, body_types)
+        section, model = _section_and_model(kind, file)
         if isinstance(data, Mapping):
             data = {key: value for key, value in data.items() if key != TYPE}
-        config = parse_section(body_type.section, data, file, body_type.Config, context or {})
+        config = parse_section(section, data, file, model, context or {})
     except ConfigError as error:
         problems += error.problems
     if problems:
@@ -118,25 +91,22 @@ def load_object(
     return config
 
 
-def _body_type(kind: str, file: str, body_types: Mapping[str, BodyType]) -> BodyType:
-    if kind in body_types:
-        return body_types[kind]
-    if ":" not in kind:
-        known = f"expected 'module:Class', or one of {', '.join(body_types)}"
-        message = f"unknown object type '{kind}'{hint(kind, body_types)}" if kind else known
+def _section_and_model(kind: str, file: str) -> tuple[str, type[BodyConfig]]:
+    if kind not in BODY_TYPES and ":" not in kind:
+        known = f"expected 'module:Class', or one of {', '.join(BODY_TYPES)}"
+        message = f"unknown object type '{kind}'{hint(kind, BODY_TYPES)}" if kind else known
         raise ConfigError([Problem(file, TYPE, message)])
     try:
-        found = find_class(kind, Body)
-        config_of(found, BodyConfig)
+        found = body_class(kind)
+        return found.section, config_of(found, BodyConfig)
     except ValueError as error:
         raise ConfigError([Problem(file, TYPE, str(error))]) from None
-    return found
 
 
 def parse_section(
     section: str, data: Mapping[str, Any], file: str, model: type[_Model], context: Mapping[str, Any]
 ) -> _Model:
-    """Validate a mapping, old spellings included; problems name the key as the user spelt it."""
+    """Validates a mapping, old spellings included; problems name the key as the user spelt it."""
     if not isinstance(data, Mapping):
         return model.parse(data, file)
     current, spellings, problems = modernise(section, data, file)
@@ -158,6 +128,6 @@ def _respelt(key: str, spellings: Mapping[str, str]) -> str:
 
 
 def name_in(data: Any) -> str | None:
-    """Return the name that an object goes by, if it has any."""
+    """Returns the name that an object goes by, if it has any."""
     name = data.get("name") if isinstance(data, Mapping) else None
     return name if isinstance(name, str) else None

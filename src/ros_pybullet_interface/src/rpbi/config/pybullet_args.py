@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import reduce
+from operator import or_
 from typing import Any
 
 import pybullet
@@ -11,7 +13,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from custom_ros_tools.errors import hint
-from custom_ros_tools.schema.type_names import shown
+from custom_ros_tools.schema.type_names import shown, type_name
 
 
 @dataclass(frozen=True)
@@ -29,23 +31,19 @@ class Constants:
     names: tuple[str, ...]
 
     def parse(self, given: Any) -> int:
-        """Return the number of one constant.
+        """Returns the number of one constant.
 
         Args:
             given: Its name or number.
 
         Raises:
-            ValueError: if it is not of this family.
+            ValueError: If it is not of this family.
         """
         if isinstance(given, str):
             return self._named(given.strip())
         if isinstance(given, int) and not isinstance(given, bool) and given in map(self._named, self.names):
             return given
-        raise ValueError(f"expected {self.in_words()}, got {shown(given)}")
-
-    def in_words(self) -> str:
-        """Return what is expected, for messages."""
-        return f"a {self.kind} ({', '.join(self.names)})"
+        raise ValueError(f"expected {type_name(self.schema())}, got {shown(given)}")
 
     def _named(self, name: str) -> int:
         if name not in self.names:
@@ -56,18 +54,16 @@ class Constants:
         return core_schema.no_info_before_validator_function(self.parse, handler(source))
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"kind": self.kind, "anyOf": [self._name_schema(), self._number_schema()]}
+        return self.schema()
+
+    def schema(self) -> dict[str, Any]:
+        """Returns the JSON Schema of what is taken."""
+        return {"kind": self.kind, "enum": [*self.names, *sorted(set(map(self._named, self.names)))]}
 
     def one_or_several_schema(self) -> dict[str, Any]:
         """Returns the JSON Schema of one name, of names as `A|B`, or of one number."""
         several = {"type": "string", "pattern": r"^\s*[A-Z]\w*\s*(\|\s*[A-Z]\w*\s*)+$"}
-        return {"kind": self.kind, "anyOf": [self._name_schema(), several, self._number_schema()]}
-
-    def _name_schema(self) -> dict[str, Any]:
-        return {"type": "string", "enum": list(self.names)}
-
-    def _number_schema(self) -> dict[str, Any]:
-        return {"type": "integer", "enum": sorted(set(map(self._named, self.names)))}
+        return {"kind": self.kind, "anyOf": [{"enum": list(self.names)}, several, {"type": "integer", "minimum": 0}]}
 
 
 @dataclass(frozen=True)
@@ -75,39 +71,29 @@ class Flags(Constants):
     """A family of PyBullet constants that are bits: `A|B`, a list of names and numbers, or one number."""
 
     def parse(self, given: Any) -> int:
-        """Return the numbers of all constants, or-ed.
+        """Returns the numbers of all constants, or-ed.
 
         Args:
             given: `"A|B"`, a number, or a list of both.
 
         Raises:
-            ValueError: if one of them is not of this family.
+            ValueError: If one of them is not of this family.
         """
         if isinstance(given, str):
-            return self._union(self._named(name.strip()) for name in given.split("|"))
+            return _union(self._named(name.strip()) for name in given.split("|"))
         if isinstance(given, (list, tuple)):
-            return self._union(map(self.parse, given))
+            return _union(map(self.parse, given))
         if isinstance(given, int) and not isinstance(given, bool) and given >= 0:
             return given
-        raise ValueError(f"expected {self.in_words()}, got {shown(given)}")
+        raise ValueError(f"expected {type_name(self.schema())}, got {shown(given)}")
 
-    def in_words(self) -> str:
-        """Return what is expected, for messages."""
-        return f"{self.kind}s such as {'|'.join(self.names[:2])}"
-
-    @staticmethod
-    def _union(values: Iterable[int]) -> int:
-        result = 0
-        for value in values:
-            result |= value
-        return result
-
-    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def schema(self) -> dict[str, Any]:
         one = self.one_or_several_schema()
-        return {"kind": self.kind, "anyOf": [*one["anyOf"], {"type": "array", "items": one}]}
+        return {**one, "anyOf": [*one["anyOf"], {"type": "array", "items": one}]}
 
-    def _number_schema(self) -> dict[str, Any]:
-        return {"type": "integer", "minimum": 0}
+
+def _union(values: Iterable[int]) -> int:
+    return reduce(or_, values, 0)
 
 
 def _starting_with(prefix: str) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ it takes each of them, with values of that type.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
@@ -24,6 +24,7 @@ from custom_ros_tools.schema import (
     ListOf,
     Metres,
     NonNegative,
+    NonNegativeMetres,
     Position,
     Positive,
     PositiveMetres,
@@ -33,6 +34,7 @@ from custom_ros_tools.schema import (
     Switch,
     Unit,
     Vec3,
+    optional,
 )
 
 from .asset_files import ExistingFile, RobotFile
@@ -66,7 +68,7 @@ class PybulletModel(ConfigModel):
     """Keyword arguments of one PyBullet function."""
 
     def kwargs(self) -> dict[str, Any]:
-        """Return the arguments that the user wrote, with constants as numbers."""
+        """Returns the arguments that the user wrote, with constants as numbers."""
         return self.model_dump(exclude_unset=True, exclude_none=True)
 
 
@@ -74,106 +76,95 @@ class LoadURDF(PybulletModel):
     """Where a robot description is and how it is put into the world."""
 
     fileName: RobotFile = Field(description="URDF file, or the word `robot_description` for the parameter.")
-    basePosition: Position | None = Field(None, description="Position of the base in the world.")
-    baseOrientation: Quat | None = Field(None, description="Orientation of the base in the world as x, y, z, w.")
-    useFixedBase: Switch | None = Field(None, description="Whether the base is fixed to the world.")
-    useMaximalCoordinates: Switch | None = Field(None, description="Whether joints are solved as constraints.")
-    flags: Annotated[int, URDF_FLAGS] | None = Field(None, description="URDF_... flags.")
-    globalScaling: Positive | None = Field(None, description="Factor on all lengths.")
+    basePosition: Position | None = optional("Position of the base in the world.")
+    baseOrientation: Quat | None = optional("Orientation of the base in the world as x, y, z, w.")
+    useFixedBase: Switch | None = optional("Whether the base is fixed to the world.")
+    useMaximalCoordinates: Switch | None = optional("Whether joints are solved as constraints.")
+    flags: Annotated[int, URDF_FLAGS] | None = optional("URDF_... flags.")
+    globalScaling: Positive | None = optional("Factor on all lengths.")
 
 
-class CreateVisualShape(PybulletModel):
+class _CreateShape(PybulletModel):
+    """What shapes to see and to feel have in common."""
+
+    shapeType: Annotated[int, SHAPE_TYPES] = Field(description="GEOM_... constant.")
+    radius: PositiveMetres | None = optional("Radius of a sphere, capsule or cylinder.")
+    halfExtents: HalfExtents | None = optional("Half the edge lengths of a box.")
+    fileName: ExistingFile | None = optional("Mesh file; of a shape to feel, also the file of a height field.")
+    meshScale: Vec3 | None = optional("Factors on a mesh along x, y and z.")
+    planeNormal: Direction | None = optional("Normal of a plane.")
+    vertices: ListOf[Position] | None = optional("Corners of a mesh that has no file.")
+    indices: ListOf[Count] | None = optional("Corner numbers of its triangles.")
+
+    @model_validator(mode="after")
+    def _mesh_has_a_source(self) -> Self:
+        return self._require("GEOM_MESH", "fileName", "vertices")
+
+    def _require(self, shape: str, *sources: str) -> Self:
+        if self.shapeType == SHAPE_TYPES.parse(shape) and all(getattr(self, key) is None for key in sources):
+            raise KeyedError(sources[0], f"missing, {shape} needs {' or '.join(sources)}")
+        return self
+
+
+class CreateVisualShape(_CreateShape):
     """What an object looks like."""
 
-    shapeType: Annotated[int, SHAPE_TYPES] = Field(description="GEOM_... constant.")
-    radius: PositiveMetres | None = Field(None, description="Radius of a sphere, capsule or cylinder.")
-    halfExtents: HalfExtents | None = Field(None, description="Half the edge lengths of a box.")
-    length: PositiveMetres | None = Field(None, description="Length of a capsule or cylinder.")
-    fileName: ExistingFile | None = Field(None, description="Mesh file.")
-    meshScale: Vec3 | None = Field(None, description="Factors on a mesh along x, y and z.")
-    planeNormal: Direction | None = Field(None, description="Normal of a plane.")
-    flags: Annotated[int, VISUAL_SHAPE_FLAGS] | None = Field(None, description="VISUAL_SHAPE_... flags.")
-    rgbaColor: Rgba | None = Field(None, description="Colour and opacity, each from 0 to 1.")
-    specularColor: Rgb | None = Field(None, description="Colour of highlights, each from 0 to 1.")
-    visualFramePosition: Position | None = Field(None, description="Position of the shape in the body's frame.")
-    visualFrameOrientation: Quat | None = Field(None, description="Orientation in the body's frame as x, y, z, w.")
-    vertices: ListOf[Position] | None = Field(None, description="Corners of a mesh that has no file.")
-    indices: ListOf[Count] | None = Field(None, description="Corner numbers of its triangles.")
-    normals: ListOf[Vec3] | None = Field(None, description="Normals at its corners.")
-    uvs: ListOf[Annotated[tuple[float, float], Field(strict=False)]] | None = Field(
-        None, description="Texture coordinates at its corners."
-    )
-
-    @model_validator(mode="after")
-    def _mesh_has_a_source(self) -> CreateVisualShape:
-        _require(self, "GEOM_MESH", "fileName", "vertices")
-        return self
+    length: PositiveMetres | None = optional("Length of a capsule or cylinder.")
+    flags: Annotated[int, VISUAL_SHAPE_FLAGS] | None = optional("VISUAL_SHAPE_... flags.")
+    rgbaColor: Rgba | None = optional("Colour and opacity, each from 0 to 1.")
+    specularColor: Rgb | None = optional("Colour of highlights, each from 0 to 1.")
+    visualFramePosition: Position | None = optional("Position of the shape in the body's frame.")
+    visualFrameOrientation: Quat | None = optional("Orientation in the body's frame as x, y, z, w.")
+    normals: ListOf[Vec3] | None = optional("Normals at the corners of a mesh.")
+    uvs: ListOf[Annotated[tuple[float, float], Field(strict=False)]] | None = optional("Texture coordinates there.")
 
 
-class CreateCollisionShape(PybulletModel):
+class CreateCollisionShape(_CreateShape):
     """What an object feels like."""
 
-    shapeType: Annotated[int, SHAPE_TYPES] = Field(description="GEOM_... constant.")
-    radius: PositiveMetres | None = Field(None, description="Radius of a sphere, capsule or cylinder.")
-    halfExtents: HalfExtents | None = Field(None, description="Half the edge lengths of a box.")
-    height: PositiveMetres | None = Field(None, description="Length of a capsule or cylinder.")
-    fileName: ExistingFile | None = Field(None, description="Mesh or height field file.")
-    meshScale: Vec3 | None = Field(None, description="Factors on a mesh along x, y and z.")
-    planeNormal: Direction | None = Field(None, description="Normal of a plane.")
-    flags: Annotated[int, COLLISION_SHAPE_FLAGS] | None = Field(None, description="GEOM_... flags.")
-    collisionFramePosition: Position | None = Field(None, description="Position of the shape in the body's frame.")
-    collisionFrameOrientation: Quat | None = Field(None, description="Orientation in the body's frame as x, y, z, w.")
-    vertices: ListOf[Position] | None = Field(None, description="Corners of a mesh that has no file.")
-    indices: ListOf[Count] | None = Field(None, description="Corner numbers of its triangles.")
-    heightfieldTextureScaling: Positive | None = Field(None, description="Repetitions of a height field's texture.")
-    heightfieldData: ListOf[Metres] | None = Field(None, description="Heights, row by row.")
-    numHeightfieldRows: Count | None = Field(None, description="Rows of the height field.")
-    numHeightfieldColumns: Count | None = Field(None, description="Columns of the height field.")
+    height: PositiveMetres | None = optional("Length of a capsule or cylinder.")
+    flags: Annotated[int, COLLISION_SHAPE_FLAGS] | None = optional("GEOM_... flags.")
+    collisionFramePosition: Position | None = optional("Position of the shape in the body's frame.")
+    collisionFrameOrientation: Quat | None = optional("Orientation in the body's frame as x, y, z, w.")
+    heightfieldTextureScaling: Positive | None = optional("Repetitions of a height field's texture.")
+    heightfieldData: ListOf[Metres] | None = optional("Heights, row by row.")
+    numHeightfieldRows: Count | None = optional("Rows of the height field.")
+    numHeightfieldColumns: Count | None = optional("Columns of the height field.")
 
     @model_validator(mode="after")
-    def _mesh_has_a_source(self) -> CreateCollisionShape:
-        _require(self, "GEOM_MESH", "fileName", "vertices")
-        _require(self, "GEOM_HEIGHTFIELD", "fileName", "heightfieldData")
-        return self
+    def _height_field_has_a_source(self) -> Self:
+        return self._require("GEOM_HEIGHTFIELD", "fileName", "heightfieldData")
 
 
 class ChangeDynamics(PybulletModel):
     """How a body behaves in contact and motion."""
 
-    mass: Kilograms | None = Field(None, description="Mass of the base link.")
-    lateralFriction: NonNegative | None = Field(None, description="Coulomb friction coefficient.")
-    spinningFriction: NonNegative | None = Field(None, description="Friction about the contact normal.")
-    rollingFriction: NonNegative | None = Field(None, description="Friction against rolling.")
-    restitution: NonNegative | None = Field(None, description="Bounciness; 0 does not bounce, 1 keeps all energy.")
-    linearDamping: NonNegative | None = Field(None, description="Share of linear velocity lost.")
-    angularDamping: NonNegative | None = Field(None, description="Share of angular velocity lost.")
-    contactStiffness: Annotated[NonNegative, Unit("N/m")] | None = Field(None, description="Stiffness of contacts.")
-    contactDamping: Annotated[NonNegative, Unit("N s/m")] | None = Field(None, description="Damping of contacts.")
-    frictionAnchor: Switch | None = Field(None, description="Whether friction drift is corrected.")
+    mass: Kilograms | None = optional("Mass of the base link.")
+    lateralFriction: NonNegative | None = optional("Coulomb friction coefficient.")
+    spinningFriction: NonNegative | None = optional("Friction about the contact normal.")
+    rollingFriction: NonNegative | None = optional("Friction against rolling.")
+    restitution: NonNegative | None = optional("Bounciness; 0 does not bounce, 1 keeps all energy.")
+    linearDamping: NonNegative | None = optional("Share of linear velocity lost.")
+    angularDamping: NonNegative | None = optional("Share of angular velocity lost.")
+    contactStiffness: Annotated[NonNegative, Unit("N/m")] | None = optional("Stiffness of contacts.")
+    contactDamping: Annotated[NonNegative, Unit("N s/m")] | None = optional("Damping of contacts.")
+    frictionAnchor: Switch | None = optional("Whether friction drift is corrected.")
     localInertiaDiagonal: (
         Annotated[tuple[NonNegative, NonNegative, NonNegative], Field(strict=False), Unit("kg m^2")] | None
-    ) = Field(None, description="Principal moments of inertia of the base link.")
-    ccdSweptSphereRadius: Annotated[NonNegative, Unit("m")] | None = Field(
-        None, description="Radius of the sphere for continuous collision detection."
+    ) = optional("Principal moments of inertia of the base link.")
+    ccdSweptSphereRadius: NonNegativeMetres | None = optional(
+        "Radius of the sphere for continuous collision detection."
     )
-    contactProcessingThreshold: Annotated[NonNegative, Unit("m")] | None = Field(
-        None, description="Distance below which contacts are solved."
-    )
-    activationState: Annotated[int, ACTIVATION_STATES] | None = Field(None, description="ACTIVATION_STATE_... flags.")
-    jointDamping: Annotated[NonNegative, Unit("N m s/rad or N s/m")] | None = Field(
-        None, description="Damping of the joint."
-    )
-    anisotropicFriction: Vec3 | None = Field(None, description="Factors on friction along x, y and z.")
-    maxJointVelocity: Annotated[Positive, Unit("rad/s or m/s")] | None = Field(
-        None, description="Largest velocity of the joint."
-    )
-    collisionMargin: Annotated[NonNegative, Unit("m")] | None = Field(None, description="Margin around the shape.")
-    jointLowerLimit: Annotated[float, Unit("rad or m")] | None = Field(None, description="Lower limit of the joint.")
-    jointUpperLimit: Annotated[float, Unit("rad or m")] | None = Field(None, description="Upper limit of the joint.")
-    jointLimitForce: Annotated[NonNegative, Unit("N m or N")] | None = Field(
-        None, description="Largest effort at the joint's limits."
-    )
-    sleepThreshold: NonNegative | None = Field(None, description="Motion below which the body may sleep.")
+    contactProcessingThreshold: NonNegativeMetres | None = optional("Distance below which contacts are solved.")
+    activationState: Annotated[int, ACTIVATION_STATES] | None = optional("ACTIVATION_STATE_... flags.")
+    jointDamping: Annotated[NonNegative, Unit("N m s/rad or N s/m")] | None = optional("Damping of the joint.")
+    anisotropicFriction: Vec3 | None = optional("Factors on friction along x, y and z.")
+    maxJointVelocity: Annotated[Positive, Unit("rad/s or m/s")] | None = optional("Largest velocity of the joint.")
+    collisionMargin: NonNegativeMetres | None = optional("Margin around the shape.")
+    jointLowerLimit: Annotated[float, Unit("rad or m")] | None = optional("Lower limit of the joint.")
+    jointUpperLimit: Annotated[float, Unit("rad or m")] | None = optional("Upper limit of the joint.")
+    jointLimitForce: Annotated[NonNegative, Unit("N m or N")] | None = optional("Largest effort at the joint's limits.")
+    sleepThreshold: NonNegative | None = optional("Motion below which the body may sleep.")
 
     @model_validator(mode="after")
     def _stiffness_and_damping_together(self) -> ChangeDynamics:
@@ -187,16 +178,16 @@ class ChangeDynamics(PybulletModel):
 class ResetBaseVelocity(PybulletModel):
     """How a body moves at the start."""
 
-    linearVelocity: Annotated[Vec3, Unit("m/s")] | None = Field(None, description="Velocity in the world.")
-    angularVelocity: Annotated[Vec3, Unit("rad/s")] | None = Field(None, description="Rotation in the world.")
+    linearVelocity: Annotated[Vec3, Unit("m/s")] | None = optional("Velocity in the world.")
+    angularVelocity: Annotated[Vec3, Unit("rad/s")] | None = optional("Rotation in the world.")
 
 
 class SetJointMotorControlArray(PybulletModel):
     """How the motors of a robot follow their targets."""
 
     controlMode: Annotated[int, CONTROL_MODES] = Field(description="What the targets are.")
-    positionGains: Gains | None = Field(None, description="Position gain: one, one of each driven joint, or by joint.")
-    velocityGains: Gains | None = Field(None, description="Velocity gain: one, one of each driven joint, or by joint.")
+    positionGains: Gains | None = optional("Position gain: one, one of each driven joint, or by joint.")
+    velocityGains: Gains | None = optional("Velocity gain: one, one of each driven joint, or by joint.")
 
 
 class ObjectTf(ConfigModel):
@@ -204,8 +195,3 @@ class ObjectTf(ConfigModel):
 
     tf_id: FrameId = Field(description="Name of the frame.")
     hz: Hz = Field(30.0, description="How often to look.")
-
-
-def _require(model: CreateVisualShape | CreateCollisionShape, shape: str, *sources: str) -> None:
-    if model.shapeType == SHAPE_TYPES.parse(shape) and all(getattr(model, key) is None for key in sources):
-        raise KeyedError(sources[0], f"missing, {shape} needs {' or '.join(sources)}")

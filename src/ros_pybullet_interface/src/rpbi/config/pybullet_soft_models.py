@@ -14,6 +14,7 @@ from custom_ros_tools.schema import (
     Kilograms,
     Metres,
     NonNegative,
+    NonNegativeMetres,
     Position,
     Positive,
     Quat,
@@ -22,6 +23,7 @@ from custom_ros_tools.schema import (
     Switch,
     Text,
     Unit,
+    optional,
 )
 from custom_ros_tools.schema.type_names import shown
 
@@ -36,39 +38,35 @@ class LoadSoftBody(PybulletModel):
     """A soft body: its mesh, where it is put, and what it is made of."""
 
     fileName: ExistingFile = Field(description="Mesh: tetrahedra (.vtk) or a surface (.obj).")
-    simFileName: ExistingFile | None = Field(
-        None, description="Mesh to simulate (.vtk) where `fileName` is only what it looks like."
+    simFileName: ExistingFile | None = optional("Mesh to simulate (.vtk) where `fileName` is only what it looks like.")
+    basePosition: Position | None = optional("Start position.")
+    baseOrientation: Quat | None = optional("Start orientation as x, y, z, w.")
+    scale: Positive | None = optional("Factor on all lengths of the mesh.")
+    mass: Annotated[Kilograms, Field(gt=0)] | None = optional("Mass of the whole body.")
+    collisionMargin: NonNegativeMetres | None = optional("Margin around the surface.")
+    useMassSpring: Switch | None = optional("Whether it is made of springs, as cloth is.")
+    useBendingSprings: Switch | None = optional("Whether springs resist bending as well.")
+    useNeoHookean: Switch | None = optional("Whether it is a neo-Hookean solid; needs tetrahedra.")
+    springElasticStiffness: Stiffness | None = optional("Stiffness of the springs.")
+    springDampingStiffness: Annotated[NonNegative, Unit("N s/m")] | None = optional("Damping of the springs.")
+    springDampingAllDirections: Switch | None = optional(
+        "Whether damping acts in all directions, else along the springs."
     )
-    basePosition: Position | None = Field(None, description="Start position.")
-    baseOrientation: Quat | None = Field(None, description="Start orientation as x, y, z, w.")
-    scale: Positive | None = Field(None, description="Factor on all lengths of the mesh.")
-    mass: Annotated[Kilograms, Field(gt=0)] | None = Field(None, description="Mass of the whole body.")
-    collisionMargin: Annotated[NonNegative, Unit("m")] | None = Field(None, description="Margin around the surface.")
-    useMassSpring: Switch | None = Field(None, description="Whether it is made of springs, as cloth is.")
-    useBendingSprings: Switch | None = Field(None, description="Whether springs resist bending as well.")
-    useNeoHookean: Switch | None = Field(None, description="Whether it is a neo-Hookean solid; needs tetrahedra.")
-    springElasticStiffness: Stiffness | None = Field(None, description="Stiffness of the springs.")
-    springDampingStiffness: Annotated[NonNegative, Unit("N s/m")] | None = Field(
-        None, description="Damping of the springs."
-    )
-    springDampingAllDirections: Switch | None = Field(
-        None, description="Whether damping acts in all directions, else along the springs."
-    )
-    springBendingStiffness: Stiffness | None = Field(None, description="Stiffness against bending.")
-    NeoHookeanMu: Pressure | None = Field(None, description="First Lame parameter, against shear.")
-    NeoHookeanLambda: Pressure | None = Field(None, description="Second Lame parameter, against compression.")
-    NeoHookeanDamping: NonNegative | None = Field(None, description="Damping of the solid.")
-    frictionCoeff: NonNegative | None = Field(None, description="Coulomb friction coefficient.")
-    useFaceContact: Switch | None = Field(None, description="Whether faces touch too, not only corners.")
-    useSelfCollision: Switch | None = Field(None, description="Whether it touches itself.")
-    repulsionStiffness: Stiffness | None = Field(None, description="Stiffness of the push out of contact.")
+    springBendingStiffness: Stiffness | None = optional("Stiffness against bending.")
+    NeoHookeanMu: Pressure | None = optional("First Lame parameter, against shear.")
+    NeoHookeanLambda: Pressure | None = optional("Second Lame parameter, against compression.")
+    NeoHookeanDamping: NonNegative | None = optional("Damping of the solid.")
+    frictionCoeff: NonNegative | None = optional("Coulomb friction coefficient.")
+    useFaceContact: Switch | None = optional("Whether faces touch too, not only corners.")
+    useSelfCollision: Switch | None = optional("Whether it touches itself.")
+    repulsionStiffness: Stiffness | None = optional("Stiffness of the push out of contact.")
 
 
 class ChangeVisualShape(PybulletModel):
     """Another colour."""
 
-    rgbaColor: Rgba | None = Field(None, description="Colour and opacity, each from 0 to 1.")
-    specularColor: Rgb | None = Field(None, description="Colour of highlights, each from 0 to 1.")
+    rgbaColor: Rgba | None = optional("Colour and opacity, each from 0 to 1.")
+    specularColor: Rgb | None = optional("Colour of highlights, each from 0 to 1.")
 
 
 class CreateSoftBodyAnchor(PybulletModel):
@@ -80,7 +78,7 @@ class CreateSoftBodyAnchor(PybulletModel):
     """
 
     node: Count = Field(description="Number of the corner in the simulated mesh.")
-    body: Text | None = Field(None, description="Name of the body that it is tied to, none for the world.")
+    body: Text | None = optional("Name of the body that it is tied to, none for the world.")
     link: Text | Annotated[int, Field(ge=-1)] = Field(-1, description="Name or index of its link.")
     position: tuple[Metres, Metres, Metres] = Field(
         (0.0, 0.0, 0.0), strict=False, description="Accepted without effect, as in PyBullet."

@@ -13,13 +13,16 @@ from custom_ros_tools.schema import (
     Degrees,
     KeyedError,
     ListOf,
+    Metres,
     NonNegative,
+    NonNegativeMetres,
     Position,
     PositiveMetres,
     Rgb,
     Switch,
     Text,
     Unit,
+    optional,
 )
 
 from .pybullet_args import CONNECTION_MODES, JOINT_FEEDBACK_MODES, RESET_FLAGS, SOLVER_TYPES, VISUALIZER_FLAGS
@@ -37,10 +40,10 @@ class Connect(PybulletModel):
         description="GUI opens PyBullet's window, DIRECT needs no screen.",
         json_schema_extra={"default": "GUI"},
     )
-    options: Text | None = Field(None, description="Further options, such as `--mp4=FILE` to record the window.")
-    key: Count | None = Field(None, description="Key of the shared memory.")
-    hostName: Text | None = Field(None, description="Host of a server to connect to.")
-    port: Annotated[int, Field(ge=1, le=65535)] | None = Field(None, description="Port of that server.")
+    options: Text | None = optional("Further options, such as `--mp4=FILE` to record the window.")
+    key: Count | None = optional("Key of the shared memory.")
+    hostName: Text | None = optional("Host of a server to connect to.")
+    port: Annotated[int, Field(ge=1, le=65535)] | None = optional("Port of that server.")
 
     @model_validator(mode="after")
     def _one_way_to_connect(self) -> Connect:
@@ -49,14 +52,14 @@ class Connect(PybulletModel):
         return self
 
     def kwargs(self) -> dict[str, Any]:
-        """Return the arguments that the user wrote, and `connection_mode` in any case."""
+        """Returns the arguments that the user wrote, and `connection_mode` in any case."""
         return {"connection_mode": self.connection_mode, **super().kwargs()}
 
 
 class ResetSimulation(PybulletModel):
     """What kind of world it is."""
 
-    flags: Annotated[int, RESET_FLAGS] | None = Field(None, description="RESET_USE_... flags.")
+    flags: Annotated[int, RESET_FLAGS] | None = optional("RESET_USE_... flags.")
 
 
 class SetGravity(PybulletModel):
@@ -67,57 +70,47 @@ class SetGravity(PybulletModel):
     gravZ: Acceleration = Field(0.0, description="Acceleration along z, -9.81 on Earth.")
 
     def kwargs(self) -> dict[str, Any]:
-        """Return all three, as PyBullet wants them."""
+        """Returns all three, as PyBullet wants them."""
         return self.model_dump()
 
 
 class SetPhysicsEngineParameter(PybulletModel):
     """How contacts and joints are solved; without `fixedTimeStep`, since `timeStep` says that."""
 
-    numSolverIterations: Iterations | None = Field(None, description="Most iterations of the solver.")
-    useSplitImpulse: Switch | None = Field(None, description="Whether penetration is solved apart from velocity.")
-    splitImpulsePenetrationThreshold: Annotated[float, Unit("m")] | None = Field(
-        None, description="Penetration from which it is solved apart."
+    numSolverIterations: Iterations | None = optional("Most iterations of the solver.")
+    useSplitImpulse: Switch | None = optional("Whether penetration is solved apart from velocity.")
+    splitImpulsePenetrationThreshold: Metres | None = optional("Penetration from which it is solved apart.")
+    numSubSteps: Count | None = optional("Parts that each step is divided into.")
+    collisionFilterMode: Count | None = optional("0: both masks must match, 1: one of them.")
+    contactBreakingThreshold: NonNegativeMetres | None = optional("Distance at which contacts end.")
+    maxNumCmdPer1ms: int | None = optional("Most commands in a millisecond.")
+    enableFileCaching: Switch | None = optional("Whether files are read once only.")
+    restitutionVelocityThreshold: Annotated[NonNegative, Unit("m/s")] | None = optional(
+        "Velocity below which nothing bounces."
     )
-    numSubSteps: Count | None = Field(None, description="Parts that each step is divided into.")
-    collisionFilterMode: Count | None = Field(None, description="0: both masks must match, 1: one of them.")
-    contactBreakingThreshold: Annotated[NonNegative, Unit("m")] | None = Field(
-        None, description="Distance at which contacts end."
+    erp: NonNegative | None = optional("Share of a joint's error mended in a step.")
+    contactERP: NonNegative | None = optional("Share of a contact's error mended in a step.")
+    frictionERP: NonNegative | None = optional("The same for friction, if anchored.")
+    enableConeFriction: Switch | None = optional("Whether friction is a cone, else a pyramid.")
+    deterministicOverlappingPairs: Switch | None = optional("Whether contacts are sorted.")
+    allowedCcdPenetration: NonNegativeMetres | None = optional("Penetration allowed to continuous collision detection.")
+    jointFeedbackMode: Annotated[int, JOINT_FEEDBACK_MODES] | None = optional(
+        "JOINT_FEEDBACK_... flags: where force and torque of a joint are told."
     )
-    maxNumCmdPer1ms: int | None = Field(None, description="Most commands in a millisecond.")
-    enableFileCaching: Switch | None = Field(None, description="Whether files are read once only.")
-    restitutionVelocityThreshold: Annotated[NonNegative, Unit("m/s")] | None = Field(
-        None, description="Velocity below which nothing bounces."
-    )
-    erp: NonNegative | None = Field(None, description="Share of a joint's error mended in a step.")
-    contactERP: NonNegative | None = Field(None, description="Share of a contact's error mended in a step.")
-    frictionERP: NonNegative | None = Field(None, description="The same for friction, if anchored.")
-    enableConeFriction: Switch | None = Field(None, description="Whether friction is a cone, else a pyramid.")
-    deterministicOverlappingPairs: Switch | None = Field(None, description="Whether contacts are sorted.")
-    allowedCcdPenetration: Annotated[NonNegative, Unit("m")] | None = Field(
-        None, description="Penetration allowed to continuous collision detection."
-    )
-    jointFeedbackMode: Annotated[int, JOINT_FEEDBACK_MODES] | None = Field(
-        None, description="JOINT_FEEDBACK_... flags: where force and torque of a joint are told."
-    )
-    solverResidualThreshold: NonNegative | None = Field(None, description="Residual at which the solver stops.")
-    contactSlop: Annotated[NonNegative, Unit("m")] | None = Field(None, description="Penetration left alone.")
-    enableSAT: Switch | None = Field(None, description="Whether the separating axis test is used.")
-    constraintSolverType: Annotated[int, SOLVER_TYPES] | None = Field(
-        None, description="CONSTRAINT_SOLVER_LCP_... constant."
-    )
-    globalCFM: NonNegative | None = Field(None, description="Softness of all constraints.")
-    minimumSolverIslandSize: Count | None = Field(None, description="Fewest constraints solved together.")
-    reportSolverAnalytics: Switch | None = Field(None, description="Whether the solver tells what it did.")
-    warmStartingFactor: NonNegative | None = Field(None, description="Share of the last step's solution reused.")
-    sparseSdfVoxelSize: PositiveMetres | None = Field(None, description="Voxel size for soft bodies.")
-    numNonContactInnerIterations: Iterations | None = Field(
-        None, description="Iterations on joints in each of the solver's."
-    )
+    solverResidualThreshold: NonNegative | None = optional("Residual at which the solver stops.")
+    contactSlop: NonNegativeMetres | None = optional("Penetration left alone.")
+    enableSAT: Switch | None = optional("Whether the separating axis test is used.")
+    constraintSolverType: Annotated[int, SOLVER_TYPES] | None = optional("CONSTRAINT_SOLVER_LCP_... constant.")
+    globalCFM: NonNegative | None = optional("Softness of all constraints.")
+    minimumSolverIslandSize: Count | None = optional("Fewest constraints solved together.")
+    reportSolverAnalytics: Switch | None = optional("Whether the solver tells what it did.")
+    warmStartingFactor: NonNegative | None = optional("Share of the last step's solution reused.")
+    sparseSdfVoxelSize: PositiveMetres | None = optional("Voxel size for soft bodies.")
+    numNonContactInnerIterations: Iterations | None = optional("Iterations on joints in each of the solver's.")
 
 
 def _as_list(given: Any) -> Any:
-    """Split `A|B`; anything that is no list is a list of one."""
+    """Splits `A|B`; anything that is no list is a list of one."""
     if isinstance(given, str):
         return given.split("|")
     return given if isinstance(given, (list, tuple)) else [given]
@@ -136,19 +129,17 @@ class ConfigureDebugVisualizer(PybulletModel):
         json_schema_extra={"default": "COV_ENABLE_GUI"},
     )
     enable: Switch = Field(False, description="Whether they are switched on.")
-    lightPosition: Position | None = Field(None, description="Where the light is.")
-    shadowMapResolution: Count | None = Field(
-        None, description="Resolution of shadows.", json_schema_extra={"unit": "px"}
+    lightPosition: Position | None = optional("Where the light is.")
+    shadowMapResolution: Annotated[Count, Unit("px")] | None = optional("Resolution of shadows.")
+    shadowMapWorldSize: Annotated[Count, Unit("m")] | None = optional("Extent of shadows.")
+    remoteSyncTransformInterval: Annotated[NonNegative, Unit("s")] | None = optional(
+        "Time between updates of a remote window."
     )
-    shadowMapWorldSize: Count | None = Field(None, description="Extent of shadows.", json_schema_extra={"unit": "m"})
-    remoteSyncTransformInterval: NonNegative | None = Field(
-        None, description="Time between updates of a remote window.", json_schema_extra={"unit": "s"}
-    )
-    shadowMapIntensity: NonNegative | None = Field(None, description="Darkness of shadows, 0 to 1.")
-    rgbBackground: Rgb | None = Field(None, description="Colour of the background, each from 0 to 1.")
+    shadowMapIntensity: NonNegative | None = optional("Darkness of shadows, 0 to 1.")
+    rgbBackground: Rgb | None = optional("Colour of the background, each from 0 to 1.")
 
     def calls(self) -> list[dict[str, Any]]:
-        """Return the arguments of one call for each flag; PyBullet's constants cannot be or-ed."""
+        """Returns the arguments of one call for each flag; PyBullet's constants cannot be or-ed."""
         others = {"enable": self.enable, **self.kwargs()}
         return [{**others, "flag": flag} for flag in self.flag]
 
@@ -162,5 +153,5 @@ class ResetDebugVisualizerCamera(PybulletModel):
     cameraTargetPosition: Position = Field((0.0, 0.0, 0.0), description="What it looks at.")
 
     def kwargs(self) -> dict[str, Any]:
-        """Return all four, as PyBullet wants them."""
+        """Returns all four, as PyBullet wants them."""
         return self.model_dump()

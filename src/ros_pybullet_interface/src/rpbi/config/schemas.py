@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Any
+import copy
 
 from custom_ros_tools.schema import ConfigModel
-from custom_ros_tools.schema.json_schema import Schema, json_schema, without_required
-from rpbi.bodies import BODY_TYPES, BodyConfig
+from custom_ros_tools.schema.json_schema import (
+    DEFINITIONS,
+    Schema,
+    json_schemas,
+    mapping_in,
+    resolved,
+    with_definitions,
+)
+from rpbi.bodies import BODY_TYPES
 
-from .legacy import LEGACY_KEYS, MAIN, NO_EFFECT
+from .legacy import LEGACY_KEYS, MAIN, old_keys
 from .loading import CAMERAS
 from .object_entry import FILE
-from .objects import OWN_TYPES, TYPE
+from .objects import OWN_TYPES, TYPE, object_sections
 from .sensors import RgbdSensorConfig
-from .world import WorldConfig
+from .world import main_file_model
 
 WORLD = "world"
 """Name of the main file among the kinds of YAML files."""
+_FILE_NAME = {"type": "string", "minLength": 1}
+_ENTRY = "entry"
+"""Name of the definition of what a list of the main file has."""
 
 
 def sections() -> dict[str, type[ConfigModel]]:
     """Returns the models of the files that the lists of the main file name, by list."""
-    objects = {body_type.section: body_type.Config for body_type in BODY_TYPES.values()}
-    return {**objects, OWN_TYPES: BodyConfig, CAMERAS: RgbdSensorConfig}
+    return {**object_sections(), CAMERAS: RgbdSensorConfig}
 
 
 def kind_of(section: str) -> str:
@@ -30,25 +39,41 @@ def kind_of(section: str) -> str:
     return section.removesuffix("s")
 
 
-def schemas() -> dict[str, Schema]:
-    """Returns the schemas by kind of file: `world`, `robot`, `dynamic_object` and so on.
+def file_schemas() -> dict[str, Schema]:
+    """Returns the schemas by kind of file (`world`, `robot`, `dynamic_object` and so on), without keys of older worlds.
 
     What no schema can say, such as that names are unique or files exist, is left to the models: what they take, a
     schema takes.
     """
-    files = {kind_of(section): _of_file(section, model) for section, model in sections().items()}
-    return {WORLD: _of_main_file(files), **files}
+    files = json_schemas(
+        {WORLD: main_file_model(sections())} | {kind_of(section): model for section, model in sections().items()}
+    )
+    for section in sections():
+        file = files[kind_of(section)]
+        types = [kind for kind, body_type in BODY_TYPES.items() if body_type.section == section]
+        if section == OWN_TYPES:
+            files[kind_of(section)] = _of_any_type(file)
+        elif types:
+            about = "Its type; as a rule that follows from the list of the main file and the other keys."
+            file["properties"] = {**file["properties"], TYPE: {"description": about, "enum": [*types, None]}}
+    return files
 
 
-def _of_file(section: str, model: type[ConfigModel]) -> Schema:
-    schema = json_schema(model, kind_of(section).replace("_", " "))
-    types = [kind for kind, body_type in BODY_TYPES.items() if body_type.section == section]
-    if section == OWN_TYPES:
-        schema = _of_any_type(schema)
-    elif types:
-        about = "Its type; as a rule that follows from the list of the main file and the other keys."
-        schema["properties"][TYPE] = {"description": about, "enum": [*types, None]}
-    return _with_old_keys(schema, section)
+def schemas() -> dict[str, Schema]:
+    """Returns the schemas for editors, by kind of file: `file_schemas` with keys of older worlds and with overrides.
+
+    An entry of a list of the main file may override any key of its file and requires none: its schema is the definition
+    `entry` in the file beside it, such as `robot.schema.json#/$defs/entry`.
+    """
+    files = file_schemas()
+    world = _with_old_keys(files[WORLD], MAIN)
+    result = {WORLD: world}
+    for section in sections():
+        kind = kind_of(section)
+        entry = {"$ref": f"{kind}.schema.json#/{DEFINITIONS}/{_ENTRY}"}
+        world["properties"][section]["items"]["anyOf"] = [_FILE_NAME, entry]
+        result[kind] = _with_entry(_with_old_keys(files[kind], section))
+    return result
 
 
 def _of_any_type(schema: Schema) -> Schema:
@@ -65,39 +90,64 @@ def _of_any_type(schema: Schema) -> Schema:
     }
 
 
-def _of_main_file(files: dict[str, Schema]) -> Schema:
-    schema = _with_old_keys(json_schema(WorldConfig, WORLD), MAIN)
-    for section in sections():
-        schema["properties"][section]["items"] = _entry(files[kind_of(section)])
-    return schema
-
-
-def _entry(file: Schema) -> Schema:
-    """Returns the schema of an entry of a list: a file name, or a mapping with `file` and the keys that differ."""
-    path = {"description": "File that has the keys which are not here.", "type": "string", "minLength": 1}
-    keys = without_required(file)["properties"]
-    instance = {
+def _with_entry(schema: Schema) -> Schema:
+    """Returns a schema that says the same, and has a definition of an entry with `file` and the keys that differ."""
+    path = {"description": "File that has the keys which are not here.", **_FILE_NAME}
+    entry = {
         "description": "A file, and what is different for this one.",
         "type": "object",
-        "additionalProperties": file["additionalProperties"],
-        "properties": {FILE: path, **keys},
+        "additionalProperties": schema["additionalProperties"],
+        "properties": {FILE: path, **{key: {"$ref": f"#/properties/{key}"} for key in schema["properties"]}},
         "required": [FILE],
     }
-    return {"expects": "a list of files", "anyOf": [{"type": "string", "minLength": 1}, instance]}
+    definitions = {name: _optional(each, schema) for name, each in schema.get(DEFINITIONS, {}).items()}
+    inner = _required(schema, schema).get("properties")
+    return {
+        **_optional(schema, schema),
+        "required": schema["required"],
+        **({"allOf": [{"properties": inner}]} if inner else {}),
+        DEFINITIONS: {_ENTRY: entry, **definitions},
+    }
+
+
+def _optional(schema: Schema, root: Schema) -> Schema:
+    """Returns a schema of the same keys of which none is required, nor any in mappings inside of them but for lists."""
+    result = {key: value for key, value in schema.items() if key != "required"}
+    if "properties" in schema:
+        result["properties"] = {key: _optional(value, root) for key, value in schema["properties"].items()}
+    if "anyOf" in schema:
+        result["anyOf"] = [_optional(each, root) for each in schema["anyOf"]]
+    if isinstance(schema.get("items"), dict):
+        required = _required(schema["items"], root)
+        result["items"] = {"allOf": [schema["items"], required]} if required else schema["items"]
+    return result
+
+
+def _required(schema: Schema, root: Schema) -> Schema:
+    """Returns what a schema requires of mappings, and nothing else that it says."""
+    mapping = mapping_in(schema, root) if "items" not in schema else None
+    if mapping is None:
+        return {}
+    content = resolved(mapping, root)
+    inner = {key: _required(value, root) for key, value in content["properties"].items()}
+    result = {"required": content.get("required"), "properties": {key: each for key, each in inner.items() if each}}
+    return {key: value for key, value in result.items() if value}
 
 
 def _with_old_keys(schema: Schema, section: str) -> Schema:
-    """Adds the keys of older worlds that still load."""
-    properties = schema["properties"]
-    for old, new in LEGACY_KEYS.get(section, {}).items():
-        properties[old] = {**properties[new], **_deprecated(f"Old spelling: write {new}.")}
-    for key, advice in NO_EFFECT.get(section, {}).items():
+    """Returns a schema with the keys of older worlds that still load."""
+    result = copy.deepcopy(schema)
+    properties = result["properties"]
+    for key, advice in old_keys(section).items():
         outer, _, inner = key.partition(".")
-        is_inside = bool(inner) and outer in properties
-        place, name = (properties[outer]["properties"], inner) if is_inside else (properties, key)
-        place[name] = _deprecated(f"No effect: {advice}.")
-    return schema
-
-
-def _deprecated(message: str) -> dict[str, Any]:
-    return {"description": message, "deprecated": True, "deprecationMessage": message}
+        same = properties.get(LEGACY_KEYS.get(section, {}).get(key), {})
+        old = {**same, "description": advice, "deprecated": True, "deprecationMessage": advice}
+        mapping = mapping_in(properties[outer], result) if outer in properties else None
+        if mapping is None:
+            properties[key] = old
+        else:
+            content = resolved(mapping, result)
+            mapping.pop("$ref", None)
+            mapping |= {**content, **mapping, "description": properties[outer]["description"]}
+            mapping["properties"] = {**content["properties"], inner: old}
+    return with_definitions(result, result.get(DEFINITIONS, {}))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from custom_ros_tools.schema import (
     AlsoTakes,
@@ -16,12 +16,14 @@ from custom_ros_tools.schema import (
     KeyedError,
     Name,
     NonNegative,
+    NonNegativeMetres,
     Positive,
     PositiveMetres,
     Switch,
     Text,
     Unit,
     Vec3,
+    optional,
 )
 
 from .pybullet_models import ObjectTf
@@ -29,6 +31,8 @@ from .pybullet_models import ObjectTf
 
 class SensorConfig(ConfigModel):
     """An entry of a body's `sensors`; a sensor with more keys has a subclass of this as its `Config`."""
+
+    model_config = ConfigDict(json_schema_extra={"additionalProperties": True})  # those of subclasses
 
     type: Text = Field(description="Its class, as `module:Class`.")
     name: Name = Field(description="Its name, by which its body has no other sensor; topics are named after it.")
@@ -62,14 +66,12 @@ class ForceTorqueConfig(ConfigModel):
     """A force-torque sensor in a joint."""
 
     joint: Text = Field(description="Joint that it sits in.")
-    hz: Hz | None = Field(None, description="Rate of its samples; without it, that of the joint states.")
-    frame_id: FrameId | None = Field(
-        None, description="Other name of the frame of the joint's child link, in which the samples are."
-    )
+    hz: Hz | None = optional("Rate of its samples; without it, that of the joint states.")
+    frame_id: FrameId | None = optional("Other name of the frame of the joint's child link, in which the samples are.")
     acting: Literal["parent_on_child", "child_on_parent"] = Field(
         "parent_on_child", description="Who acts on whom; it decides the sign."
     )
-    low_pass_hz: Hz | None = Field(None, description="Frequency at which a first-order low-pass lets 71 % through.")
+    low_pass_hz: Hz | None = optional("Frequency at which a first-order low-pass lets 71 % through.")
     noise_force_n: Annotated[Deviation, Unit("N")] = Field(
         (0.0, 0.0, 0.0), description="Standard deviation of the forces' noise."
     )
@@ -78,7 +80,7 @@ class ForceTorqueConfig(ConfigModel):
     )
     bias_force_n: Annotated[Vec3, Unit("N")] = Field((0.0, 0.0, 0.0), description="What is added to the forces.")
     bias_torque_nm: Annotated[Vec3, Unit("N m")] = Field((0.0, 0.0, 0.0), description="What is added to the moments.")
-    seed: Count | None = Field(None, description="Seed of the noise; without it, one that follows from the names.")
+    seed: Count | None = optional("Seed of the noise; without it, one that follows from the names.")
 
 
 def _from_name(given: Any) -> Any:
@@ -122,12 +124,10 @@ class RgbdSensorConfig(ConfigModel):
     hz: Hz = Field(30.0, description="Images in a second.")
     pointcloud: Switch = Field(False, description="Whether point clouds are published too.")
     synchronous: Switch = Field(False, description="Whether the simulation waits for every image.")
-    depth_noise_m: Annotated[NonNegative, Unit("m")] = Field(
-        0.0, description="Standard deviation of the depths' noise."
-    )
+    depth_noise_m: NonNegativeMetres = Field(0.0, description="Standard deviation of the depths' noise.")
     depth_noise_growth_per_m: Annotated[NonNegative, Unit("1/m")] = Field(
         0.0, description="What the squared depth adds to that deviation; about 0.0014 for a structured-light camera."
     )
-    seed: Count | None = Field(None, description="Seed of the noise; without it, one that follows from the name.")
+    seed: Count | None = optional("Seed of the noise; without it, one that follows from the name.")
     intrinsics: IntrinsicsConfig = Field(IntrinsicsConfig(), description="Image size, field of view and range.")
     object_tf: ObjectTf = Field(description="TF frame of the camera: x right, y down, z forward.")

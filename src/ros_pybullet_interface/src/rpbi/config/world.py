@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Mapping
+from functools import lru_cache
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, ValidationInfo, create_model
 
 from custom_ros_tools.schema import (
     AlsoTakes,
@@ -18,10 +21,11 @@ from custom_ros_tools.schema import (
     Seconds,
     Switch,
     Text,
+    optional,
 )
 
 from .asset_files import find_folder
-from .object_entry import ObjectEntryYaml
+from .object_entry import FileOrOverrides
 from .pybullet_world_models import (
     ConfigureDebugVisualizer,
     Connect,
@@ -60,7 +64,9 @@ Folders = Annotated[
 
 
 class WorldConfig(ConfigModel):
-    """The main YAML file."""
+    """The main YAML file, but for the lists of files of objects, see `main_file_model`; here they are ignored."""
+
+    model_config = ConfigDict(extra="ignore")
 
     connect: Connect = Field(Connect(), description="How to reach PyBullet.")
     setAdditionalSearchPath: Folders = Field(
@@ -75,10 +81,8 @@ class WorldConfig(ConfigModel):
     real_time_factor: NonNegative = Field(
         1.0, description="Simulated seconds in a second of wall time; 0 is as fast as it goes."
     )
-    clock_hz: Hz | None = Field(None, description="Most /clock messages in a second of wall time.")
-    tf_prefix: FrameId | None = Field(
-        None, description="What to put before all TF frames, so that two worlds can share one TF tree."
-    )
+    clock_hz: Hz | None = optional("Most /clock messages in a second of wall time.")
+    tf_prefix: FrameId | None = optional("What to put before all TF frames, so that two worlds can share one TF tree.")
     step_pybullet_manually: Switch = Field(
         False, description="Accepted without effect: the interface does every step itself."
     )
@@ -108,20 +112,47 @@ class WorldConfig(ConfigModel):
     visualizer_image_width: Pixels = Field(640, description="Columns of that image.")
     visualizer_image_height: Pixels = Field(480, description="Its rows.")
     markers_hz: HzOrOff = Field(10.0, description="How often `rpbi/markers` is looked after, in wall time; 0 is off.")
-    visual_objects: ListOf[ObjectEntryYaml] = Field((), description="Files of objects that are seen and never felt.")
-    collision_objects: ListOf[ObjectEntryYaml] = Field((), description="Files of objects that nothing moves.")
-    dynamic_objects: ListOf[ObjectEntryYaml] = Field((), description="Files of objects that physics moves.")
-    robots: ListOf[ObjectEntryYaml] = Field((), description="Files of robots.")
-    soft_objects: ListOf[ObjectEntryYaml] = Field((), description="Files of soft bodies.")
-    urdfs: ListOf[ObjectEntryYaml] = Field((), description="Files of objects that come from a URDF and have no motors.")
-    objects: ListOf[ObjectEntryYaml] = Field(
+    objects: ListOf[FileOrOverrides] = Field(
         (), description="Files of objects of your own types, see docs/extending.md."
     )
-    rgbd_sensor: RgbdSensorConfig | None = Field(
-        None, description="Camera of colour, depth and segmentation; the first one if there are several."
+    rgbd_sensor: RgbdSensorConfig | None = optional(
+        "Camera of colour, depth and segmentation; the first one if there are several."
     )
-    rgbd_sensors: ListOf[ObjectEntryYaml] = Field((), description="Files of further cameras.")
+    rgbd_sensors: ListOf[FileOrOverrides] = Field((), description="Files of further cameras.")
+
+    @classmethod
+    def from_main_file(cls, content: WorldConfig) -> WorldConfig:
+        """Returns what a main file that has been validated says, but for its lists."""
+        values = {key: getattr(content, key) for key in cls.model_fields}
+        return cls.model_construct(content.model_fields_set & cls.model_fields.keys(), **values)
 
     def search_paths(self) -> tuple[str, ...]:
-        """Return the folders to look for files in, as absolute paths."""
+        """Returns the folders to look for files in, as absolute paths."""
         return self.setAdditionalSearchPath
+
+
+def main_file_model(sections: Mapping[str, type[ConfigModel]]) -> type[WorldConfig]:
+    """Returns the model of a main file, which refuses keys that it does not know.
+
+    Args:
+        sections: Model of the files that a list of the main file names, by list.
+    """
+    return _main_file_model(tuple(sections.items()))
+
+
+@lru_cache(maxsize=10)
+def _main_file_model(sections: tuple[tuple[str, type[ConfigModel]], ...]) -> type[WorldConfig]:
+    lists: dict[str, Any] = {}
+    for section, model in sections:
+        about = inspect.cleandoc(model.__doc__ or "").split("\n")[0]
+        lists[section] = (
+            ListOf[FileOrOverrides],
+            Field((), description=f"Files, each of {about[:1].lower()}{about[1:]}"),
+        )
+    return create_model(
+        "MainFile",
+        __base__=WorldConfig,
+        __doc__="The main YAML file.",
+        __cls_kwargs__={"extra": "forbid"},
+        **{key: value for key, value in lists.items() if key not in WorldConfig.model_fields},
+    )

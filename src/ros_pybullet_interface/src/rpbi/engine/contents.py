@@ -6,13 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from custom_ros_tools.errors import ConfigError, PhysicsError, PluginError, Problem, UnknownNameError
-from custom_ros_tools.plugins import find_class
 from rpbi.bodies import Body, BodyConfig
 from rpbi.config.loading import LoadedWorld
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.config.sensors import FIRST_TOPIC_NAME, RgbdSensorConfig
 from rpbi.plugins import blaming
-from rpbi.sensors import BodySensor
+from rpbi.sensors import sensor_class
 from rpbi.sensors.contacts import ContactReader
 from rpbi.sensors.rgbd import RgbdSensor
 from rpbi.sensors.sensor import SensedWorld, Sensor
@@ -40,9 +39,9 @@ def sensors_and_inputs(body: Body, config: BodyConfig) -> tuple[tuple[Sensor, ..
 
 
 def _make(body: Body, config: Any) -> Sensor:
-    sensor_class = find_class(config.type, BodySensor)
-    with blaming(sensor_class, f"making '{body.name}/{config.name}'"):
-        return sensor_class(body, config)
+    found = sensor_class(config.type)
+    with blaming(found, f"making '{body.name}/{config.name}'"):
+        return found(body, config)
 
 
 class WorldContents:

@@ -23,7 +23,7 @@ class Input:
             It raises ValueError or an InterfaceError for what must be refused.
         apply: Acts on the newest value, on the simulation thread, before the tick.
         merge: Joins a value that still waits with a newer one; without it the newer one replaces it.
-        ros_topic: Where to find the topic of an input from another package, a TopicInput, as `module:NAME`.
+        ros_topic: Where to find the topic of an input from another package, a Topic, as `module:NAME`.
     """
 
     check: Callable[[Any], Any]

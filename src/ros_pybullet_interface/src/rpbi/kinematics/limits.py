@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple, Protocol
+import random
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
 
 from rpbi.geometry import Vector
 from rpbi.urdf.document import UrdfJoint
@@ -15,11 +18,7 @@ from .residual import POSITION_TOLERANCE_M
 TURN = 2.0 * math.pi
 
 
-class Generator(Protocol):
-    """Random numbers, such as `random.Random` and `numpy.random.Generator`."""
-
-    def uniform(self, low: float, high: float, /) -> float:
-        """Returns a number between two."""
+Generator = random.Random | np.random.Generator
 
 
 class Limits:
@@ -84,9 +83,16 @@ class Limits:
             positions.append(generator.uniform(low, high))
         return positions
 
-    def starts(self, first: list[float], generator: Generator, restarts: int) -> Iterator[list[float]]:
-        """Yields n positions to start a search at [rad or m]: first the given ones, then as many random ones."""
+    def starts(self, first: list[float], restarts: int, seed: Callable[[], Generator]) -> Iterator[list[float]]:
+        """Yields n positions to start a search at [rad or m].
+
+        Args:
+            first: The first ones.
+            restarts: How many random ones follow.
+            seed: Returns what they are drawn from; only called if they are asked for, since that takes a while.
+        """
         yield first
+        generator = seed()
         for _ in range(restarts):
             yield self.random(generator, first)
 
@@ -115,7 +121,7 @@ class Reach(NamedTuple):
         return cls(anchor, sum(lengths) + sum(travel))
 
     def covers(self, position: Sequence[float], tolerance_m: float = 0.0) -> bool:
-        """Tells whether the tip may come as near to a position in the base as counts as reached.
+        """Returns whether the tip may come as near to a position in the base as counts as reached.
 
         Args:
             position: The position [m].

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable
 
 import numpy as np
 import pybullet
@@ -10,20 +10,12 @@ import pybullet
 from .chain import Chain, Target
 from .limits import Limits
 
+Step = Callable[[np.ndarray, np.ndarray, int], np.ndarray]
+"""A method that brings a link nearer to its target; limits are not considered.
 
-class Step(Protocol):
-    """A method that brings a link nearer to its target."""
-
-    def __call__(self, q: np.ndarray, frozen: np.ndarray, iterations: int) -> np.ndarray:
-        """Returns m positions nearer to the target [rad or m]; limits are not considered.
-
-        Args:
-            q: m positions to start at.
-            frozen: Which joints to leave where they are.
-            iterations: Most iterations to make.
-        """
-
-
+It takes m positions to start at [rad or m], which joints to leave where they are, and most iterations, and returns m
+positions.
+"""
 FROZEN = 1e6
 """Damping that keeps a joint where it is."""
 DAMPING = 1e-3
@@ -50,7 +42,6 @@ class DampedLeastSquares:
             self._arguments["targetOrientation"] = target.quat_xyzw
 
     def __call__(self, q: np.ndarray, frozen: np.ndarray, iterations: int) -> np.ndarray:
-        """See `Step`."""
         damping = np.where(frozen, FROZEN, self._damping).tolist()
         a_call = max(1, JOINT_ITERATIONS_A_CALL // len(q))
         for done in range(0, iterations, a_call):
@@ -88,7 +79,6 @@ class SelectivelyDampedLeastSquares:
         self._willingness = 1.0 / np.sqrt(damping)
 
     def __call__(self, q: np.ndarray, frozen: np.ndarray, iterations: int) -> np.ndarray:
-        """See `Step`."""
         willingness = np.where(frozen, 0.0, self._willingness)
         for _ in range(iterations):
             self._chain.set(q)

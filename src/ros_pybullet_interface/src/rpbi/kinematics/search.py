@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 import pybullet
@@ -98,7 +99,7 @@ class Search:
             yield self._asked_step, self._limits.wrap_to_limits(self._rest.tolist(), self._current)[0]
         is_reachable = self._chain.reach.covers(self._target.position)
         restarts = RANDOM_STARTS if is_reachable else RANDOM_STARTS_BEYOND_REACH
-        for i, start in enumerate(self._limits.starts(self._current, np.random.default_rng(SEED), restarts)):
+        for i, start in enumerate(self._limits.starts(self._current, restarts, partial(np.random.default_rng, SEED))):
             yield (self._fast_step if i else self._asked_step), start
 
     def _descent(self, step: Step, q: np.ndarray) -> Iterator[tuple[np.ndarray, Residual]]:

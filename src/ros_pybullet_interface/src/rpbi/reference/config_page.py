@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
+from typing import Any, NamedTuple
 
-from custom_ros_tools.schema.json_schema import Schema, yaml_text
+from custom_ros_tools.schema.json_schema import Schema, mapping_in, name_of, resolved, unit_in, yaml_text
+from custom_ros_tools.schema.type_names import constants_in, type_name
+from rpbi.config.legacy import MAIN, old_keys
+from rpbi.config.object_entry import FILES
 from rpbi.config.schemas import WORLD, kind_of, sections
 
-from .mappings import Mappings, is_list_of_files
 from .markdown import WRITTEN_BY, block, code, link, page, table
-from .type_words import constants_in, heading_of, mapping_in, type_in_words
 
 INTRODUCTION = """\
 Every YAML file of a world and every key in it. How to write worlds is told in [worlds.md](worlds.md), what they then
@@ -46,6 +48,26 @@ GUIDES = {
 HEAD = ("key", "type", "default", "meaning")
 
 
+class Place(NamedTuple):
+    """Where a mapping inside of files is told.
+
+    Attributes:
+        heading: The heading: its path in the first file that has it.
+        root: Schema of that file.
+        mapping: Schema of the mapping.
+        files: Kinds of the files that have it.
+    """
+
+    heading: str
+    root: Schema
+    mapping: Schema
+    files: list[str]
+
+
+Places = dict[str, Place]
+"""By the name of the mapping's definition, which is the same in all files."""
+
+
 def config_page(files: Mapping[str, Schema], nodes: Mapping[str, Schema], examples: Mapping[str, str]) -> str:
     """Returns the page.
 
@@ -54,22 +76,56 @@ def config_page(files: Mapping[str, Schema], nodes: Mapping[str, Schema], exampl
         nodes: Schema of the parameter `~config` of each node that has one.
         examples: YAML text to show for some of the files.
     """
-    mappings = Mappings(files)
+    places = _places(files)
     parts = [WRITTEN_BY, "# Configuration reference", INTRODUCTION, "## Files", _overview(files)]
     for kind, schema in files.items():
         parts += [f"## {kind}", _guide(kind), block("yaml", examples[kind]) if kind in examples else ""]
-        parts += [_keys(schema, mappings), _old_keys(schema)]
-        for place in mappings.of(kind):
-            parts += [f"### {place.heading}", _guide(place.heading), _keys(place.schema, mappings)]
+        parts += [_keys(schema, schema, places), _old_keys(kind)]
+        for place in places.values():
+            if place.files == [kind]:
+                parts += [f"### {place.heading}", _guide(place.heading), _keys(place.mapping, place.root, places)]
     parts += ["## Mappings that several files have"]
-    for place in mappings.shared():
-        owners = f"Of {', '.join(map(link, place.files))}. {_guide(place.heading)}"
-        parts += [f"### {place.heading}", owners, _keys(place.schema, mappings)]
-    parts += ["## Constants", *_constants(files)]
+    for place in sorted(places.values(), key=lambda place: place.heading.lower()):
+        if len(place.files) > 1:
+            owners = f"Of {', '.join(map(link, place.files))}. {_guide(place.heading)}"
+            parts += [f"### {place.heading}", owners, _keys(place.mapping, place.root, places)]
+    families = {each["kind"]: constants_in(each) for each in _constants(list(files.values()))}
+    parts += ["## Constants"]
+    for kind, names in sorted(families.items()):
+        parts += [f"### {kind}s", ", ".join(map(code, names)) + "."]
     parts += ["## Nodes", NODES]
     for node, schema in nodes.items():
-        parts += [f"### {node}", *_node(node, schema)]
+        places = _places({node: schema})
+        parts += [f"### {node}", _keys(schema, schema, places)]
+        for place in places.values():
+            parts += [f"#### {place.heading}", _keys(place.mapping, schema, places)]
     return page(parts)
+
+
+def _places(files: Mapping[str, Schema]) -> Places:
+    """Gives each mapping inside of the files a heading."""
+    places: Places = {}
+    for kind, root in files.items():
+        for path, reference in _inside(root, root, "", files):
+            known = places.setdefault(name_of(reference), Place(path, root, resolved(reference, root), []))
+            known.files.extend({kind}.difference(known.files))
+    return places
+
+
+def _inside(mapping: Schema, root: Schema, path: str, files: Container[str]) -> Iterator[tuple[str, Schema]]:
+    """Yields the mappings inside of one, with their paths, but for those that are files too."""
+    for key, value in _values(mapping).items():
+        inner_path = f"{path}{key}"
+        reference = mapping_in(value, root)
+        if reference is not None and inner_path not in files:
+            yield inner_path, reference
+            yield from _inside(resolved(reference, root), root, f"{inner_path}.", files)
+
+
+def _values(mapping: Schema) -> dict[str, Schema]:
+    """Returns the schemas of a mapping's keys, and under `NAME` that of all further ones."""
+    more = mapping.get("additionalProperties")
+    return {**mapping["properties"], **({"NAME": more} if isinstance(more, dict) else {})}
 
 
 def _guide(heading: str) -> str:
@@ -86,57 +142,50 @@ def _overview(files: Mapping[str, Schema]) -> str:
     return table(("file", "named in the main file by", "what it is", "schema for editors"), rows)
 
 
-def _keys(schema: Schema, mappings: Mappings) -> str:
+def _keys(mapping: Schema, root: Schema, places: Places) -> str:
     rows = []
-    for key, value in schema["properties"].items():
-        if "deprecated" not in value:
-            rows.append((code(key), _type(key, value, mappings), _default(key, schema), value["description"]))
-    more = schema.get("additionalProperties")
-    if more is True:
+    for key, value in _values(mapping).items():
+        meaning = resolved(value, root)["description"] if "description" not in value else value["description"]
+        rows.append((code(key), _type(key, value, root, places), _default(key, mapping), meaning))
+    if mapping.get("additionalProperties") is True:
         rows.append(("others", "", "", "What its class reads."))
-    if isinstance(more, dict):
-        rows.append((code("NAME"), _type("", more, mappings), "", more["description"]))
     return table(HEAD, rows)
 
 
-def _type(key: str, value: Schema, mappings: Mappings) -> str:
-    if is_list_of_files(value):
+def _type(key: str, value: Schema, root: Schema, places: Places) -> str:
+    if value.get("items", {}).get("expects") == FILES:
         return f"list of files, each {link(kind_of(key))}"
-    words = type_in_words(value)
-    mapping = mapping_in(value)
-    return words if mapping is None else f"{words}, see {link(mappings.heading_of(mapping))}"
+    families = list(_constants(value))
+    if families:
+        several = " or several" if any("anyOf" in each for each in families) else ""
+        return f"{link(families[0]['kind'] + 's')}, one{several}"
+    unit = unit_in(value)
+    words = type_name(value, detailed=True).removeprefix("a ") + (f" [{unit}]" if unit else "")
+    mapping = mapping_in(value, root)
+    if mapping is None:
+        return words
+    place = places.get(name_of(mapping))
+    return f"{words}, see {link(place.heading if place else key)}"
 
 
-def _default(key: str, schema: Schema) -> str:
-    if key in schema.get("required", ()):
+def _default(key: str, mapping: Schema) -> str:
+    if key in mapping.get("required", ()):
         return "required"
-    value = schema["properties"][key]
+    value = mapping["properties"].get(key, {})
     return code(yaml_text(value["default"])) if "default" in value else ""
 
 
-def _old_keys(schema: Schema) -> str:
-    rows = [(code(key), advice) for key, advice in _deprecated(schema, "")]
+def _old_keys(kind: str) -> str:
+    section = next((section for section in sections() if kind_of(section) == kind), MAIN)
+    rows = [(code(key), advice) for key, advice in old_keys(section).items()]
     return "Older worlds may also have:\n\n" + table(("key", "what to do"), rows) if rows else ""
 
 
-def _deprecated(schema: Schema, path: str) -> Iterator[tuple[str, str]]:
-    for key, value in schema.get("properties", {}).items():
-        if "deprecated" in value:
-            yield f"{path}{key}", value["description"]
-        elif not is_list_of_files(value):
-            yield from _deprecated(value, f"{path}{key}.")
-
-
-def _constants(files: Mapping[str, Schema]) -> Iterator[str]:
-    families = {kind: names for schema in files.values() for kind, names in constants_in(schema)}
-    for kind, names in sorted(families.items()):
-        yield f"### {heading_of(kind)}"
-        yield ", ".join(map(code, names)) + "."
-
-
-def _node(node: str, schema: Schema) -> Iterator[str]:
-    mappings = Mappings({node: schema})
-    yield _keys(schema, mappings)
-    for place in mappings.of(node):
-        yield f"#### {place.heading}"
-        yield _keys(place.schema, mappings)
+def _constants(schema: Any) -> Iterator[Schema]:
+    """Yields the schemas of families of constants anywhere in a schema."""
+    if isinstance(schema, dict):
+        if isinstance(schema.get("kind"), str):
+            yield schema
+        schema = list(schema.values())
+    for each in schema if isinstance(schema, list) else ():
+        yield from _constants(each)

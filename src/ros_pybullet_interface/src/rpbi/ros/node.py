@@ -11,26 +11,19 @@ from typing import Any
 import pybullet
 import rospy
 
-from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, Problem
-from custom_ros_tools.ros.lifecycle.fatal_log import log_fatal_lines, log_loss_of_master
-from custom_ros_tools.ros.lifecycle.interrupts import leaving_ros_on_interrupt, wait_for_master
+from custom_ros_tools.errors import ConfigError, PhysicsError, Problem
 from custom_ros_tools.ros.lifecycle.kept_parameters import kept_parameters
-from custom_ros_tools.ros.lifecycle.logging_bridge import attach_logging
-from custom_ros_tools.ros.lifecycle.master_watch import MasterWatch
-from rpbi.bodies import BODY_TYPES
+from custom_ros_tools.ros.lifecycle.run_node import run_node
 from rpbi.config.asset_files import ROBOT_DESCRIPTION
 from rpbi.config.loading import load_world_dict
 from rpbi.ros.publishers.sample_publishers import SamplePublishers
-from rpbi.ros.publishers.status import FREE_RUNNING_CLOCK_HZ, ClockPublisher
 from rpbi.ros.publishers.world_markers import WorldMarkers
-from rpbi.ros.services.camera_services import CameraServices
-from rpbi.ros.services.dynamics_services import DynamicsServices
-from rpbi.ros.services.node_services import NodeServices
-from rpbi.ros.services.time_services import TimeServices
+from rpbi.ros.services.node_services import NODE_SERVICES, NodeContext
 from rpbi.ros.window.topics import WindowTopics
 from rpbi.urdf.files import write_description
 from rpbi.world import World
 
+from .endpoints import serve
 from .headers import use_prefix
 from .initial_state import start_where_robots_are
 from .object_lifecycle import ObjectLifecycle
@@ -51,29 +44,17 @@ def config_parameter() -> dict[str, Any]:
     return config
 
 
-def robot_description_file() -> str | None:
-    """Returns a file with the robot description of the parameter server, None if there is none."""
-    text = _parameter_above("robot_description", None)
-    return None if text is None else write_description(text)
-
-
-def uses_simulated_time() -> bool:
-    """Tells whether stamps are to be simulated time."""
-    return bool(_parameter_above("use_sim_time", False))
-
-
-def _parameter_above(name: str, default: Any) -> Any:
-    """Returns a parameter of this namespace or, failing that, of the nearest one around it."""
+def parameter_above(name: str) -> Any:
+    """Returns a parameter of this namespace or, failing that, of the nearest one around it; None if there is none."""
     found = rospy.search_param(name)
     if found is None:
-        return default
+        return None
     kept_parameters.keep(found)
     return rospy.get_param(found)
 
 
 log = logging.getLogger(__name__)
 
-MAX_CLOCK_HZ = 1000.0
 LONGEST_END_S = 10.0
 """How long ROS waits for the loop and the renderer before it shuts down without them [s]."""
 
@@ -85,18 +66,18 @@ class SimulatorNode:
     """Builds the world of `~config` and connects everything in it to ROS.
 
     Raises:
-        ConfigError: If the configuration is wrong; it tells everything that is.
+        ConfigError: If the configuration is wrong; it has everything that is.
         PhysicsError: If PyBullet cannot do what is asked.
     """
 
     def __init__(self) -> None:
-        MasterWatch()
-        description = robot_description_file()
-        loaded = load_world_dict(config_parameter(), "~config", BODY_TYPES, description)
+        urdf = parameter_above("robot_description")
+        description = None if urdf is None else write_description(urdf)
+        loaded = load_world_dict(config_parameter(), "~config", description)
         loaded = start_where_robots_are(loaded)
         config = loaded.config
         use_prefix(config.tf_prefix)
-        simulated = uses_simulated_time()
+        simulated = bool(parameter_above("use_sim_time"))
         if config.real_time_factor != 1 and not simulated:
             log.warning(
                 "real_time_factor is %g but /use_sim_time is not true: stamps are wall time and tell nothing of it",
@@ -107,30 +88,19 @@ class SimulatorNode:
         for name in self._world.bodies:
             publishers.find_topics(name)
         self._cameras = publishers.cameras
-        clock = ClockPublisher(self._world.clock, _clock_hz(config)) if simulated else None
         helpers: list[Callable[[], None]] = []
         if config.markers_hz:
             helpers.append(WorldMarkers(self._world, config.markers_hz).poll)
         window = WindowTopics(self._world)
         helpers += (self._cameras.poll, *window.polls)
-        self._simulation = Simulation(
-            self._world,
-            publishers.by_type,
-            config.real_time_factor,
-            config.status_hz,
-            clock,
-            helpers,
-            self._cameras.facts,
-            self._cameras.before_tick,
-        )
+        self._simulation = Simulation(self._world, publishers, helpers)
         ask = Requests(self._simulation)
-        self._objects = ObjectLifecycle(self._world, self._simulation, ask, publishers)
-        context = {"search_paths": config.search_paths(), ROBOT_DESCRIPTION: description}
-        NodeServices(self._simulation, ask, self._objects.add, self._objects.remove, context)
-        CameraServices(self._objects.add_camera, config.search_paths())
-        DynamicsServices(self._world, ask)
+        self._objects = ObjectLifecycle(self._simulation, ask, publishers)
+        loading = {"search_paths": config.search_paths(), ROBOT_DESCRIPTION: description}
+        context = NodeContext(self._simulation, ask, self._objects, loading)
         window.serve(ask)
-        TimeServices(self._simulation, ask, self._objects.reset)
+        for service in NODE_SERVICES:
+            serve(service, context)
         if config.start_pybullet_after_initialization:
             self._simulation.start()
 
@@ -162,30 +132,5 @@ class SimulatorNode:
 
 def main() -> None:
     """Runs the node; exits with 1 if it cannot start, with 0 when it is interrupted."""
-    if not wait_for_master():
-        return
     # Without ROS time: the simulator is the source of /clock and must never wait for it.
-    rospy.init_node("ros_pybullet_interface", disable_rostime=True, disable_signals=True)
-    attach_logging()
-    try:
-        node = SimulatorNode()
-    except InterfaceError as error:
-        log_fatal_lines(str(error).splitlines())
-        sys.exit(1)
-    except ConnectionError as error:
-        log_loss_of_master(error)
-        sys.exit(1)
-    with leaving_ros_on_interrupt():
-        try:
-            node.run()
-        except PhysicsError as error:
-            log_fatal_lines([str(error)])
-            sys.exit(1)
-
-
-def _clock_hz(config: Any) -> float:
-    if not config.real_time_factor:
-        limit = FREE_RUNNING_CLOCK_HZ
-    else:
-        limit = min(config.real_time_factor / config.timeStep, MAX_CLOCK_HZ)
-    return min(config.clock_hz or limit, limit)
+    run_node("ros_pybullet_interface", SimulatorNode, SimulatorNode.run, ros_time=False)

@@ -12,7 +12,6 @@ from rpbi.ros.publishers.sample_publishers import SamplePublishers
 from rpbi.ros.publishers.topics import FastTopic
 from rpbi.ros.services.body_endpoints import BodyEndpoints
 from rpbi.sensors.rgbd import RgbdSensor
-from rpbi.world import World
 
 from .initial_state import with_initial_state
 from .inputs import Inputs
@@ -26,24 +25,21 @@ class ObjectLifecycle:
     It opens the topics and services of all that is in the world at the start.
 
     Args:
-        world: The world.
-        simulation: What runs it.
+        simulation: What runs the world.
         ask: Asks the simulation thread.
         publishers: Where samples go.
     """
 
-    def __init__(self, world: World, simulation: Simulation, ask: Requests, publishers: SamplePublishers) -> None:
-        self._world = world
-        self._simulation = simulation
-        self._ask = ask
+    def __init__(self, simulation: Simulation, ask: Requests, publishers: SamplePublishers) -> None:
+        self._world, self._simulation, self._ask = simulation.world, simulation, ask
         self._publishers = publishers
-        self._inputs = Inputs(world)
-        self._endpoints = BodyEndpoints(world, simulation, ask)
+        self._inputs = Inputs(self._world)
+        self._endpoints = BodyEndpoints(simulation, ask)
         self._lock = threading.Lock()
         self._open_bodies: set[str] = set()
         self._placed_cameras: Mapping[str, RgbdSensor] = {}
         self._place_cameras()
-        for name in world.bodies:
+        for name in self._world.bodies:
             self._open(name)
 
     def add(self, kind: str, config: Any, file: str) -> None:

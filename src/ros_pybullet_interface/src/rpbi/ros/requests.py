@@ -58,14 +58,3 @@ class Requests:
             return future.result()
         except ClosedError as error:
             raise InterfaceError(str(error)) from None
-
-    def or_service_error(self, call: Callable[[], T]) -> T:
-        """Does the same for services whose answer cannot say that something failed.
-
-        Raises:
-            rospy.ServiceException: If it failed; rospy tells the caller why.
-        """
-        try:
-            return self(call)
-        except InterfaceError as error:
-            raise rospy.ServiceException(str(error)) from error

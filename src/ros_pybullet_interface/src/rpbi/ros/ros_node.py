@@ -10,7 +10,7 @@ from custom_ros_tools.tf import TfInterface
 
 
 class RosNode:
-    """A node, its TF, and what scripts use of rospy, under the same names unless said otherwise.
+    """A node, its TF, and all that rospy has, under the same names: `Publisher`, `Rate`, `loginfo` and so on.
 
     The simulator does not use it: it must never wait for ROS time, and this does.
 
@@ -21,31 +21,12 @@ class RosNode:
         tf: TF.
     """
 
-    Time = rospy.Time
-    Duration = rospy.Duration
-    Rate = rospy.Rate
-    Timer = rospy.Timer
-    Publisher = rospy.Publisher
-    Subscriber = rospy.Subscriber
-    Service = rospy.Service
-    ServiceProxy = rospy.ServiceProxy
-
-    on_shutdown = staticmethod(rospy.on_shutdown)
-    sleep = staticmethod(rospy.sleep)
-    spin = staticmethod(rospy.spin)
-    wait_for_service = staticmethod(rospy.wait_for_service)
-    wait_for_message = staticmethod(rospy.wait_for_message)
-    set_param = staticmethod(rospy.set_param)
-    get_param = staticmethod(rospy.get_param)
-    logdebug = staticmethod(rospy.logdebug)
-    loginfo = staticmethod(rospy.loginfo)
-    logwarn = staticmethod(rospy.logwarn)
-    logerr = staticmethod(rospy.logerr)
-    logfatal = staticmethod(rospy.logfatal)
-
     def __init__(self, name: str) -> None:
         rospy.init_node(name)
         self.tf = TfInterface()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(rospy, name)
 
     @staticmethod
     def time_now() -> rospy.Time:

@@ -5,19 +5,16 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
 from rpbi.engine.pacer import Pacer
 from rpbi.ros.publishers.commands import CommandPublisher
-from rpbi.ros.publishers.state import StatePublisher
-from rpbi.ros.publishers.status import ClockPublisher, StatusPublisher
-from rpbi.ros.publishers.tick_publishers import TickPublisher
-from rpbi.ros.publishers.topic_publisher import SamplePublisher
+from rpbi.ros.publishers.sample_publishers import SamplePublishers, TickPublisher
+from rpbi.ros.publishers.status import StatePublisher, StatusPublisher
 from rpbi.world import World
-
-from .step_burst import StepBurst
 
 log = logging.getLogger(__name__)
 
@@ -27,6 +24,32 @@ BURST_S = 0.01
 """How long ticks follow each other before the loop looks at requests [s]."""
 
 
+class StepBurst:
+    """Counts the ticks of one request; whoever asked waits for `done`.
+
+    Args:
+        steps: How many ticks.
+    """
+
+    def __init__(self, steps: int) -> None:
+        self.done: Future[tuple[int, int]] = Future()
+        """Tick and stamp [ns] after the last one."""
+        self._steps = self.left = steps
+
+    def finish(self, tick: int, stamp_ns: int) -> None:
+        """Ends the wait: all is done."""
+        if self.done.set_running_or_notify_cancel():
+            self.done.set_result((tick, stamp_ns))
+
+    def fail(self, error: Exception) -> None:
+        """Ends the wait: no more ticks come."""
+        if self.done.set_running_or_notify_cancel():
+            self.done.set_exception(error)
+
+    def __str__(self) -> str:
+        return f"after {self._steps - self.left} of {self._steps} ticks"
+
+
 class Simulation:
     """Runs, stops and steps a world on the one thread that owns PyBullet.
 
@@ -34,43 +57,27 @@ class Simulation:
 
     Args:
         world: The world.
-        publishers: Where samples go, one for each type of sample; there may be more later.
-        real_time_factor: Simulated seconds per wall second; 0 is as fast as it goes.
-        status_hz: Rate of the status [Hz].
-        clock: Publishes /clock if stamps are simulated time.
+        publishers: Where samples go.
         helpers: Called at every pass; they must return at once.
-        facts: Tells what else the diagnostics should have.
-        before_tick: Called before each tick, which waits for it.
     """
 
-    def __init__(
-        self,
-        world: World,
-        publishers: Mapping[type, SamplePublisher],
-        real_time_factor: float,
-        status_hz: float,
-        clock: ClockPublisher | None = None,
-        helpers: Sequence[Callable[[], None]] = (),
-        facts: Callable[[], Mapping[str, str]] = dict,
-        before_tick: Callable[[], None] = lambda: None,
-    ) -> None:
+    def __init__(self, world: World, publishers: SamplePublishers, helpers: Sequence[Callable[[], None]]) -> None:
         self.world = world
         self.running = False
-        self._broken = False
-        self._log_fatal_lines = ""
-        """Why it broke off the last time."""
+        self._failure: str | None = None
+        """Why it has broken off, until somebody starts or steps it again."""
         self._burst: StepBurst | None = None
         self._thread: int | None = None
         self.passes = 0
         """Grows as long as the loop is alive."""
         idle_ticks = max(1, round(IDLE_PERIOD_S / world.clock.dt_s))
-        self._publishers = TickPublisher(world, publishers, clock, idle_ticks)
+        self._publishers = TickPublisher(world, publishers, idle_ticks)
         self._helpers = helpers
-        self._before_tick = before_tick
-        self._pacer = Pacer(world.clock.dt_s, real_time_factor)
+        self._before_tick = publishers.cameras.before_tick
+        self._pacer = Pacer(world.clock.dt_s, world.config.real_time_factor)
         self._idle_pacer = Pacer(max(world.clock.dt_s, IDLE_PERIOD_S))
-        self._status = StatusPublisher(world.clock, self._pacer, status_hz, real_time_factor, facts)
-        self._state = StatePublisher(world, self._pacer, real_time_factor)
+        self._status = StatusPublisher(world, self._pacer, publishers.cameras.facts)
+        self._state = StatePublisher(world, self._pacer)
         self._commands = CommandPublisher(world)
 
     @property
@@ -90,13 +97,13 @@ class Simulation:
         if self.running:
             return False
         self._refuse_while_stepping()
-        self.running, self._broken = True, False
+        self.running, self._failure = True, None
         self._pacer.restart()
         self._status.publish(True)
         return True
 
     def stop(self) -> bool:
-        """Lets the world stand still, with all of its last tick told.
+        """Lets the world stand still, with all of its last tick published.
 
         Returns:
             False if it stands still already.
@@ -120,9 +127,9 @@ class Simulation:
             PhysicsError: If something in the world is not finite any more.
         """
         self._refuse_while_moving()
-        self._broken = False
+        self._failure = None
         self._status.publish(True)
-        self._take_last_tick()
+        self._take_tick(is_last=True)
         self._status.publish(False)
         return self.world.clock.tick, self.world.clock.stamp_ns
 
@@ -143,7 +150,7 @@ class Simulation:
         if not steps:
             burst.finish(self.world.clock.tick, self.world.clock.stamp_ns)
             return burst.done
-        self._broken = False
+        self._failure = None
         self._burst, self._state.is_stepping = burst, True
         self._status.publish(True)
         return burst.done
@@ -165,7 +172,7 @@ class Simulation:
         except InterfaceError as error:
             self._break_off(error)
             raise
-        self._broken = False
+        self._failure = None
         refill()
         self.world.take_inputs()
         self._pacer.restart()
@@ -192,29 +199,22 @@ class Simulation:
     def _move(self) -> None:
         if self._burst is not None:
             self._advance_burst(self._burst)
-        elif self.running:
-            self._advance()
-        else:
+        elif not self.running:
             self._idle()
+        elif self._pacer.is_due():
+            self._take_tick()
 
     def _publish(self) -> None:
         self._status.spin(self.running, self._burst is not None)
         self._state.spin(self.running or self._burst is not None)
         self._commands.spin()
+        flush_buffered_sockets()
 
-    def _advance(self) -> None:
-        if self._pacer.is_due():
-            self._take_tick()
-
-    def _take_tick(self) -> None:
+    def _take_tick(self, is_last: bool = False) -> None:
+        """Goes one tick on; of the last one before standing still everything is published, whatever is due."""
         self._before_tick()
-        self._publishers.publish_tick(self.world.step())
-        self._state.take_tick()
-
-    def _take_last_tick(self) -> None:
-        """Goes one tick on before standing still: all of it is told, whatever is due."""
-        self._before_tick()
-        self._publishers.publish_all(self.world.step())
+        publish = self._publishers.publish_all if is_last else self._publishers.publish_tick
+        publish(self.world.step())
         self._state.take_tick()
 
     def _advance_burst(self, burst: StepBurst) -> None:
@@ -223,7 +223,7 @@ class Simulation:
             self._take_tick()
             burst.left -= 1
         if burst.left == 1:
-            self._take_last_tick()
+            self._take_tick(is_last=True)
             burst.left = 0
             self._end_burst()
             self._status.publish(False)
@@ -235,7 +235,7 @@ class Simulation:
         return burst
 
     def _break_burst(self, error: Exception) -> None:
-        """Ends the ticks of a request before their time, with all of the last one told."""
+        """Ends the ticks of a request before their time, with all of the last one published."""
         burst = self._end_burst()
         self._halt()
         burst.fail(error)
@@ -250,11 +250,11 @@ class Simulation:
             raise InterfaceError("the simulation is stepping: wait for that, or stop it")
 
     def _break_off(self, error: Exception) -> None:
-        """Stands still, and tells no more of a world that is broken; until somebody starts or steps it again."""
-        if self._broken and str(error) == self._log_fatal_lines:
-            return  # it goes on telling the same
+        """Stands still, and publishes no more of a world that is broken; until somebody starts or steps it again."""
+        if str(error) == self._failure:
+            return  # it goes on saying the same
         log.error("simulation stopped: %s", error, exc_info=not isinstance(error, InterfaceError))
-        self.running, self._broken, self._log_fatal_lines = False, True, str(error)
+        self.running, self._failure = False, str(error)
         if self._burst is not None:
             self._end_burst().fail(error)
         self.world.halt("the simulation broke off")
@@ -271,6 +271,6 @@ class Simulation:
         if not self._idle_pacer.is_due():
             return
         self._publishers.repeat_time()
-        if not self._broken:
+        if self._failure is None:
             self.world.take_inputs()
             self._publishers.publish_idle()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from custom_ros_tools.plugins import ClassTable
+from custom_ros_tools.plugins import ClassTable, find_class
 from rpbi.config.sensors import SensorConfig
 
 from .body_sensor import BodySensor
@@ -22,4 +22,19 @@ SENSOR_TYPES = ClassTable(
     }
 )
 
-__all__ = ["SENSOR_TYPES", "BodySensor", "Sensor", "SensorConfig"]
+
+def sensor_class(kind: str) -> type[BodySensor]:
+    """Returns the class of sensors that a body's YAML asks for.
+
+    Args:
+        kind: A key of SENSOR_TYPES whose class is a BodySensor, or `module:Class` of another package.
+
+    Raises:
+        ValueError: If there is none.
+    """
+    known = SENSOR_TYPES.get(kind, Sensor)
+    found: type[BodySensor] = known if issubclass(known, BodySensor) else find_class(kind, BodySensor)
+    return found
+
+
+__all__ = ["SENSOR_TYPES", "BodySensor", "Sensor", "SensorConfig", "sensor_class"]

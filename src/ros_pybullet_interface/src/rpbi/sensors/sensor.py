@@ -44,7 +44,7 @@ class Sensor(ABC):
     sample_type: ClassVar[type]
     """The type of its samples, by which their topic is found."""
     ros_topic: ClassVar[str] = ""
-    """Where to find the topic of a sensor from another package, a SampleTopic, as `module:NAME`."""
+    """Where to find the topic of a sensor from another package, a Topic, as `module:NAME`."""
 
     def __init__(self, name: str, hz: float) -> None:
         self.name = name

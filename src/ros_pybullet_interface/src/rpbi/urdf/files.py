@@ -77,7 +77,7 @@ def write_description(text: str) -> str:
 
 
 def is_temporary(path: str) -> bool:
-    """Tells whether a file is one of this module's, which go when the process ends."""
+    """Returns whether a file is one of this module's, which go when the process ends."""
     return Path(path).parent == _folder()
 
 

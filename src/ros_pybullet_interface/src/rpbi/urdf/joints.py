@@ -51,7 +51,7 @@ class Joint:
 
     @classmethod
     def from_info(cls, info: Sequence) -> Joint:
-        """Takes over what PyBullet's `getJointInfo` returned; 0 and inverted ranges mean that there is no limit."""
+        """Returns a joint from PyBullet's `getJointInfo`; 0 and inverted ranges mean that there is no limit."""
         limited = info[8] < info[9]
         return cls(
             index=info[0],
@@ -85,11 +85,11 @@ class Joint:
         return "m" if self.type == pybullet.JOINT_PRISMATIC else "rad"
 
     def allows(self, position: float) -> bool:
-        """Tells whether a position [rad or m] is within the limits, rounding errors of limits in degrees aside."""
+        """Returns whether a position [rad or m] is within the limits, rounding errors of limits in degrees aside."""
         return self.lower - LIMIT_ROUNDING <= position <= self.upper + LIMIT_ROUNDING
 
     def limit_violation(self, position: float) -> str:
-        """Returns a message that tells how a position [rad or m] lies to the limits."""
+        """Returns a message about a position [rad or m] that is outside the limits."""
         limits = f"{self.lower:.6g} to {self.upper:.6g} {self.unit}"
         return f"joint '{self.name}' must be within {limits}, got {position:.6g}"
 

@@ -19,7 +19,7 @@ MESH_FORMATS = (".obj", ".stl", ".dae", ".cdf")
 
 
 def urdf_problems(path: str) -> list[str]:
-    """Looks for the problems that are most likely in a URDF file that PyBullet has refused.
+    """Returns the problems that are most likely in a URDF file that PyBullet has refused.
 
     Args:
         path: The file.
@@ -61,7 +61,7 @@ def load_urdf(
         PyBullet's id of the body.
 
     Raises:
-        ConfigError: If it cannot be loaded; it tells what is wrong with the file.
+        ConfigError: If it cannot be loaded; it names what is wrong with the file.
     """
     file: str = arguments["fileName"]
     try:

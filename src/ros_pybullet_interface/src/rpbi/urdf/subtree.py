@@ -50,7 +50,7 @@ class Subtree:
         self.take_dynamics()
 
     def take_dynamics(self) -> None:
-        """Takes over the links' masses and inertias as they are now."""
+        """Takes the links' masses and inertias as they are now."""
         infos = [self._pb.getDynamicsInfo(self._body_id, link) for link in self._links]
         self._inertias = tuple((float(info[0]), info[2]) for info in infos)
         self.mass_kg = sum(mass for mass, _ in self._inertias)
@@ -80,7 +80,7 @@ class Subtree:
     def contact_wrench(self, origin: Vector) -> tuple[Vector, Vector]:
         """Returns force [N] and moment about a point [N m], world axes, of contacts with what is not in the subtree.
 
-        PyBullet tells normal and sliding friction forces of the last step; those against rolling and spinning, and
+        PyBullet returns normal and sliding friction forces of the last step; those against rolling and spinning, and
         contacts with soft bodies, it keeps to itself.
         """
         force = moment = (0.0, 0.0, 0.0)

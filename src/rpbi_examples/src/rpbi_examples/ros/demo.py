@@ -22,7 +22,6 @@ import rospy
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.transform_messages import position_in, quat_in
-from rpbi.bodies import BODY_TYPES
 from rpbi.config.loading import load_world
 from rpbi.geometry import Pose
 from rpbi_examples import demo_report
@@ -30,7 +29,7 @@ from rpbi_examples.draw_rate import draw_rate_hz
 from rpbi_examples.process_tree import kill_with_children
 from rpbi_utils import Recorder, bag_to_dataframes
 
-from .basic_robot_example import HZ as TARGET_HZ
+from .moving_robots import HZ as TARGET_HZ
 
 EXAMPLE = "basic_example_kuka_lwr"
 WORLD = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"
@@ -94,7 +93,7 @@ def _demo(arguments: argparse.Namespace) -> int:
             time.sleep(arguments.seconds)
     _say("reading the bag")
     summary = _report(bag, expected_hz, arguments.seconds, out)
-    print(demo_report.as_text(summary))
+    print(demo_report.as_text(summary), flush=True)
     _say(f"\nwritten to {out}: {', '.join(sorted(path.name for path in out.iterdir()))}")
     for line in demo_report.slow_lines(summary, CAMERA_TOPICS, REQUIRED_TOPICS, WORLD):
         _say(f"SLOW: {line}")
@@ -166,7 +165,7 @@ def _is_published(topic: str) -> bool:
 
 def _expected_rates() -> dict[str, float]:
     """Returns the rate of each topic [Hz], from the files that the example is made of."""
-    world = load_world(WORLD, BODY_TYPES)
+    world = load_world(WORLD)
     robot: Any = next(item.config for item in world.objects if item.type == "robot")
     camera = world.config.rgbd_sensor
     assert camera is not None
@@ -193,7 +192,7 @@ def _report(bag: Path, expected_hz: dict[str, float], seconds: float, out: Path)
     demo_report.plot_joints(states, targets, out / "joints.png")
     error = demo_report.tracking_error(states, targets)
     demo_report.plot_efforts(states, list(error.index), out / "efforts.png")
-    world = load_world(WORLD, BODY_TYPES)
+    world = load_world(WORLD)
     assert world.config.rgbd_sensor is not None
     for picture in (out / "colour.png", out / "depth.png"):  # a very busy machine may draw none
         picture.unlink(missing_ok=True)

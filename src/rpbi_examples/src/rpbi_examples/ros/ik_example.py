@@ -19,7 +19,7 @@ from custom_ros_tools.transforms import pose_of
 from ik_ros.msg import IKProblem, Waypoint
 from ik_ros.srv import SolveIK
 from ros_pybullet_interface.srv import ResetJointState
-from rpbi_examples.figure_eight import FigureEight
+from rpbi_examples.motions import FigureEight
 
 HOME = {"lwr_arm_1_joint": 0.52, "lwr_arm_3_joint": -1.57, "lwr_arm_5_joint": 1.05}
 """Where the search begins [rad]; other joints at 0."""

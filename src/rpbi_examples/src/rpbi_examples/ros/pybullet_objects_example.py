@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import rospy
 
+from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import PybulletObject
 from ros_pybullet_interface.srv import AddPybulletObject
@@ -16,11 +17,7 @@ STAY_S = 3.0
 
 def main() -> None:
     """Runs the node."""
-    rospy.init_node("pybullet_objects_example")
-    try:
-        _throw_boxes()
-    except rospy.ROSInterruptException:
-        pass  # Ctrl-C
+    run_node("pybullet_objects_example", _throw_boxes)
 
 
 def _throw_boxes() -> None:

@@ -13,7 +13,7 @@ import rospy
 
 from custom_ros_tools.errors import InterfaceError
 from rpbi_utils.errors import BagError
-from rpbi_utils.table_files import FORMATS, file_stems, write_table
+from rpbi_utils.tables import FORMATS, file_stems, write_table
 
 from .bags import bag_to_dataframes
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.client
 import itertools
 import logging
 import os
@@ -11,19 +12,23 @@ import signal
 import subprocess
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from types import TracebackType
+from typing import Any
+from xmlrpc.client import Error, ServerProxy
 
 import rosgraph
 import roslib.packages
 from rosgraph.names import get_ros_namespace, resolve_name
 
 from custom_ros_tools.errors import MissingDependency
+from custom_ros_tools.ros.lifecycle.timed_master import TimedTransport
 from rpbi_utils.errors import RecordingError
 
-from .connections import unconnected, unsubscribed
-
+_CALLER = "/rpbi_utils"
+_ANSWER_S = 1.0
+_OUTBOUND = "o"
 _POLL_S = 0.02
 _GRACE_S = 0.2  # for what was published just before the end and is on its way
 _NOT_WRITING = ("Disabling recording", "Error writing", "Unknown exception")
@@ -161,8 +166,8 @@ class Recorder:
                 raise RecordingError(self.path, f"the recorder ended at once{self._log_fatal_lines()}")
             self._raise_if_not_writing()
             try:
-                missing = unsubscribed(self._node, self.topics)
-                silent = [] if missing else unconnected(self._node, self.topics)
+                missing = _unsubscribed(self._node, self.topics)
+                silent = [] if missing else _unconnected(self._node, self.topics)
             except OSError as error:
                 uri = rosgraph.get_master_uri()
                 raise RecordingError(self.path, f"the ROS master at {uri} does not answer any more: {error}") from None
@@ -206,3 +211,53 @@ class Recorder:
 
 def _what_is_left(active: Path) -> str:
     return f"; what was recorded can be saved with 'rosbag reindex {active}'" if active.exists() else ""
+
+
+def _unsubscribed(node: str, topics: Collection[str]) -> list[str]:
+    """Returns those of some topics to which a node has not subscribed at the master.
+
+    Raises:
+        OSError: If the master cannot be reached.
+    """
+    _, subscribers, _ = rosgraph.Master(_CALLER).getSystemState()
+    subscribed = {topic for topic, nodes in subscribers if node in nodes}
+    return [topic for topic in topics if topic not in subscribed]
+
+
+def _unconnected(node: str, topics: Collection[str]) -> list[str]:
+    """Returns the publishers of some topics that do not send to a node yet, as `"/publisher (/topic)"`.
+
+    The publishers are asked, since only they know when a subscriber gets what they publish. One that is
+    registered but gone is not counted; one that does not answer is.
+
+    Raises:
+        OSError: If the master cannot be reached.
+    """
+    master = rosgraph.Master(_CALLER)
+    publishers, _, _ = master.getSystemState()
+    wanted: dict[str, list[str]] = {}
+    for topic, nodes in publishers:
+        if topic in topics:
+            for publisher in nodes:
+                wanted.setdefault(publisher, []).append(topic)
+    missing = []
+    for publisher, published in wanted.items():
+        try:
+            connected = _receivers(master.lookupNode(publisher), node)
+        except (ConnectionRefusedError, rosgraph.MasterError):  # it ended without a word, or just now
+            continue
+        missing += [f"{publisher} ({topic})" for topic in published if topic not in connected]
+    return missing
+
+
+def _receivers(uri: str, node: str) -> set[str]:
+    """Returns the topics that the node at `uri` sends to `node`; none if it does not answer."""
+    proxy: Any = ServerProxy(uri, TimedTransport(_ANSWER_S))
+    try:
+        _, _, connections = proxy.getBusInfo(_CALLER)
+    except ConnectionRefusedError:
+        raise
+    except (OSError, Error, http.client.HTTPException):
+        return set()
+    # id, other end, direction, transport, topic, whether connected
+    return {topic for _, other, way, _, topic, *_ in connections if other == node and way == _OUTBOUND}

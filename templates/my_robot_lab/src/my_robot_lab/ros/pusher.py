@@ -5,6 +5,7 @@ from geometry_msgs.msg import Quaternion, Transform, Vector3
 from sensor_msgs.msg import JointState, Range
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
+from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.srv import SetTransform
 
 OUT, HOME = 0.5, 0.0
@@ -47,6 +48,4 @@ class Pusher:
 
 def main() -> None:
     """Runs the node."""
-    rospy.init_node("pusher")
-    Pusher()
-    rospy.spin()
+    run_node("pusher", Pusher)

@@ -5,9 +5,8 @@ import math
 from sensor_msgs.msg import Range
 from std_msgs.msg import Float64
 
+from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import prefixed, to_ros_time
-from rpbi.ros.inputs import TopicInput
-from rpbi.ros.publishers.sample_topics import SampleTopic
 
 from ..range_finder import RangeSample
 
@@ -21,5 +20,5 @@ def _range_message(sample: RangeSample, stamp_ns: int) -> Range:
     return message
 
 
-RANGE = SampleTopic("rpbi/{name}/range", Range, _range_message)
-SPEED = TopicInput("rpbi/{name}/speed", Float64, lambda message: message.data)
+RANGE = Topic("rpbi/{name}/range", Range, _range_message)
+SPEED = Topic("rpbi/{name}/speed", Float64, lambda message: message.data)

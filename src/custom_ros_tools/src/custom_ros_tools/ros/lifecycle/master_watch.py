@@ -9,10 +9,10 @@ from xmlrpc.client import MultiCall
 
 import rosgraph
 import rospy
-from rospy.impl.paramserver import get_param_server_cache
+
+from custom_ros_tools.ros.rospy_internals import Registry, answer_cached, registry
 
 from .kept_parameters import kept_parameters
-from .registrations import Registrations
 from .timed_master import MASTER_FAILURES, timed_master
 from .wall_timer import WallTimer
 
@@ -20,19 +20,103 @@ LOOK_HZ = 1.0
 _ASKED_BY_LOGGING = "/rosout_disable_topics_generation"
 
 
+_METHODS = {"sub": "Subscriber", "pub": "Publisher", "srv": "Service"}
+
+
+class Registrations:
+    """Registers the topics and services of this node, in the place of rospy's own part for that.
+
+    That one waits for a master that has gone, with all topics locked, and registers nothing again. Here what is opened
+    or closed while there is no master is told to the next one.
+
+    Args:
+        registry: The topics and services.
+
+    Attributes:
+        are_complete: Whether the master knows them all, as far as is known.
+    """
+
+    def __init__(self, registry: Registry) -> None:
+        self.are_complete = True
+        self._registry = registry
+        self._name, self._node_uri = rospy.get_name(), rospy.get_node_uri()
+        self._withdrawn: list[tuple[str, tuple[str, str, str]]] = []
+        """Calls that a master who comes back, and has not forgotten anything, has to hear."""
+        registry.hand_over(self)
+
+    def reg_added(self, name: str, type_or_uri: str, kind: str) -> None:
+        """Registers a topic or service; rospy calls it."""
+        if not self.are_complete:
+            return
+        try:
+            with timed_master() as master:
+                call = getattr(master, f"register{_METHODS[kind]}")
+                answer = call(self._name, name, type_or_uri, self._node_uri)
+        except MASTER_FAILURES:
+            self.are_complete = False
+            return
+        self._take(kind, name, answer)
+
+    def reg_removed(self, name: str, type_or_uri: str, kind: str) -> None:
+        """Withdraws a topic or service; rospy calls it."""
+        uri = type_or_uri if kind == "srv" else self._node_uri
+        method, arguments = f"unregister{_METHODS[kind]}", (self._name, name, uri)
+        try:
+            if self.are_complete:
+                with timed_master() as master:
+                    getattr(master, method)(*arguments)
+                return
+        except MASTER_FAILURES:
+            self.are_complete = False
+        self._withdrawn.append((method, arguments))
+
+    def repeat(self, master: Any) -> tuple[int, int]:
+        """Registers everything again, and parameters with it.
+
+        Args:
+            master: See `timed_master`.
+
+        Returns:
+            The number of topics and that of services.
+        """
+        with self._registry.entries() as entries:  # no topic or service comes or goes meanwhile
+            kept_parameters.restore(master)
+            calls = MultiCall(master)
+            for method, arguments in self._withdrawn:
+                getattr(calls, method)(*arguments)
+            for kind, name, type_or_uri in entries:
+                getattr(calls, f"register{_METHODS[kind]}")(self._name, name, type_or_uri, self._node_uri)
+            answers = list(calls())[len(self._withdrawn) :]
+            self._withdrawn.clear()
+            self.are_complete = True
+        for (kind, name, _), answer in zip(entries, answers, strict=True):
+            self._take(kind, name, answer)
+        served = sum(kind == "srv" for kind, _, _ in entries)
+        return len(entries) - served, served
+
+    def _take(self, kind: str, name: str, answer: tuple[int, str, Any]) -> None:
+        code, message, value = answer
+        if code != 1:
+            rospy.logfatal("the ROS master does not take %s: %s", name, message)
+        elif kind == "sub":
+            self._registry.connect(name, value)
+
+
 class MasterWatch:
     """Looks after the ROS master once a second, until the node shuts down.
 
     When the master cannot be reached, it says so; connections that exist do not need it. When the master is back, all
     topics, services and parameters of the node are registered again, since rospy does that at the start only. If
-    another node has taken the name meanwhile, this one ends, as ROS has it when a master sees both.
+    another node has taken the name meanwhile, this one ends, as ROS has it when a master sees both. A rospy that is
+    built otherwise than expected registers nothing again, which is said at the start.
 
     Make it once, after `rospy.init_node`.
     """
 
     def __init__(self) -> None:
         self._name, self._uri = rospy.get_name(), rosgraph.get_master_uri()
-        self._registrations = Registrations()
+        found = registry()
+        self._registrations = None if found is None else Registrations(found)
         self._process: int | None = None
         self._is_gone = self._is_over = False
         self._registering = threading.Lock()
@@ -40,7 +124,8 @@ class MasterWatch:
             self._process = master.getPid(self._name)[2]
             kept_parameters.keep("/use_sim_time")
             kept_parameters.keep(self._name)
-            _log_without_master()
+            # rospy asks the master for each line that it logs: one that hangs would hold up who says anything
+            answer_cached(_ASKED_BY_LOGGING, rospy.get_param_cached(_ASKED_BY_LOGGING, False))
         rospy.on_shutdown(self._end)
         WallTimer(LOOK_HZ, self._look)
 
@@ -56,7 +141,9 @@ class MasterWatch:
                     error,
                     self._name,
                 )
-            self._is_gone, self._registrations.are_complete = True, False
+            self._is_gone = True
+            if self._registrations is not None:
+                self._registrations.are_complete = False
 
     def _compare(self, master: Any) -> None:
         """Compares what the master knows of us with what is."""
@@ -66,8 +153,12 @@ class MasterWatch:
         (_, _, process), (_, _, node_uri) = calls()
         if node_uri and node_uri != rospy.get_node_uri():
             self._give_way(node_uri)
+        elif self._registrations is None:
+            if process != self._process:
+                rospy.logwarn("the ROS master at %s is another one: it knows nothing of %s", self._uri, self._name)
+            self._process, self._is_gone = process, False
         elif process != self._process or not node_uri or not self._registrations.are_complete:
-            self._register(master)
+            self._register(master, self._registrations)
             self._process, self._is_gone = process, False
 
     def _give_way(self, node_uri: str) -> None:
@@ -75,11 +166,11 @@ class MasterWatch:
             rospy.logfatal("another node is called %s by now (at %s): this one ends", self._name, node_uri)
             rospy.signal_shutdown("another node has its name")
 
-    def _register(self, master: Any) -> None:
+    def _register(self, master: Any, registrations: Registrations) -> None:
         with self._registering:
             if self._is_over:
                 return
-            topics, services = self._registrations.repeat(master)
+            topics, services = registrations.repeat(master)
         rospy.loginfo(
             "the ROS master at %s is back: %s has registered its %d topics and %d services again",
             self._uri,
@@ -92,9 +183,3 @@ class MasterWatch:
         """Sees to it that nothing is registered after the node has taken its leave."""
         with self._registering:
             self._is_over = True
-
-
-def _log_without_master() -> None:
-    """Answers what rospy asks the master for each line that it logs: one that hangs would hold up who says anything."""
-    answer = rospy.get_param_cached(_ASKED_BY_LOGGING, False)
-    get_param_server_cache().set(_ASKED_BY_LOGGING, answer)

@@ -1,48 +1,176 @@
-"""The life of a small node: start, wait, end."""
+"""The life of a node: start, wait, end; with Ctrl-C at any moment, without hanging and without a traceback.
+
+rospy would shut down inside the signal handler, wherever the program happens to be. If that is inside a lock that the
+shutdown needs too, the process hangs for good; and also if anybody opens or closes a topic meanwhile. So SIGINT stays
+blocked (see `custom_ros_tools.ros.node`), and is waited for where it is safe to act on it, in a thread. Child processes
+inherit the block, which leaves their end to this process.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import logging
+import os
+import signal
 import sys
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import TypeVar
 
+import rosgraph
 import rospy
+from rosgraph_msgs.msg import Log
 
 from custom_ros_tools.errors import InterfaceError
 
-from .fatal_log import log_fatal_lines, log_loss_of_master
-from .interrupts import leaving_ros_on_interrupt, wait_for_master
-from .logging_bridge import attach_logging
 from .master_watch import MasterWatch
 
+T = TypeVar("T")
 
-def run_node(name: str, start: Callable[[], object], anonymous: bool = False) -> None:
+LONGEST_FAREWELL_S = 10.0
+"""How long leaving the ROS master may take [s]; it may hang or be gone."""
+MASTER_PERIOD_S = 0.2
+ROSOUT = "/rosout"
+LONGEST_WAIT_S = 2.0
+"""How long to wait for those who listen to /rosout; a node that has just begun is not connected to them yet."""
+SENDING_S = 0.2
+
+
+def init_node(name: str, loggers: Iterable[str] = (), anonymous: bool = False, ros_time: bool = True) -> None:
+    """Makes this process a node that a ROS master finds again when it comes back; for the arguments see `run_node`."""
+    rospy.init_node(name, anonymous=anonymous, disable_rostime=not ros_time, disable_signals=True)
+    _attach_logging({"custom_ros_tools", *loggers})
+    MasterWatch()
+
+
+def run_node(
+    name: str,
+    start: Callable[[], T],
+    run: Callable[[T], object] | None = None,
+    *,
+    anonymous: bool = False,
+    ros_time: bool = True,
+    loggers: Iterable[str] = (),
+) -> None:
     """Runs a node until it is interrupted; what is wrong with its configuration ends it with 1.
 
-    SIGINT has to be blocked when the process starts; see `interrupts`.
+    The program is one that `custom_ros_tools.ros.node.run` runs.
 
     Args:
         name: The node's name unless it is given another one.
         start: Opens topics and services, and perhaps does the node's work itself until ROS shuts down, which
             `rospy.ROSInterruptException` may tell; what it returns lives as long as the node.
+        run: Does the work of what `start` returns, until ROS shuts down; if it is given, an interrupt waits until
+            `start` has returned.
         anonymous: Whether the name is made unique.
+        ros_time: Whether the node goes by ROS time; else it never waits for a clock.
+        loggers: Top-level Python modules whose loggers go to /rosout, beside that of `start`.
     """
-    if not wait_for_master():
+    if not _wait_for_master():
         return
-    rospy.init_node(name, anonymous=anonymous, disable_signals=True)
-    attach_logging()
-    MasterWatch()
+    init_node(name, (start.__module__.partition(".")[0], *loggers), anonymous, ros_time)
     ended = threading.Event()
     rospy.on_shutdown(ended.set)
-    with leaving_ros_on_interrupt():
+    with ExitStack() as stack:
         try:
-            _node = start()
+            if run is None:
+                stack.enter_context(_leaving_ros_on_interrupt())
+            node = start()
+            if run is not None:
+                stack.enter_context(_leaving_ros_on_interrupt())
+                run(node)
+            ended.wait()
         except InterfaceError as error:
-            log_fatal_lines(str(error).splitlines())
+            _log_fatal_lines(str(error).splitlines())
             sys.exit(1)
         except ConnectionError as error:
-            log_loss_of_master(error)
+            uri = rosgraph.get_master_uri()
+            _log_fatal_lines([f"the ROS master at {uri} has gone while the node was starting: {error}"])
             sys.exit(1)
         except rospy.ROSInterruptException:
             return
-        ended.wait()
+
+
+def _wait_for_master() -> bool:
+    """Waits until there is a ROS master; from here on, SIGTERM does the same as SIGINT.
+
+    Returns:
+        False if it was interrupted.
+    """
+    signal.signal(signal.SIGTERM, lambda *_: _interrupt())
+    told = False
+    while not rosgraph.is_master_online():
+        if not told:
+            print(f"waiting for a ROS master at {rosgraph.get_master_uri()}: is roscore running?", flush=True)
+            told = True
+        if signal.sigtimedwait({signal.SIGINT}, MASTER_PERIOD_S) is not None:
+            return False
+    return True
+
+
+@contextmanager
+def _leaving_ros_on_interrupt() -> Iterator[None]:
+    """Shuts ROS down on SIGINT, and in any case when the block ends, in a thread of its own."""
+    thread = threading.Thread(target=_wait_and_leave, name="interrupts", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        _interrupt()
+        thread.join(LONGEST_FAREWELL_S)
+
+
+def _interrupt() -> None:
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+def _wait_and_leave() -> None:
+    signal.sigwait({signal.SIGINT})
+    rospy.signal_shutdown("interrupted, or at its end")
+
+
+class _RosHandler(logging.Handler):
+    """Hands log records to rospy."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        levels = (
+            (logging.CRITICAL, rospy.logfatal),
+            (logging.ERROR, rospy.logerr),
+            (logging.WARNING, rospy.logwarn),
+            (logging.INFO, rospy.loginfo),
+            (logging.DEBUG, rospy.logdebug),
+        )
+        next(send for level, send in levels if record.levelno >= level)(self.format(record))
+
+
+def _attach_logging(modules: Iterable[str]) -> None:
+    """Attaches the loggers of top-level Python modules to /rosout; call it once, after `rospy.init_node`."""
+    handler = _RosHandler(level=logging.DEBUG)
+    for module in modules:
+        logger = logging.getLogger(module)
+        logger.setLevel(logging.INFO)
+        logger.propagate = False
+        logger.addHandler(handler)
+
+
+def _log_fatal_lines(lines: Iterable[str]) -> None:
+    """Logs lines as fatal, on the console and in /rosout, just before the node ends."""
+    publisher = rospy.Publisher(ROSOUT, Log, queue_size=100, latch=True)  # another handle on what rospy logs to
+    end_s = time.monotonic() + LONGEST_WAIT_S
+    expected = _listeners()
+    while publisher.get_num_connections() < expected and time.monotonic() < end_s and not rospy.is_shutdown():
+        time.sleep(0.01)
+    print(file=sys.stderr)  # libraries, PyBullet for one, may leave their own last line unended
+    for line in lines:
+        rospy.logfatal(line)
+    time.sleep(SENDING_S)
+
+
+def _listeners() -> int:
+    """Returns how many nodes listen to /rosout."""
+    with contextlib.suppress(OSError, rosgraph.MasterException):
+        subscribed = rosgraph.Master(rospy.get_name()).getSystemState()[1]
+        return len(dict(subscribed).get(ROSOUT, ()))
+    return 0

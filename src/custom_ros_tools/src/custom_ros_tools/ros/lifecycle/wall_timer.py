@@ -1,4 +1,4 @@
-"""A timer by the wall clock: it goes on when simulated time stands still or has not begun."""
+"""Rates by the wall clock: they go on when simulated time stands still or has not begun."""
 
 from __future__ import annotations
 
@@ -12,8 +12,38 @@ import rospy
 from .throttle import ThrottledWarning
 
 
+class WallRate:
+    """Says when something is due at a rate; what it is late for it leaves out.
+
+    Args:
+        hz: The rate [Hz]; 0 is never.
+        delay_s: When it is due for the first time [s] from now.
+    """
+
+    def __init__(self, hz: float, delay_s: float = 0.0) -> None:
+        self._period_s = 1.0 / hz if hz else float("inf")
+        self._due_s = time.monotonic() + delay_s if hz else float("inf")
+
+    @property
+    def left_s(self) -> float:
+        """How long until it is due again [s]; 0 or less if it is."""
+        return self._due_s - time.monotonic()
+
+    def is_due(self) -> bool:
+        """Returns whether it is due; if so, it is due again a period later."""
+        now_s = time.monotonic()
+        if now_s < self._due_s:
+            return False
+        self._due_s = max(self._due_s + self._period_s, now_s)
+        return True
+
+    def rest(self, duration_s: float) -> None:
+        """Is not due for some time from now [s]."""
+        self._due_s = max(self._due_s, time.monotonic() + duration_s)
+
+
 class WallTimer:
-    """Calls something at a rate, in a thread of its own, until ROS shuts down; what it is late for it leaves out.
+    """Calls something at a rate, in a thread of its own, until ROS shuts down.
 
     An exception is logged, and the next call is made all the same.
 
@@ -23,19 +53,17 @@ class WallTimer:
     """
 
     def __init__(self, hz: float, action: Callable[[], None]) -> None:
-        self._period_s = 1.0 / hz
-        self._action = action
+        self._rate, self._action = WallRate(hz), action
         self._warn = ThrottledWarning()
         self._ended = threading.Event()
         rospy.on_shutdown(self._ended.set)
         threading.Thread(target=self._run, name="wall timer", daemon=True).start()
 
     def _run(self) -> None:
-        due_s = time.monotonic()
-        while not self._ended.wait(max(due_s - time.monotonic(), 0.0)):
+        while not self._ended.wait(max(self._rate.left_s, 0.0)):
             try:
-                self._action()
+                if self._rate.is_due():
+                    self._action()
             except Exception:
                 if not rospy.is_shutdown():  # else its topics are closed already
                     self._warn(threading.current_thread().name, traceback.format_exc())
-            due_s = max(due_s + self._period_s, time.monotonic())

@@ -12,8 +12,7 @@ from custom_ros_tools.marker_config import MARKER_ACTIONS, MARKER_TYPES, SHAPES,
 from custom_ros_tools.ros.lifecycle.parameters import private_config
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_timer import WallTimer
-from custom_ros_tools.ros.transform_messages import as_pose, transform_message
-from custom_ros_tools.ros.transform_topic import TransformTopic
+from custom_ros_tools.ros.transform_messages import TransformTopic, as_pose, transform_message
 
 log = logging.getLogger(__name__)
 

@@ -29,6 +29,7 @@ class MobileRobot(Robot):
 
     base_joints = len(PLANAR_JOINTS)
     prepare_urdf = staticmethod(with_planar_joints)
+    example = {key: value for key, value in Robot.example.items() if key != "object_tf"} | {"planar_base": {}}
 
     def __init__(self, pb: Client, config: RobotConfig) -> None:
         super().__init__(pb, config)

@@ -44,6 +44,18 @@ class Robot(JointedBody):
         PhysicsError: If PyBullet cannot load it.
     """
 
+    example = {
+        "loadURDF": {"fileName": "kuka_iiwa/model.urdf", "useFixedBase": True},
+        "setJointMotorControlArray": {"controlMode": "POSITION_CONTROL"},
+        "broadcast_link_states": True,
+        "base_state_hz": 50.0,
+        "enabled_joint_force_torque_sensors": ["lbr_iiwa_joint_7"],
+        "joint_trajectory_controller": {},
+        "start_ik_callback": True,
+        "contacts": {},
+        "object_tf": {"tf_id": "FRAME"},
+    }
+
     def __init__(self, pb: Client, config: RobotConfig) -> None:
         super().__init__(pb, config)
         assert config.setJointMotorControlArray is not None  # the model demands it

@@ -22,6 +22,14 @@ class VisualRobot(JointedBody):
         PhysicsError: If PyBullet cannot load it.
     """
 
+    example = {
+        "is_visual_robot": True,
+        "loadURDF": {"fileName": "kuka_iiwa/model.urdf", "useFixedBase": True},
+        "broadcast_link_states": True,
+        "start_ik_callback": True,
+        "object_tf": {"tf_id": "FRAME"},
+    }
+
     def __init__(self, pb: Client, config: RobotConfig) -> None:
         super().__init__(pb, config, fixed_base=True)
         self._limit_reports = LimitReports(self.name)

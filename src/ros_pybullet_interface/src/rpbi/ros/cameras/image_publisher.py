@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,18 +13,17 @@ import rospy
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
 
-from custom_ros_tools.ros.lifecycle.logging_bridge import attach_logging
-from custom_ros_tools.ros.lifecycle.master_watch import MasterWatch
+from custom_ros_tools.ros.lifecycle.run_node import init_node
 from rpbi.render.depth import PointCloud
 from rpbi.render.frame import Camera, Demand, Frame
 from rpbi.ros.headers import to_ros_time
 from rpbi.ros.publishers.topics import StateTopic
 
-from .messages import camera_info, cloud_message, image_message
-from .topics import CameraTopic, camera_topics
+from .topics import camera_info, camera_topics, cloud_message, image_message
 
 SINK = "rpbi.ros.cameras.image_publisher:ImagePublisher"
 
+warnings.filterwarnings("ignore", "The publisher should be created", SyntaxWarning)  # None is meant: rospy then waits
 QUEUE_SIZE = 2
 """Images kept for a slow subscriber: a stopped one must not fill the memory."""
 LONGEST_WAIT_S = 5.0
@@ -35,9 +35,7 @@ class ImagePublisher:
 
     def __init__(self) -> None:
         # Without ROS time, since it must never wait for the clock: stamps come with the frames.
-        rospy.init_node("rpbi_camera", disable_rostime=True, disable_signals=True)
-        attach_logging("custom_ros_tools")
-        MasterWatch()
+        init_node("rpbi_camera", ros_time=False)
         self._cameras: dict[str, _CameraTopics] = {}
 
     def add(self, camera: Camera) -> None:
@@ -95,9 +93,7 @@ class _Topic(StateTopic):
 
     def __init__(self, topic: str, message_type: type, waits: bool) -> None:
         self.seen = 0
-        super().__init__(topic, message_type, QUEUE_SIZE)
-        if waits:
-            self._publisher.impl.set_queue_size(None)  # rospy then sends in the caller's thread
+        super().__init__(topic, message_type, None if waits else QUEUE_SIZE)
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Any) -> None:
         super().peer_subscribe(topic_name, topic_publish, peer_publish)
@@ -116,9 +112,9 @@ class _CameraTopics:
         self._frame_id = camera.frame_id
         self._info = camera_info(camera)
         self._cloud = PointCloud(camera.intrinsics) if camera.pointcloud else None
-        self._topics: dict[str, tuple[CameraTopic, _Topic]] = {
-            name: (topic, _Topic(name, topic.message_type, camera.synchronous))
-            for name, topic in camera_topics(camera.topic_name, camera.pointcloud).items()
+        self._topics: dict[str, tuple[str, _Topic]] = {
+            name: (stream, _Topic(name, topic.message_type, camera.synchronous))
+            for name, (stream, topic) in camera_topics(camera.topic_name, camera.pointcloud).items()
         }
         self._published_ns = -1
 
@@ -126,37 +122,37 @@ class _CameraTopics:
         """Waits until all who have subscribed at the master are connected; but not for ever, some may be dead."""
         registered = dict(rosgraph.Master(rospy.get_name()).getSystemState()[1])
         end_s = time.monotonic() + LONGEST_WAIT_S
-        for name, (_, ros_topic) in self._topics.items():
+        for name, (_, topic) in self._topics.items():
             expected = len(registered.get(rospy.resolve_name(name), ()))
-            while ros_topic.subscriber_count() < expected and time.monotonic() < end_s:
+            while topic.subscriber_count() < expected and time.monotonic() < end_s:
                 time.sleep(0.01)
 
     def demand(self) -> Demand:
         """Returns what is subscribed to."""
         topics = self._topics.values()
-        streams = frozenset(topic.stream for topic, ros_topic in topics if ros_topic.has_subscribers)
-        return Demand(streams, sum(ros_topic.seen for _, ros_topic in topics))
+        streams = frozenset(stream for stream, topic in topics if topic.has_subscribers)
+        return Demand(streams, sum(topic.seen for _, topic in topics))
 
     def publish(self, frame: Frame) -> None:
         """Publishes a frame; one with the last stamp again goes only to who has come since."""
         header = Header(stamp=to_ros_time(frame.stamp_ns), frame_id=self._frame_id)
         again = frame.stamp_ns == self._published_ns
-        for topic, ros_topic in self._topics.values():
-            if not ros_topic.has_subscribers:
+        for stream, topic in self._topics.values():
+            if not topic.has_subscribers:
                 continue
-            message = self._message(topic.stream, frame, header)
+            message = self._message(stream, frame, header)
             if message is None:
                 continue  # its first subscriber came while the frame was drawn
             if again:
-                ros_topic.serve_late(lambda late=message: late)
+                topic.serve_late(lambda late=message: late)
             else:
-                ros_topic.publish(message)
+                topic.publish(message)
         self._published_ns = frame.stamp_ns
 
     def close(self) -> None:
         """Ends the topics."""
-        for _, ros_topic in self._topics.values():
-            ros_topic.close()
+        for _, topic in self._topics.values():
+            topic.close()
 
     def _message(self, stream: str, frame: Frame, header: Header) -> CameraInfo | Image | PointCloud2 | None:
         if stream == "info":

@@ -1,58 +1,111 @@
-"""The topics of a camera."""
+"""The topics of a camera, and what it sees as messages."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import numpy as np
+import numpy.typing as npt
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
+from std_msgs.msg import Header
 
-from sensor_msgs.msg import CameraInfo, Image, PointCloud2
-
-
-class CameraTopic(NamedTuple):
-    """A topic of a camera.
-
-    Attributes:
-        stream: What of the frame it tells, as in `render.frame.Demand`.
-        suffix: Its name after the camera's prefix.
-        message_type: Its ROS type.
-        meaning: What it tells, in a sentence.
-    """
-
-    stream: str
-    suffix: str
-    message_type: type
-    meaning: str
-
+from rpbi.render.frame import Camera, Frame
+from rpbi.ros.endpoints import Topic
 
 IMAGE_TOPICS = (
-    CameraTopic("colour", "colour/image", Image, "Colour, `rgb8`."),
-    CameraTopic(
+    ("colour", Topic("rpbi/{name}/colour/image", Image, meaning="Colour, `rgb8`.")),
+    (
         "depth",
-        "depth/image",
-        Image,
-        "Distance along the optical axis, `32FC1` [m]; the far end of `range` where nothing is.",
+        Topic(
+            "rpbi/{name}/depth/image",
+            Image,
+            meaning="Distance along the optical axis, `32FC1` [m]; the far end of `range` where nothing is.",
+        ),
     ),
-    CameraTopic(
-        "segmentation", "segmentation", Image, "PyBullet's ids of the bodies, `mono16`; 65535 where nothing is."
+    (
+        "segmentation",
+        Topic(
+            "rpbi/{name}/segmentation",
+            Image,
+            meaning="PyBullet's ids of the bodies, `mono16`; 65535 where nothing is.",
+        ),
     ),
-    CameraTopic("info", "colour/camera_info", CameraInfo, "Intrinsics of the colour image."),
-    CameraTopic("info", "depth/camera_info", CameraInfo, "Intrinsics of the depth image."),
+    ("info", Topic("rpbi/{name}/colour/camera_info", CameraInfo, meaning="Intrinsics of the colour image.")),
+    ("info", Topic("rpbi/{name}/depth/camera_info", CameraInfo, meaning="Intrinsics of the depth image.")),
     # By the rule of image_transport
-    CameraTopic("info", "camera_info", CameraInfo, "Intrinsics of the segmentation."),
+    ("info", Topic("rpbi/{name}/camera_info", CameraInfo, meaning="Intrinsics of the segmentation.")),
 )
-CLOUD_TOPIC = CameraTopic(
+"""Streams, as in `render.frame.Demand`, and their topics."""
+CLOUD_TOPIC = (
     "points",
-    "pointcloud",
-    PointCloud2,
-    "Points `x`, `y`, `z` [m] in the optical frame and `rgb`, one a pixel, NaN where nothing is; with `pointcloud`.",
+    Topic(
+        "rpbi/{name}/pointcloud",
+        PointCloud2,
+        meaning="Points `x`, `y`, `z` [m] in the optical frame and `rgb`, one a pixel, NaN where nothing is; "
+        "with `pointcloud`.",
+    ),
 )
 
 
-def camera_topics(topic_name: str, pointcloud: bool) -> dict[str, CameraTopic]:
-    """Returns the topics of a camera by their relative names.
+def camera_topics(topic_name: str, pointcloud: bool) -> dict[str, tuple[str, Topic]]:
+    """Returns the streams and topics of a camera by their relative names.
 
     Args:
         topic_name: What it is called in topics.
         pointcloud: Whether it has point clouds.
     """
-    topics = (*IMAGE_TOPICS, CLOUD_TOPIC) if pointcloud else IMAGE_TOPICS
-    return {f"rpbi/{topic_name}/{topic.suffix}": topic for topic in topics}
+    rows = (*IMAGE_TOPICS, CLOUD_TOPIC) if pointcloud else IMAGE_TOPICS
+    return {topic.name.format(name=topic_name): (stream, topic) for stream, topic in rows}
+
+
+def camera_info(camera: Camera) -> CameraInfo:
+    """Returns what ROS has to know of a camera that distorts nothing."""
+    info = CameraInfo(width=camera.intrinsics.width_px, height=camera.intrinsics.height_px)
+    K = camera.intrinsics.K
+    info.K = K.ravel().tolist()
+    info.distortion_model = "plumb_bob"
+    info.D = [0.0] * 5
+    info.R = np.eye(3).ravel().tolist()
+    info.P = np.hstack([K, np.zeros((3, 1))]).ravel().tolist()
+    return info
+
+
+def image_message(stream: str, frame: Frame, header: Header) -> Image | None:
+    """Returns an image of a frame as a message, None if the frame has none of it.
+
+    Args:
+        stream: `colour` (rgb8), `depth` (32FC1, metres) or `segmentation` (mono16, 65535 where nothing is).
+        frame: The frame.
+        header: Stamp and frame of the message.
+    """
+    if stream == "colour":
+        encoding, pixels = "rgb8", frame.colour
+    elif stream == "depth":
+        encoding, pixels = "32FC1", frame.depth
+    else:
+        encoding, pixels = "mono16", _as_mono16(frame.segmentation)
+    if pixels is None:
+        return None
+    height, width = pixels.shape[:2]
+    image = Image(header=header, height=height, width=width, encoding=encoding, is_bigendian=0)
+    image.step = pixels.nbytes // height
+    image.data = pixels.tobytes()
+    return image
+
+
+def cloud_message(points: npt.NDArray[np.float32], header: Header) -> PointCloud2:
+    """Returns points as an organised cloud, pixel by pixel.
+
+    Args:
+        points: x, y, z [m], NaN where nothing is, and the colour; shape (height, width, 4).
+        header: Stamp and frame of the message.
+    """
+    height, width = points.shape[:2]
+    fields = [PointField(name, 4 * index, PointField.FLOAT32, 1) for index, name in enumerate(("x", "y", "z", "rgb"))]
+    cloud = PointCloud2(header=header, height=height, width=width, fields=fields, is_bigendian=False, is_dense=False)
+    cloud.point_step = 4 * points.itemsize
+    cloud.row_step = width * cloud.point_step
+    cloud.data = points.tobytes()
+    return cloud
+
+
+def _as_mono16(body_ids: npt.NDArray[np.int32] | None) -> npt.NDArray[np.uint16] | None:
+    return None if body_ids is None else body_ids.astype(np.uint16)  # -1 becomes 65535

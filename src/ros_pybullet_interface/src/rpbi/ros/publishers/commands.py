@@ -15,6 +15,7 @@ from ros_pybullet_interface.msg import WorldCommands
 from rpbi.engine.command_log import WorldCommand
 from rpbi.replay.recorded_values import to_text
 from rpbi.replay.world_description import describe
+from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import to_ros_time
 from rpbi.world import World
 
@@ -22,6 +23,8 @@ from .topics import FastTopic
 
 log = logging.getLogger(__name__)
 
+COMMANDS = Topic("rpbi/commands", WorldCommands, meaning="What enters the world, by tick, for replays; as it comes.")
+DESCRIPTION = Topic("rpbi/world_description", String, meaning="The world as loaded, as JSON, for replays; latched.")
 MOST_IN_A_MESSAGE = 25
 """So that making one never takes long."""
 
@@ -43,16 +46,11 @@ class _CommandTopic(FastTopic):
 
     def __init__(self) -> None:
         self.newcomers: deque[_Reader] = deque()
-        super().__init__("rpbi/commands", WorldCommands)
+        super().__init__(COMMANDS.name, COMMANDS.message_type)
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Callable[[Any], None]) -> None:
         """Notes a new subscriber; rospy calls it from a thread of its own."""
-
-        def send(message: WorldCommands) -> None:
-            with self._publisher.impl.publock:
-                peer_publish(message)
-
-        self.newcomers.append(_Reader(send))
+        self.newcomers.append(_Reader(peer_publish))
 
 
 class CommandPublisher:
@@ -67,12 +65,12 @@ class CommandPublisher:
         self._topic = _CommandTopic()
         self._all = _Reader(self._topic.publish)
         self._newcomers: list[_Reader] = []
-        self._description = rospy.Publisher("rpbi/world_description", String, queue_size=1, latch=True)
+        self._description = rospy.Publisher(DESCRIPTION.name, String, queue_size=1, latch=True)
         self._description.publish(describe(world))
         self._resets = world.resets
 
     def spin(self) -> None:
-        """Sends what is new, to newcomers what is old, and to who was slow the rest."""
+        """Sends what is new, and to newcomers what is old."""
         commands, resets = self._world.commands, self._world.resets
         while self._topic.newcomers:
             self._newcomers.append(self._topic.newcomers.popleft())
@@ -89,7 +87,6 @@ class CommandPublisher:
             self._topic.wrap_connections()
             self._send(reader)
         self._newcomers = [reader for reader in self._newcomers if reader.next < commands.count]
-        self._topic.flush()
 
     def _send(self, reader: _Reader) -> None:
         first, commands = self._world.commands.since(reader.next, MOST_IN_A_MESSAGE)

@@ -1,6 +1,9 @@
-"""The publishers of a world's samples, and which topics a body has among them."""
+"""The publishers of a world's samples, and the order in which a tick goes out."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
 
 from rpbi.engine.inputs import PoseInput
 from rpbi.ros.cameras.publisher import ScenePublisher
@@ -8,34 +11,30 @@ from rpbi.ros.inputs import topic_input
 from rpbi.samples import LinkPoseSample, SceneSample
 from rpbi.world import World
 
-from .sample_topics import TOPICS, sample_topic
-from .topic_publisher import SamplePublisher, TopicPublisher
+from .sample_topics import sample_topic
+from .status import ClockPublisher
+from .topic_publisher import SampleKey, TopicPublisher, TransformPublisher
 from .topics import FastTopic
-from .transforms import TransformPublisher
 
 
 class SamplePublishers:
-    """All publishers of a world.
+    """All publishers of a world's samples.
 
     Args:
         world: The world.
 
     Attributes:
         cameras: That of the images.
-        by_type: All of them by type of sample; more come with bodies that other packages add.
     """
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self._topics = {sample_type: TopicPublisher() for sample_type in TOPICS}
-        self._fed: dict[str, list[tuple[SamplePublisher, str]]] = {}
-        """The publishers and sensors of each body whose topics are open."""
         self.cameras = ScenePublisher(world)
-        self.by_type: dict[type, SamplePublisher] = {
-            **self._topics,
-            LinkPoseSample: TransformPublisher(),
-            SceneSample: self.cameras,
-        }
+        self._topics, self._transforms = TopicPublisher(), TransformPublisher()
+        self._elsewhere = {LinkPoseSample: self._transforms, SceneSample: self.cameras}
+        self._all = (self._topics, self._transforms, self.cameras)
+        self._open: dict[str, list[SampleKey]] = {}
+        """The sensors of each body whose topics are open."""
 
     def find_topics(self, name: str) -> None:
         """Finds the topics of a body before its first sample, those that other packages name too.
@@ -44,8 +43,7 @@ class SamplePublishers:
             InterfaceError: If there is one that cannot be found.
         """
         for sensor in self._world.sensors_of(name):
-            if sample_topic(sensor) is not None and sensor.sample_type not in self._topics:
-                self._topics[sensor.sample_type] = self.by_type[sensor.sample_type] = TopicPublisher()
+            sample_topic(sensor)
         for key, taken in self._world.bodies[name].inputs().items():
             if not isinstance(taken, PoseInput):
                 topic_input(key, taken)
@@ -53,18 +51,97 @@ class SamplePublishers:
     def open(self, name: str) -> None:
         """Opens the topics of a body's samples."""
         sensors = self._world.sensors_of(name)
-        self._fed[name] = [(self.by_type[sensor.sample_type], sensor.name) for sensor in sensors]
-        for sensor in sensors:
+        self._open[name] = [(sensor.sample_type, sensor.name) for sensor in sensors]
+        for key, sensor in zip(self._open[name], sensors, strict=True):
             topic = sample_topic(sensor)
             if topic is not None:
-                self._topics[sensor.sample_type].open(sensor.name, topic)
+                self._topics.open(key, topic)
+
+    def publish(self, samples: Iterable[Any], stamp_ns: int) -> None:
+        """Publishes the samples of a tick.
+
+        Raises:
+            PluginError: If another package makes no message of one that can be sent.
+        """
+        for sample in samples:
+            self._elsewhere.get(type(sample), self._topics).publish(sample, stamp_ns)
+        self._transforms.flush()
+        self.cameras.flush()
+
+    def serve_late(self) -> None:
+        """Gives the last samples to subscribers that have come since."""
+        for publisher in self._all:
+            publisher.serve_late()
+
+    def restart(self) -> None:
+        """Drops what is kept of all samples: the world was reset."""
+        for publisher in self._all:
+            publisher.restart()
 
     def forget(self, name: str) -> list[FastTopic]:
         """Drops what is kept of a body that has gone, and of its sensors; for the simulation thread.
 
         Returns:
-            The topics that are left to close, by another thread.
+            The topics that are left to close, by another thread, since the ROS master may be slow to answer.
         """
         self.cameras.forget(name)
-        topics = [publisher.forget(sensor) for publisher, sensor in self._fed.pop(name, [])]
-        return [topic for topic in topics if topic is not None]
+        keys = self._open.pop(name, [])
+        for _, sensor in keys:
+            self._transforms.forget(sensor)
+        return [topic for topic in map(self._topics.forget, keys) if topic is not None]
+
+
+class TickPublisher:
+    """Publishes everything of a tick: the time first, then the samples.
+
+    Args:
+        world: The world.
+        publishers: Where samples go.
+        idle_ticks: How many ticks pass between two calls of `publish_idle` were the world running.
+    """
+
+    def __init__(self, world: World, publishers: SamplePublishers, idle_ticks: int) -> None:
+        self._world = world
+        self._publishers = publishers
+        self._clock = ClockPublisher(world) if world.clock.simulated else None
+        self._idle_ticks = idle_ticks
+        self._idle_tick = 0
+        """The tick at which the world would be, had it not stood still."""
+
+    def publish_tick(self, samples: list[Any]) -> None:
+        """Publishes a tick and the samples that were due."""
+        if self._clock is not None:
+            self._clock.publish_tick()
+        if samples:
+            self._publishers.publish(samples, self._world.clock.stamp_ns)
+
+    def publish_all(self, samples: list[Any]) -> None:
+        """Publishes the last tick before standing still: all of it, whatever is due."""
+        self.publish_last_time()
+        self._publishers.publish(samples + self._world.read_rest(), self._world.clock.stamp_ns)
+
+    def publish_last_time(self) -> None:
+        """Publishes the time of the last tick before standing still, and nothing of a world that may be broken."""
+        self._idle_tick = self._world.clock.tick
+        if self._clock is not None:
+            self._clock.publish_now()
+
+    def repeat_time(self) -> None:
+        """Repeats the time for those who come late."""
+        if self._clock is not None:
+            self._clock.repeat()
+
+    def publish_idle(self) -> None:
+        """Keeps a world that stands still visible to those who come late, without repeating a stamp."""
+        if self._clock is not None:
+            self._publishers.publish(self._world.read_rest(), self._world.clock.stamp_ns)
+            self._publishers.serve_late()
+        else:
+            since, self._idle_tick = self._idle_tick, self._idle_tick + self._idle_ticks
+            self._world.clock.restamp()
+            self._publishers.publish(self._world.read_idle(self._idle_tick, since), self._world.clock.stamp_ns)
+
+    def restart(self) -> None:
+        """Drops what is kept of a world before its reset, and publishes how it is now."""
+        self._publishers.restart()
+        self.publish_all([])

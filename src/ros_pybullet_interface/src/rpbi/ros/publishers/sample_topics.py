@@ -1,20 +1,19 @@
-"""The topic of each type of samples."""
+"""The topic of each type of samples, and the samples as messages."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
-
-from geometry_msgs.msg import Vector3, Wrench, WrenchStamped
+from geometry_msgs.msg import Point, Quaternion, Twist, Vector3, Wrench, WrenchStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
+from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from custom_ros_tools.errors import ConfigError, Problem
-from custom_ros_tools.plugins import find, full_name
-from ros_pybullet_interface.msg import Contacts
+from custom_ros_tools.plugins import full_name
+from ros_pybullet_interface.msg import ContactPoint, Contacts
 from rpbi.control.trajectories.controller_state import ControllerState
-from rpbi.ros.headers import prefixed, to_ros_time
+from rpbi.ros.endpoints import Topic, find_topic
+from rpbi.ros.headers import prefixed, to_ros_time, world_frame
 from rpbi.ros.robots.trajectory_messages import CONTROLLER, JointTrajectoryControllerState, state_message
 from rpbi.samples import (
     BaseStateSample,
@@ -28,46 +27,13 @@ from rpbi.samples import (
 )
 from rpbi.sensors.sensor import Sensor
 
-from .messages import contact_arrows_message, contacts_message, odometry_message, surface_message
-
-
-def find_topic(name: str, kind: type, owner: Any) -> Any:
-    """Returns a topic of another package.
-
-    Args:
-        name: Where it is, as `module:NAME`.
-        kind: What it should be: SampleTopic or TopicInput.
-        owner: The sensor or body that names it as its `ros_topic`.
-
-    Raises:
-        ConfigError: If there is no such thing; it names the class of the owner.
-    """
-    try:
-        found = find(name)
-        if not isinstance(found, kind):
-            raise ValueError(f"expected a {full_name(kind)} in '{name}', got {found!r}")
-    except ValueError as error:
-        raise ConfigError([Problem(full_name(owner), "ros_topic", str(error))]) from None
-    return found
-
-
-class SampleTopic(NamedTuple):
-    """The topic of one type of samples.
-
-    Attributes:
-        topic: Its name, with `{name}` for the sensor.
-        message_type: ROS type.
-        to_message: Makes the message of a sample and its stamp [ns].
-        meaning: What it tells and which key sets its rate, in a sentence.
-    """
-
-    topic: str
-    message_type: type
-    to_message: Callable[[Any, int], Any]
-    meaning: str = ""
+_ARROW = Vector3(0.015, 0.03, 0.04)
+"""Diameters of shaft and head and length of the head [m]."""
+_COLOUR = ColorRGBA(0.85, 0.1, 0.1, 1.0)
 
 
 def joint_state_message(sample: JointStateSample, stamp_ns: int) -> JointState:
+    """Returns positions, velocities and efforts of all joints."""
     message = JointState(
         name=sample.joint_names, position=sample.position, velocity=sample.velocity, effort=sample.effort
     )
@@ -76,6 +42,7 @@ def joint_state_message(sample: JointStateSample, stamp_ns: int) -> JointState:
 
 
 def wrench_message(sample: WrenchSample, stamp_ns: int) -> WrenchStamped:
+    """Returns force and moment; frames that are not the world's own get no prefix."""
     message = WrenchStamped(wrench=Wrench(Vector3(*sample.force), Vector3(*sample.torque)))
     is_ours = sample.frame_id.startswith("rpbi/")
     message.header.frame_id = prefixed(sample.frame_id) if is_ours else sample.frame_id
@@ -83,43 +50,100 @@ def wrench_message(sample: WrenchSample, stamp_ns: int) -> WrenchStamped:
     return message
 
 
-TOPICS: dict[type, SampleTopic] = {
-    WrenchSample: SampleTopic(
+def contacts_message(sample: ContactsSample, stamp_ns: int) -> Contacts:
+    """Returns where others touch a body, and their forces."""
+    points = [
+        ContactPoint(
+            link=point.link,
+            other_body=point.other_body,
+            other_link=point.other_link,
+            position=Point(*point.position),
+            normal=Vector3(*point.normal),
+            depth=point.depth,
+            normal_force=point.normal_force,
+            friction_direction_1=Vector3(*point.friction_directions[0]),
+            friction_force_1=point.friction_forces[0],
+            friction_direction_2=Vector3(*point.friction_directions[1]),
+            friction_force_2=point.friction_forces[1],
+        )
+        for point in sample.points
+    ]
+    return Contacts(_header(stamp_ns), Vector3(*sample.force), points)
+
+
+def contact_arrows_message(sample: ContactArrowsSample, stamp_ns: int) -> MarkerArray:
+    """Returns arrows in place of those before."""
+    header = _header(stamp_ns)
+    markers = [Marker(header=header, action=Marker.DELETEALL)]
+    for number, (start, end) in enumerate(sample.arrows):
+        marker = Marker(header=header, ns=sample.name, id=number, type=Marker.ARROW, action=Marker.ADD)
+        marker.points = [Point(*start), Point(*end)]
+        marker.scale, marker.color = _ARROW, _COLOUR
+        marker.pose.orientation.w = 1.0
+        markers.append(marker)
+    return MarkerArray(markers)
+
+
+def odometry_message(sample: BaseStateSample, stamp_ns: int) -> Odometry:
+    """Returns pose and twist of a base; covariances are zero, since both are exact."""
+    message = Odometry(_header(stamp_ns), prefixed(sample.frame))
+    message.pose.pose.position = Point(*sample.pose.position)
+    message.pose.pose.orientation = Quaternion(*sample.pose.quat_xyzw)
+    message.twist.twist = Twist(Vector3(*sample.twist.linear), Vector3(*sample.twist.angular))
+    return message
+
+
+def surface_message(sample: SurfaceSample, stamp_ns: int) -> Marker:
+    """Returns a surface as triangles in the world."""
+    marker = Marker(ns=sample.name, type=Marker.TRIANGLE_LIST, action=Marker.ADD, scale=Vector3(1.0, 1.0, 1.0))
+    marker.header = _header(stamp_ns)
+    marker.pose.orientation.w = 1.0
+    marker.color = ColorRGBA(*sample.rgba)
+    marker.points = [Point(*corner) for corner in sample.corners]
+    return marker
+
+
+def _header(stamp_ns: int) -> Header:
+    return Header(stamp=to_ros_time(stamp_ns), frame_id=world_frame())
+
+
+TOPICS: dict[type, Topic] = {
+    WrenchSample: Topic(
         "rpbi/{name}/ft_sensor",
         WrenchStamped,
         wrench_message,
         "Force [N] and moment [N m] in the joint, in the frame of its child link; "
         "`hz` of `enabled_joint_force_torque_sensors`.",
     ),
-    JointStateSample: SampleTopic(
+    JointStateSample: Topic(
         "rpbi/{name}/joint_states",
         JointState,
         joint_state_message,
         "Position [rad or m], velocity and the motor's effort [N m or N] of all joints, fixed ones too, in the URDF's "
         "order; `joint_state_publisher_hz`.",
     ),
-    BaseStateSample: SampleTopic(
+    BaseStateSample: Topic(
         "rpbi/{name}/base_state",
         Odometry,
         odometry_message,
         "Pose of the root link in the world [m], its velocity in its own axes [m/s, rad/s]; `base_state_hz`.",
     ),
-    ContactsSample: SampleTopic(
+    ContactsSample: Topic(
         "rpbi/{name}/contacts",
         Contacts,
         contacts_message,
         "Where others touch the body, and their forces on it [N]; `contacts.hz`.",
     ),
-    SurfaceSample: SampleTopic(
+    SurfaceSample: Topic(
         "rpbi/{name}/surface", Marker, surface_message, "The surface as triangles, for RViz; `surface_hz`."
     ),
-    ContactArrowsSample: SampleTopic(
+    ContactArrowsSample: Topic(
         "rpbi/{name}/contacts/arrows",
         MarkerArray,
         contact_arrows_message,
         "The forces as arrows, for RViz; `contacts.arrows_hz`.",
     ),
-    ControllerState: SampleTopic(
+    ControllerState: Topic(
         f"rpbi/{{name}}/{CONTROLLER}/state",
         JointTrajectoryControllerState,
         state_message,
@@ -132,7 +156,7 @@ _ELSEWHERE = (LinkPoseSample, SceneSample)
 """Samples that go to TF and to the renderer."""
 
 
-def sample_topic(sensor: Sensor) -> SampleTopic | None:
+def sample_topic(sensor: Sensor) -> Topic | None:
     """Returns the topic of a sensor, None if its samples go elsewhere.
 
     Raises:
@@ -141,8 +165,8 @@ def sample_topic(sensor: Sensor) -> SampleTopic | None:
     if sensor.sample_type in _ELSEWHERE:
         return None
     if sensor.ros_topic:
-        return find_topic(sensor.ros_topic, SampleTopic, sensor)
+        return find_topic(sensor.ros_topic, sensor)
     if sensor.sample_type not in TOPICS:
-        message = f"missing, expected 'module:NAME' of the SampleTopic for its {sensor.sample_type.__qualname__}"
+        message = f"missing, expected 'module:NAME' of the Topic for its {sensor.sample_type.__qualname__}"
         raise ConfigError([Problem(full_name(sensor), "ros_topic", message)])
     return TOPICS[sensor.sample_type]

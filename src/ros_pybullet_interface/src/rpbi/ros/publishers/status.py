@@ -1,4 +1,4 @@
-"""The node's own state: /clock, `rpbi/status` and /diagnostics."""
+"""How the simulation is doing: /clock, `rpbi/status`, `rpbi/state` and /diagnostics."""
 
 from __future__ import annotations
 
@@ -12,25 +12,45 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rosgraph_msgs.msg import Clock as ClockMessage
 from std_msgs.msg import Int64
 
-from rpbi.engine.clock import Clock
+from custom_ros_tools.ros.lifecycle.wall_timer import WallRate
+from ros_pybullet_interface.msg import SimulationState
+from rpbi.engine.clock import Schedule
 from rpbi.engine.pacer import Pacer
+from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import to_ros_time
+from rpbi.world import World
 
 from .topics import FastTopic
 
 log = logging.getLogger(__name__)
 
-DIAGNOSTICS_PERIOD_S = 1.0
+CLOCK = Topic(
+    "/clock", ClockMessage, meaning="The world's time, if `/use_sim_time` is true; every tick, or `clock_hz`."
+)
+STATUS = Topic(
+    "rpbi/status", Int64, meaning="1 while the world runs, 0 while it stands still; `status_hz`.", key="status_hz"
+)
+DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, meaning="Real-time factor, overruns, lost time, renderer; 1 Hz.")
+
+STATE = Topic(
+    "rpbi/state",
+    SimulationState,
+    meaning="Tick, time, real-time factor and hash of the state; `state_hz`, `state_hash_hz`.",
+    key="state_hz",
+)
+WINDOW_S = 1.0
+"""Over how long the real-time factor is measured at least [s] of wall time."""
 STOPPED_CLOCK_PERIOD_S = 0.05
+MAX_CLOCK_HZ = 1000.0
 FREE_RUNNING_CLOCK_HZ = 250.0
 FALLING_BEHIND = 0.98
 """Share of the asked real-time factor below which the diagnostics warn."""
 
 
 def _warn_of_rivals() -> None:
-    """Warns if another node tells the time too: ROS time would jump between the two."""
+    """Warns if another node publishes the time too: ROS time would jump between the two."""
     published: list[tuple[str, list[str]]] = rosgraph.Master(rospy.get_name()).getSystemState()[0]
-    rivals = [node for topic, nodes in published if topic == "/clock" for node in nodes if node != rospy.get_name()]
+    rivals = [node for topic, nodes in published if topic == CLOCK.name for node in nodes if node != rospy.get_name()]
     if rivals:
         log.warning("/clock is published by %s too: two worlds cannot both be the clock", ", ".join(rivals))
 
@@ -39,19 +59,20 @@ class ClockPublisher:
     """Simulated time on /clock, of which the simulator is the only source.
 
     Args:
-        clock: The world's clock.
-        hz: Most messages a second of wall time.
+        world: The world; its configuration has the most messages a second of wall time.
     """
 
-    def __init__(self, clock: Clock, hz: float) -> None:
-        self._clock = clock
-        self._period_s = 1.0 / hz
+    def __init__(self, world: World) -> None:
+        self._clock, config = world.clock, world.config
+        factor = config.real_time_factor
+        limit_hz = min(factor / config.timeStep, MAX_CLOCK_HZ) if factor else FREE_RUNNING_CLOCK_HZ
+        self._period_s = 1.0 / min(config.clock_hz or limit_hz, limit_hz)
         _warn_of_rivals()
-        self._publisher = FastTopic("/clock", ClockMessage)
+        self._publisher = FastTopic(CLOCK.name, ClockMessage)
         self._due_s = 0.0
 
     def publish_tick(self) -> None:
-        """Tells a new tick, unless the rate is used up."""
+        """Publishes a new tick, unless the rate is used up."""
         now_s = time.monotonic()
         if now_s >= self._due_s:
             # Counting on from the last deadline keeps the mean rate; a pause must not be made up for.
@@ -59,12 +80,12 @@ class ClockPublisher:
             self._send()
 
     def publish_now(self) -> None:
-        """Tells the present tick in any case, for the last one before standing still."""
+        """Publishes the present tick in any case, for the last one before standing still."""
         self._due_s = time.monotonic() + STOPPED_CLOCK_PERIOD_S
         self._send()
 
     def repeat(self) -> None:
-        """Tells the same tick again now and then while the world stands still, for those who come late."""
+        """Publishes the same tick again now and then while the world stands still, for those who come late."""
         if time.monotonic() >= self._due_s:
             self.publish_now()
 
@@ -76,28 +97,18 @@ class StatusPublisher:
     """Whether the world runs, and how well.
 
     Args:
-        clock: The world's clock.
+        world: The world.
         pacer: What keeps it in step with the wall clock.
-        hz: Rate of `rpbi/status` [Hz] of wall time.
-        real_time_factor: The factor asked for; 0 is as fast as it goes.
-        facts: Tells what else the diagnostics should have.
+        facts: Returns what else the diagnostics are to have.
     """
 
-    def __init__(
-        self,
-        clock: Clock,
-        pacer: Pacer,
-        hz: float,
-        real_time_factor: float,
-        facts: Callable[[], Mapping[str, str]] = dict,
-    ) -> None:
-        self._clock, self._pacer, self._wanted_factor = clock, pacer, real_time_factor
-        self._facts = facts
-        self._period_s = 1.0 / hz
-        self._status = rospy.Publisher("rpbi/status", Int64, queue_size=10)
-        self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
-        self._due_s = 0.0
-        self._diagnostics_due_s = time.monotonic() + DIAGNOSTICS_PERIOD_S
+    def __init__(self, world: World, pacer: Pacer, facts: Callable[[], Mapping[str, str]]) -> None:
+        self._clock, self._pacer, self._facts = world.clock, pacer, facts
+        self._wanted_factor = world.config.real_time_factor
+        self._rate = WallRate(world.config.status_hz)
+        self._diagnostics_rate = WallRate(1.0, delay_s=1.0)
+        self._status = rospy.Publisher(STATUS.name, Int64, queue_size=10)
+        self._diagnostics = rospy.Publisher(DIAGNOSTICS.name, DiagnosticArray, queue_size=10)
         self._overruns = 0
 
     def spin(self, running: bool, stepping: bool = False) -> None:
@@ -107,12 +118,9 @@ class StatusPublisher:
             running: Whether the world runs.
             stepping: Whether it is about the ticks of a request.
         """
-        now_s = time.monotonic()
-        if now_s >= self._due_s:
-            self._due_s = max(self._due_s + self._period_s, now_s)
+        if self._rate.is_due():
             self.publish(running or stepping)
-        if now_s >= self._diagnostics_due_s:
-            self._diagnostics_due_s = max(self._diagnostics_due_s + DIAGNOSTICS_PERIOD_S, now_s)
+        if self._diagnostics_rate.is_due():
             self._publish_diagnostics(running, stepping)
 
     def publish(self, running: bool) -> None:
@@ -141,3 +149,80 @@ class StatusPublisher:
         message = DiagnosticArray(status=[status])
         message.header.stamp = to_ros_time(self._clock.stamp_ns)
         self._diagnostics.publish(message)
+
+
+class StatePublisher:
+    """Publishes how the simulation is doing, at a rate of the wall clock, and its hash, at a rate of the world's.
+
+    Args:
+        world: The world.
+        pacer: What keeps it in step with the wall clock.
+    """
+
+    def __init__(self, world: World, pacer: Pacer) -> None:
+        self._world, self._pacer = world, pacer
+        config = world.config
+        self._rate = WallRate(config.state_hz)
+        self._schedule = Schedule(config.state_hash_hz, world.clock.dt_ns) if config.state_hash_hz else None
+        self._topic = FastTopic(STATE.name, SimulationState)
+        self._factor = 0.0
+        self._moves = False
+        self.is_stepping = False
+        """Whether the ticks are those of a request."""
+        self.restart()
+
+    def restart(self) -> None:
+        """Publishes a world that was built or reset, with its hash."""
+        tick = self._world.clock.tick
+        self._hash_tick = None if self._schedule is None else self._schedule.next_due(tick)
+        self._begin_window()
+        self._publish(self._schedule is not None)
+
+    def take_tick(self) -> None:
+        """Publishes the hash of a tick, if it is due."""
+        tick = self._world.clock.tick
+        if self._schedule is not None and self._hash_tick is not None and tick >= self._hash_tick:
+            self._hash_tick = self._schedule.next_due(tick)
+            self._publish(with_hash=True)
+
+    def spin(self, moves: bool) -> None:
+        """Publishes what is due by the wall clock, and at once when the world starts or stops.
+
+        Args:
+            moves: Whether the world runs, or is stepping.
+        """
+        now_s = time.monotonic()
+        if moves != self._moves:
+            self._moves = moves
+            self._begin_window()
+        elif moves and now_s - self._window_s >= WINDOW_S:
+            ticks = self._world.clock.tick - self._window_tick
+            self._factor = ticks * self._world.clock.dt_s / (now_s - self._window_s)
+            self._window_s, self._window_tick = now_s, self._world.clock.tick
+        if self._rate.is_due():
+            self._publish()
+
+    def _begin_window(self) -> None:
+        """Measures the real-time factor from now on; until it is known, it is 0."""
+        self._factor = 0.0
+        self._window_s, self._window_tick = time.monotonic(), self._world.clock.tick
+
+    def _publish(self, with_hash: bool = False) -> None:
+        if not self._topic.has_subscribers:
+            return
+        clock = self._world.clock
+        message = SimulationState(
+            running=self._moves and not self.is_stepping,
+            stepping=self.is_stepping,
+            tick=clock.tick,
+            simulated_time=clock.time_s,
+            real_time_factor_asked=self._world.config.real_time_factor,
+            real_time_factor=self._factor,
+            overruns=self._pacer.overruns,
+            lost_time=self._pacer.lost_s,
+            resets=self._world.resets,
+            commands=self._world.commands.count,
+            state_hash=self._world.state_hash() if with_hash else "",
+        )
+        message.header.stamp = to_ros_time(clock.stamp_ns)
+        self._topic.publish(message)

@@ -1,33 +1,25 @@
-"""Where samples go: one publisher for each type of samples."""
+"""Where samples go: those of a sensor to a topic of its own, poses of links to TF."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
+
+from geometry_msgs.msg import TransformStamped
+from tf2_msgs.msg import TFMessage
 
 from rpbi.plugins import blame, blaming
+from rpbi.ros.endpoints import Topic
+from rpbi.ros.headers import prefixed, to_ros_time, world_frame
+from rpbi.samples import LinkPoseSample
 
-from .sample_topics import SampleTopic
 from .topics import FastTopic
 
+TF = Topic("/tf", TFMessage, meaning="Where it is, see [frames](#frames).")
 
-class SamplePublisher(Protocol):
-    """Takes one type of samples."""
 
-    def publish(self, sample: Any, stamp_ns: int) -> None:
-        """Passes a sample on."""
-
-    def flush(self) -> None:
-        """Sends what was collected during the tick."""
-
-    def serve_late(self) -> None:
-        """Gives the last state to subscribers that have come since."""
-
-    def forget(self, name: str) -> FastTopic | None:
-        """Drops what it keeps of a body or sensor that has gone; returns its topic, if it has one to close."""
-
-    def restart(self) -> None:
-        """Drops what it keeps of all samples: the world was reset."""
+SampleKey = tuple[type, str]
+"""Type and name of the samples of a sensor: sensors of a body may have its name."""
 
 
 class _Route(NamedTuple):
@@ -38,16 +30,16 @@ class _Route(NamedTuple):
 
 
 class TopicPublisher:
-    """Samples of one type, each sensor on a topic of its own."""
+    """Samples of sensors, each on a topic of its own."""
 
     def __init__(self) -> None:
-        self._routes: dict[str, _Route] = {}
-        self._last: dict[str, tuple[Any, int]] = {}
+        self._routes: dict[SampleKey, _Route] = {}
+        self._last: dict[SampleKey, tuple[Any, int]] = {}
 
-    def open(self, name: str, sample_topic: SampleTopic) -> None:
+    def open(self, key: SampleKey, row: Topic) -> None:
         """Advertises the topic of a sensor; any thread may call it."""
-        topic = FastTopic(sample_topic.topic.format(name=name), sample_topic.message_type)
-        self._routes = {**self._routes, name: _Route(topic, sample_topic.to_message)}
+        topic = FastTopic(row.name.format(name=key[1]), row.message_type)
+        self._routes = {**self._routes, key: _Route(topic, row.handler)}
 
     def publish(self, sample: Any, stamp_ns: int) -> None:
         """Sends a sample.
@@ -55,8 +47,9 @@ class TopicPublisher:
         Raises:
             PluginError: If another package makes no message of it that can be sent.
         """
-        self._last[sample.name] = sample, stamp_ns
-        route = self._routes.get(sample.name)  # there is none as long as the body is new
+        key = type(sample), sample.name
+        self._last[key] = sample, stamp_ns
+        route = self._routes.get(key)  # there is none as long as the body is new
         if route is not None and route.topic.has_subscribers:
             try:
                 route.topic.publish(route.to_message(sample, stamp_ns))
@@ -64,28 +57,68 @@ class TopicPublisher:
                 blame(route.to_message, f"the message of '{sample.name}'", error)
                 raise
 
-    def flush(self) -> None:
-        """Has nothing to send: each sensor has a topic of its own."""
-
     def serve_late(self) -> None:
         """Gives the last samples to who has come since."""
-        for name, (topic, to_message) in self._routes.items():
-            if name in self._last:
-                with blaming(to_message, f"the message of '{name}'"):
-                    topic.serve_late(lambda last=self._last[name], make=to_message: make(*last))
+        for key, (topic, to_message) in self._routes.items():
+            if key in self._last:
+                with blaming(to_message, f"the message of '{key[1]}'"):
+                    topic.serve_late(lambda last=self._last[key], make=to_message: make(*last))
 
     def restart(self) -> None:
         """Drops what it keeps of all samples; the topics stay."""
         self._last.clear()
 
-    def forget(self, name: str) -> FastTopic | None:
-        """Drops what it keeps of a sensor.
-
-        Returns:
-            Its topic. Closing it is left to another thread, since the ROS master may be slow to answer.
-        """
-        self._last.pop(name, None)
+    def forget(self, key: SampleKey) -> FastTopic | None:
+        """Drops what it keeps of a sensor; returns its topic, which is left to close."""
+        self._last.pop(key, None)
         routes = dict(self._routes)
-        route = routes.pop(name, None)
+        route = routes.pop(key, None)
         self._routes = routes
         return None if route is None else route.topic
+
+
+class TransformPublisher:
+    """Link poses on TF, all that a tick has in one message."""
+
+    def __init__(self) -> None:
+        self._topic = FastTopic(TF.name, TF.message_type)
+        self._last: dict[str, list[TransformStamped]] = {}
+        self._collected: list[TransformStamped] = []
+
+    def publish(self, sample: LinkPoseSample, stamp_ns: int) -> None:
+        """Collects the transforms of a body."""
+        transforms = self._last.get(sample.name)
+        if transforms is None or len(transforms) != len(sample.frames):
+            transforms = self._last[sample.name] = [_transform(frame) for frame in sample.frames]
+        stamp = to_ros_time(stamp_ns)
+        for message, (position, quat) in zip(transforms, sample.poses, strict=True):
+            message.header.stamp = stamp
+            translation, rotation = message.transform.translation, message.transform.rotation
+            translation.x, translation.y, translation.z = position
+            rotation.x, rotation.y, rotation.z, rotation.w = quat
+        self._collected += transforms
+
+    def flush(self) -> None:
+        """Sends what was collected."""
+        if self._collected:
+            if self._topic.has_subscribers:
+                self._topic.publish(TFMessage(self._collected))
+            self._collected = []
+
+    def serve_late(self) -> None:
+        """Gives all last poses to who has come since."""
+        self._topic.serve_late(lambda: TFMessage([one for body in self._last.values() for one in body]))
+
+    def restart(self) -> None:
+        """Drops all poses."""
+        self._last.clear()
+
+    def forget(self, name: str) -> None:
+        """Drops the poses of a body."""
+        self._last.pop(name, None)
+
+
+def _transform(frame: str) -> TransformStamped:
+    message = TransformStamped(child_frame_id=prefixed(frame))
+    message.header.frame_id = world_frame()
+    return message

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import socket
 from collections import deque
 from collections.abc import Callable
 from typing import Any
 
 import rospy
 
-from .buffered_socket import BufferedSocket
+from custom_ros_tools.ros.rospy_internals import DirectSending
 
 QUEUE_SIZE = 1000
 """Messages kept for a slow subscriber before its oldest are dropped: it never holds physics up."""
@@ -18,16 +17,16 @@ QUEUE_SIZE = 1000
 class StateTopic(rospy.SubscribeListener):
     """A topic whose last message can be given to subscribers that come while the world stands still.
 
-    A stopped world in simulated time says nothing new, and saying the same again would repeat stamps; so who comes
-    late is served alone.
+    A stopped world in simulated time has nothing new, and the same again would repeat stamps; so who comes late is
+    served alone. One thread at a time publishes and serves.
 
     Args:
         topic: Name of the topic.
         message_type: Its ROS type.
-        queue_size: Messages kept for each subscriber.
+        queue_size: Messages kept for each subscriber; None if publishing waits until each has taken its message.
     """
 
-    def __init__(self, topic: str, message_type: type, queue_size: int = QUEUE_SIZE) -> None:
+    def __init__(self, topic: str, message_type: type, queue_size: int | None = QUEUE_SIZE) -> None:
         super().__init__()
         self._late: deque[Callable[[Any], None]] = deque()
         self._publisher = rospy.Publisher(
@@ -55,9 +54,7 @@ class StateTopic(rospy.SubscribeListener):
     def serve_late(self, last_message: Callable[[], Any]) -> None:
         """Gives the last message to the subscribers that have come since it was published."""
         while self._late:
-            peer_publish = self._late.popleft()
-            with self._publisher.impl.publock:
-                peer_publish(last_message())
+            self._late.popleft()(last_message())
 
     def close(self) -> None:
         """Ends the topic."""
@@ -67,42 +64,24 @@ class StateTopic(rospy.SubscribeListener):
 class FastTopic(StateTopic):
     """A topic of small messages that go out in the caller's own thread, which never waits.
 
-    With a queue size, rospy hands every message to a thread for each subscriber. At 1 kHz with a few subscribers the
-    threads' quarrel about Python's lock costs more than the simulation; without a queue size, one subscriber that does
-    not read stops everybody. So here rospy sends at once, through sockets that keep what is not taken yet. It is not
-    for images, whose rest would wait for the next one.
+    What a slow subscriber does not take is kept for it, and sent by `flush_buffered_sockets`.
     """
 
-    def __init__(self, topic: str, message_type: type, queue_size: int = QUEUE_SIZE) -> None:
-        super().__init__(topic, message_type, queue_size)
-        self._queue_size = queue_size
-        self._connections: Any = None
-        self._publisher.impl.set_queue_size(None)
+    def __init__(self, topic: str, message_type: type) -> None:
+        super().__init__(topic, message_type)
+        self._sending = DirectSending.of(self._publisher, QUEUE_SIZE)
+
+    def wrap_connections(self) -> None:
+        """Sees to it that sending never waits for anybody, not for those either that have just come."""
+        if self._sending is not None:
+            self._sending.wrap_connections()
 
     def publish(self, message: Any) -> None:
         """Sends a message to all subscribers, or keeps it for those that are slow."""
         self.wrap_connections()
         super().publish(message)
 
-    def wrap_connections(self) -> None:
-        """Sees to it that sending never waits for anybody, not for those either that have just come."""
-        connections = self._publisher.impl.connections  # rospy makes a new list whenever somebody comes or goes
-        if connections is not self._connections:
-            for connection in connections:
-                if isinstance(connection.socket, socket.socket):
-                    connection.socket = BufferedSocket(connection.socket, self._queue_size)
-            self._connections = connections
-
-    def flush(self) -> None:
-        """Sends what slow subscribers have not taken yet; for a time in which nothing new is published."""
-        for connection in self._publisher.impl.connections:
-            if isinstance(connection.socket, BufferedSocket):
-                try:
-                    connection.socket.flush()
-                except OSError:
-                    connection.close()
-
     def serve_late(self, last_message: Callable[[], Any]) -> None:
-        """Gives the last message to who has come since, and the rest to who was slow."""
+        """Gives the last message to who has come since."""
+        self.wrap_connections()
         super().serve_late(last_message)
-        self.flush()

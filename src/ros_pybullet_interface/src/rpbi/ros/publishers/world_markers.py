@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from typing import NamedTuple
 from urllib.parse import quote
 
@@ -13,9 +12,11 @@ from geometry_msgs.msg import Pose as PoseMessage
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
+from custom_ros_tools.ros.lifecycle.wall_timer import WallRate
 from rpbi.bodies import Body
 from rpbi.bodies.visual_shapes import BodyShape, ShapeKind, body_shapes, followed_frame, link_frame, link_pose
 from rpbi.geometry import Pose
+from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import prefixed, world_frame
 from rpbi.world import World
 
@@ -69,9 +70,14 @@ def pose_message(pose: Pose) -> PoseMessage:
     return PoseMessage(Point(*pose.position), Quaternion(*pose.quat_xyzw))
 
 
-MARKERS_TOPIC = "rpbi/markers"
+MARKERS = Topic(
+    "rpbi/markers",
+    MarkerArray,
+    meaning="All visual shapes, for RViz; latched, sent when something comes, goes or moves; `markers_hz`.",
+    key="markers_hz",
+)
 STILL = 1e-4
-"""What moves and turns less than that [m, and parts of a quaternion] is not told again."""
+"""What moves and turns less than that [m, and parts of a quaternion] is not sent again."""
 
 _Key = tuple[str, int]
 
@@ -97,21 +103,18 @@ class WorldMarkers:
 
     def __init__(self, world: World, hz: float) -> None:
         self._world = world
-        self._period_s = 1.0 / hz
-        self._due_s = 0.0
+        self._rate = WallRate(hz)
         self._seen: tuple[object, ...] = ()
         self._markers: dict[_Key, Marker] = {}
         self._loose: list[_Loose] = []
         self._shown: dict[_Key, Pose] = {}
-        """Where the loose ones were when they were last told."""
-        self._publisher = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=100, latch=True)
+        """Where the loose ones were when they were last sent."""
+        self._publisher = rospy.Publisher(MARKERS.name, MarkerArray, queue_size=100, latch=True)
 
     def poll(self) -> None:
-        """Tells what has changed, if it is time to look."""
-        now_s = time.monotonic()
-        if now_s < self._due_s:
+        """Publishes what has changed, if it is time to look."""
+        if not self._rate.is_due():
             return
-        self._due_s = max(self._due_s + self._period_s, now_s)
         present = (len(self._world.log), *self._world.bodies.values())
         if present != self._seen:
             self._seen = present

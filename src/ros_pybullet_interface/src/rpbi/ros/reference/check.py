@@ -10,7 +10,7 @@ import sys
 import pybullet
 
 from custom_ros_tools.errors import InterfaceError
-from rpbi.bodies import BODY_TYPES, kind_of
+from rpbi.bodies import kind_of
 from rpbi.config.loading import load_world
 from rpbi.world import World
 
@@ -25,7 +25,7 @@ def main() -> None:
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # so that it may be piped into `head`
     logging.basicConfig(format="warning: %(message)s", level=logging.WARNING)
     try:
-        world = World(load_world(path, BODY_TYPES), connection_mode=pybullet.DIRECT)
+        world = World(load_world(path), connection_mode=pybullet.DIRECT)
         listed = endpoints(world)
     except InterfaceError as error:
         problems = str(error).splitlines()

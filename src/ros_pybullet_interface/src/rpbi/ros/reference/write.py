@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import re
 from pathlib import Path
 
 from custom_ros_tools.node_configs import NODE_CONFIGS
 from custom_ros_tools.schema.json_schema import Schema, explained, json_schema, schema_text
-from rpbi.config.schemas import schemas
+from rpbi.config.schemas import file_schemas, schemas
 from rpbi.reference.config_page import config_page
 
 from .interface_page import interface_page
@@ -15,16 +16,9 @@ from .reference_world import reference_world
 
 PACKAGES = ("ros_pybullet_interface", "custom_ros_tools")
 """Those with messages and services of ours."""
-EXAMPLES = {
-    "world": "basic_example_kuka_lwr/config.yaml",
-    "visual_object": "basic_example_kuka_lwr/work_area.yaml",
-    "collision_object": "floor.yaml",
-    "dynamic_object": "basic_example_kuka_lwr/box.yaml",
-    "robot": "basic_example_kuka_lwr/kuka_lwr.yaml",
-    "urdf": "soft_body/cube.yaml",
-    "soft_object": "soft_body/torus.yaml",
-}
-"""File in rpbi_examples/configs that is shown for each kind."""
+FAVOURITE = "basic_example_kuka_lwr"
+"""Folder of the examples that are shown first."""
+_FIRST_LINE = re.compile(r"# yaml-language-server: .*/(\w+)\.schema\.json\n")
 
 
 def reference_files(root: Path) -> dict[Path, str]:
@@ -33,17 +27,16 @@ def reference_files(root: Path) -> dict[Path, str]:
     Args:
         root: The workspace.
     """
-    worlds, nodes = schemas(), {node: json_schema(model, node) for node, model in NODE_CONFIGS.items()}
-    examples = {kind: _example(root / "src/rpbi_examples/configs" / name) for kind, name in EXAMPLES.items()}
+    nodes = {node: json_schema(model, node) for node, model in NODE_CONFIGS.items()}
     world = reference_world()
     try:
         topics = interface_page(world, _definitions(root))
     finally:
         world.close()
     return {
-        **_schema_files(root / "src/ros_pybullet_interface/schema", worlds),
+        **_schema_files(root / "src/ros_pybullet_interface/schema", schemas()),
         **_schema_files(root / "src/custom_ros_tools/schema", nodes),
-        root / "docs/config_reference.md": config_page(worlds, nodes, examples),
+        root / "docs/config_reference.md": config_page(file_schemas(), nodes, _examples(root)),
         root / "docs/topics_and_services.md": topics,
     }
 
@@ -60,9 +53,16 @@ def main() -> None:
         print(f"{'written' if is_new else 'as it was'}: {path.relative_to(root)}")
 
 
-def _example(path: Path) -> str:
-    """Returns the text of a file without the first line, which is for editors only and right for that place only."""
-    return path.read_text().split("\n", 1)[1]
+def _examples(root: Path) -> dict[str, str]:
+    """Returns an example of each kind of file; its first line, which names the schema, is for editors only."""
+    examples: dict[str, str] = {}
+    paths = (root / "src/rpbi_examples/configs").rglob("*.yaml")
+    for path in sorted(paths, key=lambda path: (path.parent.name != FAVOURITE, len(path.parts), path)):
+        text = path.read_text()
+        named = _FIRST_LINE.match(text)
+        if named:
+            examples.setdefault(named[1], text[named.end() :])
+    return examples
 
 
 def _schema_files(folder: Path, by_name: dict[str, Schema]) -> dict[Path, str]:

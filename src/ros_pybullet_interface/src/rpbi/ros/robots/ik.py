@@ -10,7 +10,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
-from ros_pybullet_interface.srv import CalculateInverseKinematicsRequest, CalculateInverseKinematicsResponse
+from ros_pybullet_interface.srv import CalculateInverseKinematicsRequest
 from rpbi.bodies import Body
 from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.geometry import Pose
@@ -23,15 +23,17 @@ NEAR_M, NEAR_RAD = 0.01, 0.02
 """A link that was moved has arrived within these: joints within 0.01 rad of their goals may add up to as much."""
 
 
-def ik_topic_suffixes(body: Body) -> tuple[str, ...]:
-    """Returns `ik` for robots that shall have the topic."""
-    return ("ik",) if isinstance(body, JointedBody) and body.config.start_ik_callback else ()
+def moved_by_ik(body: Body) -> tuple[str, ...]:
+    """Returns the owner of the topic: a robot that is to have it."""
+    return (body.name,) if isinstance(body, JointedBody) and body.config.start_ik_callback else ()
 
 
 def inverse_kinematics(
     context: BodyContext, request: CalculateInverseKinematicsRequest
-) -> CalculateInverseKinematicsResponse:
-    """Answers with positions of all joints that a motor can move; moves nothing.
+) -> tuple[bool, str, JointState]:
+    """Returns joint positions that bring a link to a pose; moves nothing.
+
+    They are those of all joints that a motor can move.
 
     Raises:
         InterfaceError: If the robot has no such link or has gone.
@@ -44,7 +46,7 @@ def inverse_kinematics(
         position=solution.positions,
         velocity=_velocities(request.problem, solution),
     )
-    return CalculateInverseKinematicsResponse(solution.success, solution.message, state)
+    return solution.success, solution.message, state
 
 
 def move_by_ik(context: BodyContext, problem: CalculateInverseKinematicsProblem) -> None:

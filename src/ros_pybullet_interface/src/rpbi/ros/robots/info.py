@@ -1,20 +1,30 @@
-"""The service that tells what is known of a robot."""
+"""What ROS learns of a robot: the parameter with its URDF, and the service that returns its joints."""
 
 from __future__ import annotations
 
+import argparse
+import sys
+from collections.abc import Callable
+
+import pybullet_data
+import rospy
 from geometry_msgs.msg import Point, Quaternion
 
+from custom_ros_tools.errors import ConfigError
+from custom_ros_tools.ros.lifecycle.kept_parameters import kept_parameters
 from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import RobotInfoRequest, RobotInfoResponse
 from rpbi.bodies.robots.jointed import JointedBody
+from rpbi.config.asset_files import find_file
 from rpbi.ros.publishers.sample_topics import joint_state_message
 from rpbi.ros.services.body_context import BodyContext
 from rpbi.sensors.joint_state import JointStateSensor
+from rpbi.urdf.files import description_for_ros
 from rpbi.urdf.joints import Joint
 
 
 def robot_info(context: BodyContext, _: RobotInfoRequest) -> RobotInfoResponse:
-    """Tells a robot's joints and where they are."""
+    """Returns joints, limits, force-torque sensors and the present joint state."""
     robot: JointedBody = context.body
 
     def read() -> RobotInfoResponse:
@@ -36,7 +46,7 @@ def robot_info(context: BodyContext, _: RobotInfoRequest) -> RobotInfoResponse:
 
 
 def _joint_info(info: tuple, joint: Joint) -> JointInfo:
-    """Turns what PyBullet's `getJointInfo` returns into a message."""
+    """Returns what PyBullet's `getJointInfo` returns as a message."""
     return JointInfo(
         jointIndex=info[0],
         jointName=info[1].decode(),
@@ -59,3 +69,25 @@ def _joint_info(info: tuple, joint: Joint) -> JointInfo:
         is_fixed=joint.is_fixed,
         is_revolute=joint.is_revolute,
     )
+
+
+def publish_description(context: BodyContext) -> Callable[[], None] | None:
+    """Sets `rpbi/NAME/robot_description`, for robot_state_publisher and RViz; returns what deletes it."""
+    body = context.body
+    if not isinstance(body, JointedBody):
+        return None
+    name = rospy.resolve_name(f"rpbi/{body.name}/robot_description")
+    kept_parameters.set(name, description_for_ros(body.config.loadURDF.fileName))
+    return lambda: kept_parameters.delete(name)
+
+
+def main() -> None:
+    """Prints a robot description; launch files need it before the simulator is up: robot_state_publisher does."""
+    parser = argparse.ArgumentParser(description="Prints a URDF with mesh paths that RViz finds.")
+    parser.add_argument("urdf", help="file; {package}/path is resolved, and PyBullet's data is looked in")
+    name = parser.parse_args().urdf
+    try:
+        print(description_for_ros(find_file(name, ".", (pybullet_data.getDataPath(),))))
+    except (ConfigError, OSError, ValueError) as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        sys.exit(1)

@@ -1,51 +1,93 @@
-"""Services that move a robot in a given time and answer when it has arrived."""
+"""Services that move a robot, in a given time or at once, and that change how it is controlled."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from custom_ros_tools.errors import InterfaceError
-from ros_pybullet_interface.srv import (
-    ResetEffStateRequest,
-    ResetEffStateResponse,
-    ResetJointStateRequest,
-    ResetJointStateResponse,
-)
+from custom_ros_tools.srv import SetStringRequest
+from ros_pybullet_interface.srv import ResetEffStateRequest, ResetJointStateRequest, SetJointStateRequest
+from rpbi.config.pybullet_args import CONTROL_MODES
 from rpbi.control.motion import Motion, MotionResult
+from rpbi.control.motors import MODE_NAMES
 from rpbi.engine.actions import TimedGoal
+from rpbi.ros.endpoints import Answer
 from rpbi.ros.services.body_context import BodyContext
 from rpbi.urdf.joints import JointTarget
 
 from .ik import residual_of_robot, solve_for_robot
 
 
-def move_to_joint_state(context: BodyContext, request: ResetJointStateRequest) -> ResetJointStateResponse:
-    """Moves the joints that are named; the others stay."""
+def move_to_joint_state(context: BodyContext, request: ResetJointStateRequest) -> Answer:
+    """Moves the joints that are named, in `duration` [s]; answers at the end."""
     state = request.joint_state
     target = JointTarget(state.name, state.position, state.velocity, state.effort)
     positions = target.values_of("position", "the goal of a motion is a position")
     result = _move(context, context.body.model.resolve_driven(target.names, positions), request.duration)
-    return ResetJointStateResponse(success=result.success, message=result.message)
+    return result.success, result.message
 
 
-def move_to_initial_joint_state(context: BodyContext, request: ResetJointStateRequest) -> ResetJointStateResponse:
-    """Moves all joints to where the robot started; the state in the request is not looked at."""
+def move_to_initial_joint_state(context: BodyContext, request: ResetJointStateRequest) -> Answer:
+    """Moves all joints to where they started, in `duration` [s]; answers at the end.
+
+    The state in the request is not looked at.
+    """
     result = _move(context, context.body.start_positions(), request.duration)
-    return ResetJointStateResponse(success=result.success, message=result.message)
+    return result.success, result.message
 
 
-def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> ResetEffStateResponse:
-    """Moves a link to a pose by way of inverse kinematics; nothing moves if that fails."""
+def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> Answer:
+    """Moves a link to a pose by inverse kinematics, in `duration` [s]; answers at the end.
+
+    Nothing moves if there is no solution.
+    """
     solution = solve_for_robot(context, request.problem)
     if not solution.success:
-        return ResetEffStateResponse(success=False, message=f"nothing moved: {solution.message}")
+        return False, f"nothing moved: {solution.message}"
     goal = context.body.model.resolve(solution.chain, solution.chain_positions)
     result = _move(context, goal, request.duration)
     if not result.success:
-        return ResetEffStateResponse(success=False, message=result.message)
+        return False, result.message
     residual = residual_of_robot(context, request.problem)
     message = f"{result.message}; {residual.in_words(request.problem.link_name)}"
-    return ResetEffStateResponse(success=residual.is_near, message=message)
+    return residual.is_near, message
+
+
+def set_control_mode(context: BodyContext, request: SetStringRequest) -> Answer:
+    """Switches to `POSITION_CONTROL`, `VELOCITY_CONTROL` or `TORQUE_CONTROL`.
+
+    Raises:
+        ValueError: If the text is none of these.
+    """
+    mode = CONTROL_MODES.parse(request.data)
+    before = MODE_NAMES[context.body.motors.mode]
+    context.act("switch_mode", mode)
+    return True, f"{MODE_NAMES[mode]}, was {before}"
+
+
+def stop_motion(context: BodyContext, _: Any) -> Answer:
+    """Ends a timed motion.
+
+    Its joints hold where they are.
+    """
+    was_moving = context.act("stop_motion", "it was stopped")
+    return was_moving, "stopped" if was_moving else "no motion is running"
+
+
+def set_joint_state(context: BodyContext, request: SetJointStateRequest) -> Answer:
+    """Puts the joints that are named somewhere at once, within their limits.
+
+    Raises:
+        UnknownNameError: If the robot lacks one of the joints.
+        ValueError: If a number is missing, not finite or outside the joint's limits.
+    """
+    state = request.joint_state
+    if not state.name:
+        raise ValueError("expected one joint or more, got none")
+    target = JointTarget(state.name, state.position, state.velocity)
+    context.act("set_joint_state", target)
+    return True, f"{', '.join(state.name)} put there"
 
 
 def _move(context: BodyContext, goal: Mapping[int, float], duration_s: float) -> MotionResult:

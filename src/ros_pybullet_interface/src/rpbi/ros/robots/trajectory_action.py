@@ -11,6 +11,7 @@ from queue import SimpleQueue
 from typing import Any
 
 import rospy
+from actionlib import ActionServer
 from actionlib.server_goal_handle import ServerGoalHandle
 from actionlib_msgs.msg import GoalStatus
 
@@ -20,9 +21,13 @@ from rpbi.control.trajectories.controller_state import ControllerState
 from rpbi.control.trajectories.motion import TrajectoryMotion
 from rpbi.control.trajectories.request import ErrorCode, TrajectoryRefusedError
 from rpbi.engine.actions import RecordedTrajectory
+from rpbi.engine.clock import Clock
+from rpbi.ros.endpoints import Service
+from rpbi.ros.headers import to_ros_time
+from rpbi.ros.publishers.topics import FastTopic
 from rpbi.ros.services.body_context import BodyContext
 
-from .stamped_action_server import StampedActionServer
+from .trajectory_commands import followers_with_control_msgs
 from .trajectory_messages import (
     CONTROLLER,
     FollowJointTrajectoryAction,
@@ -33,10 +38,67 @@ from .trajectory_messages import (
 
 log = logging.getLogger(__name__)
 
+ACTION = Service(
+    f"rpbi/{{name}}/{CONTROLLER}/follow_joint_trajectory",
+    FollowJointTrajectoryAction,
+    None,
+    followers_with_control_msgs,
+)
 MOST_TASKS = 100
 """Tasks that may wait before feedback is left out, as it would pile up in a world that runs much too fast."""
 LONGEST_END_S = 5.0
 """How long closing waits for the last answers [s]."""
+
+
+class StampedActionServer(ActionServer):
+    """An action server for a node that does not use ROS time.
+
+    actionlib takes all stamps and its timer from rospy, which in the simulator is the wall clock whatever
+    `use_sim_time` says: right for the timer, not for the stamps. It also hands messages to threads that may lose the
+    last ones when the server closes; here they leave at once.
+
+    Args:
+        name: Name of the action.
+        action_type: Its ROS type.
+        clock: The world's clock.
+        take_goal: Takes the handle of a new goal; it must return at once.
+        take_cancel: Takes the handle of a goal that is to be cancelled; it must return at once.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        action_type: type,
+        clock: Clock,
+        take_goal: Callable[[ServerGoalHandle], None],
+        take_cancel: Callable[[ServerGoalHandle], None],
+    ) -> None:
+        super().__init__(name, action_type, take_goal, take_cancel, auto_start=False)
+        self._clock = clock
+
+    def initialize(self) -> None:
+        """Opens the topics and starts the timer; called by `start`."""
+        super().initialize()
+        for key in ("status_pub", "result_pub", "feedback_pub"):
+            publisher: rospy.Publisher = getattr(self, key)
+            # Both are the same topic to rospy, so it must not end with the first one: who just comes would be lost.
+            setattr(self, key, _StampedTopic(publisher.resolved_name, publisher.data_class, self._clock))
+            publisher.unregister()
+
+
+class _StampedTopic(FastTopic):
+    """A topic with the stamps of the world, under the names by which actionlib uses it."""
+
+    def __init__(self, topic: str, message_type: type, clock: Clock) -> None:
+        super().__init__(topic, message_type)
+        self._clock = clock
+
+    def publish(self, message: Any) -> None:
+        message.header.stamp = to_ros_time(self._clock.stamp_ns)
+        super().publish(message)
+
+    def unregister(self) -> None:
+        self.close()
 
 
 def open_trajectory_action(context: BodyContext) -> Callable[[], None] | None:
@@ -80,8 +142,8 @@ class TrajectoryAction:
         self._tasks: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._thread = threading.Thread(target=self._work, name=f"{context.name} trajectories", daemon=True)
         self._server = StampedActionServer(
-            f"rpbi/{context.name}/{CONTROLLER}/follow_joint_trajectory",
-            FollowJointTrajectoryAction,
+            ACTION.name.format(name=context.name),
+            ACTION.service_type,
             context.world.clock,
             take_goal=lambda goal: self._tasks.put(lambda: self._begin(goal)),
             take_cancel=lambda goal: self._tasks.put(lambda: self._cancel(goal)),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from trajectory_msgs.msg import JointTrajectory
@@ -14,22 +14,17 @@ from rpbi.engine.actions import RecordedTrajectory
 from rpbi.engine.clock import NS_PER_S
 from rpbi.ros.services.body_context import BodyContext
 
-from .trajectory_messages import CONTROLLER, FollowJointTrajectoryAction, QueryTrajectoryState, trajectory_request
+from .trajectory_messages import QueryTrajectoryState, trajectory_request
 
 
-def of_followers(suffix: str) -> Callable[[Body], Sequence[str]]:
-    """Returns the suffixes of something that every robot with a follower of trajectories has once."""
-    return lambda body: (f"{CONTROLLER}/{suffix}",) if isinstance(body, Robot) and body.follower is not None else ()
+def followers(body: Body) -> Sequence[str]:
+    """Returns the owner of what every robot with a follower of trajectories has."""
+    return (body.name,) if isinstance(body, Robot) and body.follower is not None else ()
 
 
-def action_suffixes(body: Body) -> Sequence[str]:
-    """Returns the suffix of the action; there is none without control_msgs."""
-    return of_followers("follow_joint_trajectory")(body) if FollowJointTrajectoryAction is not None else ()
-
-
-def query_suffixes(body: Body) -> Sequence[str]:
-    """Returns the suffix of the service that tells where joints will be; there is none without control_msgs."""
-    return of_followers("query_state")(body) if QueryTrajectoryState is not None else ()
+def followers_with_control_msgs(body: Body) -> Sequence[str]:
+    """Returns the owner of what such a robot has where control_msgs is installed."""
+    return followers(body) if QueryTrajectoryState is not None else ()
 
 
 def follow_command(context: BodyContext, message: JointTrajectory) -> None:
@@ -46,7 +41,7 @@ def follow_command(context: BodyContext, message: JointTrajectory) -> None:
 
 
 def query_state(context: BodyContext, request: Any) -> Any:
-    """Tells where the joints are to be at a time, as far as it is known now."""
+    """Returns where joints will be at a time; only with control_msgs."""
     follower, clock = context.body.follower, context.world.clock
     stamp_ns = request.time.to_nsec()
 
@@ -54,7 +49,4 @@ def query_state(context: BodyContext, request: Any) -> Any:
         return follower.desired(clock.time_s + (stamp_ns - clock.stamp_ns) / NS_PER_S)
 
     state = context.ask_body(desired)
-    response = QueryTrajectoryState._response_class()
-    response.name = follower.joint_names
-    response.position, response.velocity, response.acceleration = state
-    return response
+    return follower.joint_names, *state

@@ -18,17 +18,20 @@ class BodyContext(NamedTuple):
 
     Attributes:
         name: Name of the body.
-        suffix: What follows `rpbi/NAME/` in the name of the service or topic.
-        world: The world it is in.
+        owner: What stands for `{name}` in the name of the service or topic: the body, or a sensor as `BODY/JOINT`.
         simulation: The loop that runs the world.
         ask: Reaches the simulation thread.
     """
 
     name: str
-    suffix: str
-    world: World
+    owner: str
     simulation: Simulation
     ask: Requests
+
+    @property
+    def world(self) -> World:
+        """The world it is in."""
+        return self.simulation.world
 
     @property
     def body(self) -> Any:

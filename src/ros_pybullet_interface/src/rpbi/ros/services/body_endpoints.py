@@ -1,54 +1,170 @@
-"""All that a body has in ROS beside its samples and inputs."""
+"""All that a body has in ROS beside its samples and inputs: tables, and how it is opened and closed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import wait
 from contextlib import ExitStack
+from typing import Any
 
+from std_srvs.srv import Empty, Trigger
+from trajectory_msgs.msg import JointTrajectory
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.srv import SetString, SetTransform, SetTransformRequest
+from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
+from ros_pybullet_interface.srv import (
+    CalculateInverseKinematics,
+    ResetEffState,
+    ResetJointState,
+    RobotInfo,
+    SetJointState,
+)
 from rpbi.bodies import Body
+from rpbi.bodies.robots.jointed import JointedBody
+from rpbi.bodies.robots.robot import Robot
+from rpbi.engine.inputs import PoseInput, check_pose
+from rpbi.geometry import Pose
+from rpbi.ros.endpoints import Answer, Service, Topic, of, serve, subscribe
 from rpbi.ros.requests import Requests
-from rpbi.ros.robots.description import publish_description
+from rpbi.ros.robots.ik import inverse_kinematics, move_by_ik, moved_by_ik
+from rpbi.ros.robots.info import publish_description, robot_info
+from rpbi.ros.robots.motion import (
+    move_to_eff_state,
+    move_to_initial_joint_state,
+    move_to_joint_state,
+    set_control_mode,
+    set_joint_state,
+    stop_motion,
+)
 from rpbi.ros.robots.trajectory_action import open_trajectory_action
+from rpbi.ros.robots.trajectory_commands import follow_command, followers, followers_with_control_msgs, query_state
+from rpbi.ros.robots.trajectory_messages import CONTROLLER, QueryTrajectoryState
 from rpbi.ros.simulation import Simulation
-from rpbi.world import World
+from rpbi.sensors.filters import Zeroing
 
 from .body_context import BodyContext
-from .body_services import BODY_SERVICES, open_service
-from .body_topics import BODY_TOPICS, open_topic
 
-Part = Callable[[BodyContext], Callable[[], None] | None]
-"""Opens something for a body, if the body has it, and returns what closes it."""
+SAMPLES = 100
+"""How many samples of a force-torque sensor are averaged."""
+LOOK_AGAIN_AFTER_S = 0.2
+"""How often it is seen whether samples still come [s] of wall time."""
 
-BODY_PARTS: tuple[Part, ...] = (publish_description, open_trajectory_action)
-"""What is neither a plain service nor a plain topic."""
+
+def set_pose(context: BodyContext, request: SetTransformRequest) -> Answer:
+    """Puts the base link at a pose in the world, at rest.
+
+    Its URDF frame is put there, whatever is in the way.
+
+    Raises:
+        ValueError: If the pose is not finite, or the body follows a TF frame, which would take it back.
+    """
+    position, quat = request.transform.translation, request.transform.rotation
+    pose = check_pose(Pose((position.x, position.y, position.z), (quat.x, quat.y, quat.z, quat.w)))
+    for taken in context.body.inputs().values():
+        if isinstance(taken, PoseInput):
+            raise ValueError(f"'{context.name}' follows the TF frame '{taken.tf_id}': move that")
+    context.act("teleport", pose)
+    return True, f"'{context.name}' was put there"
+
+
+def force_torque_sensors(body: Body) -> list[str]:
+    """Returns the names of the force-torque sensors of a body, as `BODY/JOINT`."""
+    return [sensor.name for sensor in body.force_torque_sensors] if isinstance(body, JointedBody) else []
+
+
+def zero_force_torque(context: BodyContext, _: Any) -> tuple[()]:
+    """Takes the mean of the next 100 samples of that force-torque sensor for zero.
+
+    Raises:
+        InterfaceError: If the simulation is stopped, before or meanwhile, or the robot goes; the old zero stays then.
+    """
+    body = context.body
+    sensor = next(each for each in body.force_torque_sensors if each.name == context.owner)
+
+    def start() -> Zeroing:
+        if not context.simulation.running:
+            raise InterfaceError("the simulation is stopped: start it, else there are no samples to average")
+        zeroing: Zeroing = sensor.zero(SAMPLES)
+        return zeroing
+
+    def check() -> None:
+        if not context.simulation.running and not zeroing.mean.done():
+            sensor.cancel_zeroing()
+            raise InterfaceError(f"the simulation was stopped before {SAMPLES} samples had come; the old zero stays")
+
+    zeroing = context.ask_body(start, body)
+    while not wait([zeroing.mean], timeout=LOOK_AGAIN_AFTER_S).done:
+        context.ask_body(check, body)
+    return ()
+
+
+BODY_SERVICES = (
+    Service("rpbi/{name}/set_pose", SetTransform, set_pose),
+    Service("rpbi/{name}/robot_info", RobotInfo, robot_info, of(JointedBody)),
+    Service("rpbi/{name}/ik", CalculateInverseKinematics, inverse_kinematics, of(JointedBody)),
+    Service("rpbi/{name}/set_joint_state", SetJointState, set_joint_state, of(JointedBody)),
+    Service("rpbi/{name}/ft_sensor", Empty, zero_force_torque, force_torque_sensors),
+    Service("rpbi/{name}/set_control_mode", SetString, set_control_mode, of(Robot)),
+    Service("rpbi/{name}/stop_motion", Trigger, stop_motion, of(Robot)),
+    Service("rpbi/{name}/move_to_joint_state", ResetJointState, move_to_joint_state, of(Robot)),
+    Service("rpbi/{name}/move_to_initial_joint_state", ResetJointState, move_to_initial_joint_state, of(Robot)),
+    Service("rpbi/{name}/move_to_eff_state", ResetEffState, move_to_eff_state, of(Robot)),
+    Service(f"rpbi/{{name}}/{CONTROLLER}/query_state", QueryTrajectoryState, query_state, followers_with_control_msgs),
+)
+BODY_TOPICS = (
+    Topic(
+        "rpbi/{name}/ik",
+        CalculateInverseKinematicsProblem,
+        move_by_ik,
+        "The robot goes to the solution of the problem; with `start_ik_callback`.",
+        owners=moved_by_ik,
+    ),
+    Topic(
+        f"rpbi/{{name}}/{CONTROLLER}/command",
+        JointTrajectory,
+        follow_command,
+        "The robot follows the trajectory, without looking at how well.",
+        owners=followers,
+    ),
+)
+BODY_PARTS: tuple[Callable[[BodyContext], Callable[[], None] | None], ...] = (
+    publish_description,
+    open_trajectory_action,
+)
+"""What is neither a service nor a topic: opens it for a body that has it, and returns what closes it."""
 
 
 class BodyEndpoints:
     """Opens services, topics and other parts of bodies, and closes them with the body.
 
     Args:
-        world: The world.
-        simulation: The loop that runs it.
+        simulation: The loop that runs the world.
         ask: Reaches the simulation thread.
     """
 
-    def __init__(self, world: World, simulation: Simulation, ask: Requests) -> None:
-        self._world, self._simulation, self._ask = world, simulation, ask
+    def __init__(self, simulation: Simulation, ask: Requests) -> None:
+        self._simulation, self._ask = simulation, ask
         self._open: dict[str, ExitStack] = {}
 
     def open(self, body: Body) -> None:
         """Opens all that a body has; when it raises, nothing is left open."""
+
+        def contexts(owners: Sequence[str]) -> list[BodyContext]:
+            return [BodyContext(body.name, owner, self._simulation, self._ask) for owner in owners]
+
         with ExitStack() as stack:
+            (context,) = contexts([body.name])
             for part in BODY_PARTS:
-                close = part(self._context(body, ""))
+                close = part(context)
                 if close is not None:
                     stack.callback(close)
             for topic in BODY_TOPICS:
-                for suffix in topic.suffixes(body):
-                    stack.callback(open_topic(topic, self._context(body, suffix)).unregister)
+                for context in contexts(topic.owners(body)):
+                    stack.callback(subscribe(topic, context, context.owner).unregister)
             for service in BODY_SERVICES:
-                for suffix in service.suffixes(body):
-                    stack.callback(open_service(service, self._context(body, suffix)).shutdown, "its body has gone")
+                for context in contexts(service.owners(body)):
+                    stack.callback(serve(service, context, context.owner).shutdown, "its body has gone")
             self._open[body.name] = stack.pop_all()
 
     def close(self, name: str) -> None:
@@ -56,6 +172,3 @@ class BodyEndpoints:
         stack = self._open.pop(name, None)
         if stack is not None:
             stack.close()
-
-    def _context(self, body: Body, suffix: str) -> BodyContext:
-        return BodyContext(body.name, suffix, self._world, self._simulation, self._ask)

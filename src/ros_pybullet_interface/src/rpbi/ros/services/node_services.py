@@ -1,51 +1,54 @@
-"""The node's services; a handler never touches PyBullet, it asks the simulation thread."""
+"""The services of the node: of time, of objects and cameras, and of how objects behave in contact and motion.
+
+A handler never touches PyBullet, it asks the simulation thread.
+"""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-import rospy
-from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
+import genpy
+from std_srvs.srv import Trigger
 
 from custom_ros_tools.config import load_config, load_configs
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.srv import SetString, SetStringRequest, SetStringResponse
-from ros_pybullet_interface.msg import PybulletObject
+from custom_ros_tools.srv import SetString, SetStringRequest
+from ros_pybullet_interface.msg import ObjectDynamics, PybulletObject
 from ros_pybullet_interface.srv import (
     AddPybulletObject,
     AddPybulletObjectRequest,
-    AddPybulletObjectResponse,
+    ChangeDynamicsRequest,
+    ChangeObjectDynamics,
+    ChangeObjectDynamicsRequest,
+    GetObjectDynamics,
+    GetObjectDynamicsRequest,
+    GetStateHash,
     ListObjects,
-    ListObjectsRequest,
-    ListObjectsResponse,
+    StepN,
+    StepNRequest,
 )
-from rpbi.bodies import BODY_TYPES, kind_of
+from ros_pybullet_interface.srv import ChangeDynamics as ChangeDynamicsService
+from rpbi.bodies import kind_of
 from rpbi.bodies.collision import CollisionObject
 from rpbi.bodies.dynamic import DynamicObject
+from rpbi.bodies.dynamics import LinkDynamics, difference
 from rpbi.bodies.robots.robot import Robot
 from rpbi.bodies.soft import SoftObject
 from rpbi.bodies.urdf_object import UrdfObject
 from rpbi.bodies.visual import VisualObject
 from rpbi.config.asset_files import find_file
 from rpbi.config.loading import load_object, type_of
+from rpbi.config.object_entry import FILE, parse_object_entry
+from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.config.sensors import RgbdSensorConfig
 from rpbi.engine.clock import NS_PER_S
+from rpbi.ros.endpoints import Answer, Service
+from rpbi.ros.headers import to_ros_time
+from rpbi.ros.object_lifecycle import ObjectLifecycle
 from rpbi.ros.requests import Requests
 from rpbi.ros.simulation import Simulation
-
-
-class NodeService(NamedTuple):
-    """What a service of the node is.
-
-    Attributes:
-        service_type: Its ROS type.
-        meaning: What it does, in a sentence.
-    """
-
-    service_type: type
-    meaning: str
-
 
 log = logging.getLogger(__name__)
 
@@ -62,110 +65,182 @@ OBJECT_TYPES = {
 """List of the main file for each number in PybulletObject."""
 
 
-NODE_SERVICES: dict[str, NodeService] = {
-    "rpbi/start": NodeService(Trigger, "Lets the world run; `success` is false if it does so already."),
-    "rpbi/stop": NodeService(Trigger, "Lets the world stand still; `success` is false if it does so already."),
-    "rpbi/step": NodeService(
-        Trigger, "Goes one tick on, if the world stands still; the message is `tick N, stamp S` [s]."
-    ),
-    "rpbi/add_pybullet_object": NodeService(
-        AddPybulletObject, "Adds an object from a YAML file or text; the message has all problems of it."
-    ),
-    "rpbi/remove_pybullet_object": NodeService(SetString, "Removes the object or camera of that name."),
-    "rpbi/list_objects": NodeService(ListObjects, "Tells names and types of all objects and cameras."),
-}
-"""What the node serves, in the order of its handlers."""
+class NodeContext(NamedTuple):
+    """The node.
 
-
-class NodeServices:
-    """Start, stop, step; add, remove and list objects.
-
-    Args:
-        simulation: What to control.
+    Attributes:
+        simulation: The loop that runs the world.
         ask: Reaches the simulation thread.
-        add: Adds an object, by type, configuration and name of its file, and all that belongs to it.
-        remove: Removes an object, by name, and all that belongs to it.
-        context: What reading an object's file needs to know of the world, see `load_object`.
+        objects: What comes and goes.
+        loading: What reading an object's file needs to know of the world, see `load_object`.
     """
 
-    def __init__(
-        self,
-        simulation: Simulation,
-        ask: Requests,
-        add: Callable[[str, Any, str], None],
-        remove: Callable[[str], None],
-        context: Mapping[str, Any],
-    ) -> None:
-        self._simulation, self._ask, self._add, self._remove = simulation, ask, add, remove
-        self._context = context
-        handlers = (self._start, self._stop, self._step, self._add_object, self._remove_object, self._list_objects)
-        for (name, service), handler in zip(NODE_SERVICES.items(), handlers, strict=True):
-            rospy.Service(name, service.service_type, handler)
+    simulation: Simulation
+    ask: Requests
+    objects: ObjectLifecycle
+    loading: Mapping[str, Any]
 
-    def _start(self, _: TriggerRequest) -> TriggerResponse:
-        return self._switch(self._simulation.start, "started", "already running")
 
-    def _stop(self, _: TriggerRequest) -> TriggerResponse:
-        return self._switch(self._simulation.stop, "stopped", "already stopped")
+def _start(node: NodeContext, _: Any) -> Answer:
+    """Lets the world run; `success` is false if it does so already."""
+    has_started = node.ask(node.simulation.start)
+    return has_started, "started" if has_started else "already running"
 
-    def _switch(self, switch: Callable[[], bool], done: str, refused: str) -> TriggerResponse:
-        try:
-            changed = self._ask(switch)
-        except InterfaceError as error:
-            return TriggerResponse(success=False, message=str(error))
-        return TriggerResponse(success=changed, message=done if changed else refused)
 
-    def _step(self, _: TriggerRequest) -> TriggerResponse:
-        try:
-            tick, stamp_ns = self._ask(self._simulation.step)
-        except InterfaceError as error:
-            return TriggerResponse(success=False, message=str(error))
-        seconds, nanoseconds = divmod(stamp_ns, NS_PER_S)
-        return TriggerResponse(success=True, message=f"tick {tick}, stamp {seconds}.{nanoseconds:09d}")
+def _stop(node: NodeContext, _: Any) -> Answer:
+    """Lets the world stand still; `success` is false if it does so already."""
+    has_stopped = node.ask(node.simulation.stop)
+    return has_stopped, "stopped" if has_stopped else "already stopped"
 
-    def _add_object(self, request: AddPybulletObjectRequest) -> AddPybulletObjectResponse:
-        asked = request.pybullet_object
-        try:
-            section = OBJECT_TYPES.get(asked.object_type)
-            if section is None:
-                known = ", ".join(f"{number} ({name})" for number, name in OBJECT_TYPES.items())
-                raise InterfaceError(f"object_type: expected one of {known}; got {asked.object_type}")
-            data, file, path = self._read(asked)
-            kind = type_of(section, data, BODY_TYPES)
-            config = load_object(kind, data, file, BODY_TYPES, {**self._context, "file": path})
-            self._add(kind, config, file)
-        except InterfaceError as error:
-            return AddPybulletObjectResponse(success=False, message=str(error))
-        except Exception as error:  # nothing that an object brings along may leave the caller without an answer
-            log.exception("adding an object failed in a way that is not foreseen")
-            return AddPybulletObjectResponse(success=False, message=f"{type(error).__name__}: {error}")
-        return AddPybulletObjectResponse(success=True, message=f"added '{config.name}'")
 
-    def _read(self, asked: PybulletObject) -> tuple[dict[str, Any], str, str]:
-        """Returns an object's YAML, what to call its file in messages, and beside what its own files are looked for.
+def _step(node: NodeContext, _: Any) -> Answer:
+    """Goes one tick on, if the world stands still; the message is `tick N, stamp S` [s]."""
+    tick, stamp_ns = node.ask(node.simulation.step)
+    seconds, nanoseconds = divmod(stamp_ns, NS_PER_S)
+    return True, f"tick {tick}, stamp {seconds}.{nanoseconds:09d}"
 
-        The caller's working directory is unknown here: what has no folder, such as a text, is looked for in the
-        world's search paths and PyBullet's data only.
-        """
-        if asked.filename:
-            try:
-                path = find_file(asked.filename, NO_FOLDER, self._context["search_paths"])
-            except ValueError as error:
-                raise InterfaceError(f"filename: {error}") from None
-            return load_config(path), asked.filename, path
-        if asked.config:
-            return load_configs(asked.config, "config"), "config", NO_FOLDER
-        raise InterfaceError("expected a filename or a config; got neither")
 
-    def _remove_object(self, request: SetStringRequest) -> SetStringResponse:
-        try:
-            self._remove(request.data)
-        except InterfaceError as error:
-            return SetStringResponse(success=False, message=str(error))
-        return SetStringResponse(success=True, message=f"removed '{request.data}'")
+def _step_n(node: NodeContext, request: StepNRequest) -> tuple[bool, str, int, genpy.Time]:
+    """Goes many ticks on, as fast as it goes, if the world stands still."""
+    try:
+        tick, stamp_ns = node.ask.wait_for(node.ask(lambda: node.simulation.step_n(request.steps)))
+        return True, f"{request.steps} ticks done", tick, to_ros_time(stamp_ns)
+    except InterfaceError as error:
+        clock = node.simulation.world.clock
+        return False, str(error), clock.tick, to_ros_time(clock.stamp_ns)
 
-    def _list_objects(self, _: ListObjectsRequest) -> ListObjectsResponse:
-        world = self._simulation.world
-        bodies, cameras = self._ask.or_service_error(lambda: (dict(world.bodies), list(world.cameras)))
-        types = [kind_of(body) for body in bodies.values()] + ["rgbd_sensor"] * len(cameras)
-        return ListObjectsResponse(names=[*bodies, *cameras], types=types)
+
+def _reset(node: NodeContext, _: Any) -> Answer:
+    """Makes the world what it was at its start, to the last bit; stamps go on."""
+    node.objects.reset()
+    return True, "the world is as configured"
+
+
+def _state_hash(node: NodeContext, _: Any) -> tuple[bool, str, int, genpy.Time, int, str]:
+    """Returns a text that is the same for worlds in the same state."""
+    world, clock = node.simulation.world, node.simulation.world.clock
+    return node.ask(lambda: (True, "", clock.tick, to_ros_time(clock.stamp_ns), world.resets, world.state_hash()))
+
+
+def _add_object(node: NodeContext, request: AddPybulletObjectRequest) -> Answer:
+    """Adds an object from a YAML file or text; the message has all problems of it."""
+    asked = request.pybullet_object
+    try:
+        section = OBJECT_TYPES.get(asked.object_type)
+        if section is None:
+            known = ", ".join(f"{number} ({name})" for number, name in OBJECT_TYPES.items())
+            raise InterfaceError(f"object_type: expected one of {known}; got {asked.object_type}")
+        data, file, path = _read_object(node, asked)
+        kind = type_of(section, data)
+        config = load_object(kind, data, file, {**node.loading, "file": path})
+        node.objects.add(kind, config, file)
+    except InterfaceError:
+        raise
+    except Exception as error:  # nothing that an object brings along may leave the caller without an answer
+        log.exception("adding an object failed in a way that is not foreseen")
+        return False, f"{type(error).__name__}: {error}"
+    return True, f"added '{config.name}'"
+
+
+def _read_object(node: NodeContext, asked: PybulletObject) -> tuple[dict[str, Any], str, str]:
+    """Returns an object's YAML, what to call its file in messages, and beside what its own files are looked for.
+
+    The caller's working directory is unknown here: what has no folder, such as a text, is looked for in the world's
+    search paths and PyBullet's data only.
+    """
+    if asked.filename:
+        path = _find(node, asked.filename, "filename")
+        return load_config(path), asked.filename, path
+    if asked.config:
+        return load_configs(asked.config, "config"), "config", NO_FOLDER
+    raise InterfaceError("expected a filename or a config; got neither")
+
+
+def _add_camera(node: NodeContext, request: SetStringRequest) -> Answer:
+    """Adds a camera: the keys of `rgbd_sensor` as YAML text, or `file` and the keys that differ."""
+    data, file = _read_camera(node, request.data)
+    config = RgbdSensorConfig.parse(data, file)
+    node.objects.add_camera(config, file)
+    return True, f"added '{config.name}'"
+
+
+def _read_camera(node: NodeContext, text: str) -> tuple[Mapping[str, Any], str]:
+    """Returns the keys of a camera and what to call where they came from."""
+    data = load_configs(text, "data")
+    if FILE not in data:
+        return data, "data"
+    try:
+        entry = parse_object_entry(data)
+    except ValueError as error:
+        raise InterfaceError(f"{FILE}: {error}") from None
+    return entry.apply_overrides(load_config(_find(node, entry.file, FILE))), entry.file
+
+
+def _find(node: NodeContext, name: str, key: str) -> str:
+    """Returns the path of the file that a key names."""
+    try:
+        return find_file(name, NO_FOLDER, node.loading["search_paths"])
+    except ValueError as error:
+        raise InterfaceError(f"{key}: {error}") from None
+
+
+def _remove_object(node: NodeContext, request: SetStringRequest) -> Answer:
+    """Removes the object or camera of that name."""
+    node.objects.remove(request.data)
+    return True, f"removed '{request.data}'"
+
+
+def _list_objects(node: NodeContext, _: Any) -> tuple[list[str], list[str]]:
+    """Returns names and types of all objects and cameras."""
+    world = node.simulation.world
+    bodies, cameras = node.ask(lambda: (dict(world.bodies), list(world.cameras)))
+    types = [kind_of(body) for body in bodies.values()] + ["rgbd_sensor"] * len(cameras)
+    return [*bodies, *cameras], types
+
+
+def _get_dynamics(node: NodeContext, request: GetObjectDynamicsRequest) -> tuple[bool, str, ObjectDynamics]:
+    """Returns mass, friction and the like of an object or a link."""
+    present = node.ask(lambda: node.simulation.world.dynamics(request.object_name))
+    return True, "", ObjectDynamics(**present._asdict())
+
+
+def _change_object_dynamics(node: NodeContext, request: ChangeObjectDynamicsRequest) -> Answer:
+    """Changes what differs from what the service before returns."""
+    world, asked = node.simulation.world, request.object_dynamics
+    wanted = LinkDynamics(*(getattr(asked, field) for field in LinkDynamics._fields))
+
+    def change() -> str:
+        changed = difference(world.dynamics(request.object_name), wanted)
+        if not changed:
+            return "nothing differs"
+        world.change_dynamics(request.object_name, ChangeDynamics(**changed))
+        return f"changed {', '.join(changed)}"
+
+    return True, node.ask(change)
+
+
+def _change_dynamics(node: NodeContext, request: ChangeDynamicsRequest) -> Answer:
+    """Changes the keys of `changeDynamics` that the YAML text in it has."""
+    change = ChangeDynamics.parse(load_configs(request.config, "config"), "config")
+    keys = ", ".join(change.kwargs())
+    if not keys:
+        raise InterfaceError("config: expected keys of changeDynamics, such as lateralFriction; got none")
+    node.ask(lambda: node.simulation.world.change_dynamics(request.object_name, change))
+    return True, f"changed {keys}"
+
+
+NODE_SERVICES = (
+    Service("rpbi/start", Trigger, _start),
+    Service("rpbi/stop", Trigger, _stop),
+    Service("rpbi/step", Trigger, _step),
+    Service("rpbi/step_n", StepN, _step_n),
+    Service("rpbi/reset", Trigger, _reset),
+    Service("rpbi/add_pybullet_object", AddPybulletObject, _add_object),
+    Service("rpbi/add_rgbd_sensor", SetString, _add_camera),
+    Service("rpbi/remove_pybullet_object", SetString, _remove_object),
+    Service("rpbi/list_objects", ListObjects, _list_objects),
+    Service("rpbi/get_pybullet_object_dynamics", GetObjectDynamics, _get_dynamics),
+    Service("rpbi/change_pybullet_object_dynamics", ChangeObjectDynamics, _change_object_dynamics),
+    Service("rpbi/change_dynamics", ChangeDynamicsService, _change_dynamics),
+    Service("rpbi/get_state_hash", GetStateHash, _state_hash),
+)

@@ -1,27 +1,22 @@
-"""From where PyBullet's window looks: told, asked for and changed."""
+"""Where PyBullet's window looks from: published, returned and changed."""
 
 from __future__ import annotations
 
-import time
+from typing import Any
 
 import rospy
 
 from custom_ros_tools.errors import ConfigError, InterfaceError
-from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from custom_ros_tools.ros.lifecycle.wall_timer import WallRate
 from ros_pybullet_interface.msg import ResetDebugVisualizerCamera as CameraMessage
-from ros_pybullet_interface.srv import (
-    GetDebugVisualizerCamera,
-    GetDebugVisualizerCameraRequest,
-    GetDebugVisualizerCameraResponse,
-)
+from ros_pybullet_interface.srv import GetDebugVisualizerCamera
 from rpbi.config.pybullet_world_models import ResetDebugVisualizerCamera
+from rpbi.ros.endpoints import Service, Topic, serve, subscribe
 from rpbi.ros.requests import Requests
 from rpbi.window import Window
 
-CAMERA_TOPIC = "rpbi/debug_visualizer_camera"
-RESET_TOPIC = "rpbi/reset_debug_visualizer_camera"
-GET_SERVICE = "rpbi/get_debug_visualizer_camera"
-PERIOD_S = 1.0 / 30.0
+CAMERA = Topic("rpbi/debug_visualizer_camera", CameraMessage, meaning="Where the window looks from now; 30 Hz.")
+HZ = 30.0
 
 
 class DebugCamera:
@@ -33,43 +28,47 @@ class DebugCamera:
 
     def __init__(self, window: Window | None) -> None:
         self._window = window
-        self._due_s = 0.0
-        self._warn = ThrottledWarning()
-        self._publisher = None if window is None else rospy.Publisher(CAMERA_TOPIC, CameraMessage, queue_size=10)
+        self._rate = WallRate(HZ)
+        self._publisher = None if window is None else rospy.Publisher(CAMERA.name, CameraMessage, queue_size=10)
 
     def poll(self) -> None:
-        """Tells it if it is time to."""
-        now_s = time.monotonic()
-        if self._window is None or self._publisher is None or now_s < self._due_s:
+        """Publishes it if it is time to."""
+        if self._window is None or self._publisher is None or not self._rate.is_due():
             return
-        self._due_s = max(self._due_s + PERIOD_S, now_s)
         if self._publisher.get_num_connections():
             self._publisher.publish(_message(self._window.camera()))
 
     def serve(self, ask: Requests) -> None:
-        """Opens the service that tells it and the topic that changes it.
+        """Opens the service that returns it and the topic that changes it.
 
         Args:
             ask: Reaches the simulation thread.
         """
         self._ask = ask
-        rospy.Service(GET_SERVICE, GetDebugVisualizerCamera, self._get)
-        rospy.Subscriber(RESET_TOPIC, CameraMessage, self._reset, queue_size=1, tcp_nodelay=True)
+        serve(GET, self)
+        subscribe(RESET, self)
 
-    def _get(self, _: GetDebugVisualizerCameraRequest) -> GetDebugVisualizerCameraResponse:
-        camera = self._ask.or_service_error(lambda: self._present_window().camera())
-        return GetDebugVisualizerCameraResponse(_message(camera))
+    def get(self, _: Any) -> CameraMessage:
+        """Returns where the window looks from.
 
-    def _reset(self, message: CameraMessage) -> None:
-        topic = rospy.resolve_name(RESET_TOPIC)
+        Raises:
+            InterfaceError: If there is no window.
+        """
+        return _message(self._ask(lambda: self._present_window().camera()))
+
+    def reset(self, message: CameraMessage) -> None:
+        """Has the window look from somewhere else.
+
+        Raises:
+            InterfaceError: If there is no window.
+            ValueError: If the message is not sound.
+        """
         given = {key: getattr(message, key) for key in ResetDebugVisualizerCamera.model_fields}
         try:
-            camera = ResetDebugVisualizerCamera.parse(given, topic)
-            self._ask(lambda: self._present_window().look(camera))
+            camera = ResetDebugVisualizerCamera.parse(given, RESET.name)
         except ConfigError as error:
-            self._warn(topic, "message refused: " + "; ".join(f"{one.key}: {one.message}" for one in error.problems))
-        except InterfaceError as error:
-            self._warn(topic, f"message refused: {error}")
+            raise ValueError("; ".join(f"{one.key}: {one.message}" for one in error.problems)) from None
+        self._ask(lambda: self._present_window().look(camera))
 
     def _present_window(self) -> Window:
         if self._window is None:
@@ -79,3 +78,12 @@ class DebugCamera:
 
 def _message(camera: ResetDebugVisualizerCamera) -> CameraMessage:
     return CameraMessage(**camera.model_dump())
+
+
+GET = Service("rpbi/get_debug_visualizer_camera", GetDebugVisualizerCamera, DebugCamera.get)
+RESET = Topic(
+    "rpbi/reset_debug_visualizer_camera",
+    CameraMessage,
+    DebugCamera.reset,
+    "Where the window is to look from.",
+)

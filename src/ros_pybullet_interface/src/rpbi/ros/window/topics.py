@@ -4,59 +4,24 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
 
 import pybullet
-from sensor_msgs.msg import Image
-from std_msgs.msg import Int64MultiArray
 
-from ros_pybullet_interface.msg import KeyboardEvent, MouseEvent, ResetDebugVisualizerCamera
 from rpbi.config.world import WorldConfig
 from rpbi.engine.clock import Clock
+from rpbi.ros.endpoints import Topic
 from rpbi.ros.requests import Requests
 from rpbi.window import RECORD, Window
 from rpbi.world import World
 
-from .debug_camera import CAMERA_TOPIC, DebugCamera
-from .events import KEYBOARD_TOPIC, MOUSE_TOPIC, GuiEvents
-from .image import IMAGE_TOPIC, NUMBERS_TOPIC, VisualizerImage
+from .debug_camera import CAMERA, DebugCamera
+from .publishers import IMAGE, KEYBOARD, MOUSE, NUMBERS, GuiEvents, VisualizerImage
 
 log = logging.getLogger(__name__)
 
 
-class WindowTopic(NamedTuple):
-    """A topic that the window publishes.
-
-    Attributes:
-        key: The key of the main file that opens it, empty if none is needed.
-        name: Its relative name.
-        message_type: Its ROS type.
-        meaning: What it tells, in a sentence.
-    """
-
-    key: str
-    name: str
-    message_type: type
-    meaning: str
-
-
-WINDOW_TOPICS = (
-    WindowTopic("", CAMERA_TOPIC, ResetDebugVisualizerCamera, "Where the window looks from now; 30 Hz."),
-    WindowTopic("enable_keyboard_publisher", KEYBOARD_TOPIC, KeyboardEvent, "Keys; with `enable_keyboard_publisher`."),
-    WindowTopic("enable_mouse_publisher", MOUSE_TOPIC, MouseEvent, "The mouse; with `enable_mouse_publisher`."),
-    WindowTopic(
-        "publish_visualizer_image_hz",
-        IMAGE_TOPIC,
-        Image,
-        "What the window shows, `rgb8`; at most `publish_visualizer_image_hz`.",
-    ),
-    WindowTopic(
-        "publish_visualizer_image_hz",
-        NUMBERS_TOPIC,
-        Int64MultiArray,
-        "The same as red, green, blue, alpha of each pixel, row by row.",
-    ),
-)
+WINDOW_TOPICS = (CAMERA, KEYBOARD, MOUSE, IMAGE, NUMBERS)
+"""What it publishes."""
 
 
 class WindowTopics:
@@ -95,7 +60,7 @@ def _open(window: Window, config: WorldConfig, clock: Clock) -> Iterator[Callabl
         yield VisualizerImage(window, clock, config.publish_visualizer_image_hz, *size).poll
 
 
-def published_topics(config: WorldConfig) -> list[WindowTopic]:
+def published_topics(config: WorldConfig) -> list[Topic]:
     """Returns the topics of the window that a world with this configuration publishes."""
     if config.connect.connection_mode == pybullet.DIRECT:
         return []

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rpbi_utils.table_files import file_stems, write_table
+from rpbi_utils.tables import file_stems, write_table
 
 
 def test_file_names_are_readable_unique_and_stay_in_the_folder() -> None:

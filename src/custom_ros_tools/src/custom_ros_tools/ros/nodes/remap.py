@@ -1,0 +1,128 @@
+"""The nodes that remap joint states: to another topic as they are, or as bare numbers for drivers that take those."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+from custom_ros_tools.errors import InterfaceError, collecting_problems
+from custom_ros_tools.joint_values import JointValues
+from custom_ros_tools.node_configs import FloatArrayConfig, StartParameters
+from custom_ros_tools.ros.joint_states import values_in
+from custom_ros_tools.ros.lifecycle.parameters import private_config, private_parameters
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from custom_ros_tools.ros.services import ToggleService
+from custom_ros_tools.toggle import Toggle
+
+TO_FLOAT_ARRAY = "remap_joint_state_to_floatarray"
+TO_JOINT_STATE = "remap_joint_state_to_joint_state"
+QUEUE_SIZE = 100
+"""Messages kept while the machine is busy: 0.1 s of joint states at 1 kHz."""
+
+
+class RemapNode:
+    """Publishes what it makes of joint states while it is switched on; off, it does not even listen.
+
+    It has the service `remap_joint_state/toggle` and the same under the name of its executable.
+
+    Args:
+        executable: The name of the executable.
+        source: Topic of the joint states.
+        target: Topic of what is made of them.
+        target_type: The ROS type of that.
+        convert: Makes it; raises InterfaceError or ValueError for a message that must be refused.
+        start_on_init: Whether it is on from the start.
+    """
+
+    def __init__(
+        self,
+        executable: str,
+        source: str,
+        target: str,
+        target_type: type,
+        convert: Callable[[JointState], Any],
+        start_on_init: bool,
+    ) -> None:
+        self._source, self._convert = rospy.resolve_name(source), convert
+        self._warn = ThrottledWarning()
+        self._publisher = rospy.Publisher(target, target_type, queue_size=QUEUE_SIZE, tcp_nodelay=True)
+        self._subscriber: rospy.Subscriber | None = None
+        remapping = Toggle("remapping", self._listen, self._listen_no_more)
+        if start_on_init:
+            remapping.on()
+        for name in {"remap_joint_state/toggle", f"{executable}/toggle"}:
+            ToggleService(name, remapping.on, remapping.off)
+
+    def _listen(self) -> None:
+        self._subscriber = rospy.Subscriber(
+            self._source, JointState, self._take, queue_size=QUEUE_SIZE, tcp_nodelay=True
+        )
+
+    def _listen_no_more(self) -> None:
+        if self._subscriber is not None:
+            self._subscriber.unregister()
+
+    def _take(self, message: JointState) -> None:
+        try:
+            converted = self._convert(message)
+        except (InterfaceError, ValueError) as error:
+            self._warn(self._source, f"message refused: {error}")
+            return
+        self._publisher.publish(converted)
+
+
+class FloatArrayNode(RemapNode):
+    """Publishes one quantity of joint states as numbers, in the order of `~config`.
+
+    Raises:
+        ConfigError: If the configuration or a parameter is wrong.
+    """
+
+    def __init__(self) -> None:
+        with collecting_problems() as part:
+            with part():
+                self._config = private_config(FloatArrayConfig)
+            with part():
+                start = private_parameters(StartParameters)
+        topics = "joint_states", "joint_states/floatarray"
+        super().__init__(TO_FLOAT_ARRAY, *topics, Float64MultiArray, self._numbers, start.start_on_init)
+
+    def _numbers(self, message: JointState) -> Float64MultiArray:
+        field = self._config.field
+        values = JointValues.of(message.name, **{field: getattr(message, field)})
+        if self._config.joint_names is not None:
+            values = values.in_order(self._config.joint_names)
+        numbers = getattr(values, field)
+        if not numbers:
+            raise ValueError(f"expected {field}, got none")
+        return Float64MultiArray(data=list(numbers))
+
+
+def _joint_state_node() -> RemapNode:
+    start_on_init = private_parameters(StartParameters).start_on_init
+    return RemapNode(TO_JOINT_STATE, "joint_states/from", "joint_states/to", JointState, _sound, start_on_init)
+
+
+def _sound(message: JointState) -> JointState:
+    """Returns the message as it is.
+
+    Raises:
+        ValueError: If it is faulty.
+    """
+    values_in(message)
+    return message
+
+
+def remap_to_float_array() -> None:
+    """Runs the node `remap_joint_state_to_floatarray`."""
+    run_node(TO_FLOAT_ARRAY, FloatArrayNode)
+
+
+def remap_to_joint_state() -> None:
+    """Runs the nodes `remap_joint_state` and `remap_joint_state_to_joint_state`."""
+    run_node(TO_JOINT_STATE, _joint_state_node)

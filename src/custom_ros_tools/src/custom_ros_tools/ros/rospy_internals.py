@@ -1,0 +1,151 @@
+"""The private parts of rospy that this workspace uses, all of them.
+
+rospy offers no way to send to many subscribers from one thread without waiting, nor to register again at a ROS master
+that has come back. Each use is tried when a node starts. Where rospy is built otherwise, one warning says what was
+expected, what is there and what is lost by that, and the node goes on without it.
+"""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from importlib import import_module
+from typing import Any, TypeVar
+
+import rospy
+
+from .buffered_socket import BufferedSocket
+
+T = TypeVar("T")
+
+
+def _expecting(expected: str, loss: str, use: Callable[[], T]) -> T | None:
+    """Returns the result of a use of private parts; None and a warning if they are not as expected."""
+    try:
+        return use()
+    except Exception as error:  # whatever a rospy of other making raises, the node goes on
+        rospy.logwarn(
+            "this rospy is built otherwise: expected %s, got %s: %s; %s", expected, type(error).__name__, error, loss
+        )
+        return None
+
+
+class DirectSending:
+    """Has a publisher send in the thread that publishes, through sockets that keep what is not taken yet.
+
+    With a queue size, rospy hands every message to a thread for each subscriber. At 1 kHz with a few subscribers the
+    threads' quarrel about Python's lock costs more than the simulation; without a queue size, one subscriber that does
+    not read stops everybody.
+    """
+
+    _is_possible: bool | None = None
+
+    def __init__(self, publisher: rospy.Publisher, limit: int) -> None:
+        self._topic, self._limit = publisher.impl, limit
+        self._connections: Any = None
+        self._topic.set_queue_size(None)
+
+    @classmethod
+    def of(cls, publisher: rospy.Publisher, limit: int) -> DirectSending | None:
+        """Returns that of a publisher, None if this rospy does not allow it; then the publisher stays as it is.
+
+        Args:
+            publisher: The publisher.
+            limit: Messages kept for each slow subscriber.
+        """
+        if cls._is_possible is None:
+            cls._is_possible = bool(
+                _expecting(
+                    "Publisher.impl to send by the sockets of its connections",
+                    "messages go by rospy's queues and threads, which is slower at high rates",
+                    lambda: cls._try(publisher),
+                )
+            )
+        return cls(publisher, limit) if cls._is_possible else None
+
+    def wrap_connections(self) -> None:
+        """Sees to it that sending waits for nobody, not for those either that have just come; before each message."""
+        connections = self._topic.connections  # rospy makes a new list whenever somebody comes or goes
+        if connections is not self._connections:
+            for connection in connections:
+                if isinstance(connection.socket, socket.socket):
+                    connection.socket = BufferedSocket(connection.socket, self._limit)
+            self._connections = connections
+
+    @classmethod
+    def _try(cls, publisher: rospy.Publisher) -> bool:
+        """Does with a topic that nobody knows what is to be done with the others.
+
+        Raises:
+            Exception: If that is not possible.
+        """
+        tcpros = import_module("rospy.impl.tcpros_base")
+        ours, theirs = socket.socketpair()
+        with closing(ours), closing(theirs):
+            trial = rospy.Publisher.__new__(rospy.Publisher)
+            trial.impl = type(publisher.impl)("trial", publisher.data_class)
+            sending = cls(trial, 1)
+            before = trial.impl.connections
+            connection = tcpros.TCPROSTransport(tcpros.TCPROSTransportProtocol("trial", None), "trial")
+            connection.set_socket(ours, "trial")
+            trial.impl.add_connection(connection)
+            if trial.impl.connections is before:
+                raise TypeError("the list of connections is the same as before the first one")
+            sending.wrap_connections()
+            trial.impl.publish(publisher.data_class())
+            theirs.setblocking(False)
+            if not isinstance(connection.socket, BufferedSocket) or not theirs.recv(1):
+                raise TypeError("nothing was sent by the socket of the connection")
+            trial.impl.close()
+        return True
+
+
+class Registry:
+    """The topics and services that this node has by rospy."""
+
+    def __init__(self) -> None:
+        registration = import_module("rospy.impl.registration")
+        self._topics, self._services = registration.get_topic_manager(), registration.get_service_manager()
+        self._listeners = registration.get_registration_listeners()
+        (self._rospys,) = (each for each in self._listeners.listeners if isinstance(each, registration.RegManager))
+        kinds = registration.Registration
+        if (kinds.SUB, kinds.PUB, kinds.SRV) != ("sub", "pub", "srv"):
+            raise TypeError("other kinds of registrations")
+        self.connect = self._rospys.publisher_update
+        """Connects a subscription, by name, to the URIs of publishers that it is not connected to yet."""
+        with self.entries():
+            pass  # else it cannot be done either when it is needed
+
+    @contextmanager
+    def entries(self) -> Iterator[list[tuple[str, str, str]]]:
+        """Yields the kind (`sub`, `pub`, `srv`), name and type or URI of all; none comes or goes in the context."""
+        with self._topics.lock, self._services.lock:
+            yield [
+                *(("sub", *each) for each in self._topics.get_subscriptions()),
+                *(("pub", *each) for each in self._topics.get_publications()),
+                *(("srv", *each) for each in self._services.get_services()),
+            ]
+
+    def hand_over(self, listener: Any) -> None:
+        """Has somebody else register what comes and goes, in the place of rospy, by `reg_added` and `reg_removed`."""
+        with self._listeners.lock:
+            self._listeners.listeners[self._listeners.listeners.index(self._rospys)] = listener
+
+
+def registry() -> Registry | None:
+    """Returns the registry of this node, None if this rospy has no such thing."""
+    return _expecting(
+        "rospy.impl.registration to have RegManager among its listeners",
+        "a ROS master that comes back will not know this node: start it again then",
+        Registry,
+    )
+
+
+def answer_cached(parameter: str, value: Any) -> None:
+    """Has `rospy.get_param_cached` answer without asking the master."""
+    _expecting(
+        "rospy.impl.paramserver to have a cache",
+        "who logs something waits for a master that hangs",
+        lambda: import_module("rospy.impl.paramserver").get_param_server_cache().set(parameter, value),
+    )

@@ -1,0 +1,109 @@
+"""Link poses of a chain and their distances to obstacles in CasADi; Pinocchio's wheel has no bindings to it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import casadi
+import numpy as np
+
+from ik_ros.chain.description import ChainDescription
+from ik_ros.shape import ShapeConfig
+from rpbi.geometry import Pose
+from rpbi.urdf.document import UrdfJoint
+
+SMALL = 1e-12
+"""Keeps roots smooth at 0 [m^2]."""
+
+
+def link_frames(chain: ChainDescription, q: Any) -> dict[str, tuple[Any, Any]]:
+    """Returns rotation (3 x 3) and position (3) [m] of each link of a chain in the base.
+
+    Args:
+        chain: The chain; none of its joints mimics another.
+        q: n positions [rad or m], CasADi's symbols.
+    """
+    rotation: Any = casadi.DM.eye(3)
+    position: Any = casadi.DM.zeros(3)
+    frames = {chain.base: (rotation, position)}
+    variables = iter(range(len(chain.moving)))
+    for joint in chain.joints:
+        position = position + rotation @ np.array(joint.xyz)
+        rotation = rotation @ _from_rpy(*joint.rpy)
+        if joint.is_moving:
+            turn, shift = _motion(joint, q[next(variables)])
+            position = position + rotation @ shift
+            rotation = rotation @ turn
+        frames[joint.child] = rotation, position
+    return frames
+
+
+def sphere_distances(shapes: Sequence[ShapeConfig], frames: Mapping[str, tuple[Any, Any]]) -> list[Any]:
+    """Returns how far each sphere on a link is from each shape in the base, negative in each other [m].
+
+    Args:
+        shapes: Spheres on links of the chain, and whatever stands in the base.
+        frames: Rotation and position of each link in the base.
+    """
+    obstacles = [shape for shape in shapes if shape.link is None]
+    distances = []
+    for sphere in (shape for shape in shapes if shape.link is not None):
+        rotation, position = frames[str(sphere.link)]
+        centre = position + rotation @ np.array(sphere.position)
+        distances += [_distance(centre, obstacle) - sphere.core.radius for obstacle in obstacles]
+    return distances
+
+
+def rotation_matrix(pose: Pose) -> np.ndarray:
+    """Returns the 3 x 3 rotation matrix of a pose."""
+    x, y, z, w = pose.quat_xyzw
+    cross = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+    return np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
+
+
+def rotation_vector(rotation: Any) -> Any:
+    """Returns axis times angle of a rotation that CasADi knows [rad], smooth but at half a turn."""
+    trace = rotation[0, 0] + rotation[1, 1] + rotation[2, 2]
+    w = 0.5 * casadi.sqrt(casadi.fmax(1.0 + trace, 1e-9))
+    difference = (rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1])
+    v = casadi.vertcat(*difference) / (4.0 * w)
+    sine = casadi.sqrt(casadi.sumsqr(v) + 1e-16)
+    return 2.0 * casadi.atan2(sine, w) / sine * v
+
+
+def _motion(joint: UrdfJoint, q: Any) -> tuple[Any, Any]:
+    """Returns how a joint turns and shifts what it carries, in its own frame."""
+    axis = np.array(joint.axis)
+    if not joint.is_revolute:
+        return casadi.DM.eye(3), axis * q
+    x, y, z = joint.axis
+    cross = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+    turn = casadi.DM.eye(3) + casadi.sin(q) * casadi.DM(cross) + (1.0 - casadi.cos(q)) * casadi.DM(cross @ cross)
+    return turn, casadi.DM.zeros(3)
+
+
+def _from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
+    """Returns the rotation matrix of a URDF's angles: about the fixed x, y and z axes, one after the other [rad]."""
+    (sr, sp, sy), (cr, cp, cy) = map(math.sin, (roll, pitch, yaw)), map(math.cos, (roll, pitch, yaw))
+    return np.array(
+        (
+            (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+            (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+            (-sp, cp * sr, cp * cr),
+        )
+    )
+
+
+def _distance(point: Any, obstacle: ShapeConfig) -> Any:
+    """Returns how far a point is from the surface of a shape."""
+    half, radius = obstacle.core
+    local = rotation_matrix(obstacle.pose).T @ (point - np.array(obstacle.position))
+    if not obstacle.core.is_box:
+        along = casadi.fmin(casadi.fmax(local[2], -half[2]), half[2])
+        away = local - casadi.vertcat(0.0, 0.0, along)
+        return casadi.sqrt(casadi.sumsqr(away) + SMALL) - radius
+    over = casadi.fabs(local) - half
+    outside = casadi.sqrt(casadi.sumsqr(casadi.fmax(over, 0.0)) + SMALL)
+    return outside + casadi.fmin(casadi.mmax(over), 0.0)

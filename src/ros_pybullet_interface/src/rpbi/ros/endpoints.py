@@ -1,0 +1,120 @@
+"""Rows of the tables of topics and services: by them the node opens its own, and reference pages list them."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import rospy
+
+from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
+from custom_ros_tools.plugins import find, full_name
+from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from rpbi.bodies import Body
+
+Owners = Callable[[Body], Sequence[str]]
+"""Returns what stands for `{name}` in the names of what a body has by a row; nothing if it has it not."""
+
+
+Answer = tuple[bool, str]
+"""`success` and `message` of a response."""
+
+
+def of(body_type: type[Body]) -> Owners:
+    """Returns the owners of what every body of a type has once."""
+    return lambda body: (body.name,) if isinstance(body, body_type) else ()
+
+
+class Topic(NamedTuple):
+    """A topic.
+
+    Attributes:
+        name: Its name, with `{name}` for the body, sensor or camera.
+        message_type: Its ROS type.
+        handler: Of samples: returns the message of a sample and its stamp [ns]. Of an input: returns what the input
+            takes of a message. Of a body: acts on the body's context and a message. None if something else publishes.
+        meaning: What it says, or what a message does, in a sentence; with the key that sets its rate.
+        key: Key of the main file that opens it or sets its rate, where 0 is off; empty if it is there in any case.
+        owners: Which bodies have it, if they subscribe to it.
+    """
+
+    name: str
+    message_type: type
+    handler: Callable[..., Any] | None = None
+    meaning: str = ""
+    key: str = ""
+    owners: Owners = of(Body)
+
+
+class Service(NamedTuple):
+    """A service of the node or of bodies.
+
+    Attributes:
+        name: Its name, with `{name}` for the body or sensor.
+        service_type: Its ROS type.
+        handler: Returns the response to a context and a request, or the response's fields in a tuple. What it raises
+            for a request that must be refused (InterfaceError or ValueError) becomes `success=False` and its message,
+            or an error of the call where the response has no `success`. None where something else serves it.
+        owners: Which bodies have it, if bodies have it.
+    """
+
+    name: str
+    service_type: Any
+    handler: Callable[[Any, Any], Any] | None
+    owners: Owners = of(Body)
+
+    @property
+    def meaning(self) -> str:
+        """What it does: the first paragraph of its handler's docstring."""
+        return " ".join((inspect.getdoc(self.handler) or "").split("\n\n")[0].split()) if self.handler else ""
+
+
+_warn = ThrottledWarning()
+
+
+def subscribe(topic: Topic, context: Any, owner: str = "") -> rospy.Subscriber:
+    """Subscribes to a topic whose handler acts on a context; what is refused is named now and then."""
+    name = rospy.resolve_name(topic.name.format(name=owner))
+
+    def take(message: Any) -> None:
+        try:
+            topic.handler(context, message)
+        except (InterfaceError, ValueError) as error:
+            _warn(name, f"message refused: {error}")
+
+    return rospy.Subscriber(name, topic.message_type, take, queue_size=1, tcp_nodelay=True)
+
+
+def serve(service: Service, context: Any, owner: str = "") -> rospy.Service:
+    """Opens a service."""
+    response_type = service.service_type._response_class
+
+    def handle(request: Any) -> Any:
+        try:
+            return service.handler(context, request)
+        except (InterfaceError, ValueError) as error:
+            if "success" in response_type.__slots__:
+                return response_type(success=False, message=str(error))
+            raise rospy.ServiceException(str(error)) from error
+
+    return rospy.Service(service.name.format(name=owner), service.service_type, handle)
+
+
+def find_topic(name: str, owner: Any) -> Topic:
+    """Returns a topic of another package.
+
+    Args:
+        name: Where it is, as `module:NAME`.
+        owner: The sensor or body that names it as its `ros_topic`.
+
+    Raises:
+        ConfigError: If there is no such thing; it names the class of the owner.
+    """
+    try:
+        found = find(name)
+        if not isinstance(found, Topic):
+            raise ValueError(f"expected a {full_name(Topic)} in '{name}', got {found!r}")
+    except ValueError as error:
+        raise ConfigError([Problem(full_name(owner), "ros_topic", str(error))]) from None
+    return found

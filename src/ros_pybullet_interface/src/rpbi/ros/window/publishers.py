@@ -1,0 +1,153 @@
+"""What happens in PyBullet's window, and what it shows, as topics."""
+
+from __future__ import annotations
+
+import struct
+import time
+from typing import IO
+
+import numpy as np
+import numpy.typing as npt
+import rospy
+from sensor_msgs.msg import Image
+from std_msgs.msg import Int64MultiArray
+
+from custom_ros_tools.ros.lifecycle.wall_timer import WallRate
+from ros_pybullet_interface.msg import KeyboardEvent
+from ros_pybullet_interface.msg import MouseEvent as MouseMessage
+from rpbi.engine.clock import Clock
+from rpbi.ros.endpoints import Topic
+from rpbi.ros.headers import to_ros_time
+from rpbi.window import DOWN, PRESSED, RELEASED, KeyEvent, MouseEvent, Window
+
+KEYBOARD = Topic(
+    "rpbi/keyboard", KeyboardEvent, meaning="Keys; with `enable_keyboard_publisher`.", key="enable_keyboard_publisher"
+)
+MOUSE = Topic(
+    "rpbi/mouse", MouseMessage, meaning="The mouse; with `enable_mouse_publisher`.", key="enable_mouse_publisher"
+)
+IMAGE = Topic(
+    "rpbi/visualizer_image",
+    Image,
+    meaning="What the window shows, `rgb8`; at most `publish_visualizer_image_hz`.",
+    key="publish_visualizer_image_hz",
+)
+NUMBERS = Topic(
+    "rpbi/visualizer_image_int",
+    Int64MultiArray,
+    meaning="The same as red, green, blue, alpha of each pixel, row by row.",
+    key="publish_visualizer_image_hz",
+)
+LARGEST_SHARE = 0.25
+"""Of wall time, that drawing may take from physics: images come less often rather than that."""
+HELD_HZ = 60.0
+"""How often a key that is held is published [s] of wall time; what happens to keys is published at once."""
+KEY_WORDS = {DOWN: "key_is_down", PRESSED: "", RELEASED: "key_was_released"}
+MOUSE_WORDS = {1: "mouse_move_event", 2: "mouse_button_event"}
+NO_BUTTON = 255
+
+
+class GuiEvents:
+    """Publishes what happens to keys and mouse; what happened while nobody listened is not published later.
+
+    Args:
+        window: The window.
+        clock: The world's clock.
+        keyboard: Whether keys are published.
+        mouse: Whether the mouse is.
+    """
+
+    def __init__(self, window: Window, clock: Clock, keyboard: bool, mouse: bool) -> None:
+        self._window, self._clock = window, clock
+        self._keys = rospy.Publisher(KEYBOARD.name, KeyboardEvent, queue_size=100) if keyboard else None
+        self._mouse = rospy.Publisher(MOUSE.name, MouseMessage, queue_size=100) if mouse else None
+        self._held_rate = WallRate(HELD_HZ)
+
+    def poll(self) -> None:
+        """Publishes what has happened since the last time."""
+        if self._keys is not None:
+            self._poll_keys(self._keys)
+        if self._mouse is not None:
+            for event in self._window.mouse_events():
+                self._mouse.publish(self._mouse_message(event))
+
+    def _poll_keys(self, publisher: rospy.Publisher) -> None:
+        events = list(self._window.key_events())
+        if not events:
+            return
+        is_due = self._held_rate.is_due()
+        for event in events:
+            if is_due or event.state != DOWN:
+                publisher.publish(self._key_message(event))
+
+    def _key_message(self, event: KeyEvent) -> KeyboardEvent:
+        message = KeyboardEvent(key=event.key, state=event.state, state_str=KEY_WORDS[event.state])
+        message.header.stamp = to_ros_time(self._clock.stamp_ns)
+        return message
+
+    def _mouse_message(self, event: MouseEvent) -> MouseMessage:
+        message = MouseMessage(
+            event_type=event.kind,
+            event_type_str=MOUSE_WORDS.get(event.kind, ""),
+            mouse_pos_x=event.x,
+            mouse_pos_y=event.y,
+            button_index=event.button if event.button >= 0 else NO_BUTTON,
+            button_state=event.state,
+            button_state_str=event.state,
+        )
+        message.header.stamp = to_ros_time(self._clock.stamp_ns)
+        return message
+
+
+class VisualizerImage:
+    """Draws and publishes images while somebody looks at them.
+
+    Args:
+        window: The window.
+        clock: The world's clock.
+        hz: Most images a second of wall time.
+        width_px: Columns.
+        height_px: Rows.
+    """
+
+    def __init__(self, window: Window, clock: Clock, hz: float, width_px: int, height_px: int) -> None:
+        self._window, self._clock = window, clock
+        self._rate = WallRate(hz)
+        self._size = width_px, height_px
+        self._images = rospy.Publisher(IMAGE.name, Image, queue_size=2)
+        self._numbers = rospy.Publisher(NUMBERS.name, Int64MultiArray, queue_size=2)
+
+    def poll(self) -> None:
+        """Draws an image if it is time to and somebody looks."""
+        if not self._rate.is_due():
+            return
+        start_s = time.monotonic()
+        as_image, as_numbers = (topic.get_num_connections() > 0 for topic in (self._images, self._numbers))
+        if not as_image and not as_numbers:
+            return
+        rgba = self._window.image(*self._size)
+        if as_image:
+            self._images.publish(self._message(rgba))
+        if as_numbers:
+            self._numbers.publish(_Numbers(rgba))
+        self._rate.rest((time.monotonic() - start_s) * (1.0 / LARGEST_SHARE - 1.0))
+
+    def _message(self, rgba: npt.NDArray[np.uint8]) -> Image:
+        height, width, _ = rgba.shape
+        message = Image(height=height, width=width, encoding="rgb8", step=3 * width)
+        message.header.stamp = to_ros_time(self._clock.stamp_ns)
+        message.data = rgba[..., :3].tobytes()
+        return message
+
+
+class _Numbers(Int64MultiArray):  # type: ignore[misc]
+    """Red, green, blue and alpha of each pixel; written at once, since one by one takes a tenth of a second."""
+
+    def __init__(self, rgba: npt.NDArray[np.uint8]) -> None:
+        super().__init__()
+        self._rgba = rgba
+
+    def serialize(self, buff: IO[bytes]) -> None:
+        """Writes an empty layout, the count of the numbers and the numbers."""
+        buff.write(struct.pack("<III", 0, 0, self._rgba.size))
+        buff.write(self._rgba.astype("<i8").tobytes())

@@ -1,0 +1,173 @@
+"""How things in the examples move: a figure eight, circles, an orbit, a route and joints that swing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from pydantic import Field
+
+from custom_ros_tools.node_configs import StartParameters
+from custom_ros_tools.schema import Hz, NonNegative, Seconds
+
+CIRCLE_RADIUS = 0.12
+"""Radius of the circles [m]."""
+CIRCLE_PERIOD_S = 6.0
+"""Time of one round [s]."""
+CIRCLE_CENTRE = (0.55, 0.30, 0.85)
+"""Centre of the left hand's circle in the world [m]; the right hand's has the opposite y."""
+POINTING_DOWN = (0.0, 1.0, 0.0, 0.0)
+"""Orientation of the hands as x, y, z, w: their z axis down."""
+ORBIT_RADIUS = 2.0
+"""Distance from the vertical axis that it circles [m]."""
+ORBIT_HEIGHT = 1.5
+"""Height above the ground [m]."""
+TARGET_HEIGHT = 0.4
+"""Height of what it looks at, on that axis [m]."""
+ORBIT_SPEED = math.pi / 8.0
+"""Rate of turn [rad/s]."""
+ROUTE_GAIN = 1.5
+"""Speed for each metre or radian that is left [1/s]."""
+REACHED_M = 0.03
+"""A waypoint counts as reached within this distance [m]..."""
+REACHED_RAD = 0.03
+"""... and this angle [rad]."""
+TO_ZERO_S = 3.0
+"""Time that all joints take together to reach zero [s]."""
+SWING_PERIOD_S = 4.0
+"""Time that one joint swings [s]."""
+SWING_AMPLITUDE = 1.0
+"""How far it swings to either side [rad or m]; less where its limits ask for it."""
+SWING_MARGIN = 0.95
+"""Share of the way to a limit that is used."""
+
+
+class FigureEight(StartParameters):
+    """A lemniscate of Gerono in the x-y plane of its frame."""
+
+    start_on_init: bool = Field(True, description="Whether it moves from the start on.")
+    hz: Hz = Field(50.0, description="How often its frame is broadcast.")
+    tf_ns: str = Field("", description="What the names of its frames begin with, such as rpbi.")
+    width: NonNegative = Field(0.4, description="From end to end, along y [m].")
+    height: NonNegative = Field(0.2, description="Height of each loop, along x [m].")
+    period_s: Seconds = Field(10.0, description="Time of one round [s].")
+
+    def position(self, time_s: float) -> tuple[float, float, float]:
+        """Returns where it is at a time [s], in its x-y plane [m]."""
+        angle = 2.0 * math.pi * time_s / self.period_s
+        return self.height * math.sin(angle) * math.cos(angle), self.width / 2.0 * math.sin(angle), 0.0
+
+    def frame(self, name: str) -> str:
+        """Returns the full name of one of its frames."""
+        return "/".join(part for part in (self.tf_ns.strip("/"), name) if part)
+
+
+def hand_position(time_s: float, side: float) -> tuple[float, float, float]:
+    """Returns where a hand is to be [m] at a time since the start [s].
+
+    Args:
+        time_s: The time.
+        side: 1 for the left hand, -1 for the right one.
+    """
+    angle = 2.0 * math.pi * time_s / CIRCLE_PERIOD_S
+    x, y, z = CIRCLE_CENTRE
+    return x, side * (y + CIRCLE_RADIUS * math.sin(angle)), z + CIRCLE_RADIUS * (1.0 - math.cos(angle))
+
+
+def camera_pose(time_s: float) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
+    """Returns position [m] and orientation (x, y, z, w) of the optical frame at a time [s].
+
+    The optical frame has x to the right, y down and z forward.
+    """
+    angle = ORBIT_SPEED * time_s
+    position = ORBIT_RADIUS * math.cos(angle), ORBIT_RADIUS * math.sin(angle), ORBIT_HEIGHT
+    yaw = angle + math.pi / 2.0  # to the camera's right is where the circle goes, seen from its centre backwards
+    tilt = -math.pi / 2.0 - math.atan2(ORBIT_HEIGHT - TARGET_HEIGHT, ORBIT_RADIUS)
+    # first about x by `tilt`, which lets z point forward and down, then about the vertical by `yaw`
+    sin_x, cos_x, sin_z, cos_z = math.sin(tilt / 2), math.cos(tilt / 2), math.sin(yaw / 2), math.cos(yaw / 2)
+    return position, (cos_z * sin_x, sin_z * sin_x, sin_z * cos_x, cos_z * cos_x)
+
+
+class PlanarPose(NamedTuple):
+    """Where something stands on the floor.
+
+    Attributes:
+        x: Position [m].
+        y: Position [m].
+        yaw: Angle about the vertical [rad].
+    """
+
+    x: float
+    y: float
+    yaw: float
+
+
+SQUARE = tuple(
+    PlanarPose(0.8 * x, 0.8 * y, math.pi / 2.0 * turns)
+    for x, y, turns in ((-1, -1, 0), (1, -1, 0), (1, 1, 1), (-1, 1, 1), (-1, 1, 2), (-1, -1, 3))
+)
+"""Ahead along the first side, turning along the second, sideways along the third, turning along the last again."""
+
+
+class Route:
+    """A route that begins again at its end.
+
+    Args:
+        waypoints: Where it leads.
+    """
+
+    def __init__(self, waypoints: Sequence[PlanarPose] = SQUARE) -> None:
+        self._waypoints = tuple(waypoints)
+        self._next = 0
+
+    def velocity(self, pose: PlanarPose) -> PlanarPose:
+        """Returns the velocity [m/s, m/s, rad/s] in its own frame with which a base goes on from a pose."""
+        distance, angle = _left(pose, self._waypoints[self._next])
+        if math.hypot(*distance) < REACHED_M and abs(angle) < REACHED_RAD:
+            self._next = (self._next + 1) % len(self._waypoints)
+            distance, angle = _left(pose, self._waypoints[self._next])
+        cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
+        ahead, aside = cos * distance[0] + sin * distance[1], cos * distance[1] - sin * distance[0]
+        return PlanarPose(ROUTE_GAIN * ahead, ROUTE_GAIN * aside, ROUTE_GAIN * angle)
+
+
+def _left(pose: PlanarPose, goal: PlanarPose) -> tuple[tuple[float, float], float]:
+    """Returns the way [m] and the shorter turn [rad] from a pose to another."""
+    return (goal.x - pose.x, goal.y - pose.y), math.remainder(goal.yaw - pose.yaw, 2.0 * math.pi)
+
+
+class Swing:
+    """Positions of all joints over time.
+
+    Args:
+        start: Where the n joints are at time 0 [rad or m].
+        lower: Their lower limits; -inf where there is none.
+        upper: Their upper limits.
+    """
+
+    def __init__(self, start: Sequence[float], lower: Sequence[float], upper: Sequence[float]) -> None:
+        self._start = tuple(start)
+        self._zero = tuple(min(max(0.0, low), high) for low, high in zip(lower, upper, strict=True))
+        self._amplitude = tuple(
+            max(0.0, min(SWING_AMPLITUDE, SWING_MARGIN * (high - zero), SWING_MARGIN * (zero - low)))
+            for zero, low, high in zip(self._zero, lower, upper, strict=True)
+        )
+        forth = list(range(len(self._start)))
+        self._order = forth + forth[-2:0:-1]
+
+    def at(self, time_s: float) -> tuple[float, ...]:
+        """Returns the positions of the n joints at a time since the start [s]."""
+        if time_s < TO_ZERO_S:
+            share = _minimum_jerk(time_s / TO_ZERO_S)
+            return tuple(start + share * (zero - start) for start, zero in zip(self._start, self._zero, strict=True))
+        turn, phase_s = divmod(time_s - TO_ZERO_S, SWING_PERIOD_S)
+        joint = self._order[int(turn) % len(self._order)]
+        positions = list(self._zero)
+        positions[joint] += self._amplitude[joint] * math.sin(2.0 * math.pi * phase_s / SWING_PERIOD_S)
+        return tuple(positions)
+
+
+def _minimum_jerk(share: float) -> float:
+    """Returns how much of a way is done after a share of its time (Flash and Hogan, 1985)."""
+    return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)

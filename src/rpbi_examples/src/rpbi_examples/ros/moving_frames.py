@@ -1,0 +1,79 @@
+"""TF frames that move: the camera's around the scene, and one in a figure eight."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import rospy
+
+from custom_ros_tools.ros.lifecycle.parameters import private_parameters
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.services import ToggleService
+from custom_ros_tools.ros.tf_interface import TfInterface
+from custom_ros_tools.toggle import Toggle
+from rpbi_examples.motions import FigureEight, camera_pose
+
+HZ = 50.0
+NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
+
+
+def orbit() -> None:
+    """Runs the node that circles the scene; the frame is `~child_frame_id`, by default `rpbi/camera`."""
+    run_node("orbit", lambda: _move("rpbi/world", rospy.get_param("~child_frame_id", "rpbi/camera"), camera_pose, HZ))
+
+
+def figure_eight() -> None:
+    """Runs the node that moves `figure_eight` in `figure_eight_base`."""
+    run_node("figure_eight", _FigureEightNode)
+
+
+class _FigureEightNode:
+    """Broadcasts the frame; it stands where it is while the node is switched off.
+
+    Raises:
+        ConfigError: If a parameter is wrong.
+    """
+
+    def __init__(self) -> None:
+        figure = private_parameters(FigureEight)
+        self._time_s, self._last_s, self._moves = 0.0, 0.0, False
+        moving = Toggle("figure eight", lambda: self._switch(True), lambda: self._switch(False))
+        if figure.start_on_init:
+            moving.on()
+        ToggleService("toggle_figure_eight", moving.on, moving.off)
+        parent, child = figure.frame("figure_eight_base"), figure.frame("figure_eight")
+        _move(parent, child, lambda now_s: (figure.position(self._own_time_s(now_s)), NO_ROTATION), figure.hz)
+
+    def _switch(self, on: bool) -> None:
+        self._moves = on
+
+    def _own_time_s(self, now_s: float) -> float:
+        """Returns the time that it has moved [s]."""
+        if self._moves:
+            self._time_s += now_s - self._last_s
+        self._last_s = now_s
+        return self._time_s
+
+
+def _move(parent: str, child: str, pose: Callable[[float], tuple[Sequence[float], Sequence[float]]], hz: float) -> None:
+    """Broadcasts a frame until ROS shuts down.
+
+    Args:
+        parent: The frame that it is in.
+        child: Its name.
+        pose: Position [m] and orientation (x, y, z, w) at a time since the start [s] of ROS time.
+        hz: How often.
+    """
+    tf = TfInterface()
+    start = last = rospy.Time.now()
+    rate = rospy.Rate(hz)
+    try:
+        while not rospy.is_shutdown():
+            now = rospy.Time.now()
+            if now > last:  # TF warns of a stamp that comes twice
+                message = tf.pack_tf_msg(parent, child, *pose((now - start).to_sec()))
+                message.header.stamp = last = now
+                tf.tf_broadcaster.sendTransform(message)
+            rate.sleep()
+    except rospy.ROSInterruptException:
+        pass  # Ctrl-C

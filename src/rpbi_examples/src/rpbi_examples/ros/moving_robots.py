@@ -1,0 +1,136 @@
+"""Nodes that move the robots of the examples by topics and services of the simulator."""
+
+from __future__ import annotations
+
+import math
+import sys
+
+import rospy
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Int64
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem, JointInfo
+from ros_pybullet_interface.srv import ResetEffState, RobotInfo, RobotInfoResponse
+from rpbi_examples.motions import POINTING_DOWN, PlanarPose, Route, Swing, hand_position
+
+HZ = 50.0
+"""How often targets are sent."""
+LINK = "lbr_iiwa_link_7"
+APPROACH_S = 3.0
+"""Time for the way to the circles [s]."""
+
+
+def basic_robot_example() -> None:
+    """Moves the joints of the robot that `~robot_name` or the first argument names, one after the other."""
+    run_node("basic_robot_example", _swing)
+
+
+def drive_around() -> None:
+    """Drives the mobile base that `~robot_name` or the first argument names along a route, by its `base_state`."""
+    run_node("drive_around", _drive)
+
+
+def dual_arm_example() -> None:
+    """Has the hands of two robots, which the arguments name, the left one first, draw mirrored circles."""
+    run_node("dual_arm_example", _draw)
+
+
+def _robot_name() -> str:
+    """Returns the robot that `~robot_name` or the first argument names.
+
+    Raises:
+        InterfaceError: If neither is given.
+    """
+    arguments = rospy.myargv(sys.argv)[1:]
+    name = rospy.get_param("~robot_name", arguments[0] if arguments else None)
+    if name is None:
+        raise InterfaceError("which robot? Give its name as ~robot_name or as first argument")
+    return str(name)
+
+
+def _swing() -> None:
+    name = _robot_name()
+    rospy.wait_for_service(f"rpbi/{name}/robot_info")
+    info: RobotInfoResponse = rospy.ServiceProxy(f"rpbi/{name}/robot_info", RobotInfo)()
+    joints = [joint for joint in info.joint_info if not joint.is_fixed]
+    state = dict(zip(info.current_joint_state.name, info.current_joint_state.position))
+    swing = Swing([state[joint.jointName] for joint in joints], *zip(*map(_limits, joints)))
+    publisher = rospy.Publisher(f"rpbi/{name}/joint_states/target", JointState, queue_size=10)
+    running = _Running()
+    rate = rospy.Rate(HZ)
+    time_s = 0.0
+    while not rospy.is_shutdown():
+        if running.is_so:
+            target = JointState(name=[joint.jointName for joint in joints], position=swing.at(time_s))
+            target.header.stamp = rospy.Time.now()
+            publisher.publish(target)
+            time_s += 1.0 / HZ
+        rate.sleep()
+
+
+class _Running:
+    """Whether the simulation runs, from its status."""
+
+    def __init__(self) -> None:
+        self.is_so = False
+        rospy.Subscriber("rpbi/status", Int64, self._take, queue_size=1)
+
+    def _take(self, status: Int64) -> None:
+        self.is_so = status.data == 1
+
+
+def _limits(joint: JointInfo) -> tuple[float, float]:
+    """Returns lower and upper position limit; PyBullet gives an inverted range where there is none."""
+    limited = joint.jointLowerLimit < joint.jointUpperLimit
+    return (joint.jointLowerLimit, joint.jointUpperLimit) if limited else (float("-inf"), float("inf"))
+
+
+def _drive() -> rospy.Subscriber:
+    name = _robot_name()
+    route = Route()
+    publisher = rospy.Publisher(f"rpbi/{name}/cmd_vel", Twist, queue_size=1)
+
+    def drive(state: Odometry) -> None:
+        position, quat = state.pose.pose.position, state.pose.pose.orientation
+        pose = PlanarPose(position.x, position.y, 2.0 * math.atan2(quat.z, quat.w))
+        command = Twist()
+        command.linear.x, command.linear.y, command.angular.z = route.velocity(pose)
+        publisher.publish(command)
+
+    return rospy.Subscriber(f"rpbi/{name}/base_state", Odometry, drive, queue_size=1)
+
+
+def _draw() -> None:
+    names = rospy.myargv(sys.argv)[1:]
+    if len(names) != 2:
+        raise InterfaceError(f"expected the names of two robots, got {len(names)}")
+    sides = dict(zip(names, (1.0, -1.0)))
+    for name, side in sides.items():
+        _approach(name, side)
+    problem = CalculateInverseKinematicsProblem
+    publishers = {name: rospy.Publisher(f"rpbi/{name}/ik", problem, queue_size=1) for name in sides}
+    rate = rospy.Rate(HZ)
+    start = rospy.Time.now()
+    while not rospy.is_shutdown():
+        time_s = (rospy.Time.now() - start).to_sec()
+        for name, side in sides.items():
+            publishers[name].publish(_problem(time_s, side))
+        rate.sleep()
+
+
+def _problem(time_s: float, side: float) -> CalculateInverseKinematicsProblem:
+    return CalculateInverseKinematicsProblem(
+        link_name=LINK, targetPosition=hand_position(time_s, side), targetOrientation=POINTING_DOWN
+    )
+
+
+def _approach(name: str, side: float) -> None:
+    service = f"rpbi/{name}/move_to_eff_state"
+    rospy.wait_for_service(service)
+    answer = rospy.ServiceProxy(service, ResetEffState)(_problem(0.0, side), APPROACH_S)
+    if not answer.success:
+        raise InterfaceError(f"{service}: {answer.message}")
