@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from typing import Any
 
 import numpy as np
 import rospy
@@ -86,7 +87,7 @@ def _pose(matrix: np.ndarray) -> Pose:
     return as_pose(TfInterface.pack_tf(*pose_of(matrix)))
 
 
-def _call(service: str, kind: type, *arguments: object) -> object:
+def _call(service: str, kind: type, *arguments: object) -> Any:
     """Calls a service when it is there.
 
     Raises:

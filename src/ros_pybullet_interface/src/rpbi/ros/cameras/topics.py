@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
@@ -76,6 +78,7 @@ def image_message(stream: str, frame: Frame, header: Header) -> Image | None:
         frame: The frame.
         header: Stamp and frame of the message.
     """
+    pixels: npt.NDArray[Any] | None
     if stream == "colour":
         encoding, pixels = "rgb8", frame.colour
     elif stream == "depth":
