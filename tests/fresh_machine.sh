@@ -191,6 +191,7 @@ clean_up() {
   trap - EXIT INT TERM HUP
   # All processes of its namespace end with it; of other signals, unshare would wait for them
   [[ ! $child ]] || { kill -KILL "$child" && wait; } 2>/dev/null || true
+  printf '%s\n' '' "${report[@]}"
   if [[ $keep ]]; then echo "The machines are left in $folder."; else remove "$folder"; fi
   exit "$status"
 }
@@ -230,5 +231,3 @@ trap 'exit 130' INT
 trap 'exit 143' TERM HUP
 make_base
 for kind in "${kinds[@]}"; do use_machine "$kind"; done
-printf '\n'
-printf '%s\n' "${report[@]}"
