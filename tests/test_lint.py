@@ -26,7 +26,7 @@ def test_files_are_formatted() -> None:
     assert result.returncode == 0, result.stdout + result.stderr
 
 
-def test_mypy_finds_nothing_in_the_cores() -> None:
+def test_mypy_finds_nothing() -> None:
     result = run("mypy", "--cache-dir", str(ROOT / ".rpbi" / "mypy"))
     assert result.returncode == 0, result.stdout + result.stderr
 

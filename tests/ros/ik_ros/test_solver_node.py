@@ -38,27 +38,14 @@ def send_until(publisher, message, listener, count=1):
     return listener.messages[before]
 
 
-@pytest.mark.parametrize("solver", ["kdl", "pybullet", "trac_ik", "global"])
-def test_problems_become_targets_that_reach(ros, solver):
-    start_solver(ros, solver)
-    targets, solutions = ros.listen("joint_states/target", JointState), ros.listen("ik/solution", IKSolution)
-    asked = problem(BENT, start=start_at(HOME))
-    asked.header.stamp = rospy.Time(12, 5)
-    with publishing("ik", IKProblem) as ik:
-        target = send_until(ik, asked, targets)
-        solution = wait_until(
-            lambda: next((each for each in list(solutions.messages) if each.success), None), "a solution comes"
-        )
-    assert list(target.name) == JOINTS == list(solution.joint_names)
-    assert_there(target.position, asked.target)
-    assert (solution.success, solution.interface_name) == (True, solver)
-    assert solution.header.stamp == target.header.stamp == rospy.Time(12, 5)
-    assert TIP in solution.message
+@pytest.fixture(scope="module")
+def kdl(module_ros):
+    """A node that is on; further on, tests start nodes of their own, which take the name of this one."""
+    return start_solver(module_ros)
 
 
-def test_problem_without_a_solution_is_told_with_the_reason_and_moves_nothing(ros):
+def test_problem_without_a_solution_is_told_with_the_reason_and_moves_nothing(ros, kdl):
     rosout = Rosout(ros)
-    start_solver(ros)
     targets, solutions = ros.listen("joint_states/target", JointState), ros.listen("ik/solution", IKSolution)
     with publishing("ik", IKProblem) as ik:
         solution = send_until(ik, IKProblem(has_target=True, target=FAR), solutions, 3)
@@ -82,14 +69,51 @@ def test_problem_without_a_solution_is_told_with_the_reason_and_moves_nothing(ro
     ],
     ids=["no target", "not a number", "no rotation", "unknown joint", "too few", "no names", "negative tolerance"],
 )
-def test_problem_that_makes_no_sense_is_refused_and_the_next_one_solved(ros, wrong, told):
-    start_solver(ros)
+def test_problem_that_makes_no_sense_is_refused_and_the_next_one_solved(ros, kdl, wrong, told):
     targets, solutions = ros.listen("joint_states/target", JointState), ros.listen("ik/solution", IKSolution)
     with publishing("ik", IKProblem) as ik:
         solution = send_until(ik, wrong, solutions)
         assert not solution.success and told in solution.message, solution.message
         assert targets.messages == []
         send_until(ik, problem(BENT), targets)
+
+
+def test_messages_of_another_type_are_refused_and_the_types_named(ros, kdl):
+    rosout = Rosout(ros)
+    with publishing("ik", JointState) as ik:
+        wait_until(lambda: ik.publish(JointState()) or rosout.logs("ik_ros/IKProblem or"), "they are refused")
+    assert "sensor_msgs/JointState" in rosout.logs("ik_ros/IKProblem or")[0].msg
+
+
+def test_targets_go_on_from_the_last_one_when_problems_have_no_start(ros, kdl):
+    targets = ros.listen("joint_states/target", JointState)
+    with publishing("ik", IKProblem) as ik:
+        send_until(ik, problem(BENT, start=start_at(BENT)), targets)
+        near = np.add(BENT, 0.01)
+        asked = problem(near)
+        asked.header.stamp = rospy.Time(7)
+        send_until(ik, asked, targets, 3)
+        last = targets.messages[-1]
+    assert last.header.stamp == asked.header.stamp
+    assert np.abs(np.subtract(last.position, near)).max() < 0.1, "another posture would be further away"
+
+
+@pytest.mark.parametrize("solver", ["kdl", "pybullet", "trac_ik", "global"])
+def test_problems_become_targets_that_reach(ros, solver):
+    start_solver(ros, solver)
+    targets, solutions = ros.listen("joint_states/target", JointState), ros.listen("ik/solution", IKSolution)
+    asked = problem(BENT, start=start_at(HOME))
+    asked.header.stamp = rospy.Time(12, 5)
+    with publishing("ik", IKProblem) as ik:
+        target = send_until(ik, asked, targets)
+        solution = wait_until(
+            lambda: next((each for each in list(solutions.messages) if each.success), None), "a solution comes"
+        )
+    assert list(target.name) == JOINTS == list(solution.joint_names)
+    assert_there(target.position, asked.target)
+    assert (solution.success, solution.interface_name) == (True, solver)
+    assert solution.header.stamp == target.header.stamp == rospy.Time(12, 5)
+    assert TIP in solution.message
 
 
 @pytest.mark.quick
@@ -104,14 +128,6 @@ def test_problems_of_the_release_are_taken_on_the_same_topic_and_by_service(ros)
     answer = ros.call("ik/solver/trac_ik/solve_trac_ik", TracIK, old)
     assert answer.success, answer.message
     assert_there(answer.solution.position, pose)
-
-
-def test_messages_of_another_type_are_refused_and_the_types_named(ros):
-    rosout = Rosout(ros)
-    start_solver(ros)
-    with publishing("ik", JointState) as ik:
-        wait_until(lambda: ik.publish(JointState()) or rosout.logs("ik_ros/IKProblem or"), "they are refused")
-    assert "sensor_msgs/JointState" in rosout.logs("ik_ros/IKProblem or")[0].msg
 
 
 def test_service_answers_whether_the_node_is_on_or_off(ros):
@@ -167,20 +183,6 @@ def test_poses_of_other_frames_are_turned_into_the_base(ros):
     asked.header.frame_id = "nowhere"
     refused = ros.call("ik/solver/kdl/solve", SolveIK, asked)
     assert not refused.success and "'nowhere'" in refused.message and "'foot'" in refused.message
-
-
-def test_targets_go_on_from_the_last_one_when_problems_have_no_start(ros):
-    start_solver(ros)
-    targets = ros.listen("joint_states/target", JointState)
-    with publishing("ik", IKProblem) as ik:
-        send_until(ik, problem(BENT, start=start_at(BENT)), targets)
-        near = np.add(BENT, 0.01)
-        asked = problem(near)
-        asked.header.stamp = rospy.Time(7)
-        send_until(ik, asked, targets, 3)
-        last = targets.messages[-1]
-    assert last.header.stamp == asked.header.stamp
-    assert np.abs(np.subtract(last.position, near)).max() < 0.1, "another posture would be further away"
 
 
 def test_continuity_holds_the_velocities_of_the_joints(ros):

@@ -71,11 +71,10 @@ def test_bad_targets_among_good_ones_are_refused_whole_and_named_now_and_then(ro
     )
     settled = len(joint_states.messages)
     rosout.wait_for([TOPIC])
-    time.sleep(6.0)  # once more is due after 5 s
+    wait_until(lambda: rosout.logs("more like it"), "it is named once more after 5 s, with how many were kept back")
     warnings = [log for log in rosout.logs(TOPIC) if log.level == Log.WARN]
-    assert 1 <= len(warnings) <= 4, [log.msg for log in warnings]
+    assert 1 < len(warnings) <= 4, [log.msg for log in warnings]
     assert "message refused: " in warnings[0].msg
-    assert "more like it" in warnings[-1].msg, "how many were kept back is told"
     assert all(map(_is_finite, joint_states.messages))
     for message in joint_states.messages[settled:]:
         assert message.position[3] == pytest.approx(GOAL, abs=0.02), "a bad target moved the arm"
@@ -196,15 +195,18 @@ def test_an_object_that_comes_back_follows_a_frame_that_stands_still(ros, node):
     probe = ball("probe", basePosition=[3.0, 0.0, 2.5], resetBaseVelocity={"linearVelocity": [0.0, 0.0, -4.0]})
     ros.start(["rosrun", "tf2_ros", "static_transform_publisher", *"0 0 2 0 0 0 rpbi/world shelf_frame".split()])
     tf = ros.listen("/tf", TFMessage)
-    for _ in range(2):
+
+    def is_in_the_way():
         assert add(ros, PybulletObject.COLLISION, shelf).success
-        time.sleep(1.0)  # for the first time the frame has to come up
         del tf.messages[:]
         assert add(ros, PybulletObject.DYNAMIC, {**probe, "broadcast_hz": 100}).success
         heights_m = wait_until(lambda: _heights_m(tf, "rpbi/probe", 100), "the ball has had time to fall")
-        assert heights_m[-1] > shelf_height_m, "nothing was in its way"
         for name in ("probe", "shelf"):
             assert remove(ros, name).success
+        return heights_m[-1] > shelf_height_m
+
+    wait_until(is_in_the_way, "the frame is known, and the shelf follows it")
+    assert is_in_the_way(), "nothing was in its way"
 
 
 def _heights_m(tf, frame, least):
@@ -216,9 +218,11 @@ def _heights_m(tf, frame, least):
 
 def test_a_flood_of_messages_does_not_hold_the_loop_up(ros, target):
     diagnostics = ros.listen("/diagnostics", DiagnosticArray)
-    end_s = time.monotonic() + 3.0
-    while time.monotonic() < end_s:
-        target.publish(JointState(name=["elbow"] * 50, position=[math.nan] * 50))
-        time.sleep(0.001)
-    factors = [float(diagnosed(message)["real_time_factor"]) for message in diagnostics.messages[1:]]
-    assert factors and max(factors) > 0.9
+
+    def keeps_up():
+        for _ in range(20):
+            target.publish(JointState(name=["elbow"] * 50, position=[math.nan] * 50))
+        # The first one may tell of the time before, and each tells of a second, of which others may take some
+        return any(float(diagnosed(message)["real_time_factor"]) > 0.9 for message in diagnostics.messages[2:])
+
+    wait_until(keeps_up, "it goes at its rate meanwhile")

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 import re
 import threading
-import time
 
 import pytest
-import rospy
 from node_world import add, main_config, publishing, remove
 from ros_system import wait_until
 from rosgraph_msgs.msg import Log
@@ -154,7 +152,7 @@ def test_a_stop_in_the_middle_is_answered_and_while_stopped_moves_are_refused(ro
     assert "the simulation is stopped" in move(ros, 1.0, j1=0.5).message
     reached = now(states)[FIRST]
     assert ros.call("/rpbi/start", Trigger).success
-    time.sleep(0.3)
+    states.wait_for(len(states.messages) + 15)
     assert now(states)[FIRST] == pytest.approx(reached, abs=0.02), "it does not go on by itself"
 
 
@@ -177,23 +175,22 @@ def test_modes_are_switched_and_targets_for_another_mode_named_once(ros, states)
     with publishing("/rpbi/iiwa/joint_states/target", JointState) as target:
         for _ in range(40):
             target.publish(JointState(name=[FIRST], position=[0.1]))
-            rospy.rostime.wallsleep(0.01)
         wait_until(lambda: [log for log in rosout.messages if "expected velocity" in log.msg], "it is named")
-        for _ in range(20):
+
+        def goes():
             target.publish(JointState(name=[FIRST], velocity=[0.3]))
-            rospy.rostime.wallsleep(0.02)
-        assert states.messages[-1].velocity[0] == pytest.approx(0.3, abs=0.05)
-    time.sleep(0.5)
-    assert len([log for log in rosout.messages if "expected velocity" in log.msg]) == 1
+            return states.messages[-1].velocity[0] == pytest.approx(0.3, abs=0.05)
+
+        wait_until(goes, "it has the velocity that is asked for")
     wait_until(lambda: abs(states.messages[-1].velocity[0]) < 1e-3, "it stops when nobody sends any more")
+    assert len([log for log in rosout.messages if "expected velocity" in log.msg]) == 1
 
 
 def test_torque_control_lets_an_arm_fall_and_moves_are_refused_in_it(ros, states):
     assert ros.call("/rpbi/iiwa/set_control_mode", SetString, "TORQUE_CONTROL").success
     assert "TORQUE_CONTROL" in move(ros, 1.0, j1=0.5).message
     before = now(states)[JOINTS[1]]
-    time.sleep(0.5)
-    assert abs(now(states)[JOINTS[1]] - before) > 0.05
+    wait_until(lambda: abs(now(states)[JOINTS[1]] - before) > 0.05, "it falls")
 
 
 @pytest.mark.parametrize("text", ["", "POSITION", "position_control"])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import threading
-import time
 
 import pytest
 import rospy
@@ -18,7 +17,8 @@ from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker
 from worlds import ball, iiwa
 
-FROZEN_S = 5.0
+FROZEN_MESSAGES = 2500
+"""More than sockets and queues hold."""
 PERIOD_NS = 2_000_000
 AT_ITS_RATE = 0.9
 STEPS = 100
@@ -45,15 +45,18 @@ def frozen(ros, tmp_path):
 def test_ticks_go_on_while_a_subscriber_is_frozen(ros, frozen):
     diagnostics = ros.listen("/diagnostics", DiagnosticArray)
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
-    time.sleep(FROZEN_S)
+    joint_states.wait_for(FROZEN_MESSAGES)
+
+    def factors():
+        return [float(diagnosed(message)["real_time_factor"]) for message in diagnostics.messages[1:]]
+
+    diagnostics.messages.clear()
+    # The best of them: another program on the same machine may take some of its time, a frozen one must not take all.
+    wait_until(lambda: len(factors()) >= 2 and max(factors()) >= AT_ITS_RATE, "it goes at its rate")
     stamps = joint_states.stamps_ns
     gaps = {after - before for before, after in zip(stamps, stamps[1:], strict=False)}
     assert gaps == {PERIOD_NS}, "others miss some"
-    factors = [float(diagnosed(message)["real_time_factor"]) for message in diagnostics.messages[1:]]
-    assert len(factors) >= 2
-    # The best of them: another program on the same machine may take some of its time, a frozen one must not take all.
-    assert max(factors) >= AT_ITS_RATE, factors
-    assert min(factors) > 0.0
+    assert min(factors()) > 0.0
 
 
 def test_who_was_slow_gets_the_rest_though_nothing_more_is_published(ros, tmp_path):

@@ -6,7 +6,6 @@ import contextlib
 import re
 import sys
 import threading
-import time
 from pathlib import Path
 
 import pytest
@@ -157,7 +156,6 @@ def test_the_predictive_controller_of_the_page_brings_the_joint_to_its_goal(ros,
     code = re.search(r"```python\n(.*?)```", DOCS.read_text(), re.DOTALL)[1]
     config = main_config(tmp_path, robots=(iiwa(),), start_pybullet_after_initialization=False)
     ros.simulator(config, namespace="/mpc/")
-    time.sleep(0.1)
     script = tmp_path / "mpc.py"
     script.write_text(code)
     client = ros.start([sys.executable, str(script), "__ns:=/mpc"])

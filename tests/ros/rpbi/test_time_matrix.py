@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import pytest
@@ -26,6 +25,9 @@ STATES = {
     "real time": {"real_time_factor": 1},
 }
 STEPS = 60
+"""At least so many; as many as the client needs."""
+MESSAGES = 20
+"""Of joint states that the others are waited for."""
 HZ = {"as fast as it goes": 5}
 """Rate of joint states and TF [Hz], 50 where nothing is said. `rosbag record` keeps 100 messages a topic, which at
 hundreds of simulated seconds a second is little on a busy machine; what it drops is not for this test to say."""
@@ -54,27 +56,37 @@ def scene(ros, tmp_path, state, simulated):
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     tf = ros.listen("/tf", TFMessage)
     ros.simulator(world, use_sim_time=simulated)
-    time.sleep(0.5)
+    joint_states.wait_for(1)
     client = ros.start_program("late_client.py", "rpbi/ball")
     bag = tmp_path / "late.bag"
     recorder = Recorder(bag, ["/rpbi/iiwa/joint_states", "/tf"])
     recorder.start()
-    time.sleep(0.3)  # what it is owed for coming late is on its way
     yield dict(clock=clock, joint_states=joint_states, tf=tf, client=client, bag=bag, recorder=recorder)
     if recorder.is_running:
         recorder.stop()
 
 
-def _drive(ros, state):
-    """Lets the world live for a while, in the way of its state."""
+def _drive(ros, scene, state, simulated):
+    """Lets the world live for a while, in the way of its state; returns the stamps of its steps [ns]."""
+    joint_states = scene["joint_states"]
     if state == "stepped":
-        return [ros.call("/rpbi/step", Trigger).message for _ in range(STEPS)]
-    time.sleep(2.5 if state == "slow" else 1.0)
+        stamps: list[int] = []
+
+        def step():
+            stamps.append(int(ros.call("/rpbi/step", Trigger).message.split("stamp ")[1].replace(".", "")))
+            return len(stamps) >= STEPS and "slept" in ros.output(scene["client"])
+
+        wait_until(step, "the client's sleep in ROS time ends", every_s=0.0)
+        for told in (lambda: joint_states.stamps_ns, lambda: _ball_stamps(scene["tf"].messages)):
+            wait_until(lambda told=told: told()[-1] >= stamps[-1], "the last step is told")
+        return stamps
+    if state != "stopped" or not simulated:
+        joint_states.wait_for(len(joint_states.messages) + MESSAGES)
     return []
 
 
 def test_time_behaves(ros, scene, state, simulated):
-    answers = _drive(ros, state)
+    steps_ns = _drive(ros, scene, state, simulated)
     client = scene["client"]
     stands_still = state == "stopped" and simulated
     wait_until(lambda: "transform" in ros.output(client), f"tf2 knows the ball: {ros.output(client)}")
@@ -107,9 +119,8 @@ def test_time_behaves(ros, scene, state, simulated):
             gaps = {after - before for before, after in zip(stamps, stamps[1:])}
             assert gaps <= {10**9 // HZ.get(state, 50)}, f"{topic}: messages are missing in the bag: {gaps}"
     if state == "stepped" and simulated:
-        told = [int(answer.split("stamp ")[1].replace(".", "")) for answer in answers]
         for stamps in (scene["joint_states"].stamps_ns, _ball_stamps(scene["tf"].messages)):
-            assert stamps[-STEPS:] == told, "every step is told once"
+            assert stamps[-len(steps_ns) :] == steps_ns, "every step is told once"
 
 
 def _ball_stamps(messages):

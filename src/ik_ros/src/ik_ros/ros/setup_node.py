@@ -3,6 +3,8 @@
 import threading
 from collections import deque
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import rospy
 from sensor_msgs.msg import JointState
@@ -72,14 +74,14 @@ class SetupNode:
 
     def _subscribe(self) -> None:
         for topic in START_TOPICS:
-            self._listen(topic, JointState, lambda message, t=topic: self._take_start(t, message))
+            self._listen(topic, JointState, partial(self._take_start, topic))
         for topic in PREVIOUS_TOPICS:
-            self._listen(topic, JointState, lambda message, t=topic: self._take_previous(t, message))
+            self._listen(topic, JointState, partial(self._take_previous, topic))
         for key in TOLERANCES:
-            self._listen(key, Float64, lambda message, k=key: self._take_tolerance(k, message.data))
+            self._listen(key, Float64, partial(self._take_tolerance, key))
         for task in self._goals:
             topic = f"task_map_goal/{task}"
-            self._listen(topic, Float64MultiArray, lambda message, t=task: self._take_goal(t, message))
+            self._listen(topic, Float64MultiArray, partial(self._take_goal, task))
 
     def _listen(self, topic: str, message_type: type, take: Callable[[rospy.Message], None]) -> None:
         full_name = f"{self._topics}/{topic}"
@@ -102,8 +104,8 @@ class SetupNode:
     def _take_previous(self, topic: str, message: JointState) -> None:
         self._previous.append(positions_in(topic, message))
 
-    def _take_tolerance(self, key: str, value: float) -> None:
-        changed = {**self._tolerances, key: value}
+    def _take_tolerance(self, key: str, message: Float64) -> None:
+        changed = {**self._tolerances, key: message.data}
         IKProblem(**_fields(changed))  # which checks them
         self._tolerances = changed
 
@@ -137,7 +139,7 @@ class SetupNode:
             )
 
 
-def _fields(tolerances: dict[str, float]) -> dict[str, tuple[float, ...]]:
+def _fields(tolerances: dict[str, float]) -> dict[str, Any]:
     values = tuple(tolerances[key] for key in TOLERANCES)
     return {"position_tolerance": values[:3], "rotation_tolerance": values[3:]}
 

@@ -73,11 +73,12 @@ _warn = ThrottledWarning()
 
 def subscribe(topic: Topic, context: Any, owner: str = "") -> rospy.Subscriber:
     """Subscribes to a topic whose handler acts on a context; what is refused is named now and then."""
-    name = rospy.resolve_name(topic.name.format(name=owner))
+    name, handler = rospy.resolve_name(topic.name.format(name=owner)), topic.handler
+    assert handler is not None  # rows of topics to subscribe to have one
 
     def take(message: Any) -> None:
         try:
-            topic.handler(context, message)
+            handler(context, message)
         except (InterfaceError, ValueError) as error:
             _warn(name, f"message refused: {error}")
 
@@ -86,11 +87,12 @@ def subscribe(topic: Topic, context: Any, owner: str = "") -> rospy.Subscriber:
 
 def serve(service: Service, context: Any, owner: str = "") -> rospy.Service:
     """Opens a service."""
-    response_type = service.service_type._response_class
+    response_type, handler = service.service_type._response_class, service.handler
+    assert handler is not None  # rows of services to open have one
 
     def handle(request: Any) -> Any:
         try:
-            return service.handler(context, request)
+            return handler(context, request)
         except (InterfaceError, ValueError) as error:
             if "success" in response_type.__slots__:
                 return response_type(success=False, message=str(error))

@@ -7,7 +7,7 @@ import rospy
 from sensor_msgs.msg import JointState
 
 from custom_ros_tools.errors import ConfigError, Problem
-from custom_ros_tools.schema import ConfigModel
+from rpbi.bodies import BodyConfig
 from rpbi.bodies.robots.robot_config import RobotConfig
 from rpbi.config.loading import LoadedWorld
 from rpbi.urdf.document import UrdfDocument
@@ -34,7 +34,7 @@ def start_where_robots_are(loaded: LoadedWorld) -> LoadedWorld:
     return replace(loaded, objects=tuple(objects))
 
 
-def with_initial_state(config: ConfigModel, file: str) -> ConfigModel:
+def with_initial_state(config: BodyConfig, file: str) -> BodyConfig:
     """Returns the configuration of a body; that of a robot that asks for it with the joint positions of a topic.
 
     Joints that the topic does not name start where the configuration says; joints that the robot lacks are left out.

@@ -1,5 +1,6 @@
 """Inputs of the world from ROS: subscriptions and TF, by way of the mailbox."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import geometry_msgs.msg
@@ -77,7 +78,7 @@ class Inputs:
         self._subscribers: dict[str, list[rospy.Subscriber]] = {}
         self._tf = TfFollower(world.put)
 
-    def open(self, name: str, inputs: dict[str, Input]) -> None:
+    def open(self, name: str, inputs: Mapping[str, Input]) -> None:
         """Connects the inputs of a body or sensor."""
         subscribers = self._subscribers.setdefault(name, [])
         for key, taken in inputs.items():
@@ -98,11 +99,12 @@ class Inputs:
 
     def _subscribe(self, name: str, key: str, taken: Input) -> rospy.Subscriber:
         row = topic_input(key, taken)
-        topic, slot = rospy.resolve_name(row.name.format(name=name)), f"{name}/{key}"
+        topic, slot, value = rospy.resolve_name(row.name.format(name=name)), f"{name}/{key}", row.handler
+        assert value is not None  # rows of inputs have one
 
         def take(message: Any) -> None:
             try:
-                self._world.put(slot, row.handler(message))
+                self._world.put(slot, value(message))
             except WrongQuantityError as error:
                 self._warn_seldom(topic, f"message refused: {error}")
             except Exception as error:

@@ -1,6 +1,7 @@
 """Takes an arm to the start of a figure eight and then has it track the figure, by a solver of `ik_ros`."""
 
 import sys
+from typing import Any
 
 import numpy as np
 import rospy
@@ -84,7 +85,7 @@ def _pose(matrix: np.ndarray) -> Pose:
     return as_pose(TfInterface.pack_tf(*pose_of(matrix)))
 
 
-def _call(service: str, kind: type, *arguments: object) -> object:
+def _call(service: str, kind: type, *arguments: object) -> Any:
     """Calls a service when it is there.
 
     Raises:

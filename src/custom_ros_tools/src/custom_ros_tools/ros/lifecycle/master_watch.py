@@ -79,7 +79,7 @@ class Registrations:
         """
         with self._registry.entries() as entries:  # no topic or service comes or goes meanwhile
             kept_parameters.restore(master)
-            calls = MultiCall(master)
+            calls: Any = MultiCall(master)
             for method, arguments in self._withdrawn:
                 getattr(calls, method)(*arguments)
             for kind, name, type_or_uri in entries:
@@ -145,7 +145,7 @@ class MasterWatch:
 
     def _compare(self, master: Any) -> None:
         """Compares what the master knows of us with what is."""
-        calls = MultiCall(master)
+        calls: Any = MultiCall(master)
         calls.getPid(self._name)
         calls.lookupNode(self._name, self._name)
         (_, _, process), (_, _, node_uri) = calls()

@@ -4,6 +4,7 @@ import sys
 import time
 import warnings
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import rosgraph
@@ -142,7 +143,7 @@ class _CameraTopics:
             if message is None:
                 continue  # its first subscriber came while the frame was drawn
             if again:
-                topic.serve_late(lambda late=message: late)
+                topic.serve_late(partial(lambda late: late, message))
             else:
                 topic.publish(message)
         self._published_ns = frame.stamp_ns

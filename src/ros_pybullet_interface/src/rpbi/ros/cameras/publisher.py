@@ -4,6 +4,7 @@ import sys
 import time
 import zlib
 from collections.abc import Callable, Mapping
+from functools import partial
 
 import rospy
 
@@ -64,10 +65,10 @@ class ScenePublisher:
         for sensor in self._synchronous:
             name = sensor.name
             if not self._renderer.knows_demand(name):
-                self._wait_for(lambda name=name: self._renderer.knows_demand(name), name, "the renderer is not up")
+                self._wait_for(partial(self._renderer.knows_demand, name), name, "the renderer is not up")
             if sensor.pose is None and sensor.wanted:
                 missing = f"there is no TF to '{sensor.config.object_tf.tf_id}'"
-                self._wait_for(lambda sensor=sensor: sensor.pose is not None or not sensor.wanted, name, missing)
+                self._wait_for(partial(_is_placed_or_unwanted, sensor), name, missing)
 
     def publish(self, sample: SceneSample, stamp_ns: int) -> None:
         """Has a scene drawn and published."""
@@ -86,7 +87,7 @@ class ScenePublisher:
         awaited, self._awaited = self._awaited, []
         for sample in awaited:
             self._wait_for(
-                lambda sample=sample: self._renderer.has_shown(sample.name, sample.stamp_ns),
+                partial(self._renderer.has_shown, sample.name, sample.stamp_ns),
                 sample.name,
                 f"no image of tick {sample.tick}",
                 needs_renderer=True,
@@ -155,3 +156,7 @@ def _camera(sensor: RgbdSensor) -> Camera:
         config.synchronous,
         noise,
     )
+
+
+def _is_placed_or_unwanted(sensor: RgbdSensor) -> bool:
+    return sensor.pose is not None or not sensor.wanted

@@ -1,5 +1,7 @@
 """The topics of a camera, and what it sees as messages."""
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
@@ -74,6 +76,7 @@ def image_message(stream: str, frame: Frame, header: Header) -> Image | None:
         frame: The frame.
         header: Stamp and frame of the message.
     """
+    pixels: npt.NDArray[Any] | None
     if stream == "colour":
         encoding, pixels = "rgb8", frame.colour
     elif stream == "depth":

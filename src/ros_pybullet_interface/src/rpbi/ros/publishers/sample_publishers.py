@@ -29,7 +29,7 @@ class SamplePublishers:
         self._world = world
         self.cameras = ScenePublisher(world)
         self._topics, self._transforms = TopicPublisher(), TransformPublisher()
-        self._elsewhere = {LinkPoseSample: self._transforms, SceneSample: self.cameras}
+        self._elsewhere: dict[type, Any] = {LinkPoseSample: self._transforms, SceneSample: self.cameras}
         self._all = (self._topics, self._transforms, self.cameras)
         self._open: dict[str, list[SampleKey]] = {}
         """The sensors of each body whose topics are open."""

@@ -163,7 +163,8 @@ class StatePublisher:
         self._rate = WallRate(config.state_hz)
         self._schedule = Schedule(config.state_hash_hz, world.clock.dt_ns) if config.state_hash_hz else None
         self._topic = FastTopic(STATE.name, SimulationState)
-        self._factor = 0.0
+        self._factor = self._window_s = 0.0
+        self._window_tick = 0
         self._moves = False
         self.is_stepping = False
         """Whether the ticks are those of a request."""

@@ -1,6 +1,7 @@
 """Where samples go: those of a sensor to a topic of its own, poses of links to TF."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 from geometry_msgs.msg import TransformStamped
@@ -36,6 +37,7 @@ class TopicPublisher:
 
     def open(self, key: SampleKey, row: Topic) -> None:
         """Advertises the topic of a sensor; any thread may call it."""
+        assert row.handler is not None  # rows of samples have one
         topic = FastTopic(row.name.format(name=key[1]), row.message_type)
         self._routes = {**self._routes, key: _Route(topic, row.handler)}
 
@@ -60,7 +62,7 @@ class TopicPublisher:
         for key, (topic, to_message) in self._routes.items():
             if key in self._last:
                 with blaming(to_message, f"the message of '{key[1]}'"):
-                    topic.serve_late(lambda last=self._last[key], make=to_message: make(*last))
+                    topic.serve_late(partial(to_message, *self._last[key]))
 
     def restart(self) -> None:
         """Drops what it keeps of all samples; the topics stay."""

@@ -1,7 +1,7 @@
 """Which topics and services a world has, without starting anything."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rpbi.bodies import Body
 from rpbi.engine.inputs import PoseInput
@@ -110,7 +110,8 @@ def _inputs(world: World, name: str) -> Iterator[Endpoint]:
 
 
 def _topic(kind: str, row: Topic, note: str, owner: str = "") -> Endpoint:
-    return Endpoint(kind, row.name.format(name=owner), row.message_type._type, note, row.meaning)
+    message_type: Any = row.message_type
+    return Endpoint(kind, row.name.format(name=owner), message_type._type, note, row.meaning)
 
 
 def _service(row: Service, owner: str = "", note: str = "") -> Endpoint:

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import fields, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
@@ -119,7 +119,7 @@ def solve_for_robot(context: BodyContext, message: CalculateInverseKinematicsPro
         raise ValueError(f"dt: must not be negative, got {message.dt}")
     base, positions = context.ask_body(lambda: (robot.base_pose(), robot.joint_positions()), robot)
     orientation = problem.targetOrientation or Pose().quat_xyzw
-    target = base.inverse() @ Pose(problem.targetPosition, orientation)
+    target = base.inverse() @ Pose(cast(Any, problem.targetPosition), cast(Any, orientation))
     in_base = replace(
         problem,
         targetPosition=target.position,

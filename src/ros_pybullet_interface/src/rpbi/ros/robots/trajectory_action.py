@@ -123,7 +123,12 @@ _open_actions: set[TrajectoryAction] = set()
 @cache
 def _answer_before_shutdown() -> None:
     """Has ROS wait for the answers to all goals, which end with the world, before it shuts down."""
-    rospy.on_shutdown(lambda: [action.answer_all() for action in list(_open_actions)])
+
+    def answer() -> None:
+        for action in list(_open_actions):
+            action.answer_all()
+
+    rospy.on_shutdown(answer)
 
 
 class TrajectoryAction:

@@ -11,8 +11,9 @@ from rpbi.control.trajectories.request import GoalTolerances, JointTolerance, Tr
 from rpbi.ros.headers import to_ros_time
 
 try:
-    from control_msgs.msg import FollowJointTrajectoryAction, JointTrajectoryControllerState
-    from control_msgs.srv import QueryTrajectoryState
+    from control_msgs.msg import FollowJointTrajectoryAction as FollowJointTrajectoryAction
+    from control_msgs.msg import JointTrajectoryControllerState as JointTrajectoryControllerState
+    from control_msgs.srv import QueryTrajectoryState as QueryTrajectoryState
 except ImportError:  # Debian has no package of it
     from ros_pybullet_interface.msg import JointTrajectoryControllerState
 

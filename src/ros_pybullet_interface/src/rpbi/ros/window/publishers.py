@@ -138,7 +138,7 @@ class VisualizerImage:
         return message
 
 
-class _Numbers(Int64MultiArray):  # type: ignore[misc]
+class _Numbers(Int64MultiArray):
     """Red, green, blue and alpha of each pixel; written at once, since one by one takes a tenth of a second."""
 
     def __init__(self, rgba: npt.NDArray[np.uint8]) -> None:
