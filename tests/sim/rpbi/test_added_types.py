@@ -79,9 +79,9 @@ from __future__ import annotations
 
 from std_msgs.msg import Float64
 
-from .sample_topics import SampleTopic
+from rpbi.ros.endpoints import Topic
 
-TOPIC = SampleTopic("rpbi/{name}", Float64, lambda sample, _: Float64(sample.height), "Height of the base [m].")
+TOPIC = Topic("rpbi/{name}", Float64, lambda sample, _: Float64(sample.height), "Height of the base [m].")
 '''
 NEW_FILES = {
     "rpbi/bodies/marble.py": BODY_FILE,
@@ -111,8 +111,8 @@ samples = [sample for _ in range(50) for sample in world.step() if type(sample).
 topic = sample_topic(sensor)
 print(json.dumps({
     "heights": [sample.height for sample in samples],
-    "topic": topic.topic.format(name=sensor.name),
-    "message": topic.to_message(samples[0], 1).data,
+    "topic": topic.name.format(name=sensor.name),
+    "message": topic.handler(samples[0], 1).data,
     "entries": schemas()["world"]["properties"]["marbles"]["items"],
     "schema": schemas()["marble"],
     "config_page": config_page(file_schemas(), {}, {}),

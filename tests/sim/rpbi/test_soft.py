@@ -13,9 +13,9 @@ from soft_meshes import DEFORMABLE, GROUND, MASS_KG, block, write_block
 from worlds import box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, PhysicsError, UnknownNameError
+from custom_ros_tools.schema.json_schema import json_schema, types_in
 from rpbi.bodies.soft import SoftObject
-from rpbi.config.pybullet_models import ChangeDynamics
-from rpbi.config.pybullet_soft_models import CreateSoftBodyAnchor, LoadSoftBody
+from rpbi.config.pybullet_models import ChangeDynamics, CreateSoftBodyAnchor, LoadSoftBody
 from rpbi.geometry import Pose
 from rpbi.samples import ContactsSample, SurfaceSample
 from rpbi.world import World
@@ -377,10 +377,9 @@ def test_pybullet_takes_every_key_with_a_value_of_its_type(tmp_path):
         "basePosition": [0, 0, 1],
         "baseOrientation": [0, 0, 0, 1],
     }
-    for key, schema in LoadSoftBody.model_json_schema()["properties"].items():
+    for key, schema in json_schema(LoadSoftBody, "soft body")["properties"].items():
         assert schema["description"].endswith(".")
-        kinds = {each.get("type") for each in schema.get("anyOf", [schema])}
-        values.setdefault(key, True if "boolean" in kinds else 0.5)
+        values.setdefault(key, True if "boolean" in types_in(schema) else 0.5)
     arguments = LoadSoftBody.parse(values, "f").kwargs()
     assert set(arguments) == set(LoadSoftBody.model_fields)
     code = (

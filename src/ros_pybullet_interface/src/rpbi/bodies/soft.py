@@ -10,8 +10,7 @@ from pydantic import Field, model_validator
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, Problem
 from custom_ros_tools.schema import HzOrOff, KeyedError, ListOf
-from rpbi.config.pybullet_models import LoadURDF
-from rpbi.config.pybullet_soft_models import AnchorEntry, ChangeVisualShape, CreateSoftBodyAnchor, LoadSoftBody
+from rpbi.config.pybullet_models import AnchorEntry, ChangeVisualShape, CreateSoftBodyAnchor, LoadSoftBody, LoadURDF
 from rpbi.config.sensors import ContactsConfig
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose, Twist
