@@ -92,11 +92,15 @@ def serve(service: Service, context: Any, owner: str = "") -> rospy.Service:
 
     def handle(request: Any) -> Any:
         try:
-            return handler(context, request)
+            answer = handler(context, request)
         except (InterfaceError, ValueError) as error:
             if "success" in response_type.__slots__:
                 return response_type(success=False, message=str(error))
             raise rospy.ServiceException(str(error)) from error
+        if isinstance(answer, tuple) and {"success", "message"} == set(response_type.__slots__):
+            success, message = answer
+            return response_type(success=success, message=message)  # some definitions have them the other way round
+        return answer
 
     return rospy.Service(service.name.format(name=owner), service.service_type, handle)
 
