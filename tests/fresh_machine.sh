@@ -175,7 +175,7 @@ use_machine() {
   [[ $keep ]] || remove "$machine"
 }
 
-used_mb() { du --summarize --one-file-system --block-size=1M "$machine" | cut -f 1; }
+used_mb() { du --summarize --one-file-system --block-size=1000000 "$machine" | cut -f 1; }
 holds() { (($1 <= $2)) && echo yes || echo NO; }
 
 # --- Cleaning up

@@ -15,8 +15,11 @@ Owners = Callable[[Body], Sequence[str]]
 """Returns what stands for `{name}` in the names of what a body has by a row; nothing if it has it not."""
 
 
-Answer = tuple[bool, str]
-"""`success` and `message` of a response."""
+class Answer(NamedTuple):
+    """What most services answer; their types have the two fields in different orders."""
+
+    success: bool
+    message: str
 
 
 def of(body_type: type[Body]) -> Owners:
@@ -51,7 +54,7 @@ class Service(NamedTuple):
     Attributes:
         name: Its name, with `{name}` for the body or sensor.
         service_type: Its ROS type.
-        handler: Returns the response to a context and a request, or the response's fields in a tuple. What it raises
+        handler: Returns the answer to a context and a request: an Answer, or the response or its fields. What it raises
             for a request that must be refused (InterfaceError or ValueError) becomes `success=False` and its message,
             or an error of the call where the response has no `success`. None where something else serves it.
         owners: Which bodies have it, if bodies have it.
@@ -93,14 +96,11 @@ def serve(service: Service, context: Any, owner: str = "") -> rospy.Service:
     def handle(request: Any) -> Any:
         try:
             answer = handler(context, request)
+            return answer._asdict() if isinstance(answer, Answer) else answer
         except (InterfaceError, ValueError) as error:
             if "success" in response_type.__slots__:
                 return response_type(success=False, message=str(error))
             raise rospy.ServiceException(str(error)) from error
-        if isinstance(answer, tuple) and {"success", "message"} == set(response_type.__slots__):
-            success, message = answer
-            return response_type(success=success, message=message)  # some definitions have them the other way round
-        return answer
 
     return rospy.Service(service.name.format(name=owner), service.service_type, handle)
 

@@ -23,7 +23,7 @@ def move_to_joint_state(context: BodyContext, request: ResetJointStateRequest) -
     target = JointTarget(state.name, state.position, state.velocity, state.effort)
     positions = target.values_of("position", "the goal of a motion is a position")
     result = _move(context, context.body.model.resolve_driven(target.names, positions), request.duration)
-    return result.success, result.message
+    return Answer(result.success, result.message)
 
 
 def move_to_initial_joint_state(context: BodyContext, request: ResetJointStateRequest) -> Answer:
@@ -32,7 +32,7 @@ def move_to_initial_joint_state(context: BodyContext, request: ResetJointStateRe
     The state in the request is not looked at.
     """
     result = _move(context, context.body.start_positions(), request.duration)
-    return result.success, result.message
+    return Answer(result.success, result.message)
 
 
 def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> Answer:
@@ -42,14 +42,14 @@ def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> An
     """
     solution = solve_for_robot(context, request.problem)
     if not solution.success:
-        return False, f"nothing moved: {solution.message}"
+        return Answer(False, f"nothing moved: {solution.message}")
     goal = context.body.model.resolve(solution.chain, solution.chain_positions)
     result = _move(context, goal, request.duration)
     if not result.success:
-        return False, result.message
+        return Answer(False, result.message)
     residual = residual_of_robot(context, request.problem)
     message = f"{result.message}; {residual.in_words(request.problem.link_name)}"
-    return residual.is_near, message
+    return Answer(residual.is_near, message)
 
 
 def set_control_mode(context: BodyContext, request: SetStringRequest) -> Answer:
@@ -61,7 +61,7 @@ def set_control_mode(context: BodyContext, request: SetStringRequest) -> Answer:
     mode = CONTROL_MODES.parse(request.data)
     before = MODE_NAMES[context.body.motors.mode]
     context.act("switch_mode", mode)
-    return True, f"{MODE_NAMES[mode]}, was {before}"
+    return Answer(True, f"{MODE_NAMES[mode]}, was {before}")
 
 
 def stop_motion(context: BodyContext, _: Any) -> Answer:
@@ -70,7 +70,7 @@ def stop_motion(context: BodyContext, _: Any) -> Answer:
     Its joints hold where they are.
     """
     was_moving = context.act("stop_motion", "it was stopped")
-    return was_moving, "stopped" if was_moving else "no motion is running"
+    return Answer(was_moving, "stopped" if was_moving else "no motion is running")
 
 
 def set_joint_state(context: BodyContext, request: SetJointStateRequest) -> Answer:
@@ -85,7 +85,7 @@ def set_joint_state(context: BodyContext, request: SetJointStateRequest) -> Answ
         raise ValueError("expected one joint or more, got none")
     target = JointTarget(state.name, state.position, state.velocity)
     context.act("set_joint_state", target)
-    return True, f"{', '.join(state.name)} put there"
+    return Answer(True, f"{', '.join(state.name)} put there")
 
 
 def _move(context: BodyContext, goal: Mapping[int, float], duration_s: float) -> MotionResult:

@@ -63,7 +63,7 @@ def set_pose(context: BodyContext, request: SetTransformRequest) -> Answer:
         if isinstance(taken, PoseInput):
             raise ValueError(f"'{context.name}' follows the TF frame '{taken.tf_id}': move that")
     context.act("teleport", pose)
-    return True, f"'{context.name}' was put there"
+    return Answer(True, f"'{context.name}' was put there")
 
 
 def force_torque_sensors(body: Body) -> list[str]:

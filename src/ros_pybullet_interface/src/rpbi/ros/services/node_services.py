@@ -82,20 +82,20 @@ class NodeContext(NamedTuple):
 def _start(node: NodeContext, _: Any) -> Answer:
     """Lets the world run; `success` is false if it does so already."""
     has_started = node.ask(node.simulation.start)
-    return has_started, "started" if has_started else "already running"
+    return Answer(has_started, "started" if has_started else "already running")
 
 
 def _stop(node: NodeContext, _: Any) -> Answer:
     """Lets the world stand still; `success` is false if it does so already."""
     has_stopped = node.ask(node.simulation.stop)
-    return has_stopped, "stopped" if has_stopped else "already stopped"
+    return Answer(has_stopped, "stopped" if has_stopped else "already stopped")
 
 
 def _step(node: NodeContext, _: Any) -> Answer:
     """Goes one tick on, if the world stands still; the message is `tick N, stamp S` [s]."""
     tick, stamp_ns = node.ask(node.simulation.step)
     seconds, nanoseconds = divmod(stamp_ns, NS_PER_S)
-    return True, f"tick {tick}, stamp {seconds}.{nanoseconds:09d}"
+    return Answer(True, f"tick {tick}, stamp {seconds}.{nanoseconds:09d}")
 
 
 def _step_n(node: NodeContext, request: StepNRequest) -> tuple[bool, str, int, genpy.Time]:
@@ -111,7 +111,7 @@ def _step_n(node: NodeContext, request: StepNRequest) -> tuple[bool, str, int, g
 def _reset(node: NodeContext, _: Any) -> Answer:
     """Makes the world what it was at its start, to the last bit; stamps go on."""
     node.objects.reset()
-    return True, "the world is as configured"
+    return Answer(True, "the world is as configured")
 
 
 def _state_hash(node: NodeContext, _: Any) -> tuple[bool, str, int, genpy.Time, int, str]:
@@ -136,8 +136,8 @@ def _add_object(node: NodeContext, request: AddPybulletObjectRequest) -> Answer:
         raise
     except Exception as error:  # nothing that an object brings along may leave the caller without an answer
         log.exception("adding an object failed in a way that is not foreseen")
-        return False, f"{type(error).__name__}: {error}"
-    return True, f"added '{config.name}'"
+        return Answer(False, f"{type(error).__name__}: {error}")
+    return Answer(True, f"added '{config.name}'")
 
 
 def _read_object(node: NodeContext, asked: PybulletObject) -> tuple[dict[str, Any], str, str]:
@@ -159,7 +159,7 @@ def _add_camera(node: NodeContext, request: SetStringRequest) -> Answer:
     data, file = _read_camera(node, request.data)
     config = RgbdSensorConfig.parse(data, file)
     node.objects.add_camera(config, file)
-    return True, f"added '{config.name}'"
+    return Answer(True, f"added '{config.name}'")
 
 
 def _read_camera(node: NodeContext, text: str) -> tuple[Mapping[str, Any], str]:
@@ -185,7 +185,7 @@ def _find(node: NodeContext, name: str, key: str) -> str:
 def _remove_object(node: NodeContext, request: SetStringRequest) -> Answer:
     """Removes the object or camera of that name."""
     node.objects.remove(request.data)
-    return True, f"removed '{request.data}'"
+    return Answer(True, f"removed '{request.data}'")
 
 
 def _list_objects(node: NodeContext, _: Any) -> tuple[list[str], list[str]]:
@@ -214,7 +214,7 @@ def _change_object_dynamics(node: NodeContext, request: ChangeObjectDynamicsRequ
         world.change_dynamics(request.object_name, ChangeDynamics(**changed))
         return f"changed {', '.join(changed)}"
 
-    return True, node.ask(change)
+    return Answer(True, node.ask(change))
 
 
 def _change_dynamics(node: NodeContext, request: ChangeDynamicsRequest) -> Answer:
@@ -224,7 +224,7 @@ def _change_dynamics(node: NodeContext, request: ChangeDynamicsRequest) -> Answe
     if not keys:
         raise InterfaceError("config: expected keys of changeDynamics, such as lateralFriction; got none")
     node.ask(lambda: node.simulation.world.change_dynamics(request.object_name, change))
-    return True, f"changed {keys}"
+    return Answer(True, f"changed {keys}")
 
 
 NODE_SERVICES = (
