@@ -11,7 +11,7 @@ from ros_system import wait_until
 from screen import Screen, Window
 
 WIDTH, HEIGHT = 480, 360
-SLOW_S = 60.0
+SLOW_S = 120.0
 Array = npt.NDArray[Any]
 
 

@@ -19,7 +19,7 @@ HANDLE_M = 0.16
 TIP_OF_CAMERA_PX, TIP_OF_HANDLE_PX = 300, 200
 """RViz's status bar tells what the mouse does: much where it moves the camera, little where it moves a handle."""
 NEAR_M = 0.01
-SLOW_S = 120.0
+SLOW_S = 300.0
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import pytest
 from ros_system import RosSystem, wait_until
 from sensor_msgs.msg import PointCloud2
 
-SLOW_S = 120.0
+SLOW_S = 300.0
 
 
 @pytest.fixture

@@ -35,7 +35,7 @@ COMPLAINING = {"warning": (192, 128, 0), "error": (192, 32, 32)}
 """Colours in which RViz writes the name of a display that has something to complain of."""
 HARMLESS = re.compile(r"arrived closer .* than the lower bound you provided")
 """RViz's coloured depth believes that images come twice a second at most."""
-SLOW_S = 120.0
+SLOW_S = 300.0
 
 
 class View(RvizView):

@@ -9,7 +9,7 @@ from scipy import ndimage
 
 TORUS = (242, 115, 92)
 ARROW = (217, 26, 26)
-SLOW_S = 120.0
+SLOW_S = 300.0
 
 
 @pytest.fixture(scope="module")

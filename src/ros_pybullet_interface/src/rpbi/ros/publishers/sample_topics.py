@@ -84,7 +84,7 @@ def contact_arrows_message(sample: ContactArrowsSample, stamp_ns: int) -> Marker
 
 def odometry_message(sample: BaseStateSample, stamp_ns: int) -> Odometry:
     """Returns pose and twist of a base; covariances are zero, since both are exact."""
-    message = Odometry(_header(stamp_ns), prefixed(sample.frame))
+    message = Odometry(header=_header(stamp_ns), child_frame_id=prefixed(sample.frame))
     message.pose.pose.position = Point(*sample.pose.position)
     message.pose.pose.orientation = Quaternion(*sample.pose.quat_xyzw)
     message.twist.twist = Twist(Vector3(*sample.twist.linear), Vector3(*sample.twist.angular))
