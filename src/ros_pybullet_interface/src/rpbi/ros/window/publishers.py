@@ -74,6 +74,8 @@ class GuiEvents:
         if not events:
             return
         is_due = self._held_rate.is_due()
+        if is_due:
+            self._held_rate.rest(1.0 / HELD_HZ)  # however long ago the last key was held
         for event in events:
             if is_due or event.state != DOWN:
                 publisher.publish(self._key_message(event))
