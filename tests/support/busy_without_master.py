@@ -9,8 +9,8 @@ import rospy
 from std_msgs.msg import Empty
 from std_srvs.srv import Trigger, TriggerResponse
 
-from custom_ros_tools.ros.lifecycle.kept_parameters import kept_parameters
 from custom_ros_tools.ros.lifecycle.master_watch import MasterWatch
+from custom_ros_tools.ros.lifecycle.parameters import kept_parameters
 
 rospy.init_node("busy")
 MasterWatch()

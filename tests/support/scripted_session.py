@@ -21,10 +21,7 @@ from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.control.trajectories.request import TrajectoryPoint as Point
 from rpbi.control.trajectories.request import TrajectoryRequest
 from rpbi.engine.actions import RecordedTrajectory, TimedGoal
-from rpbi.geometry import (
-    Pose,
-    Twist,
-)
+from rpbi.geometry import Pose, Twist
 from rpbi.replay.recorded_values import to_text
 from rpbi.replay.session import Checkpoint, RecordedCommand, Recording, Replay
 from rpbi.replay.world_description import WorldDescription, describe

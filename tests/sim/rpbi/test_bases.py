@@ -8,10 +8,10 @@ from mobile_base import ARM_KG, BASE_KG, CENTRE_OF_BASE_M, HALF_LENGTH_M, mobile
 from worlds import FLOOR, box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, PhysicsError, UnknownNameError
+from rpbi.control.planar_base import PLANAR_JOINTS
 from rpbi.geometry import Pose, Twist
 from rpbi.samples import BaseStateSample, JointStateSample, LinkPoseSample
 from rpbi.urdf.joints import JointTarget
-from rpbi.urdf.planar_joints import PLANAR_JOINTS
 from rpbi.world import World
 
 TICKS_A_SECOND = 1000

@@ -13,15 +13,8 @@ from worlds import FLOOR, box, iiwa, write_world
 from custom_ros_tools.errors import ConfigError
 from rpbi.control.timed_motion import TimedMotion
 from rpbi.control.trajectories.motion import TrajectoryMotion
-from rpbi.control.trajectories.request import (
-    ErrorCode,
-    GoalTolerances,
-    TrajectoryRefusedError,
-    TrajectoryRequest,
-)
-from rpbi.control.trajectories.request import (
-    TrajectoryPoint as Point,
-)
+from rpbi.control.trajectories.request import ErrorCode, GoalTolerances, TrajectoryRefusedError, TrajectoryRequest
+from rpbi.control.trajectories.request import TrajectoryPoint as Point
 from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
 

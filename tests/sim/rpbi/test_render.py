@@ -20,6 +20,8 @@ from rpbi.geometry import Pose
 from rpbi.render.camera import Intrinsics, back_project, project, rotation_matrix
 from rpbi.render.depth import DepthNoise
 from rpbi.render.frame import Camera
+from rpbi.render.mirror import Mirror
+from rpbi.render.renderers import open_renderer
 from rpbi.world import World
 
 HALF_EXTENTS_M = (0.3, 0.2, 0.1)
@@ -466,6 +468,21 @@ def test_synchronous_camera_tells_when_its_frame_is_out(tmp_path):
             assert (tmp_path / f"eye-{sample.tick}.npz").exists()
     finally:
         rendering.close()
+
+
+def test_first_image_of_a_renderer_is_the_same_as_those_after_it(tmp_path):
+    """Viewers that come late get the last scene drawn again, which has to be what the others have seen."""
+    world = World.from_file(
+        worlds.write_world(tmp_path, collision=(worlds.FLOOR,), dynamic=(worlds.box(basePosition=[0.0, 0.0, 0.1]),))
+    )
+    renderer = open_renderer([CAMERA])
+    mirror = Mirror(renderer.pb)
+    for entry in world.log:
+        mirror.apply(entry)
+    mirror.show(body.state() for body in world.bodies.values())
+    above = Pose((0.0, 0.0, 2.0), (1.0, 0.0, 0.0, 0.0))
+    first, second = (renderer.draw(INTRINSICS, above, segmentation=False).rgba.copy() for _ in range(2))
+    assert np.array_equal(first, second)
 
 
 def test_noise_of_a_camera_is_in_its_depth_and_the_same_in_another_process(tmp_path):

@@ -9,7 +9,7 @@ import deterministic_session as session
 import pytest
 from worlds import FLOOR, ball, iiwa, write_world
 
-from rpbi.engine.state_hash import state_hash
+from rpbi.engine.contents import state_hash
 from rpbi.world import World
 
 IN_ANOTHER_PROCESS = """

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from custom_ros_tools.errors import UnknownNameError, hint
+from .errors import UnknownNameError, hint
 
 own_folders = [str(Path(__file__).parent)]
 """Folders of the packages that look classes up and call them; `cause_of` looks for the fault outside of these."""

@@ -17,10 +17,9 @@ from rpbi.engine.actions import ACTIONS
 from rpbi.engine.client import Client
 from rpbi.engine.clock import Clock
 from rpbi.engine.command_log import CommandLog, WorldCommand
-from rpbi.engine.contents import WorldContents
+from rpbi.engine.contents import WorldContents, state_hash
 from rpbi.engine.inputs import Input
 from rpbi.engine.mailbox import Mailbox
-from rpbi.engine.state_hash import state_hash
 from rpbi.sensors.rgbd import RgbdSensor
 from rpbi.sensors.sensor import Sensor
 

@@ -9,7 +9,7 @@ from std_msgs.msg import Header
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.joint_values import JointValues
-from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.transforms import Array
 
 

@@ -7,8 +7,7 @@ from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, 
 
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
-from custom_ros_tools.ros.lifecycle.wall_timer import WallTimer
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
 from custom_ros_tools.ros.transform_messages import TransformTopic, transform_message
 from ik_ros.node_configs import InteractiveTargetConfig
 from rpbi.geometry import Pose

@@ -7,8 +7,7 @@ from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.joint_values import JointValues
 from custom_ros_tools.node_configs import StartParameters
 from custom_ros_tools.ros.lifecycle.parameters import private_config, private_parameters
-from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
-from custom_ros_tools.ros.lifecycle.wall_timer import WallTimer
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
 from custom_ros_tools.ros.services import ToggleService
 from custom_ros_tools.toggle import Toggle
 from ik_ros.node_configs import RobotIKConfig, TargetParameters

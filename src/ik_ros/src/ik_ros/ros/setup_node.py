@@ -12,8 +12,7 @@ from std_msgs.msg import Float64, Float64MultiArray, Header
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
-from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
-from custom_ros_tools.ros.lifecycle.wall_timer import WallTimer
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
 from custom_ros_tools.ros.services import ToggleService
 from custom_ros_tools.toggle import Toggle
 from ik_ros.msg import IKProblem as IKProblemMessage

@@ -11,7 +11,7 @@ from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
-from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.ros.services import ToggleService
 from custom_ros_tools.toggle import Toggle
 from ik_ros.lookup import make_solver

@@ -6,8 +6,7 @@ from std_msgs.msg import Float64MultiArray
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
-from custom_ros_tools.ros.lifecycle.wall_timer import WallTimer
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
 from custom_ros_tools.transforms import rpy_of
 from ik_ros.node_configs import TfToFloatArrayConfig
 

@@ -1,7 +1,9 @@
-"""A base that drives over the ground in any direction, as omnidirectional wheels do."""
+"""Bases that drive in a plane: their velocities, limits and motors."""
+
+from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import pybullet
 from pydantic import Field
@@ -9,10 +11,64 @@ from pydantic import Field
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import ConfigModel, Positive, Seconds, Unit
 from rpbi.engine.client import Client
-from rpbi.geometry import Pose
-from rpbi.urdf.planar_joints import PLANAR_JOINTS
+from rpbi.geometry import Pose, Twist
+from rpbi.urdf.document import UrdfDocument, UrdfJoint
+from rpbi.urdf.files import resolve_meshes, write_description
 
-from .planar_velocity import PlanarVelocity
+PLANAR_JOINTS = (0, 1, 2)
+"""PyBullet's indices of the joints along x and y [m] and about z [rad], and of the links behind them."""
+ROUNDING = 1e-6
+"""Components out of the plane up to this count as zero [m/s, rad/s]."""
+
+
+class PlanarVelocity(NamedTuple):
+    """Velocity of a base in its plane.
+
+    Attributes:
+        x: Forwards [m/s], in the base frame unless said otherwise.
+        y: To the left [m/s].
+        yaw: Counter-clockwise [rad/s].
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    yaw: float = 0.0
+
+    @classmethod
+    def checked(cls, twist: Twist) -> PlanarVelocity:
+        """Returns what a twist asks of a base that stays in its plane.
+
+        Raises:
+            ValueError: If a number is not finite or points out of the plane; it names what does.
+        """
+        given = {
+            f"{part}.{axis}": value
+            for part, vector in twist._asdict().items()
+            for axis, value in zip("xyz", vector, strict=True)
+        }
+        bad = [f"{key}={value}" for key, value in given.items() if not math.isfinite(value)]
+        if bad:
+            raise ValueError(f"velocities must be finite, got {', '.join(bad)}")
+        bad = [f"{key}={given[key]:g}" for key in ("linear.z", "angular.x", "angular.y") if abs(given[key]) > ROUNDING]
+        if bad:
+            raise ValueError(f"a planar base has linear.x, linear.y and angular.z alone, got {', '.join(bad)}")
+        return cls(given["linear.x"], given["linear.y"], given["angular.z"])
+
+    def turned(self, yaw: float) -> PlanarVelocity:
+        """Returns the same velocity expressed in a frame in which the present one stands at an angle [rad]."""
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        return PlanarVelocity(cos * self.x - sin * self.y, sin * self.x + cos * self.y, self.yaw)
+
+    def limited(self, linear: float, angular: float) -> PlanarVelocity:
+        """Returns it with at most a speed [m/s] and a rotation [rad/s]; its direction stays."""
+        speed = math.hypot(self.x, self.y)
+        share = min(1.0, linear / speed) if speed else 1.0
+        return PlanarVelocity(self.x * share, self.y * share, min(max(self.yaw, -angular), angular))
+
+    def towards(self, goal: PlanarVelocity, linear: float, angular: float) -> PlanarVelocity:
+        """Returns it after a change to a goal by at most so much [m/s and rad/s]."""
+        change = PlanarVelocity(goal.x - self.x, goal.y - self.y, goal.yaw - self.yaw).limited(linear, angular)
+        return PlanarVelocity(self.x + change.x, self.y + change.y, self.yaw + change.yaw)
 
 
 class PlanarBaseConfig(ConfigModel):
@@ -43,6 +99,28 @@ POSITION_GAIN = 0.1
 """Share of its lag that the base makes up for in a tick."""
 CATCH_UP_SPEED = (0.5, 0.5, 1.0)
 """How fast the base may make up for its lag [m/s, m/s, rad/s]; a greater lag is given up: something is in the way."""
+
+
+def with_planar_joints(path: str) -> str:
+    """Puts a massless chain of joints along x, along y and about z between the world and a robot's root link.
+
+    Args:
+        path: The robot's URDF file.
+
+    Returns:
+        A copy of it with the chain, which lasts as long as the process; its root is the fixed end of the chain.
+
+    Raises:
+        ConfigError: If the file is not a tree of links, or a mesh of it does not exist.
+    """
+    document = UrdfDocument(path, source=resolve_meshes(path))
+    world, x, y, yaw = (f"planar_base/{name}" for name in ("world", "x", "y", "yaw"))
+    chain = (
+        UrdfJoint(x, "prismatic", world, x, axis=(1.0, 0.0, 0.0)),
+        UrdfJoint(y, "prismatic", x, y, axis=(0.0, 1.0, 0.0)),
+        UrdfJoint(yaw, "continuous", y, document.root_link(), axis=(0.0, 0.0, 1.0)),
+    )
+    return write_description(document.mounted_on(chain))
 
 
 class PlanarBase:

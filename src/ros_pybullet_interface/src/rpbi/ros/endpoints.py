@@ -8,7 +8,7 @@ import rospy
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
 from custom_ros_tools.plugins import find, full_name
-from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from rpbi.bodies import Body
 
 Owners = Callable[[Body], Sequence[str]]

@@ -9,7 +9,7 @@ from sensor_msgs.msg import JointState
 
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.plugins import full_name
-from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Twist
 from rpbi.urdf.joints import JointTarget, WrongQuantityError

@@ -10,7 +10,7 @@ import pybullet
 import rospy
 
 from custom_ros_tools.errors import ConfigError, PhysicsError, Problem
-from custom_ros_tools.ros.lifecycle.kept_parameters import kept_parameters
+from custom_ros_tools.ros.lifecycle.parameters import kept_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from rpbi.config.asset_files import ROBOT_DESCRIPTION
 from rpbi.config.loading import load_world_dict

@@ -14,7 +14,7 @@ from tf2_msgs.msg import TFMessage
 
 from custom_ros_tools.errors import InterfaceError, PluginError
 from custom_ros_tools.plugins import cause_of, full_name
-from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Pose
 from rpbi.plugins import is_foreign

@@ -1,8 +1,8 @@
 """How far a robot is with its trajectory."""
 
 from rpbi.control.joint_drive import JointDrive
-from rpbi.control.trajectories.controller_state import ControllerState
 from rpbi.control.trajectories.follower import TrajectoryFollower
+from rpbi.control.trajectories.trajectory import ControllerState
 
 from .sensor import Sensor
 

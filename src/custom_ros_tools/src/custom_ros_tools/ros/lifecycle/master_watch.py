@@ -10,9 +10,9 @@ import rospy
 
 from custom_ros_tools.ros.rospy_internals import Registry, answer_cached, registry
 
-from .kept_parameters import kept_parameters
+from .parameters import kept_parameters
 from .timed_master import MASTER_FAILURES, timed_master
-from .wall_timer import WallTimer
+from .wall_time import WallTimer
 
 LOOK_HZ = 1.0
 _ASKED_BY_LOGGING = "/rosout_disable_topics_generation"

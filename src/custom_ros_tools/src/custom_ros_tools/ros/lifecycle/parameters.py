@@ -1,10 +1,13 @@
-"""Private parameters of a node, checked."""
+"""Parameters of a node: private ones, checked, and those that it sets again at a ROS master that has lost them."""
 
-from typing import TypeVar
+import contextlib
+from typing import Any, TypeVar
 
 import rospy
 
 from custom_ros_tools.schema import ConfigModel
+
+from .timed_master import MASTER_FAILURES, timed_master
 
 Model = TypeVar("Model", bound=ConfigModel)
 
@@ -26,3 +29,49 @@ def private_parameters(model: type[Model]) -> Model:
     """
     keys = [key for key in model.model_fields if rospy.has_param(f"~{key}")]
     return model.parse({key: rospy.get_param(f"~{key}") for key in keys}, rospy.get_name())
+
+
+class KeptParameters:
+    """Remembers parameters and their values for a master that comes back without them."""
+
+    def __init__(self) -> None:
+        self._values: dict[str, Any] = {}
+
+    def keep(self, name: str) -> None:
+        """Remembers the present value of a parameter, if there is one.
+
+        Args:
+            name: Of one parameter, or the namespace of many.
+        """
+        name = rospy.resolve_name(name)
+        if rospy.has_param(name):
+            self._values[name] = rospy.get_param(name)
+
+    def set(self, name: str, value: Any) -> None:
+        """Sets a parameter and remembers it, for later if there is no master now."""
+        name = rospy.resolve_name(name)
+        self._values[name] = value
+        with contextlib.suppress(*MASTER_FAILURES), timed_master() as master:
+            master.setParam(rospy.get_name(), name, value)
+
+    def delete(self, name: str) -> None:
+        """Deletes a parameter and forgets it; it, or the master, may have gone already."""
+        name = rospy.resolve_name(name)
+        self._values.pop(name, None)
+        with contextlib.suppress(*MASTER_FAILURES), timed_master() as master:
+            master.deleteParam(rospy.get_name(), name)
+
+    def restore(self, master: Any) -> None:
+        """Sets those that a master does not have; what it has by now is left alone.
+
+        Args:
+            master: See `timed_master`.
+        """
+        caller = rospy.get_name()
+        for name, value in dict(self._values).items():
+            if not master.hasParam(caller, name)[2]:
+                master.setParam(caller, name, value)
+
+
+kept_parameters = KeptParameters()
+"""Those of this process: a process is one node."""

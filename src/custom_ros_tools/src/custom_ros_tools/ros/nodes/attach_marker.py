@@ -9,7 +9,7 @@ from visualization_msgs.msg import Marker
 from custom_ros_tools.marker_config import MARKER_ACTIONS, MARKER_TYPES, SHAPES, MarkerConfig
 from custom_ros_tools.ros.lifecycle.parameters import private_config
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from custom_ros_tools.ros.lifecycle.wall_timer import WallTimer
+from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
 from custom_ros_tools.ros.transform_messages import TransformTopic, as_pose, transform_message
 
 log = logging.getLogger(__name__)

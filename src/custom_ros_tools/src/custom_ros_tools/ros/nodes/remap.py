@@ -13,7 +13,7 @@ from custom_ros_tools.node_configs import FloatArrayConfig, StartParameters
 from custom_ros_tools.ros.joint_states import values_in
 from custom_ros_tools.ros.lifecycle.parameters import private_config, private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from custom_ros_tools.ros.lifecycle.throttle import ThrottledWarning
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.ros.services import ToggleService
 from custom_ros_tools.toggle import Toggle
 

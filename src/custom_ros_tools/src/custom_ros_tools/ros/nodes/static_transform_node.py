@@ -8,7 +8,7 @@ from custom_ros_tools.errors import collecting_problems
 from custom_ros_tools.node_configs import RateParameters
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from custom_ros_tools.ros.lifecycle.wall_timer import WallTimer
+from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
 from custom_ros_tools.ros.transform_messages import TransformTopic, checked, transform_message
 from custom_ros_tools.srv import SetTransform, SetTransformRequest, SetTransformResponse
 from custom_ros_tools.transforms import StaticTransform

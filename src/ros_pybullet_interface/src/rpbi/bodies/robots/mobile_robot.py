@@ -3,12 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
-from rpbi.control.planar_base import PlanarBase
-from rpbi.control.planar_velocity import PlanarVelocity
+from rpbi.control.planar_base import PLANAR_JOINTS, PlanarBase, PlanarVelocity, with_planar_joints
 from rpbi.engine.client import Client
 from rpbi.engine.inputs import Input
 from rpbi.geometry import Pose, Twist, rotated
-from rpbi.urdf.planar_joints import PLANAR_JOINTS, with_planar_joints
 
 from .robot import Robot
 from .robot_config import RobotConfig

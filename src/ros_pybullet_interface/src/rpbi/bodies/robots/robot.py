@@ -10,9 +10,8 @@ import pybullet
 from custom_ros_tools.errors import Problem, UnknownNameError
 from rpbi.control.gravity import GravityModel
 from rpbi.control.joint_drive import JointDrive
-from rpbi.control.limit_reports import LimitReports
 from rpbi.control.motion import JointMotion, Motion
-from rpbi.control.motors import Command, Motors
+from rpbi.control.motors import Command, LimitReports, Motors
 from rpbi.control.trajectories.config import trajectory_problems
 from rpbi.control.trajectories.follower import TrajectoryFollower
 from rpbi.engine.client import Client

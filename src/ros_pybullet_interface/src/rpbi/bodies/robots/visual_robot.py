@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from rpbi.control.limit_reports import LimitReports
+from rpbi.control.motors import LimitReports
 from rpbi.engine.client import Client
 from rpbi.engine.inputs import Input
 from rpbi.urdf.joints import JointTarget

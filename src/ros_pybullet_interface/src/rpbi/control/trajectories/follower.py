@@ -10,12 +10,11 @@ from rpbi.control.motion import JointMotion
 from rpbi.engine.clock import NS_PER_S, Clock, Schedule
 
 from .config import JointTrajectoryControllerConfig
-from .controller_state import ControllerState
 from .joint_trajectory import JointTrajectory, validate_trajectory
 from .motion import TrajectoryMotion, stopping
 from .request import ErrorCode, GoalTolerances, TrajectoryRefusedError, TrajectoryRequest
 from .tolerances import Tolerances, resolved_tolerances
-from .trajectory import Knot, State, Trajectory
+from .trajectory import ControllerState, Knot, State, Trajectory
 
 
 class CheckedRequest(NamedTuple):

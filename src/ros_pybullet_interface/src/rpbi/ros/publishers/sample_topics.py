@@ -9,7 +9,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.plugins import full_name
 from ros_pybullet_interface.msg import ContactPoint, Contacts
-from rpbi.control.trajectories.controller_state import ControllerState
+from rpbi.control.trajectories.trajectory import ControllerState
 from rpbi.ros.endpoints import Topic, find_topic
 from rpbi.ros.headers import prefixed, to_ros_time, world_frame
 from rpbi.ros.robots.trajectory_messages import CONTROLLER, JointTrajectoryControllerState, state_message

@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rosgraph_msgs.msg import Clock as ClockMessage
 from std_msgs.msg import Int64
 
-from custom_ros_tools.ros.lifecycle.wall_timer import WallRate
+from custom_ros_tools.ros.lifecycle.wall_time import WallRate
 from ros_pybullet_interface.msg import SimulationState
 from rpbi.engine.clock import Schedule
 from rpbi.engine.pacer import Pacer

@@ -10,7 +10,7 @@ from geometry_msgs.msg import Pose as PoseMessage
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from custom_ros_tools.ros.lifecycle.wall_timer import WallRate
+from custom_ros_tools.ros.lifecycle.wall_time import WallRate
 from rpbi.bodies import Body
 from rpbi.bodies.visual_shapes import BodyShape, ShapeKind, body_shapes, followed_frame, link_frame, link_pose
 from rpbi.geometry import Pose

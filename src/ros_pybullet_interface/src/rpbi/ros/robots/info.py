@@ -9,7 +9,7 @@ import rospy
 from geometry_msgs.msg import Point, Quaternion
 
 from custom_ros_tools.errors import ConfigError
-from custom_ros_tools.ros.lifecycle.kept_parameters import kept_parameters
+from custom_ros_tools.ros.lifecycle.parameters import kept_parameters
 from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import RobotInfoRequest, RobotInfoResponse
 from rpbi.bodies.robots.jointed import JointedBody

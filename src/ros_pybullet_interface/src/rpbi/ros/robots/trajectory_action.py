@@ -17,9 +17,9 @@ from actionlib_msgs.msg import GoalStatus
 
 from custom_ros_tools.errors import InterfaceError
 from rpbi.bodies.robots.robot import Robot
-from rpbi.control.trajectories.controller_state import ControllerState
 from rpbi.control.trajectories.motion import TrajectoryMotion
 from rpbi.control.trajectories.request import ErrorCode, TrajectoryRefusedError
+from rpbi.control.trajectories.trajectory import ControllerState
 from rpbi.engine.actions import RecordedTrajectory
 from rpbi.engine.clock import Clock
 from rpbi.ros.endpoints import Service

@@ -6,8 +6,8 @@ from typing import Any
 import genpy
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from rpbi.control.trajectories.controller_state import ControllerState
 from rpbi.control.trajectories.request import GoalTolerances, JointTolerance, TrajectoryPoint, TrajectoryRequest
+from rpbi.control.trajectories.trajectory import ControllerState
 from rpbi.ros.headers import to_ros_time
 
 try:

@@ -5,7 +5,7 @@ from typing import Any
 import rospy
 
 from custom_ros_tools.errors import ConfigError, InterfaceError
-from custom_ros_tools.ros.lifecycle.wall_timer import WallRate
+from custom_ros_tools.ros.lifecycle.wall_time import WallRate
 from ros_pybullet_interface.msg import ResetDebugVisualizerCamera as CameraMessage
 from ros_pybullet_interface.srv import GetDebugVisualizerCamera
 from rpbi.config.pybullet_world_models import ResetDebugVisualizerCamera

@@ -10,7 +10,7 @@ import rospy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int64MultiArray
 
-from custom_ros_tools.ros.lifecycle.wall_timer import WallRate
+from custom_ros_tools.ros.lifecycle.wall_time import WallRate
 from ros_pybullet_interface.msg import KeyboardEvent
 from ros_pybullet_interface.msg import MouseEvent as MouseMessage
 from rpbi.engine.clock import Clock
