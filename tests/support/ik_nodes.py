@@ -9,6 +9,7 @@ from typing import Any
 
 import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped
+from ros_system import wait_until
 from sensor_msgs.msg import JointState
 from tf2_msgs.msg import TFMessage
 
@@ -19,6 +20,9 @@ ARM = str(Path(__file__).resolve().parents[2] / "src/rpbi_examples/robots/kuka_l
 TIP = "end_effector_ball"
 CHAIN = {"urdf_filename": ARM, "base_link": "lwr_arm_0_link", "tip_link": TIP}
 JOINTS = [f"lwr_arm_{number}_joint" for number in range(7)]
+BENT = (0.3, 0.6, 0.2, -1.2, 0.1, 0.8, 0.4)
+FAR = Pose(Point(5.0, 0.0, 0.5), Quaternion(0.0, 0.0, 0.0, 1.0))
+"""Out of reach."""
 HOME = (0.0, 0.52, 0.0, -1.57, 0.0, 1.05, 0.0)
 
 
@@ -59,6 +63,13 @@ def problem(positions: Any = HOME, **fields: Any) -> IKProblem:
 def start_at(positions: Any) -> JointState:
     """Returns where a search starts."""
     return JointState(name=JOINTS, position=positions)
+
+
+def send_until(publisher: rospy.Publisher, message: Any, listener: Any, count: int = 1) -> Any:
+    """Publishes a message until so many more messages have come; returns the first of them."""
+    before = len(listener.messages)
+    wait_until(lambda: publisher.publish(message) or len(listener.messages) >= before + count, "an answer comes")
+    return listener.messages[before]
 
 
 @contextlib.contextmanager

@@ -29,7 +29,7 @@ def support_on_path() -> dict[str, str]:
     return {"PYTHONPATH": os.pathsep.join((os.environ.get("PYTHONPATH", ""), str(SUPPORT)))}
 
 
-def wait_until(condition: Callable[[], Any], what: str, timeout_s: float = 60.0, every_s: float = 0.02) -> Any:
+def wait_until(condition: Callable[[], Any], what: str, timeout_s: float = 120.0, every_s: float = 0.02) -> Any:
     """Waits until a condition holds and returns its value; errors of a master that is not up yet count as no."""
     end_s = time.monotonic() + timeout_s
     while True:
@@ -77,7 +77,7 @@ class Listener:
         self.arrival_s.append(time.monotonic())
         self.messages.append(message)
 
-    def wait_for(self, count: int = 1, timeout_s: float = 60.0) -> list[Any]:
+    def wait_for(self, count: int = 1, timeout_s: float = 120.0) -> list[Any]:
         """Waits until so many messages have come and returns all."""
         wait_until(lambda: len(self.messages) >= count, f"{count} messages came on {self.topic}", timeout_s)
         return self.messages

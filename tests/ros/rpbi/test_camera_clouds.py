@@ -27,35 +27,6 @@ def topics_of_cameras():
     return {name for name, kind in rospy.get_published_topics() if kind.startswith("sensor_msgs/") and "image" in name}
 
 
-@pytest.fixture(scope="module")
-def plain(module_ros):
-    """A world with one camera; further on, tests start nodes of their own, which take the name of this one."""
-    return module_ros.simulator(box_world(module_ros, rgbd_sensor=CAMERA), use_sim_time=True)
-
-
-def test_there_is_no_cloud_unless_it_is_asked_for(ros, plain):
-    ros.listen(DEPTH, Image).wait_for(1)
-    assert CLOUD not in dict(rospy.get_published_topics())
-
-
-@pytest.mark.parametrize(
-    "text, complaint",
-    [
-        ("{name: eye, object_tf: {tf_id: eye}}", "'eye' is taken already"),
-        ("{name: new}", "object_tf: missing"),
-        ("{name: new, object_tf: {tf_id: eye}, hz: -1}", "hz: must be > 0"),
-        ("{name: new, object_tf: {tf_id: eye}, pointclouds: true}", "did you mean 'pointcloud'"),
-        ("{file: nowhere.yaml}", "nowhere.yaml"),
-        ("[1", "expected"),
-        ("", "name: missing"),
-    ],
-)
-def test_camera_that_makes_no_sense_is_refused_and_the_others_go_on(ros, plain, text, complaint):
-    answer = ros.call("/rpbi/add_rgbd_sensor", SetString, text)
-    assert not answer.success and complaint in answer.message, answer.message
-    ros.listen(DEPTH, Image).wait_for(2)
-
-
 @pytest.mark.quick
 def test_cloud_is_organised_and_agrees_with_the_images_of_its_frame(ros):
     listeners = [ros.listen(CLOUD, PointCloud2), ros.listen(DEPTH, Image), ros.listen(COLOUR, Image)]
