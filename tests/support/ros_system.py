@@ -44,8 +44,8 @@ def wait_until(condition: Callable[[], Any], what: str, timeout_s: float = 120.0
         time.sleep(every_s)
 
 
-FOREIGN = ("rostopic",)
-"""Programs of rospy's that sometimes hang on Ctrl-C, and have nothing to finish."""
+BARE = ("rostopic", "flood_targets.py", "hold_topics.py", "late_client.py", "visitor.py")
+"""Programs without our handling of Ctrl-C, on which rospy sometimes hangs; they have nothing to finish."""
 
 
 def stop_group(process: subprocess.Popen, timeout_s: float = 60.0) -> int:
@@ -55,8 +55,8 @@ def stop_group(process: subprocess.Popen, timeout_s: float = 60.0) -> int:
         TimeoutError: If it did not end by itself.
     """
     if process.poll() is None:
-        is_foreign = isinstance(process.args, list) and process.args[0] in FOREIGN
-        os.killpg(process.pid, signal.SIGKILL if is_foreign else signal.SIGINT)
+        names = [os.path.basename(word) for word in process.args[:2]] if isinstance(process.args, list) else []
+        os.killpg(process.pid, signal.SIGKILL if set(names) & set(BARE) else signal.SIGINT)
     try:
         return process.wait(timeout_s)
     except subprocess.TimeoutExpired:
