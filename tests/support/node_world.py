@@ -91,9 +91,8 @@ class Rosout:
         self._listener = ros.listen("/rosout", Log)
 
     def logs(self, containing: str = "") -> list[Log]:
-        """Returns the messages that contain a text; what the tests' own node has logged is not the simulator's."""
-        said = [log for log in list(self._listener.messages) if log.name != rospy.get_name()]
-        return [log for log in said if containing in log.msg]
+        """Returns the messages that contain a text."""
+        return [log for log in list(self._listener.messages) if containing in log.msg]
 
     def wait_for(self, texts: Sequence[str], timeout_s: float = 60.0) -> None:
         """Waits until messages that contain these texts have come."""

@@ -250,7 +250,8 @@ def test_a_hundred_resets_leave_no_trace(ros, start, tmp_path):
     assert megabytes < before[1] + 5.0
     heard = len(ros.output(listener))
     wait_until(lambda: len(ros.output(listener)) > heard, "TF is still known")
-    assert rosout.logs("refused") == []
+    ours = rospy.get_name()  # /rosout gives who comes late the last line that this process has logged
+    assert [log for log in rosout.logs("refused") if log.name != ours] == []
     assert [log.msg for log in rosout.logs() if log.level > 2 and log.name == "/ros_pybullet_interface"] == []
     assert "TF_" not in ros.output(listener), "TF_OLD_DATA and the like"
     last: dict[str, int] = {}
