@@ -33,28 +33,28 @@ def _message(number):
 
 
 def test_what_is_taken_at_once_goes_at_once(pair):
-    patient = BufferedSocket(pair[0], limit=10)
-    patient.sendall(b"hello")
+    buffered = BufferedSocket(pair[0], limit=10)
+    buffered.sendall(b"hello")
     assert _received(pair[1]) == b"hello"
 
 
 def test_a_reader_that_sleeps_holds_nobody_up_and_gets_everything_in_order(pair):
-    patient = BufferedSocket(pair[0], limit=1000)
+    buffered = BufferedSocket(pair[0], limit=1000)
     for number in range(100):  # far more than the socket's buffer takes
-        patient.sendall(_message(number))
+        buffered.sendall(_message(number))
     data = _received(pair[1])
     assert len(data) < 100 * len(_message(0)), "the buffer took all: this test shows nothing"
-    while chunk := (patient.flush(), _received(pair[1]))[1]:
+    while chunk := (buffered.flush(), _received(pair[1]))[1]:
         data += chunk
     assert data == b"".join(map(_message, range(100)))
 
 
 def test_beyond_the_limit_the_oldest_are_dropped_but_never_a_part_of_one(pair):
-    patient = BufferedSocket(pair[0], limit=5)
+    buffered = BufferedSocket(pair[0], limit=5)
     for number in range(100):
-        patient.sendall(_message(number))
+        buffered.sendall(_message(number))
     data = _received(pair[1])
-    while chunk := (patient.flush(), _received(pair[1]))[1]:
+    while chunk := (buffered.flush(), _received(pair[1]))[1]:
         data += chunk
     length = len(_message(0))
     numbers = [int(data[start : start + 6]) for start in range(0, len(data), length)]
@@ -65,10 +65,10 @@ def test_beyond_the_limit_the_oldest_are_dropped_but_never_a_part_of_one(pair):
 
 
 def test_a_reader_that_has_gone_is_an_error(pair):
-    patient = BufferedSocket(pair[0], limit=5)
+    buffered = BufferedSocket(pair[0], limit=5)
     pair[1].close()
     with pytest.raises(BrokenPipeError):
-        patient.sendall(b"x")
+        buffered.sendall(b"x")
 
 
 def test_it_is_otherwise_the_socket(pair):

@@ -47,7 +47,7 @@ def test_columns_go_to_the_joints_that_are_named():
     joint_trajectories = validate_trajectory(
         request(Point(1.0, (0.1, 0.2, 0.3)), names=("wheel", "a", "b")), JOINTS, False
     )
-    assert {course.joint.name: course.trajectory.goal[0] for course in joint_trajectories} == {
+    assert {each.joint.name: each.trajectory.goal[0] for each in joint_trajectories} == {
         "wheel": 0.1,
         "a": 0.2,
         "b": 0.3,
@@ -95,7 +95,7 @@ def test_what_cannot_be_followed_is_refused_with_its_code(asked, code, message):
 
 def test_part_of_the_joints_will_do_where_that_is_allowed():
     joint_trajectories = validate_trajectory(request(Point(1.0, (0.5,)), names=("b",)), JOINTS, True)
-    assert [course.joint.name for course in joint_trajectories] == ["b"]
+    assert [each.joint.name for each in joint_trajectories] == ["b"]
 
 
 def test_planned_motion_at_the_speed_limit_is_not_refused_for_what_its_curve_makes_of_it():
@@ -116,8 +116,8 @@ def joint_trajectory_of(*points: Point, name: str = "a"):
 
 
 def test_joined_course_leaves_out_what_is_past_and_goes_straight_to_the_next_point():
-    course = joint_trajectory_of(Point(0.5, (1.0,)), Point(1.5, (0.5,)), Point(2.5, (-0.5,)))
-    joined = course.joined(standing(0.0), start_s=9.0, from_s=10.0)
+    planned = joint_trajectory_of(Point(0.5, (1.0,)), Point(1.5, (0.5,)), Point(2.5, (-0.5,)))
+    joined = planned.joined(standing(0.0), start_s=9.0, from_s=10.0)
     assert [joined.sample(t).position[0] for t in (9.0, 10.0, 10.25, 10.5, 11.0, 11.5)] == pytest.approx(
         [0.0, 0.0, 0.25, 0.5, 0.0, -0.5]
     )
@@ -125,8 +125,8 @@ def test_joined_course_leaves_out_what_is_past_and_goes_straight_to_the_next_poi
 
 def test_joined_course_begins_with_the_motion_under_way():
     current = Trajectory([Knot(0.0, (0.0,), (0.0,)), Knot(2.0, (1.0,), (0.0,))])
-    course = joint_trajectory_of(Point(1.0, (-0.5,), (0.0,)))
-    joined = course.joined(current, start_s=1.0, from_s=1.0)
+    planned = joint_trajectory_of(Point(1.0, (-0.5,), (0.0,)))
+    joined = planned.joined(current, start_s=1.0, from_s=1.0)
     before, after = joined.sample(1.0 - 1e-9), joined.sample(1.0 + 1e-9)
     assert after.position == pytest.approx(before.position, abs=1e-6)
     assert after.velocity == pytest.approx(before.velocity, abs=1e-6)
@@ -139,8 +139,8 @@ def test_joined_course_begins_with_the_motion_under_way():
     [(0.0, 1.5 * math.pi, -0.5 * math.pi), (6.0 * math.pi, 0.5, 6.0 * math.pi + 0.5), (0.2, 0.3, 0.3)],
 )
 def test_joint_without_limits_takes_the_short_way_and_keeps_its_turns_from_then_on(now, asked, goes_to):
-    course = joint_trajectory_of(Point(1.0, (asked,)), Point(2.0, (asked + 7.0,)), name="wheel")
-    joined = course.joined(standing(now), 0.0, 0.0)
+    planned = joint_trajectory_of(Point(1.0, (asked,)), Point(2.0, (asked + 7.0,)), name="wheel")
+    joined = planned.joined(standing(now), 0.0, 0.0)
     assert joined.sample(1.0).position[0] == pytest.approx(goes_to)
     assert joined.goal[0] == pytest.approx(goes_to + 7.0)
 

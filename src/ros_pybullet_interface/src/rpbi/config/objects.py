@@ -16,8 +16,6 @@ _Model = TypeVar("_Model", bound=ConfigModel)
 
 RESERVED_NAME = "world"
 """No object may have it: `rpbi/world` is the frame that all poses are in."""
-
-
 OWN_TYPES = Body.section
 """List of the main file for objects whose files tell their type themselves."""
 TYPE = "type"

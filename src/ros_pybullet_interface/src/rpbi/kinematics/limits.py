@@ -16,8 +16,6 @@ from rpbi.urdf.joints import LIMIT_ROUNDING, Joint
 from .residual import POSITION_TOLERANCE_M
 
 TURN = 2.0 * math.pi
-
-
 Generator = random.Random | np.random.Generator
 
 

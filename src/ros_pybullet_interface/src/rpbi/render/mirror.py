@@ -33,7 +33,7 @@ class Mirror:
         self._soft_shapes = SoftShapes(pb)
 
     @property
-    def glassy(self) -> tuple[TransparentShape, ...]:
+    def transparent(self) -> tuple[TransparentShape, ...]:
         """The shapes that can be seen through."""
         return self._transparency.shapes
 

@@ -127,7 +127,7 @@ class RenderProcess:
         sample, intrinsics = scene.sample, camera.intrinsics
         assert self._renderer is not None and self._mirror is not None and sample.camera is not None
         segmentation = "segmentation" in streams
-        drawing = self._renderer.draw(intrinsics, sample.camera, segmentation, self._mirror.glassy)
+        drawing = self._renderer.draw(intrinsics, sample.camera, segmentation, self._mirror.transparent)
         images: dict[str, npt.NDArray[Any]] = {}
         if streams & {"colour", "points"}:
             images["colour"] = _without_alpha(drawing.rgba)

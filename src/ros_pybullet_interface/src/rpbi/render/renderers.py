@@ -18,7 +18,8 @@ from .frame import Camera
 
 log = logging.getLogger(__name__)
 
-
+Shapes = Sequence[TransparentShape]
+"""Shapes that can be seen through."""
 _LINK_SHIFT = 24
 """PyBullet tells a body and a link by one number: `body + ((link + 1) << 24)`."""
 
@@ -40,7 +41,7 @@ class Drawing(NamedTuple):
 class Renderer(Protocol):
     """Draws what is in its client.
 
-    A glassy shape tints what is behind it in the colours; depth and segmentation tell of the shape itself, so that
+    A transparent shape tints what is behind it in the colours; depth and segmentation tell of the shape itself, so that
     all images of a frame show the same bodies.
 
     Attributes:
@@ -55,7 +56,7 @@ class Renderer(Protocol):
         """Prepares for a camera that is new."""
 
     def draw(
-        self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, glassy: Sequence[TransparentShape] = ()
+        self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, transparent: Shapes = ()
     ) -> Drawing:
         """Draws what a camera sees.
 
@@ -63,7 +64,7 @@ class Renderer(Protocol):
             intrinsics: The camera.
             camera: Pose of its optical frame in the world.
             segmentation: Whether to tell bodies apart, which costs a second pass.
-            glassy: The shapes that can be seen through; they cost a second pass too.
+            transparent: The shapes that can be seen through; they cost a second pass too.
         """
 
 
@@ -84,26 +85,26 @@ class TinyRenderer:
         """Needs nothing."""
 
     def draw(
-        self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, glassy: Sequence[TransparentShape] = ()
+        self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, transparent: Shapes = ()
     ) -> Drawing:
         """Draws what a camera sees; segmentation is free here.
 
-        It draws glassy shapes as if they were opaque, so they are blended with a second image without them. Glass
+        It draws transparent shapes as if they were opaque, so they are blended with a second image without them. Glass
         behind glass does not show.
         """
         projection = intrinsics.projection
         projection[0, 2] += 1.0 / intrinsics.width_px
         projection[1, 2] += 1.0 / intrinsics.height_px
         how: dict[str, Any] = {"renderer": self.pb.ER_TINY_RENDERER}
-        if not glassy:
+        if not transparent:
             return _draw(self.pb, intrinsics, projection, camera, **how)
         with_links = {**how, "flags": self.pb.ER_SEGMENTATION_MASK_OBJECT_AND_LINKINDEX}
         drawing = _draw(self.pb, intrinsics, projection, camera, **with_links)
-        self._set_opacity(glassy, 0.0)
+        self._set_opacity(transparent, 0.0)
         behind = _draw(self.pb, intrinsics, projection, camera, **how)
-        self._set_opacity(glassy)
+        self._set_opacity(transparent)
         rgba = drawing.rgba.copy()
-        for shape in glassy:
+        for shape in transparent:
             seen = drawing.body_ids == shape.body_id + ((shape.link_index + 1) << _LINK_SHIFT)
             opacity = shape.rgba[3]
             rgba[seen] = np.rint(opacity * drawing.rgba[seen] + (1.0 - opacity) * behind.rgba[seen])
@@ -111,8 +112,8 @@ class TinyRenderer:
         body_ids = np.where(nothing, -1, drawing.body_ids & ((1 << _LINK_SHIFT) - 1)).astype(np.int32)
         return Drawing(rgba, drawing.depth_buffer, body_ids)
 
-    def _set_opacity(self, glassy: Sequence[TransparentShape], opacity: float | None = None) -> None:
-        for body_id, link_index, shape_index, rgba in glassy:
+    def _set_opacity(self, transparent: Shapes, opacity: float | None = None) -> None:
+        for body_id, link_index, shape_index, rgba in transparent:
             colour = [*rgba[:3], rgba[3] if opacity is None else opacity]
             self.pb.changeVisualShape(body_id, link_index, shape_index, rgbaColor=colour)
 
@@ -158,18 +159,18 @@ class EglRenderer:
             self._width_px, self._height_px = width_px, height_px
 
     def draw(
-        self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, glassy: Sequence[TransparentShape] = ()
+        self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, transparent: Shapes = ()
     ) -> Drawing:
         """Draws what a camera sees.
 
-        The colours' pass leaves glassy shapes out of the depth buffer, that of the segmentation does not, and what
+        The colours' pass leaves transparent shapes out of the depth buffer, that of the segmentation does not, and what
         it leaves there can be read.
         """
-        both = segmentation or bool(glassy)
+        both = segmentation or bool(transparent)
         flags = 0 if both else self.pb.ER_NO_SEGMENTATION_MASK
         hardware = self.pb.ER_BULLET_HARDWARE_OPENGL
         drawing = _draw(self.pb, intrinsics, intrinsics.projection, camera, renderer=hardware, flags=flags)
-        if glassy:
+        if transparent:
             drawing = drawing._replace(depth_buffer=self._egl.read_depth(intrinsics.width_px, intrinsics.height_px))
         return drawing
 

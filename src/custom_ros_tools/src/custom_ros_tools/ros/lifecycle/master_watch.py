@@ -16,8 +16,6 @@ from .wall_time import WallTimer
 
 LOOK_HZ = 1.0
 _ASKED_BY_LOGGING = "/rosout_disable_topics_generation"
-
-
 _METHODS = {"sub": "Subscriber", "pub": "Publisher", "srv": "Service"}
 
 

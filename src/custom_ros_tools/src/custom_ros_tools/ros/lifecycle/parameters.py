@@ -13,7 +13,7 @@ Model = TypeVar("Model", bound=ConfigModel)
 
 
 def private_config(model: type[Model]) -> Model:
-    """Return what the parameter `~config` says.
+    """Returns what the parameter `~config` says.
 
     Raises:
         ConfigError: If it is wrong; it tells everything that is.
@@ -22,7 +22,7 @@ def private_config(model: type[Model]) -> Model:
 
 
 def private_parameters(model: type[Model]) -> Model:
-    """Return the private parameters that a model names; others are left alone.
+    """Returns the private parameters that a model names; others are left alone.
 
     Raises:
         ConfigError: If one is wrong; it names the node.

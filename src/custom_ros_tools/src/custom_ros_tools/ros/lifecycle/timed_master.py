@@ -7,6 +7,11 @@ from xmlrpc.client import Error, ServerProxy, Transport
 
 import rosgraph
 
+TIMEOUT_S = 2.0
+"""How long the master may take to answer [s]; a healthy one takes milliseconds."""
+MASTER_FAILURES = (OSError, Error, http.client.HTTPException, ExpatError)
+"""What its calls raise if it has gone, hangs or is something else."""
+
 
 class TimedTransport(Transport):
     """Waits for an answer for a limited time: a process that is stopped accepts connections but never answers.
@@ -24,12 +29,6 @@ class TimedTransport(Transport):
         connection = super().make_connection(host)
         connection.timeout = self._timeout_s
         return connection
-
-
-TIMEOUT_S = 2.0
-"""How long the master may take to answer [s]; a healthy one takes milliseconds."""
-MASTER_FAILURES = (OSError, Error, http.client.HTTPException, ExpatError)
-"""What its calls raise if it has gone, hangs or is something else."""
 
 
 def timed_master() -> Any:

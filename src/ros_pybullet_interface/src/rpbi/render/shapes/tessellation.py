@@ -33,7 +33,7 @@ class FineShapes:
     def __init__(self) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="rpbi-shapes-")
         self._files: dict[bytes, str] = {}
-        self._glassy_count = 0
+        self._transparent_count = 0
         self._surface_of: dict[int, Callable[[CreateVisualShape], Surface | None]] = {
             pybullet.GEOM_SPHERE: lambda shape: surfaces.capsule(shape.radius or _DEFAULT_RADIUS_M, 0.0),
             pybullet.GEOM_CAPSULE: lambda shape: surfaces.capsule(*_round_size(shape)),
@@ -62,9 +62,9 @@ class FineShapes:
 
     def _as_another_file(self, file: str) -> str:
         """Returns a path of the same file that PyBullet takes for another one."""
-        self._glassy_count += 1
+        self._transparent_count += 1
         folder, name = os.path.split(file)
-        return os.path.join(folder, "./" * self._glassy_count + name)
+        return os.path.join(folder, "./" * self._transparent_count + name)
 
     def _file(self, surface: Surface) -> str:
         """Returns the file of a surface; equal ones share one, which PyBullet then reads once."""

@@ -23,7 +23,7 @@ class TransparentShape(NamedTuple):
 
 
 class Transparency:
-    """Keeps account of the glassy shapes among bodies that come and go.
+    """Keeps account of the transparent shapes among bodies that come and go.
 
     PyBullet's EGL plugin goes on telling the shapes of removed bodies, before those of later bodies with the same id.
 
@@ -36,7 +36,7 @@ class Transparency:
         self._stale = {0: len(pb.getVisualShapeData(0))}  # the renderer has drawn a test image
         self._shapes_of: dict[int, tuple[TransparentShape, ...]] = {}
         self.shapes: tuple[TransparentShape, ...] = ()
-        """All glassy shapes."""
+        """All transparent shapes."""
 
     def update(self, body_ids: set[int]) -> None:
         """Takes notice of which bodies there are now."""
@@ -44,10 +44,10 @@ class Transparency:
             del self._shapes_of[body_id]
             self._stale[body_id] = len(self._pb.getVisualShapeData(body_id))
         for body_id in body_ids - self._shapes_of.keys():
-            self._shapes_of[body_id] = tuple(self._glassy(body_id))
+            self._shapes_of[body_id] = tuple(self._transparent_shapes(body_id))
         self.shapes = tuple(shape for shapes in self._shapes_of.values() for shape in shapes)
 
-    def _glassy(self, body_id: int) -> list[TransparentShape]:
+    def _transparent_shapes(self, body_id: int) -> list[TransparentShape]:
         found = []
         count: Counter[int] = Counter()
         for data in self._pb.getVisualShapeData(body_id)[self._stale.get(body_id, 0) :]:
