@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
+from xmlrpc.client import ServerProxy
 
 import rosgraph
 import roslib.packages
@@ -89,8 +90,15 @@ class Listener:
 
     @property
     def is_connected(self) -> bool:
-        """Whether somebody publishes it and we are connected."""
-        return bool(self._subscriber.get_num_connections() > 0)
+        """Whether somebody publishes it, and all who do send to us: a subscriber counts connections not made yet."""
+        master, name = rosgraph.Master(rospy.get_name()), rospy.get_name()
+        publishers = dict(master.getSystemState()[0]).get(self.topic, [])
+
+        def sends_to_us(node: str) -> bool:
+            _, _, connections = ServerProxy(master.lookupNode(node)).getBusInfo(name)
+            return any((to, topic) == (name, self.topic) for _, to, _, _, topic, *_ in connections)
+
+        return bool(publishers) and all(map(sends_to_us, publishers))
 
     @property
     def stamps_ns(self) -> list[int]:

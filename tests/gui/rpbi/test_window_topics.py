@@ -46,12 +46,19 @@ def place(module_ros, screen):
     return found
 
 
-@pytest.fixture
-def keys(ros, place):
-    """Key events."""
-    listener = ros.listen("/rpbi/keyboard", KeyboardEvent)
+@pytest.fixture(scope="module")
+def all_keys(module_ros, place):
+    """Key events of all tests: publishers keep a connection that is closed until they next write to it."""
+    listener = module_ros.listen("/rpbi/keyboard", KeyboardEvent)
     wait_until(lambda: listener.is_connected, "the keyboard is heard")
     return listener
+
+
+@pytest.fixture
+def keys(all_keys):
+    """Key events of one test."""
+    all_keys.messages.clear()
+    return all_keys
 
 
 @pytest.fixture
