@@ -52,27 +52,25 @@ class AlsoTakes:
         return {"anyOf": [handler(core), dict(self.schema)]}
 
 
+@dataclass(eq=False)
 class InnerProblemsError(ValueError):
     """What a validator raises for a value that has a model of its own.
 
-    Args:
+    Attributes:
         problems: All that is wrong with the value, with keys inside of it.
     """
 
-    def __init__(self, problems: Sequence[Problem]) -> None:
-        self.problems = tuple(problems)
-        super().__init__(self.problems)
+    problems: Sequence[Problem]
 
 
+@dataclass(eq=False)
 class KeyedError(ValueError):
     """What a validator of a whole model raises, to blame one of its keys.
 
-    Args:
+    Attributes:
         key: Key path inside the model.
         message: What is wrong with it.
     """
 
-    def __init__(self, key: str, message: str) -> None:
-        self.key = key
-        self.message = message
-        super().__init__(key, message)
+    key: str
+    message: str

@@ -65,9 +65,6 @@ class WallTimer:
                     self._warn(threading.current_thread().name, traceback.format_exc())
 
 
-_PERIOD_S = 5.0
-
-
 class ThrottledWarning:
     """Warns about each subject at most once in some seconds of wall time, and counts what it kept back.
 
@@ -75,7 +72,7 @@ class ThrottledWarning:
         period_s: Shortest time between two warnings about one subject [s].
     """
 
-    def __init__(self, period_s: float = _PERIOD_S) -> None:
+    def __init__(self, period_s: float = 5.0) -> None:
         self._period_s = period_s
         self._lock = threading.Lock()
         self._last: dict[str, tuple[float, int]] = {}
