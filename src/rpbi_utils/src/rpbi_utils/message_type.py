@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import genmsg
@@ -29,17 +30,17 @@ class Field(NamedTuple):
     length: int = SCALAR
 
 
+@dataclass(eq=False)
 class MessageType:
     """A message type with all the types it is made of.
 
-    Args:
+    Attributes:
         name: Full name, such as `sensor_msgs/JointState`.
         fields: Its fields in the order in which they are serialised.
     """
 
-    def __init__(self, name: str, fields: tuple[Field, ...]) -> None:
-        self.name = name
-        self.fields = fields
+    name: str
+    fields: tuple[Field, ...]
 
     @classmethod
     def parse(cls, name: str, definition: str) -> MessageType:

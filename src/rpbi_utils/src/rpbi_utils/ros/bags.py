@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 from tqdm import tqdm
 
+from custom_ros_tools.errors import UnknownNameError
 from rpbi_utils.tables import TableBuilder
 
 from .bag_reader import BagMessage, BagReader
@@ -63,7 +64,9 @@ def _choose(bag: BagReader, topics: Iterable[str] | None, images: bool) -> list[
     """Returns the topics to read, sorted and each once."""
     if topics is not None:
         chosen = sorted(set(topics))
-        bag.check(chosen)
+        for topic in chosen:
+            if topic not in bag.types:
+                raise UnknownNameError("topic", topic, bag.types)
         return chosen
     if images:
         return list(bag.types)

@@ -34,12 +34,7 @@ def topic_report(path: str | Path) -> pd.DataFrame:
             times[message.topic].append(_time(message))
             sizes[message.topic] += len(message.raw)
         rows = [
-            (
-                "|".join(sorted(each.name for each in types)),
-                len(times[topic]),
-                sizes[topic],
-                *_rhythm(times[topic]),
-            )
+            ("|".join(sorted(each.name for each in types)), len(times[topic]), sizes[topic], *_rhythm(times[topic]))
             for topic, types in bag.types.items()
         ]
         return pd.DataFrame(rows, index=pd.Index(list(bag.types), name="topic"), columns=_COLUMNS)
