@@ -1,6 +1,5 @@
-"""What the demo writes about its recording: tables, pictures and a summary."""
+"""What the demo says about its recording, in pictures and words."""
 
-import json
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
@@ -146,11 +145,6 @@ def _rate(row: Mapping[str, Any]) -> str:
 def _load(summary: Mapping[str, Any]) -> str:
     figures = summary["figures"]
     return f"with a load of {figures['load_average']:.1f} on {figures['cores']} cores"
-
-
-def write_summary(summary: Mapping[str, Any], path: Path) -> None:
-    """Writes the summary as JSON."""
-    path.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
 
 
 def as_text(summary: Mapping[str, Any]) -> str:

@@ -1,9 +1,12 @@
 """Services: one that switches on and off, and proxies that wait for theirs."""
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import rospy
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
+
+from custom_ros_tools.errors import InterfaceError
 
 PATIENCE_S = 5.0
 """After how long of waiting it is said what is waited for [s]."""
@@ -34,16 +37,20 @@ def get_srv_handler(
 
 
 def get_srv_handlers(services: Mapping[str, type], persistent: bool = False) -> dict[str, rospy.ServiceProxy]:
-    """Does the same for several services.
-
-    Args:
-        services: Their types by name.
-        persistent: As for one.
-
-    Returns:
-        What calls them, by name.
-    """
+    """Does the same for several services, whose types are given by name; returns what calls them, by name."""
     return {name: get_srv_handler(name, srv_type, persistent) for name, srv_type in services.items()}
+
+
+def call_service(name: str, srv_type: type, *arguments: object) -> Any:
+    """Calls a service when it is there, and returns its answer.
+
+    Raises:
+        InterfaceError: If it answers that it did not succeed.
+    """
+    answer = get_srv_handler(name, srv_type)(*arguments)
+    if not answer.success:
+        raise InterfaceError(f"{name}: {answer.message}")
+    return answer
 
 
 Handler = Callable[[], tuple[bool, str]]
