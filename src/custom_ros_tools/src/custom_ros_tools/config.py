@@ -16,10 +16,7 @@ _PACKAGE = re.compile(r"package://(?P<uri>[^/{}]+)|\{(?P<braces>[^{}]*)\}")
 
 
 def ros_package_path(package: str) -> str:
-    """Returns the folder of a ROS package.
-
-    Args:
-        package: Its name; looked for in ROS_PACKAGE_PATH.
+    """Returns the folder of a ROS package, which is looked for in ROS_PACKAGE_PATH.
 
     Raises:
         ConfigError: If there is no such package.
@@ -44,9 +41,6 @@ def _packages(search_path: str) -> rospkg.RosPack:
 def replace_package(path: str) -> str:
     """Resolves `{package}/path` and `package://package/path`; the first package only, others stay as they are.
 
-    Args:
-        path: The path as the user wrote it.
-
     Raises:
         ConfigError: If there is no such package.
     """
@@ -58,10 +52,7 @@ def replace_package(path: str) -> str:
 
 
 def load_config(path: str) -> dict[str, Any]:
-    """Returns the mapping in a YAML file.
-
-    Args:
-        path: The file; `{package}/path` and `package://package/path` are resolved.
+    """Returns the mapping in a YAML file; `{package}/path` and `package://package/path` are resolved.
 
     Raises:
         ConfigError: If the file cannot be read or is not a YAML mapping; it names file, line and column.
@@ -78,11 +69,7 @@ def load_config(path: str) -> dict[str, Any]:
 
 
 def load_configs(text: str, file: str = "text") -> dict[str, Any]:
-    """Returns the mapping in a YAML text; an empty text is an empty mapping.
-
-    Args:
-        text: The YAML.
-        file: What to call it in messages.
+    """Returns the mapping in a YAML text, which messages call `file`; an empty text is an empty mapping.
 
     Raises:
         ConfigError: If it is not a YAML mapping, names a key twice, or asks for Python objects.
@@ -104,11 +91,7 @@ def load_configs(text: str, file: str = "text") -> dict[str, Any]:
 
 
 def config_to_str(config: Mapping[str, Any]) -> str:
-    """Returns a mapping as YAML text, in its own order; `load_configs` gives the same mapping back.
-
-    Args:
-        config: Plain data: mappings, lists, numbers, texts, true, false and None.
-    """
+    """Returns a mapping of plain data as YAML text, in its own order; `load_configs` gives the same mapping back."""
     return str(yaml.safe_dump(dict(config), sort_keys=False))
 
 

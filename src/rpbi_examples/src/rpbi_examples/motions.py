@@ -106,11 +106,7 @@ SQUARE = tuple(
 
 
 class Route:
-    """A route that begins again at its end.
-
-    Args:
-        waypoints: Where it leads.
-    """
+    """A route along waypoints that begins again at its end."""
 
     def __init__(self, waypoints: Sequence[PlanarPose] = SQUARE) -> None:
         self._waypoints = tuple(waypoints)

@@ -44,11 +44,7 @@ class MessageType:
 
     @classmethod
     def parse(cls, name: str, definition: str) -> MessageType:
-        """Reads the full text of a definition: the type itself, then those it uses, as bags carry it.
-
-        Args:
-            name: Full name of the type.
-            definition: Its text, followed by `MSG: package/Type` sections.
+        """Reads a definition as bags carry it: the type's text, then a `MSG: package/Type` section for each it uses.
 
         Raises:
             ValueError: If the text is no valid definition.

@@ -57,13 +57,7 @@ Handler = Callable[[], tuple[bool, str]]
 
 
 class ToggleService:
-    """A std_srvs/SetBool service: true switches on, false off.
-
-    Args:
-        name: Its name.
-        on: Called for true; returns success and a message.
-        off: Called for false; returns success and a message.
-    """
+    """A std_srvs/SetBool service: true calls `on`, false `off`, each of which returns success and a message."""
 
     def __init__(self, name: str, on: Handler, off: Handler) -> None:
         self._on, self._off = on, off

@@ -58,15 +58,9 @@ class TfInterface:
         return _pose(self.get_tf_msg(parent, child))
 
     def wait_for_tf_msg(self, parent: str, child: str, timeout: float | None = None) -> TransformStamped | None:
-        """Waits until there is a transform and returns the newest.
+        """Waits until there is a transform and returns the newest, None if there was none in time.
 
-        Args:
-            parent: The parent frame.
-            child: The child frame.
-            timeout: How long to wait [s] of wall time; None is for ever.
-
-        Returns:
-            None if there was none in time.
+        The timeout [s] is wall time; None is for ever.
 
         Raises:
             rospy.ROSInterruptException: If ROS shuts down meanwhile.

@@ -51,14 +51,10 @@ def as_pose(transform: Transform) -> Pose:
 
 
 class TransformTopic:
-    """Sends one transform to /tf with the present stamp; nothing while that and the transform stay the same.
+    """Sends the transform from one frame to another to /tf with the present stamp; nothing while both stay the same.
 
     While simulated time stands still, the same stamp again would make each listener warn of a repeated one. Who comes
     then gets the last one all the same, since the topic is latched.
-
-    Args:
-        parent: The parent frame.
-        child: The child frame.
     """
 
     def __init__(self, parent: str, child: str) -> None:

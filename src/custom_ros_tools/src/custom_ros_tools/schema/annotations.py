@@ -40,11 +40,7 @@ class Expects(_Keyword):
 
 @dataclass(frozen=True, eq=False)  # typing wants a hash, which a mapping has not
 class AlsoTakes:
-    """Annotation that states what a validator accepts beside the type itself.
-
-    Attributes:
-        schema: The JSON Schema of it.
-    """
+    """Annotation that states, by its JSON Schema, what a validator accepts beside the type itself."""
 
     schema: Mapping[str, Any]
 
@@ -54,23 +50,14 @@ class AlsoTakes:
 
 @dataclass(eq=False)
 class InnerProblemsError(ValueError):
-    """What a validator raises for a value that has a model of its own.
-
-    Attributes:
-        problems: All that is wrong with the value, with keys inside of it.
-    """
+    """What a validator raises for a value that has a model of its own; the keys of the problems are inside of it."""
 
     problems: Sequence[Problem]
 
 
 @dataclass(eq=False)
 class KeyedError(ValueError):
-    """What a validator of a whole model raises, to blame one of its keys.
-
-    Attributes:
-        key: Key path inside the model.
-        message: What is wrong with it.
-    """
+    """What a validator of a whole model raises, to blame one of its keys, or a key path inside of it."""
 
     key: str
     message: str

@@ -34,14 +34,7 @@ _TYPE_ERRORS = {
 
 
 def problems_of(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any], file: str) -> list[Problem]:
-    """Translates a validation error.
-
-    Args:
-        error: What pydantic raised.
-        model: The model that was validated.
-        data: What it was validated against.
-        file: Name of the file, for the messages.
-    """
+    """Translates what pydantic raised when it validated the data of a file by a model."""
     found: dict[tuple[str, str], Problem] = {}
     for details in error.errors(include_url=False):
         loc = _real_location(details, data)

@@ -31,10 +31,7 @@ class BagMessage(NamedTuple):
 
 
 class BagReader:
-    """An open bag, which is closed at the end of its context; needs no master and no installed message packages.
-
-    Args:
-        path: A `.bag` file, of any compression.
+    """An open bag of any compression, as a context that closes it; needs no master and no message packages.
 
     Attributes:
         path: The file.

@@ -28,10 +28,7 @@ _TYPES: dict[str, Any] = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs the command.
-
-    Args:
-        argv: Its arguments; by default those of the process.
+    """Runs the command, by default with the arguments of the process.
 
     Returns:
         The exit code: 0 if all states agree, else 1.
@@ -61,11 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def read_recording(path: Path, namespace: str = "/") -> Recording:
-    """Reads what a bag has of a session.
-
-    Args:
-        path: The bag.
-        namespace: Namespace of the simulator.
+    """Reads what a bag has of a session of the simulator in a namespace.
 
     Raises:
         BagError: If there is no such bag, or it lacks what a replay needs.

@@ -15,9 +15,6 @@ _COLUMNS = ("type", "messages", "bytes", "rate_hz", "max_gap_s", "first", "last"
 def topic_report(path: str | Path) -> pd.DataFrame:
     """Measures every topic of a bag.
 
-    Args:
-        path: A `.bag` file.
-
     Returns:
         One row a topic (the index), sorted by name, with the columns `type`, `messages`, `bytes` (serialised,
         before compression), `rate_hz` (mean, from the first to the last message; NaN if they have the same

@@ -25,9 +25,6 @@ class Registrations:
     That one waits for a master that has gone, with all topics locked, and registers nothing again. Here what is opened
     or closed while there is no master is told to the next one.
 
-    Args:
-        registry: The topics and services.
-
     Attributes:
         are_complete: Whether the master knows them all, as far as is known.
     """
@@ -67,14 +64,7 @@ class Registrations:
         self._withdrawn.append((method, arguments))
 
     def repeat(self, master: Any) -> tuple[int, int]:
-        """Registers everything again, and parameters with it.
-
-        Args:
-            master: See `timed_master`.
-
-        Returns:
-            The number of topics and that of services.
-        """
+        """Registers everything again, and parameters with it; returns the number of topics and that of services."""
         with self._registry.entries() as entries:  # no topic or service comes or goes meanwhile
             kept_parameters.restore(master)
             calls: Any = MultiCall(master)
