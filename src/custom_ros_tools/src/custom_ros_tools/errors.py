@@ -49,11 +49,7 @@ class Problem:
 
 
 class ConfigError(InterfaceError):
-    """The author of the configuration has to change something.
-
-    Args:
-        problems: All problems that were found, in the order of the files.
-    """
+    """The author of the configuration has to change something; it has all problems, in the order of the files."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
@@ -64,13 +60,7 @@ class ConfigError(InterfaceError):
 
 
 class UnknownNameError(InterfaceError):
-    """The caller named something that does not exist.
-
-    Args:
-        kind: What sort of thing was named, such as `"joint"`.
-        name: The name that is not known.
-        known: The names that are.
-    """
+    """The caller named something that does not exist; the kind says what sort of thing, such as `"joint"`."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
         self.kind, self.name, self.known = kind, name, tuple(known)
@@ -85,12 +75,7 @@ class UnknownNameError(InterfaceError):
 
 @dataclass(eq=False)
 class MissingDependency(InterfaceError):  # noqa: N818 (the name says what is the matter)
-    """An optional library is not installed.
-
-    Attributes:
-        package: Name of what is missing.
-        how: What to do about it, such as a command to type.
-    """
+    """An optional library is not installed; `how` says what to do about it, such as a command to type."""
 
     package: str
     how: str

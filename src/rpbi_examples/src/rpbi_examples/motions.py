@@ -85,13 +85,7 @@ def camera_pose(time_s: float) -> tuple[Vector, Array]:
 
 
 class PlanarPose(NamedTuple):
-    """Where something stands on the floor.
-
-    Attributes:
-        x: Position [m].
-        y: Position [m].
-        yaw: Angle about the vertical [rad].
-    """
+    """Where something stands on the floor: x and y [m], and the angle about the vertical [rad]."""
 
     x: float
     y: float

@@ -8,12 +8,7 @@ from custom_ros_tools.errors import InterfaceError
 
 @dataclass(eq=False)
 class BagError(InterfaceError):
-    """A bag cannot be read, or what is in it cannot be written as asked.
-
-    Attributes:
-        path: The bag.
-        message: What is wrong, and what to do about it.
-    """
+    """A bag cannot be read, or what is in it cannot be written as asked; the message says what to do about it."""
 
     path: Path
     message: str

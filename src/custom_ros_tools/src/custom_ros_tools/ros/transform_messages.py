@@ -23,23 +23,14 @@ def transform_message(position: ArrayLike, orientation: ArrayLike, in_deg: bool 
     return Transform(translation, Quaternion(*quat_of(orientation, in_deg).tolist()))
 
 
-def checked(transform: Transform) -> Transform:
-    """Returns a transform that came from outside, its quaternion normalised.
-
-    Raises:
-        ValueError: If a number is not finite or the quaternion is zero.
-    """
-    return transform_message(position_in(transform), quat_in(transform))
-
-
 def position_in(transform: Transform) -> Array:
-    """Returns the translation x, y, z [m]."""
+    """Returns the translation x, y, z [m]; raises a ValueError if a number is not finite."""
     v = transform.translation
     return finite_vector((v.x, v.y, v.z), 3, "position")
 
 
 def quat_in(transform: Transform) -> Array:
-    """Returns the rotation as a unit quaternion x, y, z, w."""
+    """Returns the rotation as a unit quaternion x, y, z, w; raises a ValueError if it is zero or not finite."""
     q = transform.rotation
     return unit_quat((q.x, q.y, q.z, q.w))
 

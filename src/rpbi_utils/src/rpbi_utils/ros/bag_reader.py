@@ -15,14 +15,7 @@ _ACTIVE_SUFFIX = ".active"
 
 
 class BagMessage(NamedTuple):
-    """A serialised message of a bag.
-
-    Attributes:
-        topic: Where it was published.
-        type: Its type.
-        raw: Its bytes.
-        record_time_s: When it was recorded [s], in ROS time.
-    """
+    """A serialised message of a bag, and when it was recorded [s], in ROS time."""
 
     topic: str
     type: MessageType
