@@ -112,11 +112,7 @@ def failures(summary: Mapping[str, Any], required: Collection[str]) -> list[str]
 def slow_lines(summary: Mapping[str, Any], images: Collection[str], required: Collection[str], world: str) -> list[str]:
     """Returns what came too seldom because the machine is slow or busy: what limits it, and what to do.
 
-    Args:
-        summary: The summary.
-        images: Topics of the camera; they share a line.
-        required: Topics that this is no excuse for.
-        world: Main YAML file.
+    Images share a line; for topics that are required this is no excuse. `world` is the main YAML file.
     """
     topics, lines = summary["topics"], []
     slow_images = _too_few(summary, images)

@@ -138,7 +138,9 @@ class MasterWatch:
         calls.lookupNode(self._name, self._name)
         (_, _, process), (_, _, node_uri) = calls()
         if node_uri and node_uri != rospy.get_node_uri():
-            self._give_way(node_uri)
+            if not rospy.core.is_shutdown_requested():
+                rospy.logfatal("another node is called %s by now (at %s): this one ends", self._name, node_uri)
+                rospy.signal_shutdown("another node has its name")
         elif self._registrations is None:
             if process != self._process:
                 rospy.logwarn("the ROS master at %s is another one: it knows nothing of %s", self._uri, self._name)
@@ -146,11 +148,6 @@ class MasterWatch:
         elif process != self._process or not node_uri or not self._registrations.are_complete:
             self._register(master, self._registrations)
             self._process, self._is_gone = process, False
-
-    def _give_way(self, node_uri: str) -> None:
-        if not rospy.core.is_shutdown_requested():
-            rospy.logfatal("another node is called %s by now (at %s): this one ends", self._name, node_uri)
-            rospy.signal_shutdown("another node has its name")
 
     def _register(self, master: Any, registrations: Registrations) -> None:
         with self._registering:

@@ -26,15 +26,8 @@ QUEUE_SIZE = 100
 class RemapNode:
     """Publishes what it makes of joint states while it is switched on; off, it does not even listen.
 
-    It has the service `remap_joint_state/toggle` and the same under the name of its executable.
-
-    Args:
-        executable: The name of the executable.
-        source: Topic of the joint states.
-        target: Topic of what is made of them.
-        target_type: The ROS type of that.
-        convert: Makes it; raises InterfaceError or ValueError for a message that must be refused.
-        start_on_init: Whether it is on from the start.
+    It has the service `remap_joint_state/toggle` and the same under the name of its executable. `convert` makes what is
+    published; it raises InterfaceError or ValueError for a message that must be refused.
     """
 
     def __init__(
