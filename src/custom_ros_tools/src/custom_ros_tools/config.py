@@ -10,7 +10,7 @@ from typing import Any, cast
 import rospkg
 import yaml
 
-from .errors import ConfigError, Problem, hint
+from .errors import ConfigError, Problem, closest
 
 _PACKAGE = re.compile(r"package://(?P<uri>[^/{}]+)|\{(?P<braces>[^{}]*)\}")
 
@@ -21,14 +21,13 @@ def ros_package_path(package: str) -> str:
     Raises:
         ConfigError: If there is no such package.
     """
-    packages = _packages(os.environ.get("ROS_PACKAGE_PATH", ""))
+    search_path = os.environ.get("ROS_PACKAGE_PATH", "")
+    packages = _packages(search_path)
     try:
         return str(packages.get_path(package))
     except rospkg.ResourceNotFound:
-        known = packages.list()
-    where = os.environ.get("ROS_PACKAGE_PATH") or "nothing"
-    close = hint(package, known)
-    advice = close if "did you mean" in close else f" (ROS_PACKAGE_PATH is {where})"
+        match = closest(package, packages.list())
+    advice = f"; did you mean '{match}'?" if match else f" (ROS_PACKAGE_PATH is {search_path or 'nothing'})"
     raise ConfigError([Problem("", "", f"unknown ROS package '{package}'{advice}")])
 
 

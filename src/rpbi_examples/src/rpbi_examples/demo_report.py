@@ -20,12 +20,7 @@ LEAST_SPAN_RAD = 0.2
 
 
 def measured_rates(messages: Mapping[str, int], expected_hz: Mapping[str, float], duration_s: float) -> pd.DataFrame:
-    """Compares how often topics came with how often they should.
-
-    Args:
-        messages: Number of messages by topic.
-        expected_hz: Rate by topic [Hz].
-        duration_s: Time in which they came [s] of ROS time.
+    """Compares how often topics came in a time [s of ROS time] with how often they should.
 
     Returns:
         One row a topic with the columns `messages`, `rate_hz`, `expected_hz` and `enough`.

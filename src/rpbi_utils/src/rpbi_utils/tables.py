@@ -148,11 +148,7 @@ class TableBuilder:
 
 
 def _read_leaf(leaf: Leaf, matrix: Array) -> Array:
-    """Reads the same value out of several messages.
-
-    Args:
-        leaf: Where it lies.
-        matrix: Messages of one layout, shape (n, size), uint8.
+    """Reads the same value out of messages of one layout, shape (n, size), uint8.
 
     Returns:
         Shape (n,): numbers of the field's own type, bool, float64 [s] for `time` and `duration`, `str` or

@@ -18,8 +18,6 @@ def get_srv_handler(
     """Waits until a service is there, for ever if need be, and returns what calls it.
 
     Args:
-        name: The service.
-        srv_type: Its type.
         persistent: Whether to keep one connection open, which is faster and ends with the server.
         headers: What else to tell the server when connecting.
 

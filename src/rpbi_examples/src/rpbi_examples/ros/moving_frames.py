@@ -56,11 +56,7 @@ class _FigureEightNode:
 def _move(parent: str, child: str, pose: Callable[[float], tuple[ArrayLike, ArrayLike]], hz: float) -> None:
     """Broadcasts a frame until ROS shuts down.
 
-    Args:
-        parent: The frame that it is in.
-        child: Its name.
-        pose: Position [m] and orientation (x, y, z, w) at a time since the start [s] of ROS time.
-        hz: How often.
+    `pose` gives position [m] and orientation (x, y, z, w) at a time since the start [s of ROS time].
     """
     tf = TfInterface()
     start = last = rospy.Time.now()

@@ -27,7 +27,6 @@ class BagReader:
     """An open bag of any compression, as a context that closes it; needs no master and no message packages.
 
     Attributes:
-        path: The file.
         types: The message types of each topic, in the order of their names; nearly always one a topic.
         md5sums: Their md5 sums.
         counts: Number of messages of each topic.
