@@ -34,17 +34,15 @@ _RULES = {
 
 def problems_of(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any], file: str) -> list[Problem]:
     """Translates what pydantic raised when it validated the data of a file by a model."""
-    found: dict[tuple[str, str], Problem] = {}
+    problems = []
     for details in error.errors(include_url=False):
         loc = _real_location(details, data)
-        error_raised = details.get("ctx", {}).get("error")
-        if isinstance(error_raised, InnerProblemsError):
-            inner = [(_joined(key_path(loc), each.key), each.message) for each in error_raised.problems]
+        raised = details.get("ctx", {}).get("error")
+        if isinstance(raised, InnerProblemsError):
+            problems += [Problem(file, _joined(key_path(loc), each.key), each.message) for each in raised.problems]
         else:
-            inner = [_explain(details, loc, _schema_of(model))]
-        for key, message in inner:
-            found.setdefault((key, message), Problem(file, key, message))
-    return list(found.values())
+            problems.append(Problem(file, *_explain(details, loc, _schema_of(model))))
+    return list(dict.fromkeys(problems))  # the same but for what pydantic adds to the location
 
 
 def key_path(loc: Sequence[str | int]) -> str:

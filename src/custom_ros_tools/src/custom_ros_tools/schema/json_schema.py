@@ -114,7 +114,7 @@ def name_of(reference: Schema) -> str:
 
 
 def resolved(schema: Schema, root: Schema) -> Schema:
-    """Returns a schema, or the definition that it refers to, which the schema of the file has."""
+    """Returns a schema, or the definition in `root`, the schema of the file, that it refers to."""
     return dict(root[DEFINITIONS][name_of(schema)]) if "$ref" in schema else schema
 
 
