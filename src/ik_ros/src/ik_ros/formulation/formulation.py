@@ -17,7 +17,7 @@ from rpbi.geometry import Pose
 
 from .frame_task import FrameTask
 from .robot import Robot
-from .task import Task, TaskConfig
+from .task import Task, TaskConfig, blaming
 
 
 def task_class(name: str) -> type[Task]:
@@ -202,8 +202,6 @@ def _robot(formulation: Formulation) -> Robot:
         if name not in robot.all_joints:
             raise KeyedError("start", str(UnknownNameError("joint", name, robot.all_joints)))
     for i, shape in enumerate(formulation.shapes):
-        try:
+        with blaming(f"shapes[{i}].link"):
             robot.add_shape(shape)
-        except UnknownNameError as error:
-            raise KeyedError(f"shapes[{i}].link", str(error)) from None
     return robot

@@ -179,14 +179,7 @@ class Robot:
         return changed
 
     def moved(self, q: np.ndarray, step: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-        """Returns the configuration after a step of what is free [rad or m].
-
-        Args:
-            q: The configuration before.
-            step: The step.
-            lower: n lower limits, which are kept.
-            upper: n upper limits.
-        """
+        """Returns the configuration after a step of what is free, within n lower and n upper limits [rad or m]."""
         if not self.is_floating:
             positions = q[self._in_q] + step
         else:
@@ -244,11 +237,7 @@ class Robot:
 
 
 def _known(kind: str, name: str, names: Collection[str]) -> str:
-    """Returns a name.
-
-    Raises:
-        UnknownNameError: If it is none of these.
-    """
+    """Returns a name; raises `UnknownNameError` if it is none of these."""
     if name not in names:
         raise UnknownNameError(kind, name, names)
     return name
