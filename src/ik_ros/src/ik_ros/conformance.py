@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import pytest
 
 from custom_ros_tools.errors import UnknownNameError
-from rpbi.geometry import Pose, Quaternion
+from rpbi.geometry import Pose, Quaternion, normalized
 from rpbi.kinematics import Kinematics
 from rpbi.kinematics.limits import Limits
 from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
@@ -218,6 +218,4 @@ def distances(pose: Pose, other: Pose) -> tuple[float, float]:
 
 def random_quat(generator: random.Random) -> Quaternion:
     """Returns a random rotation, any as likely as any other."""
-    x, y, z, w = (generator.gauss(0.0, 1.0) for _ in range(4))
-    norm = math.hypot(x, y, z, w) or 1.0
-    return x / norm, y / norm, z / norm, w / norm
+    return normalized([generator.gauss(0.0, 1.0) for _ in range(4)])

@@ -11,8 +11,8 @@ from custom_ros_tools.joint_values import JointValues
 from ik_ros.msg import IKProblem as IKProblemMessage
 from ik_ros.msg import TaskGoal, TracIKProblem
 from ik_ros.msg import Waypoint as WaypointMessage
-from ik_ros.problem import IKProblem, IKSolution, JointPositions, SampledTrajectory, Vector, Waypoint
-from rpbi.geometry import Pose
+from ik_ros.problem import IKProblem, IKSolution, JointPositions, SampledTrajectory, Waypoint
+from rpbi.geometry import Pose, Vector
 
 
 def problem_in(message: IKProblemMessage) -> IKProblem:

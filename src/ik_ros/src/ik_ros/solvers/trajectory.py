@@ -12,6 +12,7 @@ from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
+from scipy.spatial.transform import Rotation
 
 from custom_ros_tools.errors import MissingDependency, UnknownNameError
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Positive, Seconds
@@ -30,7 +31,7 @@ except ImportError:
 
 from ik_ros.trajectory.program import Program
 from ik_ros.trajectory.spline import Spline
-from ik_ros.trajectory.symbolic import link_frames, rotation_matrix, sphere_distances
+from ik_ros.trajectory.symbolic import link_frames, sphere_distances
 
 MOST_INTERVALS = 128
 """Waypoints that follow each other faster than two intervals of the finest spline can hardly all be passed."""
@@ -265,7 +266,8 @@ class TrajectorySolver(KdlSolver):
 
 def _flat(waypoint: Waypoint) -> np.ndarray:
     """Returns rotation by columns and position of a waypoint, 12 numbers."""
-    return np.concatenate((rotation_matrix(waypoint.pose).T.ravel(), waypoint.pose.position))
+    position, quat_xyzw = waypoint.pose
+    return np.concatenate((Rotation.from_quat(quat_xyzw).as_matrix().T.ravel(), position))
 
 
 def _checks(spline: Spline) -> np.ndarray:
