@@ -2,23 +2,23 @@
 
 import rospy
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.joint_values import JointValues
 from custom_ros_tools.node_configs import StartParameters
 from custom_ros_tools.ros.lifecycle.parameters import private_config, private_parameters
-from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
-from custom_ros_tools.ros.services import ToggleService
-from custom_ros_tools.toggle import Toggle
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from ik_ros.node_configs import RobotIKConfig, TargetParameters
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
 from ros_pybullet_interface.srv import RobotInfo
 
+from .solver_nodes import publish_problems
 from .tf import FreshTf
 
 TOPICS = "ik/setup/pybullet"
-LISTS = ("lowerLimits", "upperLimits", "jointRanges", "resetPoses", "jointDamping")
-QUEUE_SIZE = 10
+NOT_IN_MESSAGES = {"robot_name", "parent_frame_id", "child_frame_id"}
+"""Keys of `~config` that are no fields of a problem."""
 
 
 class RobotIKSetup:
@@ -39,21 +39,10 @@ class RobotIKSetup:
         self._period_s = 1.0 / timing.hz
         self._warn = ThrottledWarning()
         self._current: list[float] = []
-        self._is_on = False
         rospy.set_param("ik_ros/interface", "pybullet")
         self._joints = _joints_of(config.robot_name)
-        self._publisher = rospy.Publisher(
-            "ik", CalculateInverseKinematicsProblem, queue_size=QUEUE_SIZE, tcp_nodelay=True
-        )
         rospy.Subscriber(f"{TOPICS}/currentPosition", JointState, self._take_current, queue_size=1)
-        setup = Toggle("setup", lambda: self._switch(True), lambda: self._switch(False))
-        if start_on_init:
-            setup.on()
-        ToggleService(f"{TOPICS}/toggle", setup.on, setup.off)
-        WallTimer(timing.hz, self._publish)
-
-    def _switch(self, on: bool) -> None:
-        self._is_on = on
+        publish_problems(TOPICS, CalculateInverseKinematicsProblem, timing.hz, start_on_init, self._problem)
 
     def _take_current(self, message: JointState) -> None:
         try:
@@ -63,29 +52,16 @@ class RobotIKSetup:
             return
         self._current = list(values.position)
 
-    def _publish(self) -> None:
-        if not self._is_on:
-            return
-        try:
-            pose = self._tf.pose()
-        except InterfaceError as error:
-            self._warn("no problem is published", str(error))
-            return
-        config = self._config
-        message = CalculateInverseKinematicsProblem(
-            link_name=config.link_name,
+    def _problem(self) -> CalculateInverseKinematicsProblem:
+        pose = self._tf.pose()
+        return CalculateInverseKinematicsProblem(
+            header=Header(stamp=rospy.Time.now(), frame_id=self._config.parent_frame_id),
             targetPosition=pose.position,
             targetOrientation=pose.quat_xyzw,
-            solver=config.solver,
             currentPosition=self._current,
-            maxNumIterations=config.maxNumIterations,
-            residualThreshold=config.residualThreshold,
             dt=self._period_s if self._current else 0.0,
-            **{key: getattr(config, key) for key in LISTS},
+            **self._config.model_dump(exclude=NOT_IN_MESSAGES),
         )
-        message.header.stamp = rospy.Time.now()
-        message.header.frame_id = config.parent_frame_id
-        self._publisher.publish(message)
 
 
 def _joints_of(robot: str) -> tuple[str, ...]:

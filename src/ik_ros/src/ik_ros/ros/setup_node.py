@@ -10,11 +10,9 @@ import rospy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray, Header
 
-from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
+from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
-from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
-from custom_ros_tools.ros.services import ToggleService
-from custom_ros_tools.toggle import Toggle
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from ik_ros.msg import IKProblem as IKProblemMessage
 from ik_ros.node_configs import SetupParameters
 from ik_ros.problem import IKProblem, JointPositions
@@ -22,10 +20,9 @@ from rpbi.geometry import Pose
 
 from .messages import positions_in, problem_message
 from .robot_ik_setup import RobotIKSetup
-from .solver_name import run_for_solver, topics_of
+from .solver_nodes import QUEUE_SIZE, publish_problems, run_for_solver, topics_of
 from .tf import FreshTf
 
-QUEUE_SIZE = 10
 START_TOPICS = ("qinit", "start_state", "currentPosition")
 """Names that the release's solvers have for the same."""
 PREVIOUS_TOPICS = ("previous_solutions", "previous_solution")
@@ -47,7 +44,6 @@ class SetupNode:
         self._topics = topics_of("setup", name)
         self._warn = ThrottledWarning()
         self._lock = threading.Lock()
-        self._is_on = False
         self._tf: FreshTf | None = None
         if config.parent_frame_id is not None and config.child_frame_id is not None:
             self._tf = FreshTf(config.parent_frame_id, config.child_frame_id, config.tf_timeout_s)
@@ -55,21 +51,13 @@ class SetupNode:
         self._previous: deque[JointPositions] = deque(maxlen=config.max_num_prev_solutions)
         self._goals = dict(config.goals)
         self._tolerances = {key: getattr(config, f"init_{key}") for key in TOLERANCES}
-        self._check_parameters()
-        self._publisher = rospy.Publisher("ik", IKProblemMessage, queue_size=QUEUE_SIZE, tcp_nodelay=True)
-        rospy.set_param("ik_ros/interface", name)
-        self._subscribe()
-        setup = Toggle("setup", lambda: self._switch(True), lambda: self._switch(False))
-        if config.start_on_init:
-            setup.on()
-        ToggleService(f"{self._topics}/toggle", setup.on, setup.off)
-        WallTimer(config.hz, self._publish)
-
-    def _check_parameters(self) -> None:
         try:
             self._problem(None)
         except ValueError as error:
             raise ConfigError([Problem(rospy.get_name(), "", str(error))]) from None
+        rospy.set_param("ik_ros/interface", name)
+        self._subscribe()
+        publish_problems(self._topics, IKProblemMessage, config.hz, config.start_on_init, self._message)
 
     def _subscribe(self) -> None:
         for topic in START_TOPICS:
@@ -94,9 +82,6 @@ class SetupNode:
 
         rospy.Subscriber(full_name, message_type, checked, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
-    def _switch(self, on: bool) -> None:
-        self._is_on = on
-
     def _take_start(self, topic: str, message: JointState) -> None:
         self._start = positions_in(topic, message)
 
@@ -115,16 +100,9 @@ class SetupNode:
         IKProblem(goals={task: message.data})
         self._goals[task] = tuple(message.data)
 
-    def _publish(self) -> None:
-        if not self._is_on:
-            return
-        try:
-            problem = self._problem(None if self._tf is None else self._tf.pose())
-        except (InterfaceError, ValueError) as error:
-            self._warn("no problem is published", str(error))
-            return
-        header = Header(stamp=rospy.Time.now(), frame_id=self._config.parent_frame_id or "")
-        self._publisher.publish(problem_message(problem, header))
+    def _message(self) -> IKProblemMessage:
+        problem = self._problem(None if self._tf is None else self._tf.pose())
+        return problem_message(problem, Header(stamp=rospy.Time.now(), frame_id=self._config.parent_frame_id or ""))
 
     def _problem(self, target: Pose | None) -> IKProblem:
         with self._lock:
