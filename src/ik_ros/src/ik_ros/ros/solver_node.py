@@ -33,9 +33,10 @@ from ik_ros.srv import (
 )
 
 from .messages import pose_message, problem_in, problem_in_trac_ik, trajectory_message
-from .solver_nodes import QUEUE_SIZE, run_for_solver, topics_of
+from .solver_name import run_for_solver, topics_of
 from .tf import BaseFrame
 
+QUEUE_SIZE = 10
 PROBLEMS: dict[str, tuple[type[genpy.Message], Callable[[genpy.Message], IKProblem]]] = {
     IKProblemMessage._type: (IKProblemMessage, problem_in),
     TracIKProblem._type: (TracIKProblem, problem_in_trac_ik),
