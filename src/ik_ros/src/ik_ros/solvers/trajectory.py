@@ -7,7 +7,7 @@ import random
 import threading
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Annotated
 
 import numpy as np
@@ -103,7 +103,7 @@ class TrajectorySolver(KdlSolver):
         speeds = dict(zip(self.joint_names, self.velocity_limits)) | config.velocity_limits
         accelerations = dict.fromkeys(self.joint_names, math.inf) | config.acceleration_limits
         self._max_velocity, self._max_acceleration = np.array([*speeds.values()]), np.array([*accelerations.values()])
-        self._compiled = lru_cache(KEPT_PROGRAMS)(self._compile)
+        self._compiled = lru_cache(KEPT_PROGRAMS)(partial(Program, self.description, config.shapes))
         self._program_lock = threading.Lock()
         q = casadi.SX.sym("q", len(self.joint_names))
         distances = sphere_distances(config.shapes, link_frames(self.description, q)) or [casadi.inf]
@@ -151,8 +151,7 @@ class TrajectorySolver(KdlSolver):
         last_s = 0.0
         for i, waypoint in enumerate(waypoints):
             if not waypoint.time_s > last_s:
-                message = f"must be after {last_s:g} s, got {waypoint.time_s:g}"
-                raise ValueError(f"waypoints[{i}].time_s: {message}")
+                raise ValueError(f"waypoints[{i}].time_s: must be after {last_s:g} s, got {waypoint.time_s:g}")
             last_s = waypoint.time_s
         if last_s / self._config.sample_s > MOST_SAMPLES:
             raise ValueError(f"waypoints: {last_s:g} s in steps of {self._config.sample_s:g} s (sample_s) are too many")
@@ -187,7 +186,8 @@ class TrajectorySolver(KdlSolver):
         times_s = np.array([0.0, *(waypoint.time_s for waypoint in waypoints)])
         duration_s = float(times_s[-1])
         with self._program_lock:
-            spline, program = self._program(times_s)
+            program = self._program(times_s)
+            spline = program.spline
             guess = np.stack([np.interp(spline.times, times_s / duration_s, each) for each in zip(*postures)], axis=1)
             tolerance = np.array((*problem.position_tolerance, *problem.rotation_tolerance))
             aim = AIM * np.array((POSITION_TOLERANCE_M,) * 3 + (ORIENTATION_TOLERANCE_RAD,) * 3)
@@ -227,16 +227,13 @@ class TrajectorySolver(KdlSolver):
             trajectory=None if problems else self._sampled(spline, points, duration_s),
         )
 
-    def _program(self, times_s: np.ndarray) -> tuple[Spline, Program]:
-        """Returns splines that are fine enough for the waypoints, and their program."""
+    def _program(self, times_s: np.ndarray) -> Program:
+        """Returns the program of splines that are fine enough for the waypoints."""
         gap = float(np.diff(times_s).min() / times_s[-1])
         intervals = self._config.intervals
         while gap * intervals < 2.0 and intervals < MOST_INTERVALS:
             intervals *= 2
-        return Spline(intervals), self._compiled(intervals, len(times_s) - 1)
-
-    def _compile(self, intervals: int, waypoints: int) -> Program:
-        return Program(self.description, self._config.shapes, Spline(intervals), waypoints)
+        return self._compiled(intervals, len(times_s) - 1)
 
     def _nearest_m(self, q: np.ndarray) -> float:
         """Returns the least distance of all pairs in k x n positions; inf without any [m]."""
