@@ -142,13 +142,13 @@ class ChainSolver(Solver):
         return words + ("; it is farther away than the chain is long" if is_far else "")
 
 
-def refuse_mimics(description: ChainDescription, config: ChainConfig, solver: str) -> None:
+def refuse_mimics(config: ChainConfig, solver: str) -> None:
     """Refuses chains with joints that mimic others.
 
     Raises:
         ConfigError: If there are some; it names them.
     """
-    if mimics := description.mimics:
+    if mimics := config.chain.mimics:
         message = f"{', '.join(mimics)}: '{solver}' cannot solve for joints that mimic others; 'kdl' can"
         raise ConfigError([Problem(config.urdf_filename, "", message)])
 

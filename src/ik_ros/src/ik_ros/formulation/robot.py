@@ -110,10 +110,7 @@ class Robot:
         Raises:
             UnknownNameError: If there is no such joint.
         """
-        known = [name for name in names if name not in self._still]
-        for name in known:
-            self.joint_id(name)
-        return known
+        return [_known("joint", name, self.all_joints) for name in names if name not in self._still]
 
     def index(self, name: str) -> int:
         """Returns where a joint is among the n.
@@ -212,9 +209,8 @@ class Robot:
 
     def joint_rows(self, indices: Sequence[int]) -> np.ndarray:
         """Returns the Jacobian of the positions of some of the n joints: a 1 in each row."""
-        rows = np.zeros((len(indices), len(self.free)))
-        rows[np.arange(len(indices)), len(self.free) - len(self.joint_names) + np.asarray(indices, dtype=int)] = 1.0
-        return rows
+        first = len(self.free) - len(self.joint_names)
+        return np.eye(len(self.free))[[first + i for i in indices]]
 
     def _express_in(self, base: str) -> None:
         """Moves the origin from the root into another link that stands still."""

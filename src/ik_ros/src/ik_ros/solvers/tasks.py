@@ -57,7 +57,6 @@ class TasksSolver(Solver):
         self.velocity_limits = tuple(robot.max_velocity.tolist())
         self.base_frame = self.tasks.base_frame
         self._gauss_newton = GaussNewton(robot, list(self.tasks.parts.values()))
-        self._names = list(self.tasks.parts)
         self._required = [
             (i, name, part.task) for i, (name, part) in enumerate(self.tasks.parts.items()) if part.is_required
         ]
@@ -101,7 +100,7 @@ class TasksSolver(Solver):
             self.tasks.robot.moving(solution)
         for name in problem.goals:
             if name not in self.tasks.parts:
-                raise UnknownNameError("task", name, self._names)
+                raise UnknownNameError("task", name, self.tasks.parts)
         main = self.tasks.main
         if problem.target is not None and main is None:
             raise ValueError("target: the formulation has no main task that it could be for")

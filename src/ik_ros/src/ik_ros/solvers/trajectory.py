@@ -74,7 +74,7 @@ class TrajectoryConfig(KdlConfig):
     @model_validator(mode="after")
     def _fits_the_chain(self) -> TrajectoryConfig:
         chain = self.chain
-        refuse_mimics(chain, self, "trajectory")
+        refuse_mimics(self, "trajectory")
         for key in ("velocity_limits", "acceleration_limits"):
             for name in getattr(self, key):
                 if name not in chain.joint_names:
@@ -125,19 +125,13 @@ class TrajectorySolver(KdlSolver):
             message = f"at the start, a sphere is as near as {nearest * 1e3:.4g} mm to an obstacle"
             return IKSolution(False, message, self.joint_names, tuple(start))
         goals = [Goal(replace(problem, target=waypoint.pose)) for waypoint in waypoints]
-        best: IKSolution | None = None
+        answers: list[IKSolution] = []
         for attempt in range(self._config.attempts):
             postures, failure = self._postures(problem, waypoints, start, attempt)
-            if failure is not None:
-                best = best or failure
+            answers.append(failure or self._shaped(problem, waypoints, goals, start, postures))
+            if failure or answers[-1].success:
                 break
-            solution = self._shaped(problem, waypoints, goals, start, postures)
-            if best is None or solution.success:
-                best = solution
-            if best.success:
-                break
-        assert best is not None
-        return best
+        return answers[-1] if answers[-1].success else answers[0]
 
     def _waypoints(self, problem: IKProblem) -> tuple[Waypoint, ...]:
         """Returns what is to be passed, checked."""
@@ -163,8 +157,7 @@ class TrajectorySolver(KdlSolver):
         """Returns positions that lead to the waypoints, each near those before; or why there are none."""
         postures: list[Sequence[float]] = [start]
         if attempt:
-            generator = random.Random(f"{problem.seed} {attempt}")
-            postures[0] = self.limits.random(generator, start)
+            postures[0] = self.limits.random(random.Random(f"{problem.seed} {attempt}"), start)
         for waypoint in waypoints:
             near = dict(zip(self.joint_names, postures[-1]))
             found = super().solve(replace(problem, target=waypoint.pose, start=near, seed=problem.seed + attempt))
