@@ -25,9 +25,7 @@ class KdlChain:
 
     def __init__(self, description: ChainDescription) -> None:
         self._drives = description.drives
-        self.is_plain = [drive.variable for drive in self._drives] == list(range(len(self._drives))) and (
-            not description.mimics
-        )
+        self.is_plain = not description.mimics
         self.kdl = _kdl_chain(description)
         self._positions = PyKDL.JntArray(len(self._drives))
         self._frame = PyKDL.Frame()
