@@ -31,9 +31,8 @@ def start(ros, config: Any, *arguments: str):
     return ros.start(["rosrun", "custom_ros_tools", "attach_marker", "__name:=marker", *arguments])
 
 
-def test_names_of_types_and_actions_are_the_constants_of_the_message():
-    for constants in (MARKER_TYPES, MARKER_ACTIONS):
-        assert {name: getattr(Marker, name) for name in constants} == constants
+def test_names_of_types_and_actions_are_constants_of_the_message():
+    assert [name for name in (*MARKER_TYPES, *MARKER_ACTIONS) if not isinstance(getattr(Marker, name), int)] == []
 
 
 @pytest.mark.quick

@@ -278,11 +278,11 @@ def test_an_empty_bag_gives_no_tables(write_bag: Callable[..., Path]) -> None:
     assert bag_to_dataframes(write_bag([])) == {}
 
 
-def test_progress_is_reported_up_to_the_end(write_bag: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_progress_is_shown_if_it_is_asked_for(
+    write_bag: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
     path = write_bag([("/a", Float64(1.0))] * 2500 + _pictures())
-    reports: list[tuple[int, int]] = []
-    bag_to_dataframes(path, progress=lambda done, total: reports.append((done, total)))
-    assert reports == [(0, 2501), (1000, 2501), (2000, 2501), (2501, 2501)]
+    bag_to_dataframes(path)
     assert capsys.readouterr().err == ""
     bag_to_dataframes(path, progress=True)
     assert "messages" in capsys.readouterr().err

@@ -108,7 +108,7 @@ def test_what_is_published_at_the_very_end_is_in_the_bag(ros: Any, tmp_path: Pat
 
 
 def test_a_topic_that_nobody_publishes_yet_is_recorded_from_its_first_message(ros: Any, tmp_path: Path) -> None:
-    with Recorder(tmp_path / "a.bag", ["/late"], lz4=False):
+    with Recorder(tmp_path / "a.bag", ["/late"]):
         publisher = rospy.Publisher("/late", Float64, queue_size=10, latch=True)
         publisher.publish(7.0)
         wait_until(publisher.get_num_connections, "the recorder connects")

@@ -10,28 +10,24 @@ from typing import Any, cast
 import rospkg
 import yaml
 
-from .errors import ConfigError, Problem, hint
+from .errors import ConfigError, Problem, closest
 
 _PACKAGE = re.compile(r"package://(?P<uri>[^/{}]+)|\{(?P<braces>[^{}]*)\}")
 
 
 def ros_package_path(package: str) -> str:
-    """Returns the folder of a ROS package.
-
-    Args:
-        package: Its name; looked for in ROS_PACKAGE_PATH.
+    """Returns the folder of a ROS package, which is looked for in ROS_PACKAGE_PATH.
 
     Raises:
         ConfigError: If there is no such package.
     """
-    packages = _packages(os.environ.get("ROS_PACKAGE_PATH", ""))
+    search_path = os.environ.get("ROS_PACKAGE_PATH", "")
+    packages = _packages(search_path)
     try:
         return str(packages.get_path(package))
     except rospkg.ResourceNotFound:
-        known = packages.list()
-    where = os.environ.get("ROS_PACKAGE_PATH") or "nothing"
-    close = hint(package, known)
-    advice = close if "did you mean" in close else f" (ROS_PACKAGE_PATH is {where})"
+        match = closest(package, packages.list())
+    advice = f"; did you mean '{match}'?" if match else f" (ROS_PACKAGE_PATH is {search_path or 'nothing'})"
     raise ConfigError([Problem("", "", f"unknown ROS package '{package}'{advice}")])
 
 
@@ -44,9 +40,6 @@ def _packages(search_path: str) -> rospkg.RosPack:
 def replace_package(path: str) -> str:
     """Resolves `{package}/path` and `package://package/path`; the first package only, others stay as they are.
 
-    Args:
-        path: The path as the user wrote it.
-
     Raises:
         ConfigError: If there is no such package.
     """
@@ -58,10 +51,7 @@ def replace_package(path: str) -> str:
 
 
 def load_config(path: str) -> dict[str, Any]:
-    """Returns the mapping in a YAML file.
-
-    Args:
-        path: The file; `{package}/path` and `package://package/path` are resolved.
+    """Returns the mapping in a YAML file; `{package}/path` and `package://package/path` are resolved.
 
     Raises:
         ConfigError: If the file cannot be read or is not a YAML mapping; it names file, line and column.
@@ -78,11 +68,7 @@ def load_config(path: str) -> dict[str, Any]:
 
 
 def load_configs(text: str, file: str = "text") -> dict[str, Any]:
-    """Returns the mapping in a YAML text; an empty text is an empty mapping.
-
-    Args:
-        text: The YAML.
-        file: What to call it in messages.
+    """Returns the mapping in a YAML text, which messages call `file`; an empty text is an empty mapping.
 
     Raises:
         ConfigError: If it is not a YAML mapping, names a key twice, or asks for Python objects.
@@ -104,11 +90,7 @@ def load_configs(text: str, file: str = "text") -> dict[str, Any]:
 
 
 def config_to_str(config: Mapping[str, Any]) -> str:
-    """Returns a mapping as YAML text, in its own order; `load_configs` gives the same mapping back.
-
-    Args:
-        config: Plain data: mappings, lists, numbers, texts, true, false and None.
-    """
+    """Returns a mapping of plain data as YAML text, in its own order; `load_configs` gives the same mapping back."""
     return str(yaml.safe_dump(dict(config), sort_keys=False))
 
 

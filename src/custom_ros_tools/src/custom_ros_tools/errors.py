@@ -49,11 +49,7 @@ class Problem:
 
 
 class ConfigError(InterfaceError):
-    """The author of the configuration has to change something.
-
-    Args:
-        problems: All problems that were found, in the order of the files.
-    """
+    """The author of the configuration has to change something; it has all problems, in the order of the files."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
@@ -64,18 +60,10 @@ class ConfigError(InterfaceError):
 
 
 class UnknownNameError(InterfaceError):
-    """The caller named something that does not exist.
-
-    Args:
-        kind: What sort of thing was named, such as `"joint"`.
-        name: The name that is not known.
-        known: The names that are.
-    """
+    """The caller named something that does not exist; the kind says what sort of thing, such as `"joint"`."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
-        self.kind = kind
-        self.name = name
-        self.known = tuple(known)
+        self.kind, self.name, self.known = kind, name, tuple(known)
         super().__init__(kind, name, self.known)
 
     def __str__(self) -> str:
@@ -85,52 +73,37 @@ class UnknownNameError(InterfaceError):
         return f"unknown {self.kind} '{self.name}': {known}{question}"
 
 
+@dataclass(eq=False)
 class MissingDependency(InterfaceError):  # noqa: N818 (the name says what is the matter)
-    """An optional library is not installed.
+    """An optional library is not installed; `how` says what to do about it, such as a command to type."""
 
-    Args:
-        package: Name of what is missing.
-        how: What to do about it, such as a command to type.
-    """
-
-    def __init__(self, package: str, how: str) -> None:
-        self.package = package
-        self.how = how
-        super().__init__(package, how)
+    package: str
+    how: str
 
     def __str__(self) -> str:
         return f"'{self.package}' is not installed: {self.how}"
 
 
+@dataclass(eq=False)
 class PluginError(InterfaceError):
     """A class or function of another package failed.
 
-    Args:
+    Attributes:
         plugin: Its name, as `module:Class`.
         doing: What it was about to do, such as `before_step`, and where it says so itself, for what.
         cause: What happened, with file and line.
     """
 
-    def __init__(self, plugin: str, doing: str, cause: str) -> None:
-        self.plugin = plugin
-        self.doing = doing
-        self.cause = cause
-        super().__init__(plugin, doing, cause)
+    plugin: str
+    doing: str
+    cause: str
 
     def __str__(self) -> str:
         return f"{self.plugin} failed in {self.doing}: {self.cause}"
 
 
 class PhysicsError(InterfaceError):
-    """PyBullet refused a call that the configuration allows.
-
-    Args:
-        message: What was asked for, and what PyBullet said.
-    """
-
-    def __init__(self, message: str) -> None:
-        self.message = message
-        super().__init__(message)
+    """PyBullet refused a call that the configuration allows; it says what was asked for, and what PyBullet said."""
 
 
 @contextmanager

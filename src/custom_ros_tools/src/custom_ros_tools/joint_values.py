@@ -12,16 +12,10 @@ QUANTITIES = ("position", "velocity", "effort")
 
 
 class MissingJointsError(InterfaceError):
-    """A joint state lacks joints that are asked for.
-
-    Args:
-        names: The joints it lacks.
-        known: The joints it has.
-    """
+    """A joint state lacks joints that are asked for; `known` are those that it has."""
 
     def __init__(self, names: Sequence[str], known: Sequence[str]) -> None:
-        self.names = tuple(names)
-        self.known = tuple(known)
+        self.names, self.known = tuple(names), tuple(known)
         super().__init__(self.names, self.known)
 
     def __str__(self) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Annotated, Any
+from collections.abc import Sequence
+from typing import Annotated
 
 from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 
@@ -11,45 +11,32 @@ from .errors import hint
 from .schema import ConfigModel, Expects, FrameId, Hz, KeyedError, ListOf, NonNegative, Position, Rgba, Switch, Text
 from .transforms import quat_of
 
-MARKER_TYPES = {
-    "ARROW": 0,
-    "CUBE": 1,
-    "SPHERE": 2,
-    "CYLINDER": 3,
-    "LINE_STRIP": 4,
-    "LINE_LIST": 5,
-    "CUBE_LIST": 6,
-    "SPHERE_LIST": 7,
-    "POINTS": 8,
-    "TEXT_VIEW_FACING": 9,
-    "MESH_RESOURCE": 10,
-    "TRIANGLE_LIST": 11,
-}
-"""Constants of visualization_msgs/Marker, `type`."""
-MARKER_ACTIONS = {"ADD": 0, "MODIFY": 0, "DELETE": 2, "DELETEALL": 3}
-"""Constants of visualization_msgs/Marker, `action`."""
+MARKER_TYPES = (
+    "ARROW", "CUBE", "SPHERE", "CYLINDER", "LINE_STRIP", "LINE_LIST", "CUBE_LIST", "SPHERE_LIST", "POINTS",
+    "TEXT_VIEW_FACING", "MESH_RESOURCE", "TRIANGLE_LIST",
+)  # fmt: skip
+"""Names of the constants of visualization_msgs/Marker for `type`."""
+MARKER_ACTIONS = ("ADD", "MODIFY", "DELETE", "DELETEALL")
+"""Names of its constants for `action`."""
 SHAPES = ("ARROW", "CUBE", "SPHERE", "CYLINDER", "MESH_RESOURCE")
 """Types that are drawn from what this configuration holds; the others need points or a text."""
 
 
-def _in_any_case(names: Iterable[str]) -> WithJsonSchema:
+def _in_any_case(names: Sequence[str]) -> WithJsonSchema:
     """Returns the JSON Schema of constants, of which editors propose the usual spelling."""
     usual = {"type": "string", "enum": [name.lower() for name in names]}
     return WithJsonSchema({"anyOf": [usual, {"type": "string", "pattern": "^[A-Za-z_]+$"}]})
 
 
-def _known_type(name: str) -> str:
-    return _known(name, "marker type", MARKER_TYPES)
+def _one_of(names: Sequence[str], kind: str) -> AfterValidator:
+    """Returns what finds the name of a constant that is written in any case."""
 
+    def upper(name: str) -> str:
+        if name.upper() not in names:
+            raise ValueError(f"unknown marker {kind} '{name}'{hint(name, names)}")
+        return name.upper()
 
-def _known_action(name: str) -> str:
-    return _known(name, "marker action", MARKER_ACTIONS)
-
-
-def _known(name: str, kind: str, constants: dict[str, int]) -> str:
-    if name.upper() not in constants:
-        raise ValueError(f"unknown {kind} '{name}'{hint(name, constants)}")
-    return name.upper()
+    return AfterValidator(upper)
 
 
 class MarkerNodeConfig(ConfigModel):
@@ -77,12 +64,12 @@ class MarkerConfig(ConfigModel):
     node: MarkerNodeConfig = Field(description="How it is published.")
     frame_id: FrameId = Field("map", description="TF frame that it is attached to.")
     type: Annotated[
-        str, AfterValidator(_known_type), _in_any_case(MARKER_TYPES), Expects("the name of a marker type")
+        str, _one_of(MARKER_TYPES, "type"), _in_any_case(MARKER_TYPES), Expects("the name of a marker type")
     ] = Field(
         description="Constant of the message in any case: `cube`, `sphere`, `cylinder`, `arrow`, `mesh_resource`, ..."
     )
     action: Annotated[
-        str, AfterValidator(_known_action), _in_any_case(MARKER_ACTIONS), Expects("the name of a marker action")
+        str, _one_of(MARKER_ACTIONS, "action"), _in_any_case(MARKER_ACTIONS), Expects("the name of a marker action")
     ] = Field("ADD", description="Constant of the message in any case: `add`, `modify`, `delete` or `deleteall`.")
     position: Position = Field((0.0, 0.0, 0.0), description="Where it is in that frame.")
     orientation: Annotated[ListOf[float], Expects("roll, pitch, yaw or a quaternion x, y, z, w")] = Field(
@@ -112,8 +99,7 @@ class MarkerConfig(ConfigModel):
     @property
     def quat_xyzw(self) -> list[float]:
         """Its orientation as a unit quaternion x, y, z, w."""
-        quat: Any = quat_of(self.orientation, self.ori_in_deg)
-        return [float(value) for value in quat]
+        return quat_of(self.orientation, self.ori_in_deg).tolist()
 
     @property
     def mesh_uri(self) -> str:

@@ -14,11 +14,7 @@ own_folders = [str(Path(__file__).parent)]
 
 
 class ClassTable(Mapping[str, Any]):
-    """Classes by name, each of which is imported when it is asked for.
-
-    Args:
-        paths: `module:Class` by name.
-    """
+    """Classes by name, made of a `module:Class` for each, which is imported when it is asked for."""
 
     def __init__(self, paths: Mapping[str, str]) -> None:
         self._paths = paths
@@ -39,10 +35,7 @@ class ClassTable(Mapping[str, Any]):
 
 
 def find(name: str) -> Any:
-    """Returns what another package offers under a name.
-
-    Args:
-        name: `module:Name`, such as `my_robot_lab.conveyor:Conveyor`.
+    """Returns what another package offers under a name, such as `my_robot_lab.conveyor:Conveyor`.
 
     Raises:
         ValueError: If there is no such thing, or its module cannot be imported.
@@ -64,14 +57,10 @@ def find(name: str) -> Any:
 
 
 def find_class(name: str, base: type) -> Any:
-    """Returns a class of another package.
-
-    Args:
-        name: `module:Class`.
-        base: What it must be a subclass of.
+    """Returns a class of another package by its `module:Class`.
 
     Raises:
-        ValueError: If there is no such class.
+        ValueError: If there is no such class, or it is no subclass of `base`.
     """
     found = find(name)
     if isinstance(found, type) and issubclass(found, base):

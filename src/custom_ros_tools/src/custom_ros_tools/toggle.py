@@ -7,16 +7,11 @@ from collections.abc import Callable
 class Toggle:
     """Keeps whether something is on, and refuses to switch it to what it is already.
 
-    Args:
-        name: What is switched, for the messages.
-        start: Called to switch it on.
-        stop: Called to switch it off.
+    `start` switches it on and `stop` off; messages call it by its name.
     """
 
     def __init__(self, name: str, start: Callable[[], None], stop: Callable[[], None]) -> None:
-        self._name = name
-        self._start = start
-        self._stop = stop
+        self._name, self._start, self._stop = name, start, stop
         self._is_on = False
         self._lock = threading.Lock()
 

@@ -80,11 +80,7 @@ def rpy_of(quat_xyzw: ArrayLike) -> Array:
 
 
 def matrix_of(position: ArrayLike, quat_xyzw: ArrayLike) -> Array:
-    """Returns a pose as homogeneous matrix, shape (4, 4).
-
-    Args:
-        position: x, y, z [m].
-        quat_xyzw: Quaternion x, y, z, w.
+    """Returns a position x, y, z [m] and a quaternion x, y, z, w as homogeneous matrix, shape (4, 4).
 
     Raises:
         ValueError: If lengths are wrong, a number is not finite or the quaternion is zero.
@@ -136,10 +132,7 @@ class StaticTransform(ConfigModel):
 
     @classmethod
     def from_arguments(cls, arguments: Sequence[str]) -> StaticTransform:
-        """Reads `x y z roll pitch yaw PARENT CHILD` or `x y z qx qy qz qw PARENT CHILD` [m, rad].
-
-        Args:
-            arguments: Those of the command, without its name and without ROS remappings.
+        """Reads `x y z roll pitch yaw PARENT CHILD` or `x y z qx qy qz qw PARENT CHILD` [m, rad] of a command.
 
         Raises:
             ConfigError: with one `Problem` for each fault.
@@ -150,15 +143,12 @@ class StaticTransform(ConfigModel):
             got = f"{len(arguments)} arguments" if arguments else "none"
             raise ConfigError([Problem(_ARGUMENTS, "", f"expected {wanted}, got {got}")])
         problems: list[Problem] = []
-
-        def number(key: str, text: str) -> float:
+        numbers = [1.0] * (len(keys) - 2)  # they stand in for those that are none while the rest is checked
+        for index, text in enumerate(arguments[:-2]):
             try:
-                return float(text)
+                numbers[index] = float(text)
             except ValueError:
-                problems.append(Problem(_ARGUMENTS, key, f"expected a number, got {text!r}"))
-                return 1.0  # stands in for it while the rest is checked
-
-        numbers = [number(key, text) for key, text in zip(keys[:-2], arguments)]
+                problems.append(Problem(_ARGUMENTS, keys[index], f"expected a number, got {text!r}"))
         data: dict[str, Any] = {"parent": arguments[-2], "child": arguments[-1], "position": numbers[:3]}
         try:
             data["quat_xyzw"] = quat_of(numbers[3:]).tolist()
@@ -168,7 +158,7 @@ class StaticTransform(ConfigModel):
         try:
             transform = cls.parse(data, _ARGUMENTS)
         except ConfigError as error:
-            raise ConfigError([*problems, *error.problems]) from None
+            problems += error.problems
         if problems:
             raise ConfigError(problems)
         return transform

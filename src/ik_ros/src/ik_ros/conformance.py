@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import pytest
 
 from custom_ros_tools.errors import UnknownNameError
-from rpbi.geometry import Pose, Quaternion
+from rpbi.geometry import Pose, Quaternion, normalized
 from rpbi.kinematics import Kinematics
 from rpbi.kinematics.limits import Limits
 from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
@@ -111,8 +111,9 @@ class SolverConformance:
             for _ in range(count)
         ]
 
-    def check_shape(self, solution: IKSolution) -> None:
-        """Checks what holds for every answer: order, length, finiteness, limits, words."""
+    def checked(self, problem: IKProblem) -> IKSolution:
+        """Returns an answer that has order, length, finiteness, limits and words, and is true if it says success."""
+        solution = self.solver.solve(problem)
         assert solution.joint_names == self.solver.joint_names, "joints are in another order"
         assert len(solution.positions) == len(self.solver.joint_names), solution
         for positions in (solution.positions, *solution.alternatives):
@@ -121,12 +122,12 @@ class SolverConformance:
                 assert lower <= position <= upper, f"outside limits: {solution}"
         assert math.isfinite(solution.position_error_m + solution.orientation_error_rad), solution
         assert solution.message, "no word on how well it went"
-
-    def check_met(self, positions: Sequence[float], target: Pose) -> None:
-        """Checks that positions bring the link to the target."""
-        distance, angle = distances(self.forward(positions), target)
-        assert distance <= 1.01 * POSITION_TOLERANCE_M, f"said to be solved, and {distance:g} m off"
-        assert angle <= 1.01 * ORIENTATION_TOLERANCE_RAD, f"said to be solved, and {angle:g} rad off"
+        for positions in (solution.positions, *solution.alternatives) if solution.success else ():
+            assert problem.target is not None
+            distance, angle = distances(self.forward(positions), problem.target)
+            assert distance <= 1.01 * POSITION_TOLERANCE_M, f"said to be solved, and {distance:g} m off"
+            assert angle <= 1.01 * ORIENTATION_TOLERANCE_RAD, f"said to be solved, and {angle:g} rad off"
+        return solution
 
     # --- The tests.
 
@@ -140,24 +141,15 @@ class SolverConformance:
 
     def test_reachable_targets_are_reached(self) -> None:
         """Successes are true, and there are enough of them: always answering false fails here."""
-        solved = 0
-        for problem in self.reachable(random.Random(1), self.reachable_problems):
-            solution = self.solver.solve(problem)
-            self.check_shape(solution)
-            if solution.success:
-                assert problem.target is not None
-                solved += 1
-                for positions in (solution.positions, *solution.alternatives):
-                    self.check_met(positions, problem.target)
-        share = solved / self.reachable_problems
+        problems = self.reachable(random.Random(1), self.reachable_problems)
+        share = sum(self.checked(problem).success for problem in problems) / self.reachable_problems
         assert share >= self.least_share, f"only {share:.1%} of the reachable targets are reached"
 
     def test_an_unreachable_target_is_answered_with_the_best_and_how_far_it_is_off(self) -> None:
         """Failure is a value."""
         start = self.start_at(self.limits.middle)
         target = Pose((0.0, 0.0, 100.0))
-        solution = self.solver.solve(self.problem(target, start))
-        self.check_shape(solution)
+        solution = self.checked(self.problem(target, start))
         assert not solution.success
         distance, angle = distances(self.forward(solution.positions), target)
         assert abs(distance - solution.position_error_m) < 1e-3, (distance, solution)
@@ -169,12 +161,7 @@ class SolverConformance:
         for seed in range(int(os.environ.get(PROBLEMS, self.random_problems))):
             x, y, z = (generator.uniform(-self.reach_m, self.reach_m) for _ in range(3))
             start = [position + generator.gauss(0.0, 2.0) for position in self.positions(generator)]
-            problem = self.problem(Pose((x, y, z), random_quat(generator)), self.start_at(start), seed)
-            solution = self.solver.solve(problem)
-            self.check_shape(solution)
-            if solution.success:
-                assert problem.target is not None
-                self.check_met(solution.positions, problem.target)
+            self.checked(self.problem(Pose((x, y, z), random_quat(generator)), self.start_at(start), seed))
 
     def test_a_target_that_is_not_finite_is_refused(self) -> None:
         """It must not get as far as the solver."""
@@ -218,6 +205,4 @@ def distances(pose: Pose, other: Pose) -> tuple[float, float]:
 
 def random_quat(generator: random.Random) -> Quaternion:
     """Returns a random rotation, any as likely as any other."""
-    x, y, z, w = (generator.gauss(0.0, 1.0) for _ in range(4))
-    norm = math.hypot(x, y, z, w) or 1.0
-    return x / norm, y / norm, z / norm, w / norm
+    return normalized([generator.gauss(0.0, 1.0) for _ in range(4)])

@@ -4,14 +4,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from rpbi.geometry import Pose, normalized
+from rpbi.geometry import Pose, Vector, normalized
+from rpbi.kinematics.problem import LARGEST
 
-Vector = tuple[float, float, float]
 JointPositions = Mapping[str, float]
 """Positions by joint [rad or m]."""
-
-LARGEST = 1e9
-"""Largest number that is taken, whatever it means; squares of larger ones are soon beyond what a float can hold."""
 
 
 @dataclass(frozen=True)

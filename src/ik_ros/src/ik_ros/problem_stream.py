@@ -48,18 +48,14 @@ class JointRateLimiter:
         limits = dict(zip(joint_names, velocity_limits))
         given = config.max_velocity
         if isinstance(given, dict):
-            unknown = sorted(set(given) - set(limits))
-            if unknown:
+            if unknown := sorted(set(given) - set(limits)):
                 known = ", ".join(joint_names)
                 raise ValueError(f"continuity.max_velocity: no joint is called {', '.join(unknown)}; known are {known}")
             limits |= given
         elif given is not None:
             limits = dict.fromkeys(limits, given)
-        unlimited = [name for name, limit in limits.items() if not 0.0 < limit < np.inf]
-        if unlimited:
-            raise ValueError(
-                f"continuity.max_velocity: the URDF has no velocity for {', '.join(unlimited)}; give it one here"
-            )
+        if unlimited := ", ".join(name for name, limit in limits.items() if not 0.0 < limit < np.inf):
+            raise ValueError(f"continuity.max_velocity: the URDF has no velocity for {unlimited}; give it one here")
         self._limits = config.velocity_scale * np.array(list(limits.values()))
         self._last: np.ndarray | None = None
 

@@ -50,12 +50,7 @@ class Solver(ABC):
 
 
 class StartLimits:
-    """Brings starts into limits, and warns of each joint once: a stream asks the same a hundred times a second.
-
-    Args:
-        joint_names: The n joints.
-        limits: Their limits.
-    """
+    """Brings starts into limits, and warns of each joint once: a stream asks the same a hundred times a second."""
 
     def __init__(self, joint_names: Sequence[str], limits: Limits) -> None:
         self._joint_names = tuple(joint_names)

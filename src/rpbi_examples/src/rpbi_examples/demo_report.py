@@ -1,6 +1,5 @@
-"""What the demo writes about its recording: tables, pictures and a summary."""
+"""What the demo says about its recording, in pictures and words."""
 
-import json
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
@@ -21,12 +20,7 @@ LEAST_SPAN_RAD = 0.2
 
 
 def measured_rates(messages: Mapping[str, int], expected_hz: Mapping[str, float], duration_s: float) -> pd.DataFrame:
-    """Compares how often topics came with how often they should.
-
-    Args:
-        messages: Number of messages by topic.
-        expected_hz: Rate by topic [Hz].
-        duration_s: Time in which they came [s] of ROS time.
+    """Compares how often topics came in a time [s of ROS time] with how often they should.
 
     Returns:
         One row a topic with the columns `messages`, `rate_hz`, `expected_hz` and `enough`.
@@ -113,11 +107,7 @@ def failures(summary: Mapping[str, Any], required: Collection[str]) -> list[str]
 def slow_lines(summary: Mapping[str, Any], images: Collection[str], required: Collection[str], world: str) -> list[str]:
     """Returns what came too seldom because the machine is slow or busy: what limits it, and what to do.
 
-    Args:
-        summary: The summary.
-        images: Topics of the camera; they share a line.
-        required: Topics that this is no excuse for.
-        world: Main YAML file.
+    Images share a line; for topics that are required this is no excuse. `world` is the main YAML file.
     """
     topics, lines = summary["topics"], []
     slow_images = _too_few(summary, images)
@@ -146,11 +136,6 @@ def _rate(row: Mapping[str, Any]) -> str:
 def _load(summary: Mapping[str, Any]) -> str:
     figures = summary["figures"]
     return f"with a load of {figures['load_average']:.1f} on {figures['cores']} cores"
-
-
-def write_summary(summary: Mapping[str, Any], path: Path) -> None:
-    """Writes the summary as JSON."""
-    path.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
 
 
 def as_text(summary: Mapping[str, Any]) -> str:

@@ -8,6 +8,9 @@ from pydantic import Field
 
 from custom_ros_tools.node_configs import StartParameters
 from custom_ros_tools.schema import Hz, NonNegative, Seconds
+from custom_ros_tools.transforms import Array, quat_of
+from rpbi.control.trajectories.trajectory import minimum_jerk
+from rpbi.geometry import Vector
 
 CIRCLE_RADIUS = 0.12
 """Radius of the circles [m]."""
@@ -51,7 +54,7 @@ class FigureEight(StartParameters):
     height: NonNegative = Field(0.2, description="Height of each loop, along x [m].")
     period_s: Seconds = Field(10.0, description="Time of one round [s].")
 
-    def position(self, time_s: float) -> tuple[float, float, float]:
+    def position(self, time_s: float) -> Vector:
         """Returns where it is at a time [s], in its x-y plane [m]."""
         angle = 2.0 * math.pi * time_s / self.period_s
         return self.height * math.sin(angle) * math.cos(angle), self.width / 2.0 * math.sin(angle), 0.0
@@ -61,19 +64,14 @@ class FigureEight(StartParameters):
         return "/".join(part for part in (self.tf_ns.strip("/"), name) if part)
 
 
-def hand_position(time_s: float, side: float) -> tuple[float, float, float]:
-    """Returns where a hand is to be [m] at a time since the start [s].
-
-    Args:
-        time_s: The time.
-        side: 1 for the left hand, -1 for the right one.
-    """
+def hand_position(time_s: float, side: float) -> Vector:
+    """Returns where the left (`side` 1) or right hand (-1) is to be [m] at a time since the start [s]."""
     angle = 2.0 * math.pi * time_s / CIRCLE_PERIOD_S
     x, y, z = CIRCLE_CENTRE
     return x, side * (y + CIRCLE_RADIUS * math.sin(angle)), z + CIRCLE_RADIUS * (1.0 - math.cos(angle))
 
 
-def camera_pose(time_s: float) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
+def camera_pose(time_s: float) -> tuple[Vector, Array]:
     """Returns position [m] and orientation (x, y, z, w) of the optical frame at a time [s].
 
     The optical frame has x to the right, y down and z forward.
@@ -83,18 +81,11 @@ def camera_pose(time_s: float) -> tuple[tuple[float, float, float], tuple[float,
     yaw = angle + math.pi / 2.0  # to the camera's right is where the circle goes, seen from its centre backwards
     tilt = -math.pi / 2.0 - math.atan2(ORBIT_HEIGHT - TARGET_HEIGHT, ORBIT_RADIUS)
     # first about x by `tilt`, which lets z point forward and down, then about the vertical by `yaw`
-    sin_x, cos_x, sin_z, cos_z = math.sin(tilt / 2), math.cos(tilt / 2), math.sin(yaw / 2), math.cos(yaw / 2)
-    return position, (cos_z * sin_x, sin_z * sin_x, sin_z * cos_x, cos_z * cos_x)
+    return position, quat_of((tilt, 0.0, yaw))
 
 
 class PlanarPose(NamedTuple):
-    """Where something stands on the floor.
-
-    Attributes:
-        x: Position [m].
-        y: Position [m].
-        yaw: Angle about the vertical [rad].
-    """
+    """Where something stands on the floor: x and y [m], and the angle about the vertical [rad]."""
 
     x: float
     y: float
@@ -109,11 +100,7 @@ SQUARE = tuple(
 
 
 class Route:
-    """A route that begins again at its end.
-
-    Args:
-        waypoints: Where it leads.
-    """
+    """A route along waypoints that begins again at its end."""
 
     def __init__(self, waypoints: Sequence[PlanarPose] = SQUARE) -> None:
         self._waypoints = tuple(waypoints)
@@ -145,27 +132,21 @@ class Swing:
     """
 
     def __init__(self, start: Sequence[float], lower: Sequence[float], upper: Sequence[float]) -> None:
-        self._start = tuple(start)
         self._zero = tuple(min(max(0.0, low), high) for low, high in zip(lower, upper, strict=True))
+        self._to_zero = minimum_jerk(start, self._zero, 0.0, TO_ZERO_S)
         self._amplitude = tuple(
             max(0.0, min(SWING_AMPLITUDE, SWING_MARGIN * (high - zero), SWING_MARGIN * (zero - low)))
             for zero, low, high in zip(self._zero, lower, upper, strict=True)
         )
-        forth = list(range(len(self._start)))
+        forth = list(range(len(start)))
         self._order = forth + forth[-2:0:-1]
 
     def at(self, time_s: float) -> tuple[float, ...]:
         """Returns the positions of the n joints at a time since the start [s]."""
         if time_s < TO_ZERO_S:
-            share = _minimum_jerk(time_s / TO_ZERO_S)
-            return tuple(start + share * (zero - start) for start, zero in zip(self._start, self._zero, strict=True))
+            return self._to_zero.sample(time_s).position
         turn, phase_s = divmod(time_s - TO_ZERO_S, SWING_PERIOD_S)
         joint = self._order[int(turn) % len(self._order)]
         positions = list(self._zero)
         positions[joint] += self._amplitude[joint] * math.sin(2.0 * math.pi * phase_s / SWING_PERIOD_S)
         return tuple(positions)
-
-
-def _minimum_jerk(share: float) -> float:
-    """Returns how much of a way is done after a share of its time (Flash and Hogan, 1985)."""
-    return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)

@@ -1,22 +1,17 @@
 """What can go wrong with bags and recordings; every one of them is an `InterfaceError`."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from custom_ros_tools.errors import InterfaceError
 
 
+@dataclass(eq=False)
 class BagError(InterfaceError):
-    """A bag cannot be read, or what is in it cannot be written as asked.
+    """A bag cannot be read, or what is in it cannot be written as asked; the message says what to do about it."""
 
-    Args:
-        path: The bag.
-        message: What is wrong, and what to do about it.
-    """
-
-    def __init__(self, path: Path, message: str) -> None:
-        self.path = path
-        self.message = message
-        super().__init__(path, message)
+    path: Path
+    message: str
 
     def __str__(self) -> str:
         return f"{self.path}: {self.message}"

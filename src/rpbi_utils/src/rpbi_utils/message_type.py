@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import genmsg
@@ -29,25 +30,21 @@ class Field(NamedTuple):
     length: int = SCALAR
 
 
+@dataclass(eq=False)
 class MessageType:
     """A message type with all the types it is made of.
 
-    Args:
+    Attributes:
         name: Full name, such as `sensor_msgs/JointState`.
         fields: Its fields in the order in which they are serialised.
     """
 
-    def __init__(self, name: str, fields: tuple[Field, ...]) -> None:
-        self.name = name
-        self.fields = fields
+    name: str
+    fields: tuple[Field, ...]
 
     @classmethod
     def parse(cls, name: str, definition: str) -> MessageType:
-        """Reads the full text of a definition: the type itself, then those it uses, as bags carry it.
-
-        Args:
-            name: Full name of the type.
-            definition: Its text, followed by `MSG: package/Type` sections.
+        """Reads a definition as bags carry it: the type's text, then a `MSG: package/Type` section for each it uses.
 
         Raises:
             ValueError: If the text is no valid definition.

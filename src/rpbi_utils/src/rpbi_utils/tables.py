@@ -18,6 +18,8 @@ from .message_type import MessageType
 from .row_plan import INDEX, RECORD_TIME, STAMP, Columns, plan_rows
 
 Array = NDArray[Any]
+_Piece = tuple[int, Array]
+"""Values of a column, and the row that they begin with."""
 
 FORMATS = ("parquet", "csv")
 BATCH_MESSAGES = 16_384
@@ -61,7 +63,7 @@ class TableBuilder:
         self._time: list[Array] = []
         self._record_time: list[Array] = []
         self._message: list[Array] = []
-        self._columns: dict[str, _Pieces] = {}
+        self._columns: dict[str, list[_Piece]] = {}
         self._notes: Counter[str] = Counter()
 
     def add(self, message_type: MessageType, raw: bytes, record_time_s: float) -> None:
@@ -85,7 +87,7 @@ class TableBuilder:
         order = np.lexsort((np.concatenate([*self._message, np.empty(0, int)]), time))  # stable
         fields = list(dict.fromkeys(name.split("/")[0] for name in self._columns))
         names = sorted(self._columns, key=lambda name: fields.index(name.split("/")[0]))  # stable
-        columns = {name: self._columns.pop(name).join(self._rows)[order] for name in names}
+        columns = {name: _join(self._columns.pop(name), self._rows)[order] for name in names}
         return pd.DataFrame({RECORD_TIME: record_time[order], **columns}, index=pd.Index(time[order], name=INDEX))
 
     def _read_batch(self) -> None:
@@ -138,7 +140,7 @@ class TableBuilder:
             if name == STAMP:
                 time = np.where(values == 0.0, record_time, values)  # 0 is ROS for "no time"
             else:
-                self._columns.setdefault(name, _Pieces()).append(self._rows, values)
+                self._columns.setdefault(name, []).append((self._rows, values))
         self._time.append(time)
         self._record_time.append(record_time)
         self._message.append(self._messages + indices)
@@ -146,11 +148,7 @@ class TableBuilder:
 
 
 def _read_leaf(leaf: Leaf, matrix: Array) -> Array:
-    """Reads the same value out of several messages.
-
-    Args:
-        leaf: Where it lies.
-        matrix: Messages of one layout, shape (n, size), uint8.
+    """Reads the same value out of messages of one layout, shape (n, size), uint8.
 
     Returns:
         Shape (n,): numbers of the field's own type, bool, float64 [s] for `time` and `duration`, `str` or
@@ -180,30 +178,17 @@ def _text(cell: Array) -> str:
     return cell.tobytes().decode("utf-8", "replace")
 
 
-class _Pieces:
-    """A column in the making: runs of values, each from some row on."""
-
-    def __init__(self) -> None:
-        self._pieces: list[tuple[int, Array]] = []
-
-    def append(self, start: int, values: Array) -> None:
-        """Adds the values of the rows from `start` on."""
-        self._pieces.append((start, values))
-
-    def join(self, rows: int) -> Array:
-        """Returns the column, shape (rows,); where no value was added it is NaN, or None in text and bool."""
-        dtypes = {values.dtype for _, values in self._pieces}
-        is_mixed = len({"number" if dtype.kind in "iuf" else dtype.kind for dtype in dtypes}) > 1
-        dtype = np.dtype(object) if is_mixed else np.result_type(*dtypes)
-        if sum(len(values) for _, values in self._pieces) < rows:
-            if dtype.kind in "iu":
-                dtype = np.dtype(float)
-            elif dtype.kind == "b":
-                dtype = np.dtype(object)
-        column: Array = np.full(rows, None if dtype.kind == "O" else np.nan if dtype.kind == "f" else 0, dtype)
-        for start, values in self._pieces:
-            column[start : start + len(values)] = values
-        return column
+def _join(pieces: list[_Piece], rows: int) -> Array:
+    """Returns a column of its pieces, shape (rows,); where there is no value it is NaN, or None in text and bool."""
+    dtypes = {values.dtype for _, values in pieces}
+    is_mixed = len({"number" if dtype.kind in "iuf" else dtype.kind for dtype in dtypes}) > 1
+    dtype = np.dtype(object) if is_mixed else np.result_type(*dtypes)
+    if sum(len(values) for _, values in pieces) < rows:
+        dtype = {"i": np.dtype(float), "u": np.dtype(float), "b": np.dtype(object)}.get(dtype.kind, dtype)
+    column: Array = np.full(rows, None if dtype.kind == "O" else np.nan if dtype.kind == "f" else 0, dtype)
+    for start, values in pieces:
+        column[start : start + len(values)] = values
+    return column
 
 
 def file_stems(topics: Iterable[str]) -> dict[str, str]:

@@ -9,11 +9,7 @@ from typing import Any
 class BufferedSocket:
     """A connected socket whose `sendall` never waits: what the other side does not take yet is kept in order.
 
-    Any thread may use it.
-
-    Args:
-        connection: The socket.
-        limit: Messages kept; beyond it the oldest are dropped.
+    Any thread may use it. Beyond `limit` messages that are kept, the oldest are dropped.
     """
 
     def __init__(self, connection: socket.socket, limit: int) -> None:

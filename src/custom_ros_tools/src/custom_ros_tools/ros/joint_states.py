@@ -54,7 +54,6 @@ def get_joint_state(
     """Waits for one message of a topic and returns it.
 
     Args:
-        topic: The topic.
         timeout: How long to wait [s] of wall time; None is for ever.
         joint_names: The joints asked for; None takes all as they come.
         ns: As for `resolve_joint_order`.
@@ -72,7 +71,6 @@ class JointStatePublisher:
     """Publishes joint states of a fixed list of joints.
 
     Args:
-        topic: The topic.
         joint_names: The n joints.
         queue_size: Messages kept for a slow subscriber.
     """
@@ -107,7 +105,6 @@ class JointStateSubscriber:
     Messages that lack joints or are faulty are refused and named now and then; the one before stays.
 
     Args:
-        topic: The topic.
         joint_names: The n joints.
         ns: What their names in messages begin with, as `ns` in `ns/joint`.
         callback: Called with each joint state, its joints in order.

@@ -10,10 +10,7 @@ from custom_ros_tools.errors import MissingDependency
 
 
 class KeyDownSubscriber:
-    """Calls the function of each key that goes down, as told on `keyboard/keydown`.
-
-    Args:
-        callbacks: Functions by key code, such as `{Key.KEY_a: start}`.
+    """Calls functions by key code, such as `{Key.KEY_a: start}`, when keys go down, as told on `keyboard/keydown`.
 
     Raises:
         MissingDependency: If the ROS package `keyboard`, which has the message, is not installed.

@@ -50,9 +50,7 @@ class DirectSending:
     def of(cls, publisher: rospy.Publisher, limit: int) -> DirectSending | None:
         """Returns that of a publisher, None if this rospy does not allow it; then the publisher stays as it is.
 
-        Args:
-            publisher: The publisher.
-            limit: Messages kept for each slow subscriber.
+        At most `limit` messages are kept for each slow subscriber.
         """
         if cls._is_possible is None:
             cls._is_possible = bool(

@@ -1,9 +1,12 @@
 """Services: one that switches on and off, and proxies that wait for theirs."""
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import rospy
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
+
+from custom_ros_tools.errors import InterfaceError
 
 PATIENCE_S = 5.0
 """After how long of waiting it is said what is waited for [s]."""
@@ -15,8 +18,6 @@ def get_srv_handler(
     """Waits until a service is there, for ever if need be, and returns what calls it.
 
     Args:
-        name: The service.
-        srv_type: Its type.
         persistent: Whether to keep one connection open, which is faster and ends with the server.
         headers: What else to tell the server when connecting.
 
@@ -34,29 +35,27 @@ def get_srv_handler(
 
 
 def get_srv_handlers(services: Mapping[str, type], persistent: bool = False) -> dict[str, rospy.ServiceProxy]:
-    """Does the same for several services.
-
-    Args:
-        services: Their types by name.
-        persistent: As for one.
-
-    Returns:
-        What calls them, by name.
-    """
+    """Does the same for several services, whose types are given by name; returns what calls them, by name."""
     return {name: get_srv_handler(name, srv_type, persistent) for name, srv_type in services.items()}
+
+
+def call_service(name: str, srv_type: type, *arguments: object) -> Any:
+    """Calls a service when it is there, and returns its answer.
+
+    Raises:
+        InterfaceError: If it answers that it did not succeed.
+    """
+    answer = get_srv_handler(name, srv_type)(*arguments)
+    if not answer.success:
+        raise InterfaceError(f"{name}: {answer.message}")
+    return answer
 
 
 Handler = Callable[[], tuple[bool, str]]
 
 
 class ToggleService:
-    """A std_srvs/SetBool service: true switches on, false off.
-
-    Args:
-        name: Its name.
-        on: Called for true; returns success and a message.
-        off: Called for false; returns success and a message.
-    """
+    """A std_srvs/SetBool service: true calls `on`, false `off`, each of which returns success and a message."""
 
     def __init__(self, name: str, on: Handler, off: Handler) -> None:
         self._on, self._off = on, off

@@ -21,10 +21,6 @@ class TfInterface:
 
     A transform from parent to child is the pose of the child expressed in the parent: position [m] and quaternion
     x, y, z, w. Make one object for a node, after `rospy.init_node`; what was sent before it is not known to it.
-
-    Attributes:
-        tf_buffer: The tf2 buffer.
-        tf_broadcaster: The tf2 broadcaster.
     """
 
     def __init__(self) -> None:
@@ -58,15 +54,9 @@ class TfInterface:
         return _pose(self.get_tf_msg(parent, child))
 
     def wait_for_tf_msg(self, parent: str, child: str, timeout: float | None = None) -> TransformStamped | None:
-        """Waits until there is a transform and returns the newest.
+        """Waits until there is a transform and returns the newest, None if there was none in time.
 
-        Args:
-            parent: The parent frame.
-            child: The child frame.
-            timeout: How long to wait [s] of wall time; None is for ever.
-
-        Returns:
-            None if there was none in time.
+        The timeout [s] is wall time; None is for ever.
 
         Raises:
             rospy.ROSInterruptException: If ROS shuts down meanwhile.
@@ -89,11 +79,9 @@ class TfInterface:
     def pack_tf_msg(
         parent: str, child: str, pos: ArrayLike, quat: ArrayLike = NO_ROTATION, eul_deg: bool = False
     ) -> TransformStamped:
-        """Returns a transform with the present stamp.
+        """Returns a transform from parent to child with the present stamp.
 
         Args:
-            parent: The parent frame.
-            child: The child frame.
             pos: Position x, y, z [m].
             quat: Quaternion x, y, z, w, or roll, pitch, yaw.
             eul_deg: Whether roll, pitch, yaw are in degrees rather than radians.

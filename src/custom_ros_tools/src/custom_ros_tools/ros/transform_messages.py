@@ -23,23 +23,14 @@ def transform_message(position: ArrayLike, orientation: ArrayLike, in_deg: bool 
     return Transform(translation, Quaternion(*quat_of(orientation, in_deg).tolist()))
 
 
-def checked(transform: Transform) -> Transform:
-    """Returns a transform that came from outside, its quaternion normalised.
-
-    Raises:
-        ValueError: If a number is not finite or the quaternion is zero.
-    """
-    return transform_message(position_in(transform), quat_in(transform))
-
-
 def position_in(transform: Transform) -> Array:
-    """Returns the translation x, y, z [m]."""
+    """Returns the translation x, y, z [m]; raises a ValueError if a number is not finite."""
     v = transform.translation
     return finite_vector((v.x, v.y, v.z), 3, "position")
 
 
 def quat_in(transform: Transform) -> Array:
-    """Returns the rotation as a unit quaternion x, y, z, w."""
+    """Returns the rotation as a unit quaternion x, y, z, w; raises a ValueError if it is zero or not finite."""
     q = transform.rotation
     return unit_quat((q.x, q.y, q.z, q.w))
 
@@ -51,14 +42,10 @@ def as_pose(transform: Transform) -> Pose:
 
 
 class TransformTopic:
-    """Sends one transform to /tf with the present stamp; nothing while that and the transform stay the same.
+    """Sends the transform from one frame to another to /tf with the present stamp; nothing while both stay the same.
 
     While simulated time stands still, the same stamp again would make each listener warn of a repeated one. Who comes
     then gets the last one all the same, since the topic is latched.
-
-    Args:
-        parent: The parent frame.
-        child: The child frame.
     """
 
     def __init__(self, parent: str, child: str) -> None:

@@ -40,11 +40,7 @@ class Expects(_Keyword):
 
 @dataclass(frozen=True, eq=False)  # typing wants a hash, which a mapping has not
 class AlsoTakes:
-    """Annotation that states what a validator accepts beside the type itself.
-
-    Attributes:
-        schema: The JSON Schema of it.
-    """
+    """Annotation that states, by its JSON Schema, what a validator accepts beside the type itself."""
 
     schema: Mapping[str, Any]
 
@@ -52,27 +48,16 @@ class AlsoTakes:
         return {"anyOf": [handler(core), dict(self.schema)]}
 
 
+@dataclass(eq=False)
 class InnerProblemsError(ValueError):
-    """What a validator raises for a value that has a model of its own.
+    """What a validator raises for a value that has a model of its own; the keys of the problems are inside of it."""
 
-    Args:
-        problems: All that is wrong with the value, with keys inside of it.
-    """
-
-    def __init__(self, problems: Sequence[Problem]) -> None:
-        self.problems = tuple(problems)
-        super().__init__(self.problems)
+    problems: Sequence[Problem]
 
 
+@dataclass(eq=False)
 class KeyedError(ValueError):
-    """What a validator of a whole model raises, to blame one of its keys.
+    """What a validator of a whole model raises, to blame one of its keys, or a key path inside of it."""
 
-    Args:
-        key: Key path inside the model.
-        message: What is wrong with it.
-    """
-
-    def __init__(self, key: str, message: str) -> None:
-        self.key = key
-        self.message = message
-        super().__init__(key, message)
+    key: str
+    message: str

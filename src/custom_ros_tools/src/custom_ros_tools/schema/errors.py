@@ -13,46 +13,36 @@ from .annotations import InnerProblemsError, KeyedError
 from .json_schema import Schema, json_schema, mapping_in, resolved, unit_in
 from .type_names import TYPE_NAMES, number_advice, shown, type_name
 
-_BOUNDS = {
-    "greater_than": ("gt", ">"),
-    "greater_than_equal": ("ge", ">="),
-    "less_than": ("lt", "<"),
-    "less_than_equal": ("le", "<="),
-}
 _LENGTH_ERRORS = ("missing", "too_long", "too_short")
-_TYPE_ERRORS = {
-    "float_type": "number",
-    "int_type": "integer",
-    "int_from_float": "integer",
-    "bool_type": "boolean",
-    "string_type": "string",
-    "dict_type": "object",
-    "model_type": "object",
-    "model_attributes_type": "object",
-    "mapping_type": "object",
+_RULES = {
+    "greater_than": "must be > {gt:g}",
+    "greater_than_equal": "must be >= {ge:g}",
+    "less_than": "must be < {lt:g}",
+    "less_than_equal": "must be <= {le:g}",
+    "finite_number": "must be a finite number",
+    "literal_error": "must be {expected}",
+    "float_type": f"expected {TYPE_NAMES['number']}",
+    **dict.fromkeys(("int_type", "int_from_float"), f"expected {TYPE_NAMES['integer']}"),
+    "bool_type": f"expected {TYPE_NAMES['boolean']}",
+    "string_type": f"expected {TYPE_NAMES['string']}",
+    **dict.fromkeys(
+        ("dict_type", "model_type", "model_attributes_type", "mapping_type"), f"expected {TYPE_NAMES['object']}"
+    ),
 }
+"""What a value has to be by the kind of pydantic's error, whose context has the bounds."""
 
 
 def problems_of(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any], file: str) -> list[Problem]:
-    """Translates a validation error.
-
-    Args:
-        error: What pydantic raised.
-        model: The model that was validated.
-        data: What it was validated against.
-        file: Name of the file, for the messages.
-    """
-    found: dict[tuple[str, str], Problem] = {}
+    """Translates what pydantic raised when it validated the data of a file by a model."""
+    problems = []
     for details in error.errors(include_url=False):
         loc = _real_location(details, data)
-        error_raised = details.get("ctx", {}).get("error")
-        if isinstance(error_raised, InnerProblemsError):
-            inner = [(_joined(key_path(loc), each.key), each.message) for each in error_raised.problems]
+        raised = details.get("ctx", {}).get("error")
+        if isinstance(raised, InnerProblemsError):
+            problems += [Problem(file, _joined(key_path(loc), each.key), each.message) for each in raised.problems]
         else:
-            inner = [_explain(details, loc, _schema_of(model))]
-        for key, message in inner:
-            found.setdefault((key, message), Problem(file, key, message))
-    return list(found.values())
+            problems.append(Problem(file, *_explain(details, loc, _schema_of(model))))
+    return list(dict.fromkeys(problems))  # the same but for what pydantic adds to the location
 
 
 def key_path(loc: Sequence[str | int]) -> str:
@@ -118,22 +108,8 @@ def _explain(details: ErrorDetails, loc: tuple[str | int, ...], root: Schema) ->
         return key_path(loc), f"unknown key '{loc[-1]}'{hint(str(loc[-1]), _siblings(root, loc))}"
     if isinstance(error, Exception):
         return key_path(loc), str(error)
-    message = f"{_rule(kind, context, wanted, unit)}, got {shown(value)}{number_advice(kind, value)}"
-    return key_path(loc), message
-
-
-def _rule(kind: str, context: Mapping[str, Any], wanted: Schema | None, unit: str) -> str:
-    """Says what a value has to be."""
-    if kind in _BOUNDS:
-        name, sign = _BOUNDS[kind]
-        return f"must be {sign} {context[name]:g}{unit}"
-    if kind == "finite_number":
-        return f"must be a finite number{unit}"
-    if kind == "literal_error":
-        return f"must be {context['expected']}"
-    if kind in _TYPE_ERRORS:
-        return f"expected {TYPE_NAMES[_TYPE_ERRORS[kind]]}{unit}"
-    return f"expected {_expected(wanted)}{unit}"
+    rule = _RULES[kind].format_map(context) if kind in _RULES else f"expected {_expected(wanted)}"
+    return key_path(loc), f"{rule}{unit}, got {shown(value)}{number_advice(kind, value)}"
 
 
 def _expected(wanted: Schema | None, depth: int = 0) -> str:

@@ -69,21 +69,12 @@ class EditorSchema(GenerateJsonSchema):
 
 
 def json_schema(model: type[BaseModel], title: str) -> Schema:
-    """Returns the schema of a YAML file.
-
-    Args:
-        model: What the file is validated with.
-        title: What it is, such as `"robot"`.
-    """
+    """Returns the schema of a YAML file that is validated with a model; `title` says what it is, such as `"robot"`."""
     return json_schemas({title: model})[title]
 
 
 def json_schemas(models: Mapping[str, type[BaseModel]]) -> dict[str, Schema]:
-    """Returns the schemas of several YAML files, by title, in which the same mapping has the same name.
-
-    Args:
-        models: What the files are validated with, by title.
-    """
+    """Returns the schemas of several YAML files, by title, in which the same mapping has the same name."""
     mode: JsonSchemaMode = "validation"
     inputs = [(model, mode) for model in dict.fromkeys(models.values())]
     references, common = models_json_schema(inputs, schema_generator=EditorSchema)
@@ -123,21 +114,14 @@ def name_of(reference: Schema) -> str:
 
 
 def resolved(schema: Schema, root: Schema) -> Schema:
-    """Returns a schema, or the definition that it refers to.
-
-    Args:
-        schema: The schema.
-        root: The schema of the file, which has the definitions.
-    """
+    """Returns a schema, or the definition in `root`, the schema of the file, that it refers to."""
     return dict(root[DEFINITIONS][name_of(schema)]) if "$ref" in schema else schema
 
 
 def mapping_in(schema: Schema, root: Schema) -> Schema | None:
     """Returns the mapping with keys of its own that a value is, or each item of a list; None if there is none.
 
-    Args:
-        schema: What the value may be; the mapping may be a reference.
-        root: The schema of the file, which has the definitions.
+    It may be a reference to the definitions in `root`, the schema of the file.
     """
     for each in (schema, *schema.get("anyOf", ())):
         if "properties" in resolved(each, root):

@@ -39,10 +39,9 @@ def shown(value: Any) -> str:
 
 
 def type_name(schema: Schema, detailed: bool = False, plural: bool = False) -> str:
-    """Returns what a value has to be, such as `a list of 3 numbers`.
+    """Returns what a value has to be by its JSON Schema, such as `a list of 3 numbers`.
 
     Args:
-        schema: Its JSON Schema.
         detailed: Whether bounds are told too, and what is taken beside the usual form.
         plural: Whether it is said of several, as in `lists of 3 numbers`.
     """

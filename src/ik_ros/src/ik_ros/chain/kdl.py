@@ -17,9 +17,6 @@ from .description import ChainDescription
 class KdlChain:
     """Where the tip of a chain is, and how it moves; one thread at a time.
 
-    Args:
-        description: The chain.
-
     Attributes:
         kdl: KDL's chain; its m joints are those that are not fixed.
         is_plain: Whether the m joints are the n variables, since none mimics another.
@@ -28,9 +25,7 @@ class KdlChain:
 
     def __init__(self, description: ChainDescription) -> None:
         self._drives = description.drives
-        self.is_plain = [drive.variable for drive in self._drives] == list(range(len(self._drives))) and (
-            not description.mimics
-        )
+        self.is_plain = not description.mimics
         self.kdl = _kdl_chain(description)
         self._positions = PyKDL.JntArray(len(self._drives))
         self._frame = PyKDL.Frame()
@@ -45,11 +40,7 @@ class KdlChain:
         self.reach = Reach.of((x, y, z), [math.hypot(*joint.xyz) for joint in carried], description.moving)
 
     def frame(self, q: Sequence[float]) -> PyKDL.Frame:
-        """Returns the pose of the tip in the base, valid until the next call.
-
-        Args:
-            q: n positions [rad or m].
-        """
+        """Returns the pose of the tip in the base at n positions [rad or m], valid until the next call."""
         self._set(q)
         self._to_frame.JntToCart(self._positions, self._frame)
         return self._frame
@@ -65,8 +56,7 @@ class KdlChain:
         self._set(q)
         self._to_jacobian.JntToJac(self._positions, self._jacobian)
         joints = range(len(self._drives))
-        values = [self._jacobian[row, joint] for row in range(6) for joint in joints]
-        jacobian = np.array(values).reshape(6, len(self._drives))
+        jacobian = np.array([[self._jacobian[row, joint] for joint in joints] for row in range(6)])
         return jacobian if self.is_plain else jacobian @ self._variables
 
     def _set(self, q: Sequence[float]) -> None:
@@ -80,10 +70,7 @@ class KdlChain:
 
 
 class Goal:
-    """A target with a box of tolerances around it.
-
-    Args:
-        problem: The problem.
+    """The target of a problem with a box of tolerances around it.
 
     Attributes:
         frame: The target in the base.
@@ -115,11 +102,7 @@ class Goal:
         return min(self.tolerance[3:]) == math.inf
 
     def off(self, frame: PyKDL.Frame) -> list[float]:
-        """Returns how far a link is off: 3 ways [m] and a rotation vector [rad], in the target.
-
-        Args:
-            frame: Where the link is in the base.
-        """
+        """Returns how far a link at a pose is off: 3 ways [m] and a rotation vector [rad], in the target."""
         difference = self.inverse * frame
         p, turn = difference.p, difference.M.GetRot()
         return [p[0], p[1], p[2], turn[0], turn[1], turn[2]]
@@ -129,11 +112,7 @@ class Goal:
         return [math.copysign(max(abs(value) - tolerance, 0.0), value) for value, tolerance in zip(off, self.tolerance)]
 
     def residual(self, frame: PyKDL.Frame) -> Residual:
-        """Returns how far a link is off beyond the tolerances.
-
-        Args:
-            frame: Where the link is in the base.
-        """
+        """Returns how far a link at a pose is off beyond the tolerances."""
         x, y, z, rx, ry, rz = self.beyond(self.off(frame))
         return Residual(math.hypot(x, y, z), math.hypot(rx, ry, rz))
 

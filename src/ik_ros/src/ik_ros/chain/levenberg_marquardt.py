@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import PyKDL
 
 from rpbi.kinematics.limits import Limits
 
@@ -25,22 +24,16 @@ PATIENCE = 3
 
 
 def levenberg_marquardt(chain: KdlChain, goal: Goal, limits: Limits, start: Sequence[float]) -> list[float]:
-    """Goes from a start towards a goal, and never beyond limits.
+    """Brings the tip of a chain towards a goal, from n positions within the limits of its joints [rad or m].
 
     It minimises how far the link is off beyond its tolerances. Joints that are at a limit and would leave it stand
     still for that iteration.
 
-    Args:
-        chain: The chain.
-        goal: Where its tip shall be.
-        limits: Limits of the n joints.
-        start: n positions within limits [rad or m].
-
     Returns:
-        The n best positions that were found [rad or m].
+        The n best positions within limits that were found [rad or m].
     """
     lower, upper = np.array(limits.lower), np.array(limits.upper)
-    to_target = _matrix(goal.inverse.M)
+    to_target = np.array([[goal.inverse.M[row, column] for column in range(3)] for row in range(3)])
     q = np.array(start)
     error, turn = _error(chain, goal, q)
     cost, damping, patience = float(error @ error), FIRST_DAMPING, PATIENCE
@@ -93,7 +86,3 @@ def _jacobian(chain: KdlChain, q: np.ndarray, to_target: np.ndarray, turn: Seque
     to_vector = np.eye(3) - 0.5 * cross + factor * cross @ cross
     jacobian = chain.jacobian(q.tolist())
     return np.vstack((to_target @ jacobian[:3], LEVER_M * to_vector @ to_target @ jacobian[3:]))
-
-
-def _matrix(rotation: PyKDL.Rotation) -> np.ndarray:
-    return np.array([[rotation[row, column] for column in range(3)] for row in range(3)])

@@ -59,9 +59,6 @@ class ChainSolver(Solver):
     Any thread may call it; a lock inside lets one in at a time. A subclass only looks for positions: here they are
     brought into limits, put into the chain and judged, so that success is answered only where it is true.
 
-    Args:
-        config: Its options.
-
     Attributes:
         description: The chain as the URDF has it.
         chain: Its kinematics.
@@ -121,12 +118,7 @@ class ChainSolver(Solver):
         )
 
     def residual(self, goal: Goal, q: Sequence[float]) -> Residual:
-        """Returns how far the tip is off its goal beyond the tolerances.
-
-        Args:
-            goal: Where it shall be.
-            q: n positions [rad or m].
-        """
+        """Returns how far the tip is off its goal beyond the tolerances at n positions [rad or m]."""
         return goal.residual(self.chain.frame(q))
 
     def is_beyond_reach(self, problem: IKProblem) -> bool:
@@ -150,24 +142,19 @@ class ChainSolver(Solver):
         return words + ("; it is farther away than the chain is long" if is_far else "")
 
 
-def refuse_mimics(description: ChainDescription, config: ChainConfig, solver: str) -> None:
+def refuse_mimics(config: ChainConfig, solver: str) -> None:
     """Refuses chains with joints that mimic others.
 
     Raises:
         ConfigError: If there are some; it names them.
     """
-    if mimics := description.mimics:
+    if mimics := config.chain.mimics:
         message = f"{', '.join(mimics)}: '{solver}' cannot solve for joints that mimic others; 'kdl' can"
         raise ConfigError([Problem(config.urdf_filename, "", message)])
 
 
 def refuse_boxes(problem: IKProblem, solver: str, may_turn: bool = False) -> None:
-    """Refuses tolerances that are larger than what counts as reached anyway.
-
-    Args:
-        problem: The problem.
-        solver: Name of the solver that cannot make use of them.
-        may_turn: Whether it can make use of those for rotations.
+    """Refuses tolerances that are larger than what counts as reached anyway; `may_turn` allows those for rotations.
 
     Raises:
         ValueError: If there are some; it names the field.

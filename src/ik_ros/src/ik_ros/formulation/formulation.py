@@ -17,7 +17,7 @@ from rpbi.geometry import Pose
 
 from .frame_task import FrameTask
 from .robot import Robot
-from .task import Task, TaskConfig
+from .task import Task, TaskConfig, blaming
 
 
 def task_class(name: str) -> type[Task]:
@@ -93,15 +93,10 @@ class Formulation(ConfigModel):
 
     @model_validator(mode="after")
     def _fits_the_robot(self) -> Formulation:
-        names: list[str] = []
-        for key, task in self.entries():
-            if task.name in names:
-                raise KeyedError(f"{key}.name", f"there is another task '{task.name}'")
-            names.append(task.name)
         for i, task in enumerate(self.constraints):
             if given := {"weight", "required"} & task.model_fields_set:
                 raise KeyedError(f"constraints[{i}].{min(given)}", "is for costs; constraints have to hold")
-        if not names:
+        if not (self.costs or self.constraints):
             raise KeyedError("costs", "expected a task, here or among the constraints")
         TaskSet(self)
         return self
@@ -138,9 +133,6 @@ class Part(NamedTuple):
 class TaskSet:
     """A formulation, with its robot.
 
-    Args:
-        formulation: What the user wants.
-
     Attributes:
         robot: The robot.
         base_frame: What poses are expressed in.
@@ -156,6 +148,8 @@ class TaskSet:
         self.base_frame = formulation.base_frame or (WORLD if formulation.floating_base else self.robot.links[0])
         self.parts: dict[str, Part] = {}
         for key, config in formulation.entries():
+            if config.name in self.parts:
+                raise KeyedError(f"{key}.name", f"there is another task '{config.name}'")
             try:
                 task = task_class(config.type)(config, self.robot)
             except KeyedError as error:
@@ -163,8 +157,8 @@ class TaskSet:
             self.parts[config.name] = Part(task, key.startswith("constraints"))
         self.main = self._main(formulation.main_task)
         if self.main is not None and not self.parts[self.main].is_hard:
-            name = self.main
-            self.parts[name] = Part(_required(self.parts[name].task), False)
+            task = self.parts[self.main].task
+            task.config = task.config.model_copy(update={"required": True})
 
     @property
     def anchor(self) -> FrameTask | None:
@@ -181,16 +175,7 @@ class TaskSet:
         return name
 
 
-def _required(task: Task) -> Task:
-    task.config = task.config.model_copy(update={"required": True})
-    return task
-
-
 def _robot(formulation: Formulation) -> Robot:
-    names = [shape.name for shape in formulation.shapes]
-    for i, name in enumerate(names):
-        if name in names[:i]:
-            raise KeyedError(f"shapes[{i}].name", f"there is another shape '{name}'")
     floating, base = formulation.floating_base, formulation.base_frame
     try:
         robot = Robot(formulation.urdf_filename, floating, formulation.joints, None if floating else base)
@@ -202,8 +187,8 @@ def _robot(formulation: Formulation) -> Robot:
         if name not in robot.all_joints:
             raise KeyedError("start", str(UnknownNameError("joint", name, robot.all_joints)))
     for i, shape in enumerate(formulation.shapes):
-        try:
+        if shape.name in [other.name for other in formulation.shapes[:i]]:
+            raise KeyedError(f"shapes[{i}].name", f"there is another shape '{shape.name}'")
+        with blaming(f"shapes[{i}].link"):
             robot.add_shape(shape)
-        except UnknownNameError as error:
-            raise KeyedError(f"shapes[{i}].link", str(error)) from None
     return robot

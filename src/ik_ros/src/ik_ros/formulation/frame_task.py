@@ -2,19 +2,18 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 import pinocchio as pin
 
-from custom_ros_tools.errors import UnknownNameError
 from custom_ros_tools.schema import KeyedError, ListOf, Text
 from ik_ros.problem import IKProblem
 from rpbi.geometry import Pose, normalized
 from rpbi.kinematics.residual import Residual
 
 from .robot import Robot, to_se3
-from .task import Linearization, Task, TaskConfig
+from .task import Linearization, Task, TaskConfig, blaming
 
 Axis = Literal["x", "y", "z", "rx", "ry", "rz"]
 AXES: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")
@@ -35,7 +34,13 @@ class FrameTaskConfig(TaskConfig):
 
 
 class FrameTask(Task):
-    """Brings a link to a pose, or near it, along and about some or all axes of the goal."""
+    """Brings a link to a pose, or near it, along and about some or all axes of the goal.
+
+    Attributes:
+        link_id: Pinocchio's number of the link.
+        goal: Where it shall be, a `pinocchio.SE3`.
+        is_complete: Whether all axes count.
+    """
 
     Config = FrameTaskConfig
     available: ClassVar[tuple[str, ...]] = AXES
@@ -44,20 +49,16 @@ class FrameTask(Task):
 
     def __init__(self, config: FrameTaskConfig, robot: Robot) -> None:
         super().__init__(config, robot)
-        try:
+        with blaming("frame"):
             self.link_id = robot.link_id(config.frame)
-        except UnknownNameError as error:
-            raise KeyedError("frame", str(error)) from None
         axes = config.axes if "axes" in config.model_fields_set else self.available
         if not set(axes) <= set(self.available):
             raise KeyedError("axes", f"expected some of {', '.join(self.available)}, got {', '.join(axes)}")
         self.is_complete = len(set(axes)) == len(AXES)
         self._counts = np.array([axis in axes for axis in AXES])
-        try:
+        with blaming("goal"):
             self._default = None if config.goal is None else self.pose_of(config.goal)
-        except ValueError as error:
-            raise KeyedError("goal", str(error)) from None
-        self._set_goal(self._default or Pose(), (0.0,) * 6)
+        self._set_goal(self._default or Pose())
 
     def pose_of(self, values: Sequence[float]) -> Pose:
         """Returns the goal that numbers stand for.
@@ -74,7 +75,7 @@ class FrameTask(Task):
         pose = self._default if goal is None else self.pose_of(goal)
         if pose is None:
             raise ValueError("missing, neither the problem nor the formulation has one")
-        self._set_goal(pose, (0.0,) * 6)
+        self._set_goal(pose)
 
     def aim(self, problem: IKProblem) -> None:
         """Takes the target of a problem, with its tolerances, as the goal."""
@@ -83,7 +84,7 @@ class FrameTask(Task):
 
     def rows(self, q: np.ndarray) -> Linearization:
         """See `Task`: 3 ways along and the rotation vector about the axes of the goal, for axes that count."""
-        off = self._goal.actInv(self.robot.frame(self.link_id))
+        off = self.goal.actInv(self.robot.frame(self.link_id))
         rotation = off.rotation
         jacobian = self.robot.jacobian(self.link_id)
         rows = np.empty_like(jacobian)
@@ -99,13 +100,8 @@ class FrameTask(Task):
         off = beyond.tolist()
         return Residual(math.hypot(*off[: self._lengths]), math.hypot(*off[self._lengths :]))
 
-    @property
-    def goal(self) -> Any:
-        """Where the link shall be, a `pinocchio.SE3`."""
-        return self._goal
-
-    def _set_goal(self, pose: Pose, tolerance: Sequence[float]) -> None:
-        self._goal = to_se3(pose)
+    def _set_goal(self, pose: Pose, tolerance: Sequence[float] = (0.0,) * 6) -> None:
+        self.goal = to_se3(pose)
         wide = np.array(tolerance)
         self._used = self._counts & ~((np.arange(6) >= 3) & (wide >= np.pi))
         self._all_count = bool(self._used.all())

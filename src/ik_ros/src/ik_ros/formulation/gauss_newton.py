@@ -80,10 +80,6 @@ class GaussNewton:
     constraints and the limits of the joints hold. Constraints give way a little at a great price, so that there always
     is a step.
 
-    Args:
-        robot: The robot.
-        parts: The tasks.
-
     Attributes:
         lower: n lower limits of the joints [rad or m].
         upper: n upper limits.
@@ -113,11 +109,7 @@ class GaussNewton:
                 self.upper[i] = np.maximum(np.minimum(self.upper[i], upper), self.lower[i])
 
     def __call__(self, q: np.ndarray) -> Iterator[Iterate]:
-        """Yields each configuration on the way, also those that turn out to be worse.
-
-        Args:
-            q: Where it starts; joints beyond their limits start at them.
-        """
+        """Yields each configuration on the way from q, also worse ones; joints beyond their limits start at them."""
         q = self._robot.moved(q, np.zeros(self._count), self.lower, self.upper)
         damping, merits = 0.0, deque([np.inf], MEMORY)
         here = tried = self._at(q, np.inf)
@@ -137,9 +129,7 @@ class GaussNewton:
         self._robot.update(q)
         rows = [part.task.rows(q) for part in self._parts]
         beyond = [one.beyond() for one in rows]
-        merit = 0.0
-        for weight, over in zip(self._weights, beyond):
-            merit += weight * float(over @ over)
+        merit = sum(weight * float(over @ over) for weight, over in zip(self._weights, beyond))
         return Iterate(q, rows, beyond, merit, step)
 
     def _step(self, here: Iterate, damping: float) -> np.ndarray | None:

@@ -5,21 +5,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from custom_ros_tools.errors import UnknownNameError
 from custom_ros_tools.schema import KeyedError
 from ik_ros.problem import IKProblem
 from rpbi.kinematics.residual import Residual
 
 from .robot import Robot
-from .task import Linearization, Task, TaskConfig
+from .task import Linearization, Task, TaskConfig, blaming
 
 
 class JointTask(Task):
     """Wants positions of some joints within bounds.
 
     Args:
-        config: Its options.
-        robot: The robot.
         joints: Names of the k joints.
         key: The option that names them, for messages.
 
@@ -30,10 +27,8 @@ class JointTask(Task):
 
     def __init__(self, config: TaskConfig, robot: Robot, joints: Sequence[str], key: str) -> None:
         super().__init__(config, robot)
-        try:
+        with blaming(key):
             self.indices = [robot.index(name) for name in joints]
-        except UnknownNameError as error:
-            raise KeyedError(key, str(error)) from None
         self._jacobian = robot.joint_rows(self.indices)
         self.keep_near(None, 0.0)
 
@@ -48,11 +43,7 @@ class JointTask(Task):
         self.bounds = goal, goal
 
     def previous(self, problem: IKProblem, most: int) -> list[np.ndarray]:
-        """Returns k positions of each of a problem's previous solutions [rad or m], newest last.
-
-        Args:
-            problem: The problem.
-            most: How many of the newest to return, if there are so many.
+        """Returns k positions of each of a problem's previous solutions [rad or m], newest last, so many at most.
 
         Raises:
             KeyedError: If one of them lacks one of the k joints; it names both.

@@ -110,10 +110,7 @@ class Robot:
         Raises:
             UnknownNameError: If there is no such joint.
         """
-        known = [name for name in names if name not in self._still]
-        for name in known:
-            self.joint_id(name)
-        return known
+        return [_known("joint", name, self.all_joints) for name in names if name not in self._still]
 
     def index(self, name: str) -> int:
         """Returns where a joint is among the n.
@@ -179,14 +176,7 @@ class Robot:
         return changed
 
     def moved(self, q: np.ndarray, step: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-        """Returns the configuration after a step of what is free [rad or m].
-
-        Args:
-            q: The configuration before.
-            step: The step.
-            lower: n lower limits, which are kept.
-            upper: n upper limits.
-        """
+        """Returns the configuration after a step of what is free, within n lower and n upper limits [rad or m]."""
         if not self.is_floating:
             positions = q[self._in_q] + step
         else:
@@ -219,9 +209,8 @@ class Robot:
 
     def joint_rows(self, indices: Sequence[int]) -> np.ndarray:
         """Returns the Jacobian of the positions of some of the n joints: a 1 in each row."""
-        rows = np.zeros((len(indices), len(self.free)))
-        rows[np.arange(len(indices)), len(self.free) - len(self.joint_names) + np.asarray(indices, dtype=int)] = 1.0
-        return rows
+        first = len(self.free) - len(self.joint_names)
+        return np.eye(len(self.free))[[first + i for i in indices]]
 
     def _express_in(self, base: str) -> None:
         """Moves the origin from the root into another link that stands still."""
@@ -244,11 +233,7 @@ class Robot:
 
 
 def _known(kind: str, name: str, names: Collection[str]) -> str:
-    """Returns a name.
-
-    Raises:
-        UnknownNameError: If it is none of these.
-    """
+    """Returns a name; raises `UnknownNameError` if it is none of these."""
     if name not in names:
         raise UnknownNameError(kind, name, names)
     return name

@@ -2,12 +2,14 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from custom_ros_tools.schema import ConfigModel, Positive, Switch, Text
+from custom_ros_tools.errors import UnknownNameError
+from custom_ros_tools.schema import ConfigModel, KeyedError, Positive, Switch, Text
 from ik_ros.problem import IKProblem
 from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
@@ -32,6 +34,15 @@ class TaskConfig(ConfigModel):
     required: Switch = False
     tolerance_m: Positive = POSITION_TOLERANCE_M
     tolerance_rad: Positive = ORIENTATION_TOLERANCE_RAD
+
+
+@contextmanager
+def blaming(key: str) -> Iterator[None]:
+    """Raises what is said of unknown names and wrong values as a `KeyedError` of an option."""
+    try:
+        yield
+    except (UnknownNameError, ValueError) as error:
+        raise KeyedError(key, str(error)) from None
 
 
 class Linearization(NamedTuple):
@@ -101,11 +112,7 @@ class Task(ABC):
         """Returns what it wants, for one configuration."""
 
     def residual(self, beyond: np.ndarray) -> Residual:
-        """Returns how far off it is; here all rows are lengths.
-
-        Args:
-            beyond: How far its k numbers are outside their bounds [m or rad].
-        """
+        """Returns how far off it is when its k numbers are that far outside their bounds; here all are lengths."""
         return Residual(math.hypot(*beyond.tolist()), 0.0)
 
     def size(self, residual: Residual) -> float:

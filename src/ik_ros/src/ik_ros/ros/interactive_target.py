@@ -2,6 +2,7 @@
 
 import math
 
+from geometry_msgs.msg import Quaternion
 from interactive_markers.interactive_marker_server import InteractiveMarkerServer
 from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, InteractiveMarkerFeedback
 
@@ -57,8 +58,7 @@ def _marker(config: InteractiveTargetConfig) -> InteractiveMarker:
             ("turn", InteractiveMarkerControl.ROTATE_AXIS),
         ):
             control = InteractiveMarkerControl(name=f"{name}_{axis}", interaction_mode=mode)
-            orientation = control.orientation
-            orientation.x, orientation.y, orientation.z, orientation.w = x, y, z, HALF_TURN
+            control.orientation = Quaternion(x, y, z, HALF_TURN)
             marker.controls.append(control)
     return marker
 

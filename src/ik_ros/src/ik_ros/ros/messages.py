@@ -11,8 +11,8 @@ from custom_ros_tools.joint_values import JointValues
 from ik_ros.msg import IKProblem as IKProblemMessage
 from ik_ros.msg import TaskGoal, TracIKProblem
 from ik_ros.msg import Waypoint as WaypointMessage
-from ik_ros.problem import IKProblem, IKSolution, JointPositions, SampledTrajectory, Vector, Waypoint
-from rpbi.geometry import Pose
+from ik_ros.problem import IKProblem, JointPositions, SampledTrajectory, Waypoint
+from rpbi.geometry import Pose, Vector
 
 
 def problem_in(message: IKProblemMessage) -> IKProblem:
@@ -83,11 +83,6 @@ def positions_in(what: str, message: JointState) -> JointPositions:
 def positions_message(positions: JointPositions) -> JointState:
     """Returns positions by joint as a message."""
     return JointState(name=list(positions), position=list(positions.values()))
-
-
-def solution_message(solution: IKSolution) -> JointState:
-    """Returns the positions of a solution."""
-    return JointState(name=list(solution.joint_names), position=list(solution.positions))
 
 
 def trajectory_message(joint_names: tuple[str, ...], trajectory: SampledTrajectory | None) -> JointTrajectory:

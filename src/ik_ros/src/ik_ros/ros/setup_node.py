@@ -11,17 +11,20 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray, Header
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
-from custom_ros_tools.ros.lifecycle.parameters import private_parameters
+from custom_ros_tools.joint_values import JointValues
+from custom_ros_tools.node_configs import StartParameters
+from custom_ros_tools.ros.lifecycle.parameters import private_config, private_parameters
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
 from custom_ros_tools.ros.services import ToggleService
 from custom_ros_tools.toggle import Toggle
 from ik_ros.msg import IKProblem as IKProblemMessage
-from ik_ros.node_configs import SetupParameters
+from ik_ros.node_configs import RobotIKConfig, SetupParameters, TargetParameters
 from ik_ros.problem import IKProblem, JointPositions
+from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
+from ros_pybullet_interface.srv import RobotInfo
 from rpbi.geometry import Pose
 
 from .messages import positions_in, problem_message
-from .robot_ik_setup import RobotIKSetup
 from .solver_name import run_for_solver, topics_of
 from .tf import FreshTf
 
@@ -30,6 +33,38 @@ START_TOPICS = ("qinit", "start_state", "currentPosition")
 """Names that the release's solvers have for the same."""
 PREVIOUS_TOPICS = ("previous_solutions", "previous_solution")
 TOLERANCES = ("bx", "by", "bz", "brx", "bry", "brz")
+NOT_IN_MESSAGES = {"robot_name", "parent_frame_id", "child_frame_id"}
+"""Keys of `~config` that are no fields of the robot's own problems."""
+
+
+def publish_problems(
+    topics: str, message_type: type, hz: float, start_on_init: bool, problem: Callable[[], rospy.Message]
+) -> None:
+    """Publishes problems on the topic `ik`, from now on and while it is switched on.
+
+    Args:
+        topics: Prefix of the service `toggle`, which switches it.
+        message_type: Type of the problems.
+        hz: The rate, in wall time [Hz].
+        start_on_init: Whether it is on from the start.
+        problem: Returns the next one; if there is none, it raises an `InterfaceError` or `ValueError` that says why.
+    """
+    is_on, warn = threading.Event(), ThrottledWarning()
+    publisher = rospy.Publisher("ik", message_type, queue_size=QUEUE_SIZE, tcp_nodelay=True)
+
+    def publish() -> None:
+        if not is_on.is_set():
+            return
+        try:
+            publisher.publish(problem())
+        except (InterfaceError, ValueError) as error:
+            warn("no problem is published", str(error))
+
+    setup = Toggle("setup", is_on.set, is_on.clear)
+    if start_on_init:
+        setup.on()
+    ToggleService(f"{topics}/toggle", setup.on, setup.off)
+    WallTimer(hz, publish)
 
 
 class SetupNode:
@@ -47,7 +82,6 @@ class SetupNode:
         self._topics = topics_of("setup", name)
         self._warn = ThrottledWarning()
         self._lock = threading.Lock()
-        self._is_on = False
         self._tf: FreshTf | None = None
         if config.parent_frame_id is not None and config.child_frame_id is not None:
             self._tf = FreshTf(config.parent_frame_id, config.child_frame_id, config.tf_timeout_s)
@@ -55,21 +89,13 @@ class SetupNode:
         self._previous: deque[JointPositions] = deque(maxlen=config.max_num_prev_solutions)
         self._goals = dict(config.goals)
         self._tolerances = {key: getattr(config, f"init_{key}") for key in TOLERANCES}
-        self._check_parameters()
-        self._publisher = rospy.Publisher("ik", IKProblemMessage, queue_size=QUEUE_SIZE, tcp_nodelay=True)
-        rospy.set_param("ik_ros/interface", name)
-        self._subscribe()
-        setup = Toggle("setup", lambda: self._switch(True), lambda: self._switch(False))
-        if config.start_on_init:
-            setup.on()
-        ToggleService(f"{self._topics}/toggle", setup.on, setup.off)
-        WallTimer(config.hz, self._publish)
-
-    def _check_parameters(self) -> None:
         try:
             self._problem(None)
         except ValueError as error:
             raise ConfigError([Problem(rospy.get_name(), "", str(error))]) from None
+        rospy.set_param("ik_ros/interface", name)
+        self._subscribe()
+        publish_problems(self._topics, IKProblemMessage, config.hz, config.start_on_init, self._message)
 
     def _subscribe(self) -> None:
         for topic in START_TOPICS:
@@ -94,9 +120,6 @@ class SetupNode:
 
         rospy.Subscriber(full_name, message_type, checked, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
-    def _switch(self, on: bool) -> None:
-        self._is_on = on
-
     def _take_start(self, topic: str, message: JointState) -> None:
         self._start = positions_in(topic, message)
 
@@ -115,16 +138,9 @@ class SetupNode:
         IKProblem(goals={task: message.data})
         self._goals[task] = tuple(message.data)
 
-    def _publish(self) -> None:
-        if not self._is_on:
-            return
-        try:
-            problem = self._problem(None if self._tf is None else self._tf.pose())
-        except (InterfaceError, ValueError) as error:
-            self._warn("no problem is published", str(error))
-            return
-        header = Header(stamp=rospy.Time.now(), frame_id=self._config.parent_frame_id or "")
-        self._publisher.publish(problem_message(problem, header))
+    def _message(self) -> IKProblemMessage:
+        problem = self._problem(None if self._tf is None else self._tf.pose())
+        return problem_message(problem, Header(stamp=rospy.Time.now(), frame_id=self._config.parent_frame_id or ""))
 
     def _problem(self, target: Pose | None) -> IKProblem:
         with self._lock:
@@ -141,6 +157,59 @@ class SetupNode:
 def _fields(tolerances: dict[str, float]) -> dict[str, Any]:
     values = tuple(tolerances[key] for key in TOLERANCES)
     return {"position_tolerance": values[:3], "rotation_tolerance": values[3:]}
+
+
+class RobotIKSetup:
+    """`pybullet` with `~config`: publishes problems as the topic `rpbi/NAME/ik` takes them; no solver node is needed.
+
+    It waits for the robot before it begins, to learn the order of its joints.
+
+    Raises:
+        ConfigError: If `~config` or a parameter is wrong.
+        rospy.ROSInterruptException: If ROS shuts down while it waits.
+    """
+
+    def __init__(self) -> None:
+        self._config = config = private_config(RobotIKConfig)
+        timing = private_parameters(TargetParameters)
+        start_on_init = private_parameters(StartParameters).start_on_init
+        self._tf = FreshTf(config.parent_frame_id, config.child_frame_id, timing.tf_timeout_s)
+        self._period_s = 1.0 / timing.hz
+        self._warn = ThrottledWarning()
+        self._current: list[float] = []
+        rospy.set_param("ik_ros/interface", "pybullet")
+        self._joints = _joints_of(config.robot_name)
+        topics = topics_of("setup", "pybullet")
+        self._topic = f"{topics}/currentPosition"
+        rospy.Subscriber(self._topic, JointState, self._take_current, queue_size=1)
+        publish_problems(topics, CalculateInverseKinematicsProblem, timing.hz, start_on_init, self._problem)
+
+    def _take_current(self, message: JointState) -> None:
+        try:
+            values = JointValues.of(message.name, message.position).in_order(self._joints)
+        except (InterfaceError, ValueError) as error:
+            self._warn(rospy.resolve_name(self._topic), f"message refused: {error}")
+            return
+        self._current = list(values.position)
+
+    def _problem(self) -> CalculateInverseKinematicsProblem:
+        pose = self._tf.pose()
+        return CalculateInverseKinematicsProblem(
+            header=Header(stamp=rospy.Time.now(), frame_id=self._config.parent_frame_id),
+            targetPosition=pose.position,
+            targetOrientation=pose.quat_xyzw,
+            currentPosition=self._current,
+            dt=self._period_s if self._current else 0.0,
+            **self._config.model_dump(exclude=NOT_IN_MESSAGES),
+        )
+
+
+def _joints_of(robot: str) -> tuple[str, ...]:
+    """Waits for a robot and returns the joints that a motor can move."""
+    service = rospy.ServiceProxy(f"rpbi/{robot}/robot_info", RobotInfo)
+    rospy.loginfo("waiting for %s", service.resolved_name)
+    service.wait_for_service()
+    return tuple(joint.jointName for joint in service().joint_info if joint.is_revolute or joint.jointType == 1)
 
 
 def main() -> None:

@@ -32,7 +32,7 @@ from ik_ros.srv import (
     TracIKResponse,
 )
 
-from .messages import pose_message, problem_in, problem_in_trac_ik, solution_message, trajectory_message
+from .messages import pose_message, problem_in, problem_in_trac_ik, trajectory_message
 from .solver_name import run_for_solver, topics_of
 from .tf import BaseFrame
 
@@ -119,36 +119,33 @@ class SolverNode:
                 self._warn("ik/solution", solution.message)
         with self._publishing:
             if stream is self._stream:  # it may have been switched off meanwhile
-                self._publish(solution, header)
+                self._publish(solution, header.stamp)
 
-    def _publish(self, solution: IKSolution, header: Header) -> None:
-        answer = IKSolutionMessage(
-            interface_name=self._name,
-            success=solution.success,
-            message=solution.message,
-            joint_names=solution.joint_names,
-            solution=solution.positions,
-        )
-        answer.header.stamp = header.stamp
+    def _publish(self, solution: IKSolution, stamp: rospy.Time) -> None:
+        names, positions = solution.joint_names, solution.positions
         if solution.success and solution.trajectory is None:
-            target = solution_message(solution)
-            target.header.stamp = header.stamp
-            self._target.publish(target)
+            self._target.publish(JointState(header=Header(stamp=stamp), name=names, position=positions))
         elif solution.success:
-            self._trajectory.publish(trajectory_message(solution.joint_names, solution.trajectory))
-        self._solution.publish(answer)
+            self._trajectory.publish(trajectory_message(names, solution.trajectory))
+        self._solution.publish(
+            IKSolutionMessage(
+                header=Header(stamp=stamp),
+                interface_name=self._name,
+                success=solution.success,
+                message=solution.message,
+                joint_names=names,
+                solution=positions,
+            )
+        )
 
     def _serve(self, request: SolveIKRequest) -> SolveIKResponse:
-        try:
-            solution = self._solve_alone(problem_in(request.problem), request.problem.header)
-        except (InterfaceError, ValueError) as error:
-            return SolveIKResponse(success=False, message=str(error))
+        solution = self._solve_alone(problem_in, request.problem)
         names = solution.joint_names
         return SolveIKResponse(
             base_pose=Pose() if solution.base_pose is None else pose_message(solution.base_pose),
             success=solution.success,
             message=solution.message,
-            solution=solution_message(solution),
+            solution=JointState(name=names, position=solution.positions),
             position_error=solution.position_error_m,
             orientation_error=solution.orientation_error_rad,
             alternatives=[JointState(name=names, position=positions) for positions in solution.alternatives],
@@ -156,15 +153,17 @@ class SolverNode:
         )
 
     def _serve_trac_ik(self, request: TracIKRequest) -> TracIKResponse:
-        try:
-            solution = self._solve_alone(problem_in_trac_ik(request.problem), request.problem.header)
-        except (InterfaceError, ValueError) as error:
-            return TracIKResponse(success=False, message=str(error))
-        return TracIKResponse(solution.success, solution.message, solution_message(solution))
+        solution = self._solve_alone(problem_in_trac_ik, request.problem)
+        joints = JointState(name=solution.joint_names, position=solution.positions)
+        return TracIKResponse(solution.success, solution.message, joints)
 
-    def _solve_alone(self, problem: IKProblem, header: Header) -> IKSolution:
-        with self._solving:
-            return self._solver.solve(self._base.with_poses_in_it(problem, header.frame_id))
+    def _solve_alone(self, read: Callable[[genpy.Message], IKProblem], message: genpy.Message) -> IKSolution:
+        """Returns the answer of the solver itself, with neither start nor targets of the problems on the topic."""
+        try:
+            with self._solving:
+                return self._solver.solve(self._base.with_poses_in_it(read(message), message.header.frame_id))
+        except (InterfaceError, ValueError) as error:
+            return IKSolution(False, str(error), (), ())
 
 
 def _parameters() -> tuple[SolverNodeParameters, dict[str, object]]:

@@ -64,11 +64,7 @@ class BaseFrame:
             self._listener = tf2_ros.TransformListener(self._buffer)
 
     def with_poses_in_it(self, problem: IKProblem, frame_id: str) -> IKProblem:
-        """Returns a problem with its poses in the base.
-
-        Args:
-            problem: The problem.
-            frame_id: TF frame that its poses are in; empty is the base.
+        """Returns a problem with its poses, which are in a TF frame, in the base; an empty `frame_id` is the base.
 
         Raises:
             InterfaceError: If TF does not know how the two frames lie.

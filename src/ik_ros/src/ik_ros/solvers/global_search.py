@@ -58,7 +58,8 @@ class GlobalSolver(KdlSolver):
             return [levenberg_marquardt(self.chain, goal, self.limits, min(found)[1])]
         kept: list[list[float]] = []
         for _, q in solutions:
-            if len(kept) < self._most and all(_difference(q, other) > self._distinct for other in kept):
+            differ = (any(abs(a - b) > self._distinct for a, b in zip(q, other)) for other in kept)
+            if len(kept) < self._most and all(differ):
                 kept.append(q)
         return kept
 
@@ -68,7 +69,3 @@ class GlobalSolver(KdlSolver):
             2.0 * abs(position - middle) / (upper - lower) if upper > lower else 0.0
             for position, middle, lower, upper in zip(q, self.limits.middle, self.lower, self.upper)
         )
-
-
-def _difference(q: Sequence[float], other: Sequence[float]) -> float:
-    return max(abs(a - b) for a, b in zip(q, other))

@@ -68,14 +68,7 @@ class KdlSolver(ChainSolver):
         return [levenberg_marquardt(self.chain, goal, self.limits, best)]
 
     def candidates(self, problem: IKProblem, goal: Goal, start: list[float], restarts: int) -> Iterator[list[float]]:
-        """Yields where each start leads, within limits.
-
-        Args:
-            problem: The problem.
-            goal: Its target with tolerances.
-            start: The first n positions to start from [rad or m].
-            restarts: How many random ones follow.
-        """
+        """Yields where each start leads, within limits: first the one that is given, then random ones [rad or m]."""
         if not (goal.is_point and self.chain.is_plain):
             for first in self._starts(problem, start, min(restarts, MOST_DESCENTS)):
                 yield levenberg_marquardt(self.chain, goal, self.limits, first)

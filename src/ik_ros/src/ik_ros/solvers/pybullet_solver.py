@@ -61,7 +61,7 @@ class PybulletSolver(ChainSolver):
 
     def __init__(self, config: PybulletConfig) -> None:
         super().__init__(config)
-        refuse_mimics(self.description, config, "pybullet")
+        refuse_mimics(config, "pybullet")
         self._options = config.options
         self._kinematics = Kinematics(write_description(self.description.urdf))
         question = PybulletProblem(config.tip_link, (0.0, 0.0, 0.0), **self._options)

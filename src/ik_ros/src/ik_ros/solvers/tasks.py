@@ -41,9 +41,6 @@ class TasksSolver(Solver):
 
     Any thread may call it; a lock inside lets one in at a time.
 
-    Args:
-        config: The formulation.
-
     Attributes:
         tasks: The tasks, with their robot.
     """
@@ -60,7 +57,6 @@ class TasksSolver(Solver):
         self.velocity_limits = tuple(robot.max_velocity.tolist())
         self.base_frame = self.tasks.base_frame
         self._gauss_newton = GaussNewton(robot, list(self.tasks.parts.values()))
-        self._names = list(self.tasks.parts)
         self._required = [
             (i, name, part.task) for i, (name, part) in enumerate(self.tasks.parts.items()) if part.is_required
         ]
@@ -104,7 +100,7 @@ class TasksSolver(Solver):
             self.tasks.robot.moving(solution)
         for name in problem.goals:
             if name not in self.tasks.parts:
-                raise UnknownNameError("task", name, self._names)
+                raise UnknownNameError("task", name, self.tasks.parts)
         main = self.tasks.main
         if problem.target is not None and main is None:
             raise ValueError("target: the formulation has no main task that it could be for")
@@ -124,15 +120,12 @@ class TasksSolver(Solver):
 
     def _search(self, problem: IKProblem, start: np.ndarray) -> Candidate:
         """Returns what was found from the first start that leads to a solution, else the best of all."""
-        best: Candidate | None = None
+        candidates = []
         for first in self._starts(problem, start):
-            found = self._from(self._on_anchor(first))
-            if best is None or found.rank < best.rank:
-                best = found
-            if best.size <= 1.0:
+            candidates.append(self._from(self._on_anchor(first)))
+            if candidates[-1].size <= 1.0:
                 break
-        assert best is not None
-        return best
+        return min(candidates, key=lambda candidate: candidate.rank)
 
     def _starts(self, problem: IKProblem, start: np.ndarray) -> Iterator[np.ndarray]:
         yield start
@@ -159,29 +152,23 @@ class TasksSolver(Solver):
 
     def _from(self, first: np.ndarray) -> Candidate:
         """Returns the best that is found from one start."""
-        best: Candidate | None = None
-        sizes: list[float] = []
+        candidates: list[Candidate] = []
         merits: list[float] = []
         for tried in self._gauss_newton(first):
-            found = self._judged(tried)
-            sizes.append(found.size)
+            candidates.append(self._judged(tried))
             merits.append(tried.merit)
-            if best is None or found.rank <= best.rank:
-                best = found
-            if self._is_at_its_end(sizes, merits, tried.step):
+            if self._is_at_its_end(candidates, merits, tried.step):
                 break
-        assert best is not None
-        return best
+        return min(reversed(candidates), key=lambda candidate: candidate.rank)  # of equal ones the last
 
-    def _is_at_its_end(self, sizes: Sequence[float], merits: Sequence[float], step: float) -> bool:
+    def _is_at_its_end(self, candidates: Sequence[Candidate], merits: Sequence[float], step: float) -> bool:
         """Returns whether there is nothing more to be had from one start."""
-        if step < STANDSTILL or len(sizes) > self._config.iterations:
+        count, size = len(candidates), candidates[-1].size
+        if step < STANDSTILL or count > self._config.iterations or (size <= AIM and not self._has_wishes):
             return True
-        if not self._has_wishes and sizes[-1] <= AIM:
-            return True
-        if self._has_wishes and sizes[-1] <= 1.0:
-            return len(sizes) > PATIENCE and merits[-1] > (1.0 - SETTLED) * merits[-1 - PATIENCE]
-        return len(sizes) > self._patience and sizes[-1] > 0.5 * sizes[-1 - self._patience]
+        if size <= 1.0 and self._has_wishes:
+            return count > PATIENCE and merits[-1] > (1.0 - SETTLED) * merits[-1 - PATIENCE]
+        return count > self._patience and size > 0.5 * candidates[-1 - self._patience].size
 
     def _judged(self, tried: Iterate) -> Candidate:
         residuals = {name: task.residual(tried.beyond[i]) for i, name, task in self._required}

@@ -51,7 +51,7 @@ class TracIkSolver(ChainSolver):
 
     def __init__(self, config: TracIkConfig) -> None:
         super().__init__(config)
-        refuse_mimics(self.description, config, "trac_ik")
+        refuse_mimics(config, "trac_ik")
         for joint in self.description.joints:
             if joint.type == "prismatic" and math.isinf(joint.upper):
                 message = f"joint '{joint.name}' slides without limits, which 'trac_ik' cannot solve for; 'kdl' can"

@@ -7,11 +7,12 @@ import random
 import threading
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
+from scipy.spatial.transform import Rotation
 
 from custom_ros_tools.errors import MissingDependency, UnknownNameError
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Positive, Seconds
@@ -30,7 +31,7 @@ except ImportError:
 
 from ik_ros.trajectory.program import Program
 from ik_ros.trajectory.spline import Spline
-from ik_ros.trajectory.symbolic import link_frames, rotation_matrix, sphere_distances
+from ik_ros.trajectory.symbolic import link_frames, sphere_distances
 
 MOST_INTERVALS = 128
 """Waypoints that follow each other faster than two intervals of the finest spline can hardly all be passed."""
@@ -73,7 +74,7 @@ class TrajectoryConfig(KdlConfig):
     @model_validator(mode="after")
     def _fits_the_chain(self) -> TrajectoryConfig:
         chain = self.chain
-        refuse_mimics(chain, self, "trajectory")
+        refuse_mimics(self, "trajectory")
         for key in ("velocity_limits", "acceleration_limits"):
             for name in getattr(self, key):
                 if name not in chain.joint_names:
@@ -102,7 +103,7 @@ class TrajectorySolver(KdlSolver):
         speeds = dict(zip(self.joint_names, self.velocity_limits)) | config.velocity_limits
         accelerations = dict.fromkeys(self.joint_names, math.inf) | config.acceleration_limits
         self._max_velocity, self._max_acceleration = np.array([*speeds.values()]), np.array([*accelerations.values()])
-        self._compiled = lru_cache(KEPT_PROGRAMS)(self._compile)
+        self._compiled = lru_cache(KEPT_PROGRAMS)(partial(Program, self.description, config.shapes))
         self._program_lock = threading.Lock()
         q = casadi.SX.sym("q", len(self.joint_names))
         distances = sphere_distances(config.shapes, link_frames(self.description, q)) or [casadi.inf]
@@ -124,19 +125,13 @@ class TrajectorySolver(KdlSolver):
             message = f"at the start, a sphere is as near as {nearest * 1e3:.4g} mm to an obstacle"
             return IKSolution(False, message, self.joint_names, tuple(start))
         goals = [Goal(replace(problem, target=waypoint.pose)) for waypoint in waypoints]
-        best: IKSolution | None = None
+        answers: list[IKSolution] = []
         for attempt in range(self._config.attempts):
             postures, failure = self._postures(problem, waypoints, start, attempt)
-            if failure is not None:
-                best = best or failure
+            answers.append(failure or self._shaped(problem, waypoints, goals, start, postures))
+            if failure or answers[-1].success:
                 break
-            solution = self._shaped(problem, waypoints, goals, start, postures)
-            if best is None or solution.success:
-                best = solution
-            if best.success:
-                break
-        assert best is not None
-        return best
+        return answers[-1] if answers[-1].success else answers[0]
 
     def _waypoints(self, problem: IKProblem) -> tuple[Waypoint, ...]:
         """Returns what is to be passed, checked."""
@@ -150,8 +145,7 @@ class TrajectorySolver(KdlSolver):
         last_s = 0.0
         for i, waypoint in enumerate(waypoints):
             if not waypoint.time_s > last_s:
-                message = f"must be after {last_s:g} s, got {waypoint.time_s:g}"
-                raise ValueError(f"waypoints[{i}].time_s: {message}")
+                raise ValueError(f"waypoints[{i}].time_s: must be after {last_s:g} s, got {waypoint.time_s:g}")
             last_s = waypoint.time_s
         if last_s / self._config.sample_s > MOST_SAMPLES:
             raise ValueError(f"waypoints: {last_s:g} s in steps of {self._config.sample_s:g} s (sample_s) are too many")
@@ -163,8 +157,7 @@ class TrajectorySolver(KdlSolver):
         """Returns positions that lead to the waypoints, each near those before; or why there are none."""
         postures: list[Sequence[float]] = [start]
         if attempt:
-            generator = random.Random(f"{problem.seed} {attempt}")
-            postures[0] = self.limits.random(generator, start)
+            postures[0] = self.limits.random(random.Random(f"{problem.seed} {attempt}"), start)
         for waypoint in waypoints:
             near = dict(zip(self.joint_names, postures[-1]))
             found = super().solve(replace(problem, target=waypoint.pose, start=near, seed=problem.seed + attempt))
@@ -186,7 +179,8 @@ class TrajectorySolver(KdlSolver):
         times_s = np.array([0.0, *(waypoint.time_s for waypoint in waypoints)])
         duration_s = float(times_s[-1])
         with self._program_lock:
-            spline, program = self._program(times_s)
+            program = self._program(times_s)
+            spline = program.spline
             guess = np.stack([np.interp(spline.times, times_s / duration_s, each) for each in zip(*postures)], axis=1)
             tolerance = np.array((*problem.position_tolerance, *problem.rotation_tolerance))
             aim = AIM * np.array((POSITION_TOLERANCE_M,) * 3 + (ORIENTATION_TOLERANCE_RAD,) * 3)
@@ -226,16 +220,13 @@ class TrajectorySolver(KdlSolver):
             trajectory=None if problems else self._sampled(spline, points, duration_s),
         )
 
-    def _program(self, times_s: np.ndarray) -> tuple[Spline, Program]:
-        """Returns splines that are fine enough for the waypoints, and their program."""
+    def _program(self, times_s: np.ndarray) -> Program:
+        """Returns the program of splines that are fine enough for the waypoints."""
         gap = float(np.diff(times_s).min() / times_s[-1])
         intervals = self._config.intervals
         while gap * intervals < 2.0 and intervals < MOST_INTERVALS:
             intervals *= 2
-        return Spline(intervals), self._compiled(intervals, len(times_s) - 1)
-
-    def _compile(self, intervals: int, waypoints: int) -> Program:
-        return Program(self.description, self._config.shapes, Spline(intervals), waypoints)
+        return self._compiled(intervals, len(times_s) - 1)
 
     def _nearest_m(self, q: np.ndarray) -> float:
         """Returns the least distance of all pairs in k x n positions; inf without any [m]."""
@@ -265,7 +256,8 @@ class TrajectorySolver(KdlSolver):
 
 def _flat(waypoint: Waypoint) -> np.ndarray:
     """Returns rotation by columns and position of a waypoint, 12 numbers."""
-    return np.concatenate((rotation_matrix(waypoint.pose).T.ravel(), waypoint.pose.position))
+    position, quat_xyzw = waypoint.pose
+    return np.concatenate((Rotation.from_quat(quat_xyzw).as_matrix().T.ravel(), position))
 
 
 def _checks(spline: Spline) -> np.ndarray:

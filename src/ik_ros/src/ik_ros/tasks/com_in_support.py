@@ -5,10 +5,9 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from pydantic import Field
 
-from custom_ros_tools.errors import UnknownNameError
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Position
 from ik_ros.formulation.robot import Robot
-from ik_ros.formulation.task import Linearization, Task, TaskConfig
+from ik_ros.formulation.task import Linearization, Task, TaskConfig, blaming
 
 
 class ComInSupportConfig(TaskConfig):
@@ -35,10 +34,8 @@ class ComInSupport(Task):
     def __init__(self, config: ComInSupportConfig, robot: Robot) -> None:
         super().__init__(config, robot)
         self._margin = config.margin
-        try:
+        with blaming("support"):
             self._contacts = [(robot.link_id(link), np.array(points)) for link, points in config.support.items()]
-        except UnknownNameError as error:
-            raise KeyedError("support", str(error)) from None
         if sum(len(points) for _, points in self._contacts) < 3:
             raise KeyedError("support", "expected 3 points at least")
 

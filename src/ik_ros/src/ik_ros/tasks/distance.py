@@ -3,11 +3,10 @@
 import numpy as np
 from pydantic import Field
 
-from custom_ros_tools.errors import UnknownNameError
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Text
 from ik_ros.formulation.clearance import Placed, RobotShape, clearance
 from ik_ros.formulation.robot import Robot
-from ik_ros.formulation.task import Linearization, Task, TaskConfig
+from ik_ros.formulation.task import Linearization, Task, TaskConfig, blaming
 
 NEAR_M = 0.3
 """What is farther apart than asked by more than this is not looked at in this step [m]."""
@@ -38,10 +37,8 @@ class Distance(Task):
             key = f"pairs[{i}]"
             if len(pair) != 2:
                 raise KeyedError(key, f"expected two shapes, got {len(pair)}")
-            try:
+            with blaming(key):
                 first, second = (robot.shape(name) for name in pair)
-            except UnknownNameError as error:
-                raise KeyedError(key, str(error)) from None
             if first.link_id == second.link_id:
                 raise KeyedError(key, f"'{pair[0]}' and '{pair[1]}' are at the same link, or both stand still")
             if first.core.is_box and second.core.is_box:

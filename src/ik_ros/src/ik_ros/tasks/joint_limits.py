@@ -5,7 +5,7 @@ from pydantic import Field
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Positive
 from ik_ros.formulation.joint_task import JointTask
 from ik_ros.formulation.robot import Robot
-from ik_ros.formulation.task import TaskConfig
+from ik_ros.formulation.task import TaskConfig, blaming
 
 
 class JointLimitsConfig(TaskConfig):
@@ -27,14 +27,13 @@ class JointLimits(JointTask):
     Config = JointLimitsConfig
 
     def __init__(self, config: JointLimitsConfig, robot: Robot) -> None:
-        super().__init__(config, robot, [*robot.joint_names], "limits")
+        super().__init__(config, robot, robot.joint_names, "limits")
         lower, upper = robot.lower + config.margin, robot.upper - config.margin
         for name, limits in config.limits.items():
-            if name not in robot.joint_names:
-                super().__init__(config, robot, [name], f"limits.{name}")
-            if len(limits) != 2 or limits[0] > limits[1]:
-                raise KeyedError(f"limits.{name}", f"expected a lower and an upper limit, got {list(limits)}")
-            i = robot.index(name)
+            with blaming(f"limits.{name}"):
+                i = robot.index(name)
+                if len(limits) != 2 or limits[0] > limits[1]:
+                    raise ValueError(f"expected a lower and an upper limit, got {list(limits)}")
             lower[i], upper[i] = max(lower[i], limits[0]), min(upper[i], limits[1])
         for name, low, high in zip(robot.joint_names, lower, upper):
             if low > high:

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio as pin
 
-from custom_ros_tools.errors import UnknownNameError
 from custom_ros_tools.schema import KeyedError, Position, Text, Vec3
 from ik_ros.formulation.robot import Robot
-from ik_ros.formulation.task import Linearization, Task, TaskConfig
+from ik_ros.formulation.task import Linearization, Task, TaskConfig, blaming
 from ik_ros.problem import IKProblem
 from rpbi.kinematics.residual import Residual
 
@@ -39,10 +38,8 @@ class LookAt(Task):
 
     def __init__(self, config: LookAtConfig, robot: Robot) -> None:
         super().__init__(config, robot)
-        try:
+        with blaming("frame"):
             self._link_id = robot.link_id(config.frame)
-        except UnknownNameError as error:
-            raise KeyedError("frame", str(error)) from None
         length = math.hypot(*config.axis)
         if length < 1e-6:
             raise KeyedError("axis", "must not be zero")

@@ -39,13 +39,16 @@ class Program:
     Args:
         chain: The chain.
         shapes: Spheres on its links, and obstacles in the base that they have to stay away from.
-        spline: The splines.
+        intervals: How many polynomials each joint's spline has.
         waypoints: Number of waypoints.
+
+    Attributes:
+        spline: The splines.
     """
 
-    def __init__(self, chain: ChainDescription, shapes: Sequence[ShapeConfig], spline: Spline, waypoints: int) -> None:
-        self._spline, self._joints = spline, len(chain.joint_names)
-        joints = self._joints
+    def __init__(self, chain: ChainDescription, shapes: Sequence[ShapeConfig], intervals: int, waypoints: int) -> None:
+        self.spline = spline = Spline(intervals)
+        self._joints = joints = len(chain.joint_names)
         points = casadi.MX.sym("points", spline.count, joints)
         poses = casadi.MX.sym("poses", 12, waypoints)
         basis = casadi.MX.sym("basis", waypoints, spline.count)
@@ -59,11 +62,10 @@ class Program:
         postures = casadi.MX.sym("postures", joints, waypoints)  # unknowns too, so that the Hessian stays sparse
         passed = to_off.map(waypoints)(postures, poses)
         distances = sphere_distances(shapes, frames)
-        self._pairs = len(distances)
         times = np.linspace(0.0, 1.0, SAMPLES * spline.intervals + 1)[1:]
-        self._samples = len(times) if self._pairs else 0
+        self._distances = len(times) * len(distances)
         apart = []
-        if self._pairs:
+        if distances:
             to_distances = casadi.Function("distances", [q], [casadi.vertcat(*distances)])
             sampled = _sparse(spline.basis(times)) @ points
             apart = [casadi.vec(to_distances.map(len(times))(sampled.T))]
@@ -78,7 +80,6 @@ class Program:
         parameters = casadi.veccat(poses, basis)
         nlp: Any = {"x": casadi.veccat(points, postures), "p": parameters, "f": cost, "g": constraints}
         self._solve: Any = casadi.nlpsol("trajectory", "ipopt", nlp, OPTIONS)
-        self._waypoints = waypoints
 
     def solve(
         self,
@@ -109,14 +110,14 @@ class Program:
         Returns:
             m x n control points within limits [rad or m], and how Ipopt says it went.
         """
-        count = self._spline.count
+        count = self.spline.count
         lower, upper = (np.tile(ends, (count, 1)) for ends in (limits.lower, limits.upper))
         lower[:2] = upper[:2] = start  # two equal control points are an end at rest
         speed = np.tile(max_velocity, (count - 1, 1))
         speed[-1] = 0.0
         change = np.tile(max_acceleration, (count - 2, 1))
-        allowed = np.tile(tolerance, self._waypoints)
-        apart = np.full(self._samples * self._pairs, clearance + SAFETY_M)
+        allowed = np.tile(tolerance, poses.shape[1])
+        apart = np.full(self._distances, clearance + SAFETY_M)
         postures = (basis @ guess).ravel()
         free = np.full(len(postures), np.inf)
         most = np.concatenate((speed.T.ravel(), change.T.ravel(), 0.0 * postures, allowed))

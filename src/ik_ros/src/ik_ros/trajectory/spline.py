@@ -24,13 +24,13 @@ class Spline:
     """
 
     def __init__(self, intervals: int) -> None:
-        knots = np.linspace(0.0, 1.0, intervals + 1)
+        knots = np.concatenate((np.zeros(DEGREE), np.linspace(0.0, 1.0, intervals + 1), np.ones(DEGREE)))
         self.intervals = intervals
         self.count = intervals + DEGREE
-        self._knots = np.concatenate((np.zeros(DEGREE), knots, np.ones(DEGREE)))
-        self.times = np.array([self._knots[i + 1 : i + 1 + DEGREE].mean() for i in range(self.count)])
-        self.to_velocity = _derivative(self._knots, DEGREE, self.count)
-        self.to_acceleration = _derivative(self._knots[1:-1], DEGREE - 1, self.count - 1) @ self.to_velocity
+        self.times = np.array([knots[i + 1 : i + 1 + DEGREE].mean() for i in range(self.count)])
+        self._spline = BSpline(knots, np.eye(self.count), DEGREE)
+        self.to_velocity = self._spline.derivative(1).c[: self.count - 1]
+        self.to_acceleration = self._spline.derivative(2).c[: self.count - 2]
 
     def basis(self, times: np.ndarray, order: int = 0) -> np.ndarray:
         """Returns what each control point counts.
@@ -42,8 +42,7 @@ class Spline:
         Returns:
             k x m numbers; times the control points, they are the k values.
         """
-        spline = BSpline(self._knots, np.eye(self.count), DEGREE)
-        return np.asarray((spline.derivative(order) if order else spline)(times))
+        return np.asarray((self._spline.derivative(order) if order else self._spline)(times))
 
     @property
     def roughness(self) -> np.ndarray:
@@ -53,12 +52,3 @@ class Spline:
         for i in range(self.intervals):
             weights[i : i + 2, i : i + 2] += pair
         return np.asarray(self.to_acceleration.T @ weights @ self.to_acceleration)
-
-
-def _derivative(knots: np.ndarray, degree: int, count: int) -> np.ndarray:
-    """Returns control points of the derivative from those of a spline (de Boor, chapter X)."""
-    matrix = np.zeros((count - 1, count))
-    for i in range(count - 1):
-        slope = degree / (knots[i + degree + 1] - knots[i + 1])
-        matrix[i, i : i + 2] = -slope, slope
-    return matrix

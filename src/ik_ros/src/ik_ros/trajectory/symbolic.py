@@ -1,15 +1,14 @@
 """Link poses of a chain and their distances to obstacles in CasADi; Pinocchio's wheel has no bindings to it."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import casadi
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ik_ros.chain.description import ChainDescription
 from ik_ros.shape import ShapeConfig
-from rpbi.geometry import Pose
 from rpbi.urdf.document import UrdfJoint
 
 SMALL = 1e-12
@@ -29,7 +28,7 @@ def link_frames(chain: ChainDescription, q: Any) -> dict[str, tuple[Any, Any]]:
     variables = iter(range(len(chain.moving)))
     for joint in chain.joints:
         position = position + rotation @ np.array(joint.xyz)
-        rotation = rotation @ _from_rpy(*joint.rpy)
+        rotation = rotation @ Rotation.from_euler("xyz", joint.rpy).as_matrix()  # about the fixed axes, one by one
         if joint.is_moving:
             turn, shift = _motion(joint, q[next(variables)])
             position = position + rotation @ shift
@@ -54,13 +53,6 @@ def sphere_distances(shapes: Sequence[ShapeConfig], frames: Mapping[str, tuple[A
     return distances
 
 
-def rotation_matrix(pose: Pose) -> np.ndarray:
-    """Returns the 3 x 3 rotation matrix of a pose."""
-    x, y, z, w = pose.quat_xyzw
-    cross = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
-    return np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
-
-
 def rotation_vector(rotation: Any) -> Any:
     """Returns axis times angle of a rotation that CasADi knows [rad], smooth but at half a turn."""
     trace = rotation[0, 0] + rotation[1, 1] + rotation[2, 2]
@@ -73,31 +65,17 @@ def rotation_vector(rotation: Any) -> Any:
 
 def _motion(joint: UrdfJoint, q: Any) -> tuple[Any, Any]:
     """Returns how a joint turns and shifts what it carries, in its own frame."""
-    axis = np.array(joint.axis)
     if not joint.is_revolute:
-        return casadi.DM.eye(3), axis * q
-    x, y, z = joint.axis
-    cross = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
-    turn = casadi.DM.eye(3) + casadi.sin(q) * casadi.DM(cross) + (1.0 - casadi.cos(q)) * casadi.DM(cross @ cross)
+        return casadi.DM.eye(3), np.array(joint.axis) * q
+    cross = casadi.skew(casadi.DM(joint.axis))
+    turn = casadi.DM.eye(3) + casadi.sin(q) * cross + (1.0 - casadi.cos(q)) * (cross @ cross)
     return turn, casadi.DM.zeros(3)
-
-
-def _from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """Returns the rotation matrix of a URDF's angles: about the fixed x, y and z axes, one after the other [rad]."""
-    (sr, sp, sy), (cr, cp, cy) = map(math.sin, (roll, pitch, yaw)), map(math.cos, (roll, pitch, yaw))
-    return np.array(
-        (
-            (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
-            (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
-            (-sp, cp * sr, cp * cr),
-        )
-    )
 
 
 def _distance(point: Any, obstacle: ShapeConfig) -> Any:
     """Returns how far a point is from the surface of a shape."""
     half, radius = obstacle.core
-    local = rotation_matrix(obstacle.pose).T @ (point - np.array(obstacle.position))
+    local = Rotation.from_quat(obstacle.orientation).as_matrix().T @ (point - np.array(obstacle.position))
     if not obstacle.core.is_box:
         along = casadi.fmin(casadi.fmax(local[2], -half[2]), half[2])
         away = local - casadi.vertcat(0.0, 0.0, along)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import logging
 import os
 import signal
@@ -11,6 +12,8 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -87,7 +90,7 @@ def _demo(arguments: argparse.Namespace) -> int:
     out.mkdir(parents=True, exist_ok=True)
     bag = out / "recording.bag"
     expected_hz = _expected_rates()
-    with _Example(arguments.headless, out / "launch.log"):
+    with _example(arguments.headless, out / "launch.log"):
         with Recorder(bag, [*expected_hz, "/diagnostics", "/tf_static"], timeout_s=START_TIMEOUT_S):
             _say(f"recording {arguments.seconds:g} s of {len(expected_hz)} topics into {bag}")
             time.sleep(arguments.seconds)
@@ -103,56 +106,41 @@ def _demo(arguments: argparse.Namespace) -> int:
     return 1 if failures else 0
 
 
-class _Example:
-    """The example, launched on a ROS master of its own, so that it meets nobody else's nodes."""
-
-    def __init__(self, headless: bool, log: Path) -> None:
-        self._log = log
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self._port = probe.getsockname()[1]
-        os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{self._port}"
-        os.environ["ROS_IP"] = "127.0.0.1"
-        os.environ.pop("ROS_HOSTNAME", None)
-        self._command = [
-            "roslaunch", "-p", str(self._port), "rpbi_examples", f"{EXAMPLE}.launch", f"headless:={headless}",
-        ]  # fmt: skip
-        self._process: subprocess.Popen | None = None
-
-    def __enter__(self) -> _Example:
-        _say(f"launching {EXAMPLE} (ROS_MASTER_URI={os.environ['ROS_MASTER_URI']}, log: {self._log})")
-        with open(self._log, "w", encoding="utf-8") as log:
-            self._process = subprocess.Popen(
-                self._command, stdout=log, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True
-            )
+@contextmanager
+def _example(headless: bool, log: Path) -> Iterator[None]:
+    """Launches the example on a ROS master of its own, so that it meets nobody else's nodes, and ends it."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
+    os.environ["ROS_IP"] = "127.0.0.1"
+    os.environ.pop("ROS_HOSTNAME", None)
+    _say(f"launching {EXAMPLE} (ROS_MASTER_URI={os.environ['ROS_MASTER_URI']}, log: {log})")
+    command = ["roslaunch", "-p", str(port), "rpbi_examples", f"{EXAMPLE}.launch", f"headless:={headless}"]
+    with open(log, "w", encoding="utf-8") as output:
+        process = subprocess.Popen(
+            command, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True
+        )
+    try:
+        _wait_until_moving(process, log)
+        yield
+    finally:
+        process.send_signal(signal.SIGINT)
         try:
-            self._wait_until_moving()
-        except BaseException:
-            self.__exit__()
-            raise
-        return self
+            process.wait(STOP_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            kill_with_children(process)
 
-    def __exit__(self, *_: object) -> None:
-        assert self._process is not None
-        if self._process.poll() is None:
-            self._process.send_signal(signal.SIGINT)
-            try:
-                self._process.wait(STOP_TIMEOUT_S)
-            except subprocess.TimeoutExpired:
-                kill_with_children(self._process)
 
-    def _wait_until_moving(self) -> None:
-        """Waits until the arm gets targets, by when everything else is up."""
-        end_s = time.monotonic() + START_TIMEOUT_S
-        while time.monotonic() < end_s:
-            assert self._process is not None
-            if self._process.poll() is not None:
-                break
-            if _is_published(TARGETS) and _is_published(COLOUR):
-                return
-            time.sleep(0.1)
-        tail = "\n".join(self._log.read_text(errors="replace").splitlines()[-20:])
-        raise InterfaceError(f"the example did not come up; the end of {self._log}:\n{tail}")
+def _wait_until_moving(process: subprocess.Popen, log: Path) -> None:
+    """Waits until the arm gets targets, by when everything else is up."""
+    end_s = time.monotonic() + START_TIMEOUT_S
+    while time.monotonic() < end_s and process.poll() is None:
+        if _is_published(TARGETS) and _is_published(COLOUR):
+            return
+        time.sleep(0.1)
+    tail = "\n".join(log.read_text(errors="replace").splitlines()[-20:])
+    raise InterfaceError(f"the example did not come up; the end of {log}:\n{tail}")
 
 
 def _is_published(topic: str) -> bool:
@@ -213,7 +201,7 @@ def _report(bag: Path, expected_hz: dict[str, float], seconds: float, out: Path)
                     "tracking_error_max_rad": round(float(error["max"].max()), 5),
                     "bag_mb": round(bag.stat().st_size / 1e6, 1)},
     }  # fmt: skip
-    demo_report.write_summary(summary, out / "summary.json")
+    (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     return summary
 
 

@@ -1,7 +1,6 @@
 """Takes an arm to the start of a figure eight and then has it track the figure, by a solver of `ik_ros`."""
 
 import sys
-from typing import Any
 
 import numpy as np
 import rospy
@@ -12,6 +11,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.services import call_service
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.ros.transform_messages import as_pose
 from custom_ros_tools.transforms import pose_of
@@ -50,11 +50,11 @@ def _run() -> None:
 def _track(robot: str, solver: str, target: np.ndarray) -> None:
     """Switches setup and solver on, when the arm is where the figure begins."""
     problem = IKProblem(has_target=True, target=_pose(target), start=_state(HOME))
-    start = _call(f"ik/solver/{solver}/solve", SolveIK, problem).solution
-    _call(f"rpbi/{robot}/move_to_joint_state", ResetJointState, start, APPROACH_S)
+    start = call_service(f"ik/solver/{solver}/solve", SolveIK, problem).solution
+    call_service(f"rpbi/{robot}/move_to_joint_state", ResetJointState, start, APPROACH_S)
     figure = ("toggle_figure_eight",) if rospy.get_param("~figure_moves", True) else ()
     for toggle in (f"ik/setup/{solver}/toggle", f"ik/solver/{solver}/toggle", *figure):
-        _call(toggle, SetBool, True)
+        call_service(toggle, SetBool, True)
     rospy.loginfo("the arm tracks its target by '%s'", solver)
 
 
@@ -66,15 +66,15 @@ def _draw_a_round(robot: str, start: np.ndarray) -> None:
     for time_s in times_s:
         shifted = start @ TfInterface.pos_quat_to_matrix(figure.position(time_s))
         problem.waypoints.append(Waypoint(rospy.Duration.from_sec(APPROACH_S + time_s), _pose(shifted)))
-    answer = _call(f"ik/solver/{WHOLE_TRAJECTORIES}/solve", SolveIK, problem)
-    _call(f"rpbi/{robot}/move_to_joint_state", ResetJointState, _state(HOME), APPROACH_S)
+    answer = call_service(f"ik/solver/{WHOLE_TRAJECTORIES}/solve", SolveIK, problem)
+    call_service(f"rpbi/{robot}/move_to_joint_state", ResetJointState, _state(HOME), APPROACH_S)
     command = rospy.Publisher(
         f"rpbi/{robot}/joint_trajectory_controller/command", JointTrajectory, queue_size=1, latch=True
     )
     command.publish(answer.trajectory)
     rospy.loginfo("the arm draws the figure along one trajectory of %d points", len(answer.trajectory.points))
     rospy.sleep(APPROACH_S)
-    _call("toggle_figure_eight", SetBool, True)
+    call_service("toggle_figure_eight", SetBool, True)
 
 
 def _state(positions: dict[str, float]) -> JointState:
@@ -83,17 +83,3 @@ def _state(positions: dict[str, float]) -> JointState:
 
 def _pose(matrix: np.ndarray) -> Pose:
     return as_pose(TfInterface.pack_tf(*pose_of(matrix)))
-
-
-def _call(service: str, kind: type, *arguments: object) -> Any:
-    """Calls a service when it is there.
-
-    Raises:
-        InterfaceError: If it answers that it did not succeed.
-    """
-    proxy = rospy.ServiceProxy(service, kind)
-    proxy.wait_for_service()
-    answer = proxy(*arguments)
-    if not answer.success:
-        raise InterfaceError(f"{service}: {answer.message}")
-    return answer

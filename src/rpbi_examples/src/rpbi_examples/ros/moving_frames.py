@@ -1,18 +1,18 @@
 """TF frames that move: the camera's around the scene, and one in a figure eight."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import rospy
+from numpy.typing import ArrayLike
 
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.services import ToggleService
-from custom_ros_tools.ros.tf_interface import TfInterface
+from custom_ros_tools.ros.tf_interface import NO_ROTATION, TfInterface
 from custom_ros_tools.toggle import Toggle
 from rpbi_examples.motions import FigureEight, camera_pose
 
 HZ = 50.0
-NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 
 
 def orbit() -> None:
@@ -53,14 +53,10 @@ class _FigureEightNode:
         return self._time_s
 
 
-def _move(parent: str, child: str, pose: Callable[[float], tuple[Sequence[float], Sequence[float]]], hz: float) -> None:
+def _move(parent: str, child: str, pose: Callable[[float], tuple[ArrayLike, ArrayLike]], hz: float) -> None:
     """Broadcasts a frame until ROS shuts down.
 
-    Args:
-        parent: The frame that it is in.
-        child: Its name.
-        pose: Position [m] and orientation (x, y, z, w) at a time since the start [s] of ROS time.
-        hz: How often.
+    `pose` gives position [m] and orientation (x, y, z, w) at a time since the start [s of ROS time].
     """
     tf = TfInterface()
     start = last = rospy.Time.now()

@@ -2,6 +2,7 @@
 
 import math
 import sys
+import threading
 
 import rospy
 from geometry_msgs.msg import Twist
@@ -11,6 +12,7 @@ from std_msgs.msg import Int64
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.services import call_service, get_srv_handler
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem, JointInfo
 from ros_pybullet_interface.srv import ResetEffState, RobotInfo, RobotInfoResponse
 from rpbi_examples.motions import POINTING_DOWN, PlanarPose, Route, Swing, hand_position
@@ -52,33 +54,24 @@ def _robot_name() -> str:
 
 def _swing() -> None:
     name = _robot_name()
-    rospy.wait_for_service(f"rpbi/{name}/robot_info")
-    info: RobotInfoResponse = rospy.ServiceProxy(f"rpbi/{name}/robot_info", RobotInfo)()
+    info: RobotInfoResponse = get_srv_handler(f"rpbi/{name}/robot_info", RobotInfo)()
     joints = [joint for joint in info.joint_info if not joint.is_fixed]
     state = dict(zip(info.current_joint_state.name, info.current_joint_state.position))
     swing = Swing([state[joint.jointName] for joint in joints], *zip(*map(_limits, joints)))
     publisher = rospy.Publisher(f"rpbi/{name}/joint_states/target", JointState, queue_size=10)
-    running = _Running()
+    running = threading.Event()
+    rospy.Subscriber(
+        "rpbi/status", Int64, lambda status: running.set() if status.data == 1 else running.clear(), queue_size=1
+    )
     rate = rospy.Rate(HZ)
     time_s = 0.0
     while not rospy.is_shutdown():
-        if running.is_so:
+        if running.is_set():
             target = JointState(name=[joint.jointName for joint in joints], position=swing.at(time_s))
             target.header.stamp = rospy.Time.now()
             publisher.publish(target)
             time_s += 1.0 / HZ
         rate.sleep()
-
-
-class _Running:
-    """Whether the simulation runs, from its status."""
-
-    def __init__(self) -> None:
-        self.is_so = False
-        rospy.Subscriber("rpbi/status", Int64, self._take, queue_size=1)
-
-    def _take(self, status: Int64) -> None:
-        self.is_so = status.data == 1
 
 
 def _limits(joint: JointInfo) -> tuple[float, float]:
@@ -108,7 +101,7 @@ def _draw() -> None:
         raise InterfaceError(f"expected the names of two robots, got {len(names)}")
     sides = dict(zip(names, (1.0, -1.0)))
     for name, side in sides.items():
-        _approach(name, side)
+        call_service(f"rpbi/{name}/move_to_eff_state", ResetEffState, _problem(0.0, side), APPROACH_S)
     problem = CalculateInverseKinematicsProblem
     publishers = {name: rospy.Publisher(f"rpbi/{name}/ik", problem, queue_size=1) for name in sides}
     rate = rospy.Rate(HZ)
@@ -124,11 +117,3 @@ def _problem(time_s: float, side: float) -> CalculateInverseKinematicsProblem:
     return CalculateInverseKinematicsProblem(
         link_name=LINK, targetPosition=hand_position(time_s, side), targetOrientation=POINTING_DOWN
     )
-
-
-def _approach(name: str, side: float) -> None:
-    service = f"rpbi/{name}/move_to_eff_state"
-    rospy.wait_for_service(service)
-    answer = rospy.ServiceProxy(service, ResetEffState)(_problem(0.0, side), APPROACH_S)
-    if not answer.success:
-        raise InterfaceError(f"{service}: {answer.message}")

@@ -3,6 +3,7 @@
 import rospy
 
 from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.services import get_srv_handler
 from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import PybulletObject
 from ros_pybullet_interface.srv import AddPybulletObject
@@ -19,8 +20,7 @@ def main() -> None:
 
 
 def _throw_boxes() -> None:
-    rospy.wait_for_service("rpbi/add_pybullet_object")
-    add = rospy.ServiceProxy("rpbi/add_pybullet_object", AddPybulletObject)
+    add = get_srv_handler("rpbi/add_pybullet_object", AddPybulletObject)
     remove = rospy.ServiceProxy("rpbi/remove_pybullet_object", SetString)
     box = PybulletObject(object_type=PybulletObject.DYNAMIC, filename=BOX)
     while not rospy.is_shutdown():

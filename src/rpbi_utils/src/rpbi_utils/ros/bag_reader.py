@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from types import TracebackType
 from typing import NamedTuple
 
 import rosbag
 
-from custom_ros_tools.errors import UnknownNameError
 from rpbi_utils.errors import BagError
 from rpbi_utils.message_type import MessageType
 
@@ -17,14 +15,7 @@ _ACTIVE_SUFFIX = ".active"
 
 
 class BagMessage(NamedTuple):
-    """A serialised message of a bag.
-
-    Attributes:
-        topic: Where it was published.
-        type: Its type.
-        raw: Its bytes.
-        record_time_s: When it was recorded [s], in ROS time.
-    """
+    """A serialised message of a bag, and when it was recorded [s], in ROS time."""
 
     topic: str
     type: MessageType
@@ -33,13 +24,9 @@ class BagMessage(NamedTuple):
 
 
 class BagReader:
-    """An open bag; needs no master and no installed message packages.
-
-    Args:
-        path: A `.bag` file, of any compression.
+    """An open bag of any compression, as a context that closes it; needs no master and no message packages.
 
     Attributes:
-        path: The file.
         types: The message types of each topic, in the order of their names; nearly always one a topic.
         md5sums: Their md5 sums.
         counts: Number of messages of each topic.
@@ -52,46 +39,28 @@ class BagReader:
         self.path = Path(path)
         if not self.path.is_file():
             raise BagError(self.path, "there is no such file" if not self.path.exists() else "not a file")
-        self._bag = self._open()
-        try:
-            self._connections = sorted(self._bag._get_connections(), key=lambda connection: str(connection.topic))
-            self._types = {
-                (connection.datatype, connection.md5sum): MessageType.parse(connection.datatype, connection.msg_def)
-                for connection in self._connections
-            }
-            info = self._bag.get_type_and_topic_info().topics
-        except ValueError as error:
-            self.close()
-            raise BagError(self.path, str(error)) from error
         self.types: dict[str, set[MessageType]] = {}
         self.md5sums: dict[str, set[str]] = {}
-        for connection in self._connections:
-            message_type = self._types[connection.datatype, connection.md5sum]
-            self.types.setdefault(connection.topic, set()).add(message_type)
-            self.md5sums.setdefault(connection.topic, set()).add(connection.md5sum)
+        self._types: dict[tuple[str, str], MessageType] = {}
+        self._bag = self._open()
+        try:
+            for each in sorted(self._bag._get_connections(), key=lambda connection: str(connection.topic)):
+                key = each.datatype, each.md5sum
+                if key not in self._types:
+                    self._types[key] = MessageType.parse(each.datatype, each.msg_def)
+                self.types.setdefault(each.topic, set()).add(self._types[key])
+                self.md5sums.setdefault(each.topic, set()).add(each.md5sum)
+            info = self._bag.get_type_and_topic_info().topics
+        except ValueError as error:
+            self._bag.close()
+            raise BagError(self.path, str(error)) from error
         self.counts: dict[str, int] = {topic: info[topic].message_count for topic in self.types}
 
     def __enter__(self) -> BagReader:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Closes the file."""
+    def __exit__(self, *_: object) -> None:
         self._bag.close()
-
-    def check(self, topics: Collection[str]) -> None:
-        """Makes sure that the bag has these topics.
-
-        Raises:
-            UnknownNameError: If it does not have one of them.
-        """
-        for topic in topics:
-            if topic not in self.types:
-                raise UnknownNameError("topic", topic, self.types)
 
     def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
         """Yields the messages of some topics in the order in which they were recorded.

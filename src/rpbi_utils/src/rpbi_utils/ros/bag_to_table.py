@@ -19,10 +19,7 @@ _NAME = "bag_to_table"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs the command.
-
-    Args:
-        argv: Its arguments; by default those of the process.
+    """Runs the command, by default with the arguments of the process.
 
     Returns:
         The exit code: 0, or 1 with one line on stderr that says what is wrong.

@@ -1,18 +1,16 @@
 """Bags to pandas tables."""
 
 import logging
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 import pandas as pd
 from tqdm import tqdm
 
+from custom_ros_tools.errors import UnknownNameError
 from rpbi_utils.tables import TableBuilder
 
-from .bag_reader import BagMessage, BagReader
-
-Progress = Callable[[int, int], None]
-_REPORT_EVERY = 1000  # messages
+from .bag_reader import BagReader
 
 _log = logging.getLogger(__name__)
 
@@ -22,7 +20,7 @@ def bag_to_dataframes(
     topics: str | Iterable[str] | None = None,
     *,
     images: bool = False,
-    progress: bool | Progress = False,
+    progress: bool = False,
 ) -> dict[str, pd.DataFrame]:
     """Reads a bag into pandas tables, one a topic.
 
@@ -40,8 +38,7 @@ def bag_to_dataframes(
         path: A `.bag` file, of any compression. No master and no message packages are needed.
         topics: Names of topics, or one name; by default all but those with binary data, such as images.
         images: Whether to include these by default. Their data are columns of `bytes`.
-        progress: `True` for a progress bar, or a function to be called with the number of messages read so
-            far and that of all.
+        progress: Whether to show a progress bar.
 
     Returns:
         Tables by topic, sorted by name.
@@ -54,7 +51,9 @@ def bag_to_dataframes(
         chosen = _choose(bag, [topics] if isinstance(topics, str) else topics, images)
         builders = {topic: TableBuilder(topic, images or topics is not None) for topic in chosen}
         total = sum(bag.counts[topic] for topic in chosen)
-        for topic, message_type, raw, record_time_s in _watched(bag.messages(chosen), total, progress):
+        messages = bag.messages(chosen)
+        bar = tqdm(messages, total=total, unit=" messages", unit_scale=True, leave=False, disable=not progress)
+        for topic, message_type, raw, record_time_s in bar:
             builders[topic].add(message_type, raw, record_time_s)
     return {topic: builder.table() for topic, builder in builders.items()}
 
@@ -63,7 +62,9 @@ def _choose(bag: BagReader, topics: Iterable[str] | None, images: bool) -> list[
     """Returns the topics to read, sorted and each once."""
     if topics is not None:
         chosen = sorted(set(topics))
-        bag.check(chosen)
+        for topic in chosen:
+            if topic not in bag.types:
+                raise UnknownNameError("topic", topic, bag.types)
         return chosen
     if images:
         return list(bag.types)
@@ -71,15 +72,3 @@ def _choose(bag: BagReader, topics: Iterable[str] | None, images: bool) -> list[
     if binary:
         _log.info("left out, as they hold binary data: %s", ", ".join(binary))
     return [topic for topic in bag.types if topic not in binary]
-
-
-def _watched(messages: Iterator[BagMessage], total: int, progress: bool | Progress) -> Iterator[BagMessage]:
-    """Yields the messages, and shows or reports how many there were."""
-    if not callable(progress):
-        yield from tqdm(messages, total=total, unit=" messages", unit_scale=True, leave=False, disable=not progress)
-        return
-    for count, message in enumerate(messages):
-        if count % _REPORT_EVERY == 0:
-            progress(count, total)
-        yield message
-    progress(total, total)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import http.client
 import itertools
 import logging
 import os
@@ -14,16 +13,15 @@ import tempfile
 import time
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any
-from xmlrpc.client import Error, ServerProxy
+from xmlrpc.client import ServerProxy
 
 import rosgraph
 import roslib.packages
 from rosgraph.names import get_ros_namespace, resolve_name
 
 from custom_ros_tools.errors import MissingDependency
-from custom_ros_tools.ros.lifecycle.timed_master import TimedTransport
+from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, TimedTransport
 from rpbi_utils.errors import RecordingError
 
 _CALLER = "/rpbi_utils"
@@ -39,7 +37,7 @@ _log = logging.getLogger(__name__)
 
 
 class Recorder:
-    """A `rosbag record` of some topics, as a context: what is published inside it is in the bag.
+    """A `rosbag record` of some topics, as a context: what is published inside it is in the bag, compressed by LZ4.
 
     On entry it waits until the recorder has subscribed to every topic and every publisher that is there
     sends to it; on exit it stops the recorder and waits until the bag is closed. It waits in wall time,
@@ -51,7 +49,6 @@ class Recorder:
     Args:
         path: The bag to write, ending with `.bag`. Its folder is created, and a bag of that name is replaced.
         topics: What to record; relative names are resolved in the namespace of this process.
-        lz4: Whether to compress (fast, lossless).
         timeout_s: Wall time to wait for the subscriptions, and for the bag to be closed [s].
         min_space: What is to stay free on the disk (`"1G"`, `"200M"`); with less, `rosbag record` does not
             write.
@@ -62,7 +59,6 @@ class Recorder:
         path: str | Path,
         topics: Sequence[str],
         *,
-        lz4: bool = True,
         timeout_s: float = 30.0,
         min_space: str = "1G",
     ) -> None:
@@ -72,20 +68,16 @@ class Recorder:
         if isinstance(topics, str) or not topics:
             raise ValueError(f"a list of at least one topic is needed, got {topics!r}")
         self.topics = sorted({resolve_name(topic, get_ros_namespace()) for topic in topics})
-        self._lz4 = lz4
         self._timeout_s = timeout_s
         self._min_space = min_space
         self._node = f"/recorder_{os.getpid()}_{next(_numbers)}"
         self._process: subprocess.Popen[bytes] | None = None
-        self._output = tempfile.TemporaryFile()
 
     def __enter__(self) -> Recorder:
         self.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if error is None:
             self.stop()
             return
@@ -138,11 +130,11 @@ class Recorder:
         active = self.path.with_name(self.path.name + ".active")
         self._raise_if_not_writing()
         if died:
-            raise RecordingError(self.path, f"the recorder ended early{self._log_fatal_lines()}{_what_is_left(active)}")
+            raise RecordingError(self.path, f"the recorder ended early{self._last_line()}{_what_is_left(active)}")
         if not active.exists() and not self.path.exists():
             raise RecordingError(self.path, "no bag was begun; with use_sim_time the recorder waits for /clock")
         if not closed or active.exists():
-            raise RecordingError(self.path, f"the bag was not closed{self._log_fatal_lines()}{_what_is_left(active)}")
+            raise RecordingError(self.path, f"the bag was not closed{self._last_line()}{_what_is_left(active)}")
         return self.path
 
     def _command(self) -> list[str]:
@@ -150,24 +142,17 @@ class Recorder:
         found = roslib.packages.find_node("rosbag", "record")
         if not found:
             raise MissingDependency("rosbag record", "apt install python3-rosbag")
-        options = [
-            "--output-name",
-            str(self.path),
-            "--min-space",
-            self._min_space,
-            *(["--lz4"] if self._lz4 else []),
-        ]
+        options = ["--output-name", str(self.path), "--min-space", self._min_space, "--lz4"]
         return [found[0], *options, *self.topics, f"__name:={self._node.removeprefix('/')}", "__ns:=/"]
 
     def _wait_until_connected(self) -> None:
         deadline = time.monotonic() + self._timeout_s
         while True:
             if not self.is_running:
-                raise RecordingError(self.path, f"the recorder ended at once{self._log_fatal_lines()}")
+                raise RecordingError(self.path, f"the recorder ended at once{self._last_line()}")
             self._raise_if_not_writing()
             try:
-                missing = _unsubscribed(self._node, self.topics)
-                silent = [] if missing else _unconnected(self._node, self.topics)
+                missing, silent = _unconnected(self._node, self.topics)
             except OSError as error:
                 uri = rosgraph.get_master_uri()
                 raise RecordingError(self.path, f"the ROS master at {uri} does not answer any more: {error}") from None
@@ -183,8 +168,7 @@ class Recorder:
     def _end(self) -> bool:
         """Ends the process; returns whether it did so by itself."""
         assert self._process is not None
-        if self._process.poll() is None:
-            self._process.send_signal(signal.SIGINT)
+        self._process.send_signal(signal.SIGINT)
         try:
             return self._process.wait(self._timeout_s) == 0
         except subprocess.TimeoutExpired:
@@ -198,7 +182,7 @@ class Recorder:
                 free = shutil.disk_usage(self.path.parent).free / 1e9
                 raise RecordingError(self.path, f"the recorder does not write ({free:.1f} GB free): {line}")
 
-    def _log_fatal_lines(self) -> str:
+    def _last_line(self) -> str:
         lines = self._lines()
         return f": {lines[-1]}" if lines else ""
 
@@ -213,41 +197,33 @@ def _what_is_left(active: Path) -> str:
     return f"; what was recorded can be saved with 'rosbag reindex {active}'" if active.exists() else ""
 
 
-def _unsubscribed(node: str, topics: Collection[str]) -> list[str]:
-    """Returns those of some topics to which a node has not subscribed at the master.
+def _unconnected(node: str, topics: Collection[str]) -> tuple[list[str], list[str]]:
+    """Returns the topics that a node has not subscribed to at the master, and what does not send to it yet.
 
-    Raises:
-        OSError: If the master cannot be reached.
-    """
-    _, subscribers, _ = rosgraph.Master(_CALLER).getSystemState()
-    subscribed = {topic for topic, nodes in subscribers if node in nodes}
-    return [topic for topic in topics if topic not in subscribed]
-
-
-def _unconnected(node: str, topics: Collection[str]) -> list[str]:
-    """Returns the publishers of some topics that do not send to a node yet, as `"/publisher (/topic)"`.
-
-    The publishers are asked, since only they know when a subscriber gets what they publish. One that is
-    registered but gone is not counted; one that does not answer is.
+    When it has subscribed to all, the publishers are asked, since only they know when a subscriber gets what they
+    publish. One that is registered but gone is not counted; one that does not answer is: as `"/publisher (/topic)"`.
 
     Raises:
         OSError: If the master cannot be reached.
     """
     master = rosgraph.Master(_CALLER)
-    publishers, _, _ = master.getSystemState()
+    publishers, subscribers, _ = master.getSystemState()
+    unsubscribed = set(topics).difference(topic for topic, nodes in subscribers if node in nodes)
+    if unsubscribed:
+        return sorted(unsubscribed), []
     wanted: dict[str, list[str]] = {}
     for topic, nodes in publishers:
         if topic in topics:
             for publisher in nodes:
                 wanted.setdefault(publisher, []).append(topic)
-    missing = []
+    silent = []
     for publisher, published in wanted.items():
         try:
             connected = _receivers(master.lookupNode(publisher), node)
         except (ConnectionRefusedError, rosgraph.MasterError):  # it ended without a word, or just now
             continue
-        missing += [f"{publisher} ({topic})" for topic in published if topic not in connected]
-    return missing
+        silent += [f"{publisher} ({topic})" for topic in published if topic not in connected]
+    return [], silent
 
 
 def _receivers(uri: str, node: str) -> set[str]:
@@ -257,7 +233,7 @@ def _receivers(uri: str, node: str) -> set[str]:
         _, _, connections = proxy.getBusInfo(_CALLER)
     except ConnectionRefusedError:
         raise
-    except (OSError, Error, http.client.HTTPException):
+    except MASTER_FAILURES:
         return set()
     # id, other end, direction, transport, topic, whether connected
     return {topic for _, other, way, _, topic, *_ in connections if other == node and way == _OUTBOUND}

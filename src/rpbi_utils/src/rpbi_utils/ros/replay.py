@@ -28,10 +28,7 @@ _TYPES: dict[str, Any] = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs the command.
-
-    Args:
-        argv: Its arguments; by default those of the process.
+    """Runs the command, by default with the arguments of the process.
 
     Returns:
         The exit code: 0 if all states agree, else 1.
@@ -48,7 +45,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         recording = read_recording(arguments.bag, arguments.ns)
         for warning in recording.description.warnings:
             print(f"{_NAME}: warning: {warning}", file=sys.stderr)
-        ticks = sum(_last_ticks(recording))
+        last_ticks = {each.resets: each.tick for each in sorted(recording.checkpoints)}
+        ticks = sum(last_ticks.values())
         with tqdm(total=ticks, unit=" ticks", unit_scale=True, leave=False, disable=arguments.quiet) as bar:
             result = Replay(recording, bar.update).run()
     except (InterfaceError, OSError) as error:
@@ -60,11 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def read_recording(path: Path, namespace: str = "/") -> Recording:
-    """Reads what a bag has of a session.
-
-    Args:
-        path: The bag.
-        namespace: Namespace of the simulator.
+    """Reads what a bag has of a session of the simulator in a namespace.
 
     Raises:
         BagError: If there is no such bag, or it lacks what a replay needs.
@@ -83,8 +77,7 @@ def read_recording(path: Path, namespace: str = "/") -> Recording:
                 descriptions.append(message.data)
             elif isinstance(message, SimulationState):
                 if message.state_hash:
-                    state = Checkpoint(message.resets, message.tick, message.commands, message.state_hash)
-                    checkpoints.add(state)
+                    checkpoints.add(Checkpoint(message.resets, message.tick, message.commands, message.state_hash))
             else:
                 numbered = enumerate(message.commands, message.first)
                 of_life = commands.setdefault(message.resets, {})
@@ -111,14 +104,6 @@ def _check(bag: BagReader, topics: dict[str, Any], prefix: str) -> None:
         for md5sum in bag.md5sums.get(topic, ()):
             if md5sum != message_type._md5sum:
                 raise BagError(bag.path, f"{topic} is not {message_type._type} of this version")
-
-
-def _last_ticks(recording: Recording) -> list[int]:
-    """Returns the last recorded tick of each life of the world."""
-    last: dict[int, int] = {}
-    for each in recording.checkpoints:
-        last[each.resets] = max(each.tick, last.get(each.resets, 0))
-    return list(last.values())
 
 
 def _report(result: ReplayResult) -> int:

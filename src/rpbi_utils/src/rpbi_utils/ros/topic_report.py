@@ -15,9 +15,6 @@ _COLUMNS = ("type", "messages", "bytes", "rate_hz", "max_gap_s", "first", "last"
 def topic_report(path: str | Path) -> pd.DataFrame:
     """Measures every topic of a bag.
 
-    Args:
-        path: A `.bag` file.
-
     Returns:
         One row a topic (the index), sorted by name, with the columns `type`, `messages`, `bytes` (serialised,
         before compression), `rate_hz` (mean, from the first to the last message; NaN if they have the same
@@ -34,12 +31,7 @@ def topic_report(path: str | Path) -> pd.DataFrame:
             times[message.topic].append(_time(message))
             sizes[message.topic] += len(message.raw)
         rows = [
-            (
-                "|".join(sorted(each.name for each in types)),
-                len(times[topic]),
-                sizes[topic],
-                *_rhythm(times[topic]),
-            )
+            ("|".join(sorted(each.name for each in types)), len(times[topic]), sizes[topic], *_rhythm(times[topic]))
             for topic, types in bag.types.items()
         ]
         return pd.DataFrame(rows, index=pd.Index(list(bag.types), name="topic"), columns=_COLUMNS)

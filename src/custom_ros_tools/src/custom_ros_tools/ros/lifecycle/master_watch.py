@@ -25,9 +25,6 @@ class Registrations:
     That one waits for a master that has gone, with all topics locked, and registers nothing again. Here what is opened
     or closed while there is no master is told to the next one.
 
-    Args:
-        registry: The topics and services.
-
     Attributes:
         are_complete: Whether the master knows them all, as far as is known.
     """
@@ -67,14 +64,7 @@ class Registrations:
         self._withdrawn.append((method, arguments))
 
     def repeat(self, master: Any) -> tuple[int, int]:
-        """Registers everything again, and parameters with it.
-
-        Args:
-            master: See `timed_master`.
-
-        Returns:
-            The number of topics and that of services.
-        """
+        """Registers everything again, and parameters with it; returns the number of topics and that of services."""
         with self._registry.entries() as entries:  # no topic or service comes or goes meanwhile
             kept_parameters.restore(master)
             calls: Any = MultiCall(master)
@@ -148,7 +138,9 @@ class MasterWatch:
         calls.lookupNode(self._name, self._name)
         (_, _, process), (_, _, node_uri) = calls()
         if node_uri and node_uri != rospy.get_node_uri():
-            self._give_way(node_uri)
+            if not rospy.core.is_shutdown_requested():
+                rospy.logfatal("another node is called %s by now (at %s): this one ends", self._name, node_uri)
+                rospy.signal_shutdown("another node has its name")
         elif self._registrations is None:
             if process != self._process:
                 rospy.logwarn("the ROS master at %s is another one: it knows nothing of %s", self._uri, self._name)
@@ -156,11 +148,6 @@ class MasterWatch:
         elif process != self._process or not node_uri or not self._registrations.are_complete:
             self._register(master, self._registrations)
             self._process, self._is_gone = process, False
-
-    def _give_way(self, node_uri: str) -> None:
-        if not rospy.core.is_shutdown_requested():
-            rospy.logfatal("another node is called %s by now (at %s): this one ends", self._name, node_uri)
-            rospy.signal_shutdown("another node has its name")
 
     def _register(self, master: Any, registrations: Registrations) -> None:
         with self._registering:

@@ -38,11 +38,7 @@ class KeptParameters:
         self._values: dict[str, Any] = {}
 
     def keep(self, name: str) -> None:
-        """Remembers the present value of a parameter, if there is one.
-
-        Args:
-            name: Of one parameter, or the namespace of many.
-        """
+        """Remembers the present value of a parameter, or of all in a namespace, if there is one."""
         name = rospy.resolve_name(name)
         if rospy.has_param(name):
             self._values[name] = rospy.get_param(name)
@@ -62,11 +58,7 @@ class KeptParameters:
             master.deleteParam(rospy.get_name(), name)
 
     def restore(self, master: Any) -> None:
-        """Sets those that a master does not have; what it has by now is left alone.
-
-        Args:
-            master: See `timed_master`.
-        """
+        """Sets those that a master (see `timed_master`) does not have; what it has by now is left alone."""
         caller = rospy.get_name()
         for name, value in dict(self._values).items():
             if not master.hasParam(caller, name)[2]:

@@ -92,11 +92,7 @@ def run_node(
 
 
 def _wait_for_master() -> bool:
-    """Waits until there is a ROS master; from here on, SIGTERM does the same as SIGINT.
-
-    Returns:
-        False if it was interrupted.
-    """
+    """Waits for a ROS master and returns False if it was interrupted; from here on, SIGTERM does the same as SIGINT."""
     signal.signal(signal.SIGTERM, lambda *_: _interrupt())
     told = False
     while not rosgraph.is_master_online():

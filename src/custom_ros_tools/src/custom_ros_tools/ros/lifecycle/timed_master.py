@@ -14,11 +14,7 @@ MASTER_FAILURES = (OSError, Error, http.client.HTTPException, ExpatError)
 
 
 class TimedTransport(Transport):
-    """Waits for an answer for a limited time: a process that is stopped accepts connections but never answers.
-
-    Args:
-        timeout_s: How long [s].
-    """
+    """Waits for an answer for a limited time [s]: a process that is stopped accepts connections but never answers."""
 
     def __init__(self, timeout_s: float) -> None:
         super().__init__()

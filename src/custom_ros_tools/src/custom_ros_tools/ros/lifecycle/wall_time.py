@@ -39,13 +39,9 @@ class WallRate:
 
 
 class WallTimer:
-    """Calls something at a rate, in a thread of its own, until ROS shuts down.
+    """Calls something at a rate [Hz], in a thread of its own, until ROS shuts down.
 
     An exception is logged, and the next call is made all the same.
-
-    Args:
-        hz: The rate [Hz].
-        action: What to call.
     """
 
     def __init__(self, hz: float, action: Callable[[], None]) -> None:
@@ -65,17 +61,10 @@ class WallTimer:
                     self._warn(threading.current_thread().name, traceback.format_exc())
 
 
-_PERIOD_S = 5.0
-
-
 class ThrottledWarning:
-    """Warns about each subject at most once in some seconds of wall time, and counts what it kept back.
+    """Warns about each subject at most once in a period of wall time [s], and counts what it kept back."""
 
-    Args:
-        period_s: Shortest time between two warnings about one subject [s].
-    """
-
-    def __init__(self, period_s: float = _PERIOD_S) -> None:
+    def __init__(self, period_s: float = 5.0) -> None:
         self._period_s = period_s
         self._lock = threading.Lock()
         self._last: dict[str, tuple[float, int]] = {}

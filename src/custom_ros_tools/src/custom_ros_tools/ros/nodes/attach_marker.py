@@ -6,7 +6,7 @@ import rospy
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
-from custom_ros_tools.marker_config import MARKER_ACTIONS, MARKER_TYPES, SHAPES, MarkerConfig
+from custom_ros_tools.marker_config import SHAPES, MarkerConfig
 from custom_ros_tools.ros.lifecycle.parameters import private_config
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
@@ -43,7 +43,7 @@ class AttachMarkerNode:
 
 def _marker(config: MarkerConfig) -> Marker:
     """Returns the message but for its pose and stamp."""
-    marker = Marker(type=MARKER_TYPES[config.type], action=MARKER_ACTIONS[config.action])
+    marker = Marker(type=getattr(Marker, config.type), action=getattr(Marker, config.action))
     marker.header.frame_id = config.frame_id
     marker.ns = rospy.get_name()  # else markers of several nodes on one topic would replace each other
     marker.scale.x, marker.scale.y, marker.scale.z = config.scale

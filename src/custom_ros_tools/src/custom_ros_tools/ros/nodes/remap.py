@@ -26,15 +26,8 @@ QUEUE_SIZE = 100
 class RemapNode:
     """Publishes what it makes of joint states while it is switched on; off, it does not even listen.
 
-    It has the service `remap_joint_state/toggle` and the same under the name of its executable.
-
-    Args:
-        executable: The name of the executable.
-        source: Topic of the joint states.
-        target: Topic of what is made of them.
-        target_type: The ROS type of that.
-        convert: Makes it; raises InterfaceError or ValueError for a message that must be refused.
-        start_on_init: Whether it is on from the start.
+    It has the service `remap_joint_state/toggle` and the same under the name of its executable. `convert` makes what is
+    published; it raises InterfaceError or ValueError for a message that must be refused.
     """
 
     def __init__(
@@ -74,31 +67,29 @@ class RemapNode:
         self._publisher.publish(converted)
 
 
-class FloatArrayNode(RemapNode):
-    """Publishes one quantity of joint states as numbers, in the order of `~config`.
+def _float_array_node() -> RemapNode:
+    """Returns the node that publishes one quantity of joint states as numbers, in the order of `~config`.
 
     Raises:
         ConfigError: If the configuration or a parameter is wrong.
     """
+    with collecting_problems() as part:
+        with part():
+            config = private_config(FloatArrayConfig)
+        with part():
+            start_on_init = private_parameters(StartParameters).start_on_init
 
-    def __init__(self) -> None:
-        with collecting_problems() as part:
-            with part():
-                self._config = private_config(FloatArrayConfig)
-            with part():
-                start = private_parameters(StartParameters)
-        topics = "joint_states", "joint_states/floatarray"
-        super().__init__(TO_FLOAT_ARRAY, *topics, Float64MultiArray, self._numbers, start.start_on_init)
+    def numbers(message: JointState) -> Float64MultiArray:
+        values = JointValues.of(message.name, **{config.field: getattr(message, config.field)})
+        if config.joint_names is not None:
+            values = values.in_order(config.joint_names)
+        data = list(getattr(values, config.field))
+        if not data:
+            raise ValueError(f"expected {config.field}, got none")
+        return Float64MultiArray(data=data)
 
-    def _numbers(self, message: JointState) -> Float64MultiArray:
-        field = self._config.field
-        values = JointValues.of(message.name, **{field: getattr(message, field)})
-        if self._config.joint_names is not None:
-            values = values.in_order(self._config.joint_names)
-        numbers = getattr(values, field)
-        if not numbers:
-            raise ValueError(f"expected {field}, got none")
-        return Float64MultiArray(data=list(numbers))
+    topics = "joint_states", "joint_states/floatarray"
+    return RemapNode(TO_FLOAT_ARRAY, *topics, Float64MultiArray, numbers, start_on_init)
 
 
 def _joint_state_node() -> RemapNode:
@@ -118,7 +109,7 @@ def _sound(message: JointState) -> JointState:
 
 def remap_to_float_array() -> None:
     """Runs the node `remap_joint_state_to_floatarray`."""
-    run_node(TO_FLOAT_ARRAY, FloatArrayNode)
+    run_node(TO_FLOAT_ARRAY, _float_array_node)
 
 
 def remap_to_joint_state() -> None:

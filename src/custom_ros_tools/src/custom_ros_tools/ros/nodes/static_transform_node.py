@@ -9,7 +9,7 @@ from custom_ros_tools.node_configs import RateParameters
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
-from custom_ros_tools.ros.transform_messages import TransformTopic, checked, transform_message
+from custom_ros_tools.ros.transform_messages import TransformTopic, position_in, quat_in, transform_message
 from custom_ros_tools.srv import SetTransform, SetTransformRequest, SetTransformResponse
 from custom_ros_tools.transforms import StaticTransform
 
@@ -36,7 +36,7 @@ class StaticTransformNode:
 
     def _reset(self, request: SetTransformRequest) -> SetTransformResponse:
         try:
-            self._transform = checked(request.transform)
+            self._transform = transform_message(position_in(request.transform), quat_in(request.transform))
         except ValueError as error:
             return SetTransformResponse(False, f"transform refused: {error}")
         return SetTransformResponse(True, "transform set")
