@@ -30,6 +30,7 @@ class VisualRobot(JointedBody):
 
     def __init__(self, pb: Client, config: RobotConfig) -> None:
         super().__init__(pb, config, fixed_base=True)
+        self.object_tf = config.object_tf
         self._limit_reports = LimitReports(self.name)
         for link in (-1, *self.joint_indices):
             pb.setCollisionFilterGroupMask(self.body_id, link, 0, 0)
