@@ -34,9 +34,8 @@ class CheckedRequest(NamedTuple):
 class TrajectoryFollower:
     """Has a robot follow trajectories, one after the other or spliced into each other.
 
-    Args:
-        drive: Drives the joints of the robot.
-        config: Which joints, and how far they may be off.
+    Attributes:
+        joint_names: The joints that it drives.
     """
 
     def __init__(self, drive: JointDrive, config: JointTrajectoryControllerConfig) -> None:
@@ -45,11 +44,7 @@ class TrajectoryFollower:
         driven = {joint.name: joint for joint in drive.model.driven}
         self._joints = driven if config.joints is None else {name: driven[name] for name in config.joints}
         self._by_index = {joint.index: joint for joint in self._joints.values()}
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints that it drives."""
-        return tuple(self._joints)
+        self.joint_names = tuple(self._joints)
 
     def check(self, request: TrajectoryRequest, tolerances: GoalTolerances | None = None) -> CheckedRequest:
         """Checks a trajectory as far as it can be without looking at the robot; any thread may call it.
@@ -79,9 +74,6 @@ class TrajectoryFollower:
             clock: The world's clock.
             feedback: Takes the state at `action_monitor_rate` while the motion lasts.
 
-        Returns:
-            The motion, which tells how it ended.
-
         Raises:
             TrajectoryRefusedError: If its time has passed, the joints cannot get to it, or the control mode forbids it.
         """
@@ -98,7 +90,8 @@ class TrajectoryFollower:
             trajectories[index] = joint_trajectory.joined(current, start_s, from_s)
         if not request.joint_trajectories:
             trajectories, from_s = self._stopping(now_s, measured, trajectories or self._by_index), now_s
-        motion = TrajectoryMotion(self._by_index, trajectories, from_s, request.tolerances, self._stop_s)
+        stop_s = self.config.stop_trajectory_duration
+        motion = TrajectoryMotion(self._by_index, trajectories, from_s, request.tolerances, stop_s)
         if feedback is not None:
             motion.on_advance = self._feeding(feedback, clock)
         self._run(motion, "a newer trajectory replaced it")
@@ -118,12 +111,9 @@ class TrajectoryFollower:
         trajectories = self._stopping(clock.time_s, self._drive.measured(), running.joints)
         self._run(TrajectoryMotion(self._by_index, trajectories, clock.time_s), reason)
 
-    def state(self, time_s: float) -> ControllerState:
+    def state(self, time_s: float, measured: JointMotion | None = None) -> ControllerState:
         """Returns where the joints are to be and where they are, at the world's time now [s]."""
-        return self._state(time_s, self._drive.measured())
-
-    def _state(self, time_s: float, measured: JointMotion) -> ControllerState:
-        running = self._running
+        running, measured = self._running, measured or self._drive.measured()
         return ControllerState(
             self._drive.name,
             self.joint_names,
@@ -151,10 +141,6 @@ class TrajectoryFollower:
         motion = self._drive.motion
         return motion if isinstance(motion, TrajectoryMotion) else None
 
-    @property
-    def _stop_s(self) -> float:
-        return self.config.stop_trajectory_duration
-
     def _feeding(
         self, feedback: Callable[[ControllerState], None], clock: Clock
     ) -> Callable[[float, JointMotion], None]:
@@ -162,12 +148,13 @@ class TrajectoryFollower:
 
         def on_advance(time_s: float, measured: JointMotion) -> None:
             if schedule.is_due(round(time_s / clock.dt_s)):
-                feedback(self._state(time_s, measured))
+                feedback(self.state(time_s, measured))
 
         return on_advance
 
     def _stopping(self, now_s: float, measured: JointMotion, indices: Iterable[int]) -> dict[int, Trajectory]:
-        return {index: stopping(self._by_index[index], measured[index], now_s, self._stop_s) for index in indices}
+        stop_s = self.config.stop_trajectory_duration
+        return {index: stopping(self._by_index[index], measured[index], now_s, stop_s) for index in indices}
 
     def _run(self, motion: TrajectoryMotion, reason: str) -> None:
         """Starts a motion; the reason is for whoever waits for the one before.
@@ -181,7 +168,7 @@ class TrajectoryFollower:
         try:
             self._drive.run(motion)
         except ValueError as error:
-            raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, str(error)) from None
+            raise TrajectoryRefusedError(str(error)) from None
 
 
 def _check_time(request: CheckedRequest, start_s: float, from_s: float) -> None:
@@ -192,6 +179,5 @@ def _check_time(request: CheckedRequest, start_s: float, from_s: float) -> None:
         return
     if request.stamp_ns:
         message = f"all points are in the past, the last one by {from_s - start_s - last_s:.6g} s"
-        raise TrajectoryRefusedError(ErrorCode.OLD_HEADER_TIMESTAMP, message)
-    message = f"expected a point after the start, the last one is at {last_s:g} s"
-    raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, message)
+        raise TrajectoryRefusedError(message, ErrorCode.OLD_HEADER_TIMESTAMP)
+    raise TrajectoryRefusedError(f"expected a point after the start, the last one is at {last_s:g} s")

@@ -62,12 +62,11 @@ class TrajectoryMotion(Motion):
         """Compares where the joints are with where they were to be, and goes on if they are near enough."""
         if self.on_advance is not None:
             self.on_advance(self._time_s, measured)
-        fault = self._path_problem(measured)
-        if fault:
+        if fault := self._path_problem(measured):
             return self._break_off(ErrorCode.PATH_TOLERANCE_VIOLATED, fault, time_s, measured)
         if self._time_s >= self.end_s:
-            fault = self._goal_problem(measured)
-            if not fault:
+            goal = {} if self._tolerances is None else self._tolerances.goal
+            if not (fault := self._fault_in(goal, measured, "its goal")):
                 self._finish()
             elif self._is_out_of_time(time_s):
                 return self._break_off(ErrorCode.GOAL_TOLERANCE_VIOLATED, fault, time_s, measured)
@@ -133,11 +132,6 @@ class TrajectoryMotion(Motion):
         if self._tolerances is None or not self.from_s <= self._time_s < self.end_s:
             return ""
         return self._fault_in(self._tolerances.path, measured, "its trajectory")
-
-    def _goal_problem(self, measured: JointMotion) -> str:
-        if self._tolerances is None:
-            return ""
-        return self._fault_in(self._tolerances.goal, measured, "its goal")
 
     def _fault_in(self, tolerances: Mapping[int, JointTolerance], measured: JointMotion, what: str) -> str:
         for index, tolerance in tolerances.items():

@@ -10,7 +10,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from .polynomial import Polynomial, constant, cubic, line, quintic
+from .polynomial import Polynomial, cubic, line, quintic
 
 
 class Knot(NamedTuple):
@@ -190,7 +190,7 @@ def _evaluated(segment: Segment, time_s: float) -> State:
 
 
 def _standing(start_s: float, position: Sequence[float]) -> Segment:
-    return Segment(start_s, start_s, tuple(map(constant, position)))
+    return Segment(start_s, start_s, tuple((place, 0.0, 0.0, 0.0, 0.0, 0.0) for place in position))
 
 
 def _segment(before: Knot, after: Knot) -> Segment:
