@@ -102,10 +102,7 @@ CATCH_UP_SPEED = (0.5, 0.5, 1.0)
 
 
 def with_planar_joints(path: str) -> str:
-    """Puts a massless chain of joints along x, along y and about z between the world and a robot's root link.
-
-    Args:
-        path: The robot's URDF file.
+    """Puts a massless chain of joints along x, along y and about z between the world and the root link of a URDF file.
 
     Returns:
         A copy of it with the chain, which lasts as long as the process; its root is the fixed end of the chain.

@@ -62,7 +62,6 @@ class Robot(JointedBody):
             LimitReports(self.name),
             config.enforce_effort_limits,
             config.target_timeout_s,
-            pb.getPhysicsEngineParameters()["fixedTimeStep"],
         )
         self.drive = JointDrive(self.name, pb, self.body_id, self.model, self.motors)
         self.force_torque_sensors = tuple(
@@ -94,9 +93,10 @@ class Robot(JointedBody):
     def before_step(self, tick: int) -> None:
         """Follows the motion, lets targets expire and applies efforts."""
         self.drive.advance(tick)
+        holding: Mapping[int, float] = {}
         if self._gravity is not None and self.motors.mode == pybullet.TORQUE_CONTROL:
-            self.motors.set_feed_forward(self._gravity.efforts(self.base_pose(), self.joint_positions()))
-        self.motors.before_step(tick)
+            holding = self._gravity.efforts(self.base_pose(), self.joint_positions())
+        self.motors.before_step(tick, holding)
 
     def halt(self, reason: str) -> None:
         """Ends the motion that runs, if any; its joints hold where they are."""
