@@ -27,8 +27,6 @@ class JointedBody(Body):
     """A body that comes from a URDF and stands at its start position.
 
     Args:
-        pb: The client to create it in.
-        config: Its configuration.
         fixed_base: Whether its base is fixed, whatever the configuration says.
 
     Raises:
@@ -51,7 +49,7 @@ class JointedBody(Body):
         self.has_fixed_base = bool(arguments.get("useFixedBase", False)) and not self.base_joints
         super().__init__(pb, config.name, load_urdf(pb, config.name, arguments, self.prepare_urdf))
         self.config = config
-        joints = [Joint.from_info(pb.getJointInfo(self.body_id, i)) for i in self.joint_indices]
+        joints = Joint.all_of(pb, self.body_id)
         self.model = JointModel(joints, self.base_joints)
         self.joints = self.model.own
         self.link_indices = tuple(joint.index for joint in self.joints)
