@@ -14,9 +14,6 @@ class ShapeObject(Body):
     """An object whose shape comes from `createVisualShape` and `createCollisionShape`.
 
     Args:
-        pb: The client to create it in.
-        name: Unique name.
-        visual: Visual shape.
         collision: Collision shape, None for an object that nothing can touch.
         multi_body: Other arguments of `createMultiBody`; without `baseMass` it stays whatever pushes it.
 

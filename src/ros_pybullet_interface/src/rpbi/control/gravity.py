@@ -17,7 +17,6 @@ class GravityModel:
 
     Args:
         world: The client that the robot lives in.
-        model: Its joints.
         load: How it was loaded. What is attached to it, or was changed in it since, is not known here.
     """
 

@@ -20,7 +20,7 @@ PERIOD_S = 5.0
 
 
 class LimitReports:
-    """Reports when a joint goes beyond its limits, once until it has come back, and at most every `PERIOD_S`."""
+    """Reports when a joint goes beyond its limits, once until it has come back, and once in `PERIOD_S` at most."""
 
     def __init__(self, robot_name: str) -> None:
         self._robot_name = robot_name
@@ -118,8 +118,8 @@ class Motors:
         self._renewed.clear()
         self.applied_efforts: dict[int, float] = {}
         states = self._pb.getJointStates(self._body_id, self._indices) if self._indices else ()
-        holds = mode == pybullet.POSITION_CONTROL
-        self.targets = {index: state[0] if holds else 0.0 for index, state in zip(self._indices, states)}
+        is_held = mode == pybullet.POSITION_CONTROL
+        self.targets = {index: state[0] if is_held else 0.0 for index, state in zip(self._indices, states)}
         for index in self._indices:
             self._drive(index, self.targets[index])
 

@@ -127,9 +127,7 @@ class PlanarBase:
     there is holds the base up or pushes it away; the set point then stays near the base, as wheels slip.
 
     Args:
-        pb: The client.
         body_id: PyBullet's id of the robot, which was loaded with planar joints.
-        config: Its limits.
         dt_s: Length of a tick [s].
     """
 

@@ -64,22 +64,21 @@ class JointTrajectoryControllerConfig(ConfigModel):
 def trajectory_problems(
     name: str, config: JointTrajectoryControllerConfig | None, driven: Iterable[str]
 ) -> list[Problem]:
-    """Returns what in the configuration does not fit a robot, of which joints of these names can be driven."""
+    """Returns what in the configuration does not fit a robot; `driven` names the joints that can be driven."""
     if config is None:
         return []
     known = set(driven)
     if not known:
         return [Problem(name, "joint_trajectory_controller", "the robot has no joint that can be driven")]
-    joints = config.joints or ()
-    named = [(f"joints[{index}]", joint, joint in joints[:index]) for index, joint in enumerate(joints)]
-    named += [(f"constraints.{joint}", joint, False) for joint in config.constraints.by_joint]
     problems = []
-    for key, joint, is_repeated in named:
+    for index, joint in enumerate(config.joints or ()):
+        key = f"joint_trajectory_controller.joints[{index}]"
         if joint not in known:
-            message = f"no joint '{joint}' that can be driven{hint(joint, known)}"
-        elif is_repeated:
-            message = f"joint '{joint}' is named twice"
-        else:
-            continue
-        problems.append(Problem(name, f"joint_trajectory_controller.{key}", message))
+            problems.append(Problem(name, key, f"no joint '{joint}' that can be driven{hint(joint, known)}"))
+        elif joint in (config.joints or ())[:index]:
+            problems.append(Problem(name, key, f"joint '{joint}' is named twice"))
+    for joint in config.constraints.by_joint:
+        if joint not in known:
+            key = f"joint_trajectory_controller.constraints.{joint}"
+            problems.append(Problem(name, key, f"no joint '{joint}' that can be driven{hint(joint, known)}"))
     return problems

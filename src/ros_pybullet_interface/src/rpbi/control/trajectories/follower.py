@@ -40,7 +40,7 @@ class TrajectoryFollower:
 
     def __init__(self, drive: JointDrive, config: JointTrajectoryControllerConfig) -> None:
         self.config = config
-        self._drive = drive
+        self._drive, self._stop_s = drive, config.stop_trajectory_duration
         driven = {joint.name: joint for joint in drive.model.driven}
         self._joints = driven if config.joints is None else {name: driven[name] for name in config.joints}
         self._by_index = {joint.index: joint for joint in self._joints.values()}
@@ -90,8 +90,7 @@ class TrajectoryFollower:
             trajectories[index] = joint_trajectory.joined(current, start_s, from_s)
         if not request.joint_trajectories:
             trajectories, from_s = self._stopping(now_s, measured, trajectories or self._by_index), now_s
-        stop_s = self.config.stop_trajectory_duration
-        motion = TrajectoryMotion(self._by_index, trajectories, from_s, request.tolerances, stop_s)
+        motion = TrajectoryMotion(self._by_index, trajectories, from_s, request.tolerances, self._stop_s)
         if feedback is not None:
             motion.on_advance = self._feeding(feedback, clock)
         self._run(motion, "a newer trajectory replaced it")
@@ -153,8 +152,7 @@ class TrajectoryFollower:
         return on_advance
 
     def _stopping(self, now_s: float, measured: JointMotion, indices: Iterable[int]) -> dict[int, Trajectory]:
-        stop_s = self.config.stop_trajectory_duration
-        return {index: stopping(self._by_index[index], measured[index], now_s, stop_s) for index in indices}
+        return {index: stopping(self._by_index[index], measured[index], now_s, self._stop_s) for index in indices}
 
     def _run(self, motion: TrajectoryMotion, reason: str) -> None:
         """Starts a motion; the reason is for whoever waits for the one before.

@@ -17,8 +17,7 @@ class TrajectoryMotion(Motion):
     joints stop where they are. Without tolerances it just ends.
 
     Args:
-        joints: The joints by index.
-        trajectories: Their trajectories, each of one joint, by joint index, in the world's time.
+        trajectories: The joints' trajectories, each of one joint, by joint index, in the world's time.
         from_s: From when on tolerances hold [s].
         tolerances: How far the joints may be off.
         stop_s: How long joints take to stop when it is broken off [s].
@@ -151,7 +150,6 @@ def stopping(joint: Joint, measured: tuple[float, float], time_s: float, duratio
     """Returns how a joint comes to a stop with constant deceleration, within its limits.
 
     Args:
-        joint: The joint.
         measured: Its position [rad or m] and velocity [rad/s or m/s].
         time_s: Now [s].
         duration_s: How long it may take [s]; 0 is at once.
