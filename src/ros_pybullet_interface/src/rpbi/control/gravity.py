@@ -16,7 +16,6 @@ class GravityModel:
     turned instead.
 
     Args:
-        world: The client that the robot lives in.
         load: How it was loaded. What is attached to it, or was changed in it since, is not known here.
     """
 

@@ -50,7 +50,6 @@ class TrajectoryFollower:
         """Checks a trajectory as far as it can be without looking at the robot; any thread may call it.
 
         Args:
-            request: The trajectory.
             tolerances: How well it is to be followed; without them it is not looked at.
 
         Raises:
@@ -71,7 +70,6 @@ class TrajectoryFollower:
 
         Args:
             request: What `check` returned.
-            clock: The world's clock.
             feedback: Takes the state at `action_monitor_rate` while the motion lasts.
 
         Raises:
@@ -86,7 +84,7 @@ class TrajectoryFollower:
         measured = self._drive.measured()
         for joint_trajectory in request.joint_trajectories:
             index = joint_trajectory.joint.index
-            current = trajectories.get(index) or Trajectory([Knot(now_s, measured[index][:1])])
+            current = trajectories.get(index) or Trajectory.through([Knot(now_s, measured[index][:1])])
             trajectories[index] = joint_trajectory.joined(current, start_s, from_s)
         if not request.joint_trajectories:
             trajectories, from_s = self._stopping(now_s, measured, trajectories or self._by_index), now_s
@@ -101,7 +99,6 @@ class TrajectoryFollower:
 
         Args:
             reason: Why, for whoever waits for it.
-            clock: The world's clock.
             motion: What to stop; if it is not being followed any more, nothing happens. Without it, whatever it is.
         """
         running = self._running

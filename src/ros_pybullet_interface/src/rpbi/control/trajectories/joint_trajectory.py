@@ -4,6 +4,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from custom_ros_tools.errors import UnknownNameError
 from rpbi.urdf.joints import Joint
 
@@ -58,7 +60,7 @@ class JointTrajectory(NamedTuple):
             offset = TURN * round((before.position[0] - knot.position[0]) / TURN)
         shifted = self.trajectory.shifted(start_s, (offset,))
         next_knot = knot._replace(time_s=start_s + knot.time_s, position=(knot.position[0] + offset,))
-        bridge = Trajectory([Knot(from_s, *before), next_knot])
+        bridge = Trajectory.through([Knot(from_s, *before), next_knot])
         self._check_bridge(bridge, number, abs(before.velocity[0]))
         return current.spliced(bridge.spliced(shifted, next_knot.time_s), from_s)
 
@@ -80,11 +82,6 @@ def validate_trajectory(
 ) -> tuple[JointTrajectory, ...]:
     """Checks a trajectory as far as it can be without knowing where the joints are; any thread may call it.
 
-    Args:
-        request: The trajectory.
-        joints: The joints that may be driven, by name.
-        may_be_partial: Whether joints may be left out.
-
     Raises:
         TrajectoryRefusedError: If it cannot be followed.
     """
@@ -96,7 +93,7 @@ def validate_trajectory(
         for number, point in enumerate(request.points):
             _check_limits(joint, number, point, column)
         knots = tuple(_knot(point, column) for point in request.points)
-        trajectory = Trajectory(knots)
+        trajectory = Trajectory.through(knots)
         _check_curves(joint, trajectory)
         joint_trajectories.append(JointTrajectory(joint, knots, trajectory))
     return tuple(joint_trajectories)
@@ -154,10 +151,9 @@ def _check_limits(joint: Joint, number: int, point: TrajectoryPoint, column: int
 
 def _check_curves(joint: Joint, trajectory: Trajectory) -> None:
     """Checks what happens between the points."""
-    spans = trajectory.spans()
-    positions = [segment.polynomials[0] for segment, _ in spans]
+    positions = [segment.polynomials[0] for segment in trajectory.segments]
     velocities = [derivative(polynomial) for polynomial in positions]
-    durations_s = [end_s - segment.start_s for segment, end_s in spans]
+    durations_s = np.diff([*(segment.start_s for segment in trajectory.segments), trajectory.end_s]).tolist()
     for number in _beyond(velocities, durations_s, -joint.max_velocity, joint.max_velocity):
         where = f"between points {number} and {number + 1}"
         slack = CURVE_SPEED_SLACK if any(positions[number][2:]) else ROUNDING

@@ -156,7 +156,7 @@ def stopping(joint: Joint, measured: tuple[float, float], time_s: float, duratio
     """
     position, velocity = measured
     if not duration_s:
-        return Trajectory([Knot(time_s, (position,))])
+        return Trajectory.through([Knot(time_s, (position,))])
     end = position + velocity * duration_s / 2.0
     end = min(max(end, min(joint.lower, position)), max(joint.upper, position))
-    return Trajectory([Knot(time_s, (position,), (velocity,)), Knot(time_s + duration_s, (end,), (0.0,))])
+    return Trajectory.through([Knot(time_s, (position,), (velocity,)), Knot(time_s + duration_s, (end,), (0.0,))])

@@ -19,12 +19,7 @@ class ErrorCode(IntEnum):
 
 
 class TrajectoryRefusedError(InterfaceError):
-    """A trajectory cannot be followed; nothing has moved.
-
-    Args:
-        message: What is wrong, with the joint's name.
-        code: The kind of fault.
-    """
+    """A trajectory cannot be followed; nothing has moved."""
 
     def __init__(self, message: str, code: ErrorCode = ErrorCode.INVALID_GOAL) -> None:
         self.code = code
