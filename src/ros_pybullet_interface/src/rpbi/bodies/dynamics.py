@@ -45,7 +45,7 @@ class LinkDynamics(NamedTuple):
     collision_margin: float
 
 
-_FIXED = ("local_inertia_pos", "local_inertia_orn", "body_type")
+_UNCHANGEABLE = ("local_inertia_pos", "local_inertia_orn", "body_type")
 """Fields of LinkDynamics that cannot be changed."""
 
 
@@ -65,7 +65,7 @@ def difference(present: LinkDynamics, wanted: LinkDynamics) -> dict[str, Any]:
             problems.append(f"{field}: expected {len(old)} numbers or none, got {len(new)}")
         elif not all(map(math.isfinite, new)):
             problems.append(f"{field}: must be finite, got {_shown(new)}")
-        elif field in _FIXED:
+        elif field in _UNCHANGEABLE:
             problems.append(f"{field}: cannot be changed, expected {_shown(old)}, got {_shown(new)}")
         elif min(new) < 0:
             problems.append(f"{field}: must be >= 0, got {_shown(new)}")

@@ -25,8 +25,8 @@ def mesh_problems(shape: CreateVisualShape | CreateCollisionShape) -> list[tuple
 
 def _is_binary_stl(path: str) -> bool:
     data = Path(path).read_bytes()
-    header, triangles = 84, int.from_bytes(data[80:84], "little")  # of 50 bytes each
-    return len(data) > header and len(data) == header + triangles * 50
+    triangles = int.from_bytes(data[80:84], "little")
+    return len(data) > 84 and len(data) == 84 + 50 * triangles  # a header, and 50 bytes for each triangle
 
 
 def soft_mesh_problems(path: str) -> list[str]:

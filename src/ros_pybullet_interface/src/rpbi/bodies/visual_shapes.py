@@ -68,7 +68,7 @@ def body_shapes(body: Body) -> list[BodyShape]:
 
 
 def link_pose(body: Body, link_index: int) -> Pose:
-    """Returns the pose of a link's URDF frame in the world, -1 for the root; only the simulation thread may ask."""
+    """Returns the pose of a link's URDF frame in the world, -1 the root; only the simulation thread may ask."""
     if link_index == -1:
         return body.base_pose()
     return Pose(*body.pb.getLinkState(body.body_id, link_index, computeForwardKinematics=1)[4:6])
@@ -78,7 +78,7 @@ def _parts(body: Body, data: Sequence[Any]) -> list[BodyShape]:
     """Returns what a row of PyBullet's visual shapes consists of."""
     _, index, kind, size, file, position, quat, rgba, texture = data
     link, frame = body.link_name(index), Pose(position, quat)
-    own_file = body.visual if isinstance(body, ShapeObject) else None
+    visual = body.visual if isinstance(body, ShapeObject) else None  # what the object's own file says
 
     def shape(kind: ShapeKind, size: Vector, pose: Pose = frame, **more: Any) -> BodyShape:
         return BodyShape(index, link, kind, size, pose, rgba, **more)
@@ -96,15 +96,15 @@ def _parts(body: Body, data: Sequence[Any]) -> list[BodyShape]:
         return [cylinder, *(shape(ShapeKind.SPHERE, _cube(diameter), end) for end in ends)]
     if kind == pybullet.GEOM_PLANE:
         # PyBullet does not tell the normal of a plane; that of a URDF is taken to be z.
-        normal = own_file.planeNormal if own_file is not None else None
+        normal = visual.planeNormal if visual is not None else None
         surface = frame @ Pose(quat_xyzw=_turned_to(normal or (0.0, 0.0, 1.0)))
         middle = surface @ Pose((0.0, 0.0, -PLANE_THICKNESS_M / 2))
         return [shape(ShapeKind.BOX, (PLANE_SIZE_M, PLANE_SIZE_M, PLANE_THICKNESS_M), middle)]
     if file:
         return [shape(ShapeKind.MESH, size, mesh_file=file.decode(), is_textured=texture >= 0)]
-    if own_file is None or not own_file.vertices or not own_file.indices:
+    if visual is None or not visual.vertices or not visual.indices:
         return []
-    return [shape(ShapeKind.TRIANGLES, size, corners=tuple(own_file.vertices[i] for i in own_file.indices))]
+    return [shape(ShapeKind.TRIANGLES, size, corners=tuple(visual.vertices[i] for i in visual.indices))]
 
 
 def _cube(edge_m: float) -> Vector:

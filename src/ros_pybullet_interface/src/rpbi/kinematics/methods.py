@@ -123,8 +123,7 @@ def towards_posture(
     last one spoiled (Liegeois, IEEE Transactions on Systems, Man, and Cybernetics 7(12), 1977).
 
     Args:
-        chain: The link.
-        target: Where it is and shall stay.
+        target: Where the link is and shall stay.
         limits: Limits of its m joints.
         rest: m positions of the posture [rad or m].
         ranges: m weights, 1 at most: a joint may be as far from its rest as its range is wide.

@@ -40,15 +40,12 @@ def urdf_problems(path: str) -> list[str]:
 def load_urdf(
     pb: Client, name: str, arguments: Mapping[str, Any], prepare: Callable[[str], str] = resolve_meshes
 ) -> int:
-    """Loads a URDF file.
+    """Loads a URDF file and returns PyBullet's id of the body.
 
     Args:
         name: Name of the body, for messages.
         arguments: Those of `loadURDF`.
         prepare: Returns a file that PyBullet can load in place of `fileName`.
-
-    Returns:
-        PyBullet's id of the body.
 
     Raises:
         ConfigError: If it cannot be loaded; it names what is wrong with the file.
