@@ -89,10 +89,7 @@ class Body:
         self.halt(reason)
 
     def attach(self, bodies: Mapping[str, Body]) -> None:
-        """Ties it to other bodies when it comes into their world; most bodies are tied to none.
-
-        Args:
-            bodies: Those that are there already, by name.
+        """Ties it to bodies that are there already, by name, when it comes into their world; most are tied to none.
 
         Raises:
             ConfigError: If it cannot be done.

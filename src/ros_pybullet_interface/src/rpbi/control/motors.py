@@ -72,9 +72,7 @@ class Motors:
     simulated time, so that whoever stops sending stops the robot.
 
     Args:
-        mode: Control mode at the start.
         gains: PyBullet's `positionGain` and `velocityGain` by joint index, where they are not PyBullet's own.
-        limit_reports: Tells of positions beyond the joints' limits.
         enforce_effort_limits: Whether motors are held to the efforts of the URDF.
         timeout_s: Age at which velocity and effort targets expire [s] of the world's time.
 
@@ -148,8 +146,9 @@ class Motors:
     def track(self, index: int, position: float, velocity: float) -> None:
         """Sets a joint's position [rad or m] and velocity [rad/s or m/s] at the coming tick, in any control mode.
 
-        To the velocity PyBullet adds its gain times how far the joint is from the position before the tick. So this is
-        the position before it, and the velocity the one that leads to where the joint is to be after it.
+        PyBullet's position motor moves by the velocity, and beyond that takes away a share, its gain, of the difference
+        to the position before the tick. So this is the position before it, and the velocity the one that leads to
+        where the joint is to be after it.
         """
         self._pb.setJointMotorControl2(
             self._body_id,

@@ -128,7 +128,6 @@ class PlanarBase:
 
     Args:
         body_id: PyBullet's id of the robot, which was loaded with planar joints.
-        dt_s: Length of a tick [s].
     """
 
     def __init__(self, pb: Client, body_id: int, config: PlanarBaseConfig, dt_s: float) -> None:

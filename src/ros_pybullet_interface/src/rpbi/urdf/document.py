@@ -138,9 +138,6 @@ class UrdfDocument:
 
         It loads in half a millisecond where meshes take up to some hundred. Every link has unit mass at its own frame,
         so that PyBullet's frames of mass centres are the links' frames.
-
-        Args:
-            links: The links; None: all.
         """
         kept = [name for name in self.links if links is None or name in links]
         ends = {*kept}

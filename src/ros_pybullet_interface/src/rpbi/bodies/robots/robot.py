@@ -31,10 +31,6 @@ class Robot(JointedBody):
 
     It holds its start position until the first target. Targets of joints that a motion drives are refused until it
     ends.
-
-    Raises:
-        ConfigError: If the configuration does not fit the robot.
-        PhysicsError: If PyBullet cannot load it.
     """
 
     example = {

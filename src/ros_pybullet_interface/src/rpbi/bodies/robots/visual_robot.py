@@ -13,12 +13,7 @@ from .robot_config import RobotConfig
 
 
 class VisualRobot(JointedBody):
-    """A robot without physics: it is put where it shall be, pushes nothing and is pushed by nothing.
-
-    Raises:
-        ConfigError: If the configuration does not fit the robot.
-        PhysicsError: If PyBullet cannot load it.
-    """
+    """A robot without physics: it is put where it shall be, pushes nothing and is pushed by nothing."""
 
     example = {
         "is_visual_robot": True,

@@ -45,7 +45,6 @@ class JointTrajectory(NamedTuple):
         turns takes the short way there.
 
         Args:
-            current: What the joint does now.
             start_s: The world's time at which the trajectory's times begin [s].
             from_s: When it takes over [s]; there is a point after it.
 

@@ -87,12 +87,7 @@ class TrajectoryMotion(Motion):
         self.desired = {index: trajectory.sample(time_s) for index, trajectory in self.trajectories.items()}
 
     def _go_on(self, time_s: float) -> JointMotion:
-        """Returns set points with which the joints are at the end of the tick where they are to be then.
-
-        PyBullet's position motor moves by the target velocity, and beyond that takes away a share of the difference
-        between target and position before the step. So the target is where the joint is to be before the step, and the
-        velocity the one that leads to where it is to be after it.
-        """
+        """Returns set points with which the joints are at the end of the tick where they are to be then."""
         before, duration_s = self.desired, time_s - self._time_s
         self._sample(time_s)
         return {
