@@ -94,7 +94,7 @@ class Script:
         draw = self._random
         joints = draw.sample(JOINTS, draw.randint(1, 7))
         values = [draw.uniform(-1.0, 1.0) for _ in joints]
-        if world.bodies["iiwa"].motion is None:
+        if world.bodies["iiwa"].drive.motion is None:
             world.put("iiwa/target", JointTarget(joints, values, values, [20.0 * value for value in values]))
 
     def _something(self, world: World) -> None:

@@ -48,7 +48,7 @@ def without_damping(world: World) -> World:
 
 def state(world: World, name: str = FIRST) -> tuple[float, float]:
     robot = world.bodies["iiwa"]
-    return robot.joint_motion()[robot.model[name].index]
+    return robot.drive.measured()[robot.model[name].index]
 
 
 def test_a_velocity_target_moves_a_joint_at_that_velocity_until_it_expires(build):

@@ -98,7 +98,7 @@ def test_line_arrives_with_a_velocity_and_has_its_goal_time_to_stop(tmp_path):
 def test_holds_its_goal_when_it_has_ended(arm):
     arm.follow(Point(0.5, STRETCHED, STILL))
     arm.step(1.0)
-    assert arm.robot.motion is None
+    assert arm.robot.drive.motion is None
     arm.step(2.0)
     assert arm.position == pytest.approx(STRETCHED, abs=1e-3)
 
@@ -119,7 +119,7 @@ def test_all_points_past_is_refused(arm):
     with pytest.raises(TrajectoryRefusedError, match=r"all points are in the past, the last one by 0.4 s") as refused:
         arm.follow(Point(0.1, STRETCHED), start_in_s=-0.5)
     assert refused.value.code == ErrorCode.OLD_HEADER_TIMESTAMP
-    assert arm.robot.motion is None
+    assert arm.robot.drive.motion is None
 
 
 def test_splices_smoothly_and_preempts(arm):
@@ -247,7 +247,7 @@ def test_world_that_stands_still_keeps_the_trajectory_and_breaks_off_timed_motio
     arm.step(0.6)
     assert motion.result.result().success
     timed = TimedMotion(arm.robot.model, {0: 0.0}, 1.0)
-    arm.robot.run(timed)
+    arm.robot.drive.run(timed)
     arm.step(0.1)
     arm.world.pause("the simulation was stopped")
     assert timed.is_over
@@ -269,7 +269,7 @@ def test_goal_is_answered_when_robot_or_world_goes(arm, end):
 def test_timed_motion_takes_over_and_tells_so(arm):
     motion = arm.follow(Point(1.0, STRETCHED, STILL))
     arm.step(0.2)
-    arm.robot.run(TimedMotion(arm.robot.model, {0: 0.0}, 0.5))
+    arm.robot.drive.run(TimedMotion(arm.robot.model, {0: 0.0}, 0.5))
     assert "a newer motion replaced it" in motion.result.result(timeout=0).message
 
 

@@ -72,7 +72,7 @@ def test_motions_end_with_the_reason(arm):
     arm.reset()
     success, message = motion.result.result(timeout=0)
     assert not success and "the world was reset" in message
-    assert arm.bodies["iiwa"].motion is None
+    assert arm.bodies["iiwa"].drive.motion is None
 
 
 def test_the_first_target_after_it_is_obeyed_and_none_from_before(arm):

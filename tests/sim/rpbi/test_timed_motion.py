@@ -44,7 +44,7 @@ def build(tmp_path):
 def start(world: World, goal: dict[str, float], duration_s: float) -> TimedMotion:
     robot = world.bodies["iiwa"]
     motion = TimedMotion(robot.model, robot.model.resolve(list(goal), list(goal.values())), duration_s)
-    robot.run(motion)
+    robot.drive.run(motion)
     return motion
 
 
@@ -91,7 +91,7 @@ def test_a_motion_that_is_asked_to_be_too_fast_takes_the_time_that_the_joints_ne
     fastest = 0.0
     while not motion.is_over:
         world.step()
-        fastest = max(fastest, abs(world.bodies["iiwa"].joint_motion()[0][1]))
+        fastest = max(fastest, abs(world.bodies["iiwa"].drive.measured()[0][1]))
     assert motion.result.result().success
     assert "it took" in motion.result.result().message
     assert fastest <= 1.02 * limit
@@ -176,7 +176,7 @@ def test_a_goal_outside_limits_is_refused_before_anything_moves(build):
     world = build()
     with pytest.raises(ValueError, match=f"joint '{JOINTS[1]}' must be within -2.094.* got 3"):
         start(world, {JOINTS[0]: 0.5, JOINTS[1]: 3.0}, 1.0)
-    assert world.bodies["iiwa"].motion is None
+    assert world.bodies["iiwa"].drive.motion is None
 
 
 @pytest.mark.parametrize("duration_s", [-1.0, 1e100, float("nan"), float("inf")])
@@ -199,7 +199,7 @@ def test_under_velocity_control_a_motion_arrives_and_the_robot_then_stands_still
     world.put("iiwa/target", JointTarget([JOINTS[0]], velocity=[0.2]))
     for _ in range(50):
         world.step()
-    assert world.bodies["iiwa"].joint_motion()[0][1] == pytest.approx(0.2, rel=0.05)
+    assert world.bodies["iiwa"].drive.measured()[0][1] == pytest.approx(0.2, rel=0.05)
 
 
 def test_targets_of_joints_that_a_motion_drives_are_refused_and_others_obeyed(build):

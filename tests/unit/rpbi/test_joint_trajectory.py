@@ -40,7 +40,7 @@ def request(*points: Point, names: tuple[str, ...] = NAMES) -> TrajectoryRequest
 
 
 def standing(position: float, time_s: float = 0.0) -> Trajectory:
-    return Trajectory([Knot(time_s, (position,))])
+    return Trajectory.through([Knot(time_s, (position,))])
 
 
 def test_columns_go_to_the_joints_that_are_named():
@@ -124,7 +124,7 @@ def test_joined_course_leaves_out_what_is_past_and_goes_straight_to_the_next_poi
 
 
 def test_joined_course_begins_with_the_motion_under_way():
-    current = Trajectory([Knot(0.0, (0.0,), (0.0,)), Knot(2.0, (1.0,), (0.0,))])
+    current = Trajectory.through([Knot(0.0, (0.0,), (0.0,)), Knot(2.0, (1.0,), (0.0,))])
     planned = joint_trajectory_of(Point(1.0, (-0.5,), (0.0,)))
     joined = planned.joined(current, start_s=1.0, from_s=1.0)
     before, after = joined.sample(1.0 - 1e-9), joined.sample(1.0 + 1e-9)

@@ -31,7 +31,7 @@ def sample_just_before(trajectory: Trajectory, time_s: float) -> State:
 @pytest.mark.parametrize("kind", KINDS)
 def test_passes_through_its_knots_with_what_they_give(kind):
     given = knots(kind)
-    trajectory = Trajectory(given)
+    trajectory = Trajectory.through(given)
     for knot in given[:-1]:
         state = trajectory.sample(knot.time_s)
         assert state.position == pytest.approx(knot.position, abs=1e-9)
@@ -46,7 +46,7 @@ def test_passes_through_its_knots_with_what_they_give(kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_velocity_and_acceleration_are_the_derivatives_of_the_position(kind):
-    trajectory = Trajectory(knots(kind))
+    trajectory = Trajectory.through(knots(kind))
     h = 1e-4
     for time_s in np.linspace(trajectory.start_s + 0.01, trajectory.end_s - 0.01, 300):
         if min(abs(time_s - segment.start_s) for segment in trajectory.segments) < 2 * h:
@@ -56,14 +56,14 @@ def test_velocity_and_acceleration_are_the_derivatives_of_the_position(kind):
 
 
 def test_line_is_straight_when_one_of_two_knots_has_a_position_alone():
-    trajectory = Trajectory([Knot(0.0, (0.0,), (5.0,)), Knot(2.0, (4.0,))])
+    trajectory = Trajectory.through([Knot(0.0, (0.0,), (5.0,)), Knot(2.0, (4.0,))])
     assert [trajectory.sample(t).position[0] for t in (0.0, 0.5, 1.5)] == [0.0, 1.0, 3.0]
     assert trajectory.sample(0.0).velocity == (2.0,)
 
 
 def test_stands_before_the_start_and_exactly_at_the_last_knot_after_the_end():
     given = knots("quintic")
-    trajectory = Trajectory(given)
+    trajectory = Trajectory.through(given)
     still = (0.0,) * 3
     assert trajectory.sample(trajectory.start_s - 1.0) == (given[0].position, still, still)
     for late_s in (0.0, 1e-12, 5.0):
@@ -71,7 +71,7 @@ def test_stands_before_the_start_and_exactly_at_the_last_knot_after_the_end():
 
 
 def test_one_knot_stands_still():
-    trajectory = Trajectory([Knot(3.0, (1.0, 2.0))])
+    trajectory = Trajectory.through([Knot(3.0, (1.0, 2.0))])
     assert (trajectory.start_s, trajectory.end_s) == (3.0, 3.0)
     assert {trajectory.sample(t).position for t in (0.0, 3.0, 9.0)} == {(1.0, 2.0)}
 
@@ -87,8 +87,8 @@ def test_minimum_jerk_has_the_known_profile():
 
 @pytest.mark.parametrize("at_s", [-1.0, 0.0, 0.3, 1.0, 1.5, 2.0, 2.7, 3.0, 4.5, 6.0, 9.0])
 def test_spliced_is_the_old_one_until_the_time_and_the_new_one_from_then_on(at_s):
-    old = Trajectory([Knot(0.0, (0.0,), (0.0,)), Knot(1.0, (2.0,), (1.0,)), Knot(3.0, (1.0,), (0.0,))])
-    new = Trajectory([Knot(2.0, (5.0,)), Knot(4.0, (6.0,)), Knot(6.0, (3.0,))])
+    old = Trajectory.through([Knot(0.0, (0.0,), (0.0,)), Knot(1.0, (2.0,), (1.0,)), Knot(3.0, (1.0,), (0.0,))])
+    new = Trajectory.through([Knot(2.0, (5.0,)), Knot(4.0, (6.0,)), Knot(6.0, (3.0,))])
     spliced = old.spliced(new, at_s)
     for time_s in np.arange(0.0, 10.0, 0.05):
         expected = (old if time_s < at_s else new).sample(time_s)
@@ -98,15 +98,15 @@ def test_spliced_is_the_old_one_until_the_time_and_the_new_one_from_then_on(at_s
 
 
 def test_splicing_again_and_again_keeps_no_segments_that_are_over():
-    trajectory = Trajectory([Knot(0.0, (0.0,))])
+    trajectory = Trajectory.through([Knot(0.0, (0.0,))])
     for number in range(1000):
-        new = Trajectory([Knot(number + 1.0, (0.0,)), Knot(number + 2.0, (1.0,))])
+        new = Trajectory.through([Knot(number + 1.0, (0.0,)), Knot(number + 2.0, (1.0,))])
         trajectory = trajectory.since(number).spliced(new, number + 1.0)
     assert len(trajectory.segments) < 5
 
 
 def test_shifted_is_the_same_motion_elsewhere():
-    trajectory = Trajectory(knots("quintic"))
+    trajectory = Trajectory.through(knots("quintic"))
     shifted = trajectory.shifted(10.0, (1.0, 2.0, 3.0))
     for time_s in np.linspace(trajectory.start_s - 1.0, trajectory.end_s + 1.0, 50):
         expected = np.array(trajectory.sample(time_s)) + [[1.0, 2.0, 3.0], [0.0] * 3, [0.0] * 3]
@@ -126,7 +126,7 @@ def test_shifted_is_the_same_motion_elsewhere():
 )
 def test_what_is_no_trajectory_is_refused(given, message):
     with pytest.raises(ValueError, match=message):
-        Trajectory(given)
+        Trajectory.through(given)
 
 
 def test_range_of_a_polynomial_is_found_and_its_bounds_hold():

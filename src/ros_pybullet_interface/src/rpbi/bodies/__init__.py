@@ -21,10 +21,7 @@ BODY_TYPES = ClassTable(
 
 
 def body_class(kind: str) -> type[Body]:
-    """Returns the class of bodies of a type.
-
-    Args:
-        kind: A key of BODY_TYPES, or `module:Class` of another package.
+    """Returns the class of bodies of a type, a key of BODY_TYPES or `module:Class` of another package.
 
     Raises:
         ValueError: If there is none.

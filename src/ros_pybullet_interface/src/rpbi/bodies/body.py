@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, ClassVar
@@ -10,11 +11,14 @@ import pybullet
 
 from custom_ros_tools.errors import PhysicsError
 from custom_ros_tools.schema import ConfigModel
+from rpbi.config.pybullet_models import ObjectTf, ResetBaseVelocity
 from rpbi.engine.client import Client
-from rpbi.engine.inputs import Input
+from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Pose, Twist, cross, minus, plus
 from rpbi.samples import BodyState
 from rpbi.sensors.sensor import Sensor
+
+log = logging.getLogger(__name__)
 
 
 class Body:
@@ -22,11 +26,6 @@ class Body:
 
     A new type is a subclass with a `Config` and an `__init__` that creates the body and hands its id on; the rest may
     stay as it is. Whatever PyBullet created when `__init__` raises is removed by the caller.
-
-    Args:
-        pb: The client that the body lives in.
-        name: Unique name of the body.
-        body_id: PyBullet's id of it, valid as long as it exists.
     """
 
     Config: ClassVar[type[ConfigModel]]
@@ -37,6 +36,8 @@ class Body:
     example: ClassVar[Mapping[str, Any]] = {}
     """Keys of a YAML, without its name, that asks for all that a body of this type can have in ROS, and follows the TF
     frame `FRAME` if it can follow one. The reference pages are written from it."""
+    object_tf: ObjectTf | None = None
+    """The TF frame that its base follows, if it follows one."""
 
     def __init__(self, pb: Client, name: str, body_id: int) -> None:
         if body_id < 0:
@@ -60,33 +61,35 @@ class Body:
 
     @cached_property
     def _link_names(self) -> dict[int, str]:
-        base = self.pb.getBodyInfo(self.body_id)[0].decode()
-        infos = [self.pb.getJointInfo(self.body_id, index) for index in self.joint_indices]
-        return {-1: base, **{info[0]: info[12].decode() for info in infos}}
+        names = {index: self.pb.getJointInfo(self.body_id, index)[12].decode() for index in self.joint_indices}
+        return {-1: self.pb.getBodyInfo(self.body_id)[0].decode(), **names}
+
+    def _start_base(
+        self, velocity: ResetBaseVelocity | None, object_tf: ObjectTf | None = None, is_fixed: bool = False
+    ) -> None:
+        """Has a fixed base follow its TF frame, and gives any other its start velocity; warns of what has no effect."""
+        if is_fixed:
+            self.object_tf = object_tf
+            if velocity is not None:
+                log.warning("%s: resetBaseVelocity: has no effect: the base is fixed", self.name)
+            return
+        if velocity is not None:
+            self.pb.resetBaseVelocity(self.body_id, **velocity.kwargs())
+        if object_tf is not None:
+            log.warning("%s: object_tf: has no effect: physics moves a base that is not fixed", self.name)
 
     def before_step(self, tick: int) -> None:
         """Acts just before the physics of each tick; bodies that need nothing leave it."""
 
     def halt(self, reason: str) -> None:
-        """Breaks off what it was about to do over the coming ticks, since they may not come; most bodies do nothing.
-
-        Args:
-            reason: Why, for whoever waits for it.
-        """
+        """Breaks off what it was about to do over the coming ticks, since they may not come; most bodies do nothing."""
 
     def pause(self, reason: str) -> None:
-        """Breaks off what cannot wait until a world that is stopped runs again; as a rule that is all.
-
-        Args:
-            reason: Why, for whoever waits for it.
-        """
+        """Breaks off what cannot wait until a world that is stopped runs again; as a rule that is all."""
         self.halt(reason)
 
     def attach(self, bodies: Mapping[str, Body]) -> None:
-        """Ties it to other bodies when it comes into their world; most bodies are tied to none.
-
-        Args:
-            bodies: Those that are there already, by name.
+        """Ties it to bodies that are there already, by name, when it comes into their world; most are tied to none.
 
         Raises:
             ConfigError: If it cannot be done.
@@ -105,8 +108,8 @@ class Body:
         return ()
 
     def inputs(self) -> Mapping[str, Input]:
-        """Returns what the body takes while the world runs, by name."""
-        return {}
+        """Returns what the body takes while the world runs, by name: the `pose` of the TF frame that it follows."""
+        return {} if self.object_tf is None else {"pose": PoseInput.following(self.object_tf, self.set_base_pose)}
 
     def base_pose(self) -> Pose:
         """Returns the pose of the base link's URDF frame in the world."""

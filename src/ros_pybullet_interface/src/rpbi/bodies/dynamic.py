@@ -6,7 +6,6 @@ from custom_ros_tools.schema import HzOrOff, Position, Positive, Quat
 from rpbi.config.pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ResetBaseVelocity
 from rpbi.config.sensors import ContactsConfig
 from rpbi.engine.client import Client
-from rpbi.geometry import Pose
 from rpbi.sensors.contact_arrows import contact_sensors
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
@@ -49,12 +48,12 @@ class DynamicObject(ShapeObject):
             config.name,
             config.createVisualShape,
             config.createCollisionShape,
-            config.baseMass,
-            Pose(config.basePosition, config.baseOrientation),
+            baseMass=config.baseMass,
+            basePosition=config.basePosition,
+            baseOrientation=config.baseOrientation,
         )
         pb.changeDynamics(self.body_id, -1, **config.changeDynamics.kwargs())
-        if config.resetBaseVelocity is not None:
-            pb.resetBaseVelocity(self.body_id, **config.resetBaseVelocity.kwargs())
+        self._start_base(config.resetBaseVelocity)
         self._broadcast_hz = config.broadcast_hz
         self._contacts = config.contacts
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import pybullet
+from pydantic.alias_generators import to_camel
 
 from custom_ros_tools.errors import PhysicsError, UnknownNameError
 from rpbi.config.pybullet_models import ChangeDynamics
@@ -44,18 +45,8 @@ class LinkDynamics(NamedTuple):
     collision_margin: float
 
 
-KEYS = {
-    "mass": "mass",
-    "lateral_friction": "lateralFriction",
-    "local_inertia_diagonal": "localInertiaDiagonal",
-    "restitution": "restitution",
-    "rolling_friction": "rollingFriction",
-    "spinning_friction": "spinningFriction",
-    "contact_damping": "contactDamping",
-    "contact_stiffness": "contactStiffness",
-    "collision_margin": "collisionMargin",
-}
-"""PyBullet's argument for each field of LinkDynamics that can be changed."""
+_UNCHANGEABLE = ("local_inertia_pos", "local_inertia_orn", "body_type")
+"""Fields of LinkDynamics that cannot be changed."""
 
 
 def difference(present: LinkDynamics, wanted: LinkDynamics) -> dict[str, Any]:
@@ -74,18 +65,17 @@ def difference(present: LinkDynamics, wanted: LinkDynamics) -> dict[str, Any]:
             problems.append(f"{field}: expected {len(old)} numbers or none, got {len(new)}")
         elif not all(map(math.isfinite, new)):
             problems.append(f"{field}: must be finite, got {_shown(new)}")
-        elif field not in KEYS:
+        elif field in _UNCHANGEABLE:
             problems.append(f"{field}: cannot be changed, expected {_shown(old)}, got {_shown(new)}")
         elif min(new) < 0:
             problems.append(f"{field}: must be >= 0, got {_shown(new)}")
         else:
-            changed[KEYS[field]] = getattr(wanted, field)
-    pair = {"contact_damping": wanted.contact_damping, "contact_stiffness": wanted.contact_stiffness}
-    if not problems and any(KEYS[field] in changed for field in pair):
-        for field, value in pair.items():
-            if value < 0:
+            changed[to_camel(field)] = getattr(wanted, field)
+    if not problems and changed.keys() & {"contactDamping", "contactStiffness"}:
+        changed |= {"contactDamping": wanted.contact_damping, "contactStiffness": wanted.contact_stiffness}
+        for field in ("contact_damping", "contact_stiffness"):
+            if (value := getattr(wanted, field)) < 0:
                 problems.append(f"{field}: must be >= 0 when the other is set, got {value:g}")
-            changed[KEYS[field]] = value
     if problems:
         raise ValueError("; ".join(problems))
     return changed
@@ -110,7 +100,6 @@ def link_index(body: Body, link: str) -> int:
     """Returns PyBullet's index of a link.
 
     Args:
-        body: The body.
         link: Name of the link; empty for the root link.
 
     Raises:
@@ -119,12 +108,11 @@ def link_index(body: Body, link: str) -> int:
     """
     if body.is_soft:
         raise ValueError(f"'{body.name}' is soft: what it is made of stands in its file and does not change")
-    links = {body.pb.getJointInfo(body.body_id, index)[12].decode(): index for index in body.joint_indices}
-    known = [body.root_link, *(name for name, index in links.items() if index in body.link_indices)]
+    known = [body.root_link, *map(body.link_name, body.link_indices)]
     wanted = link or body.root_link
     if wanted not in known:
         raise UnknownNameError(f"link of {body.name}", wanted, known)
-    return links.get(wanted, -1)
+    return next((index for index in body.joint_indices if body.link_name(index) == wanted), -1)
 
 
 def read_dynamics(body: Body, link: str) -> LinkDynamics:
@@ -143,9 +131,7 @@ def change_dynamics(body: Body, link: str, change: ChangeDynamics) -> None:
     collision shape, would forget the URDF's.
 
     Args:
-        body: The body.
         link: Name of the link; empty for the root link.
-        change: What to change.
 
     Raises:
         UnknownNameError: If the body has no such link.
@@ -155,8 +141,7 @@ def change_dynamics(body: Body, link: str, change: ChangeDynamics) -> None:
     index = link_index(body, link)
     present = LinkDynamics(*body.pb.getDynamicsInfo(body.body_id, index))
     arguments = change.kwargs()
-    problems = _problems(body, index, present, arguments)
-    if problems:
+    if problems := _problems(body, index, present, arguments):
         raise ValueError("; ".join(problems))
     if "mass" in arguments:
         ratio = arguments["mass"] / present.mass
@@ -181,11 +166,11 @@ def _renew_contacts(body: Body, index: int) -> None:
 
 def _problems(body: Body, index: int, present: LinkDynamics, arguments: dict[str, Any]) -> list[str]:
     """Returns what a link cannot be given."""
+    what = body.name if index < 0 else f"{body.name}/{body.link_name(index)}"
     problems = []
-    what = body.name if index < 0 else f"{body.name}/{body.pb.getJointInfo(body.body_id, index)[12].decode()}"
-    for key in ("mass", "localInertiaDiagonal"):
-        if key in arguments and not present.mass:
-            problems.append(f"{key}: '{what}' is static, and stays so; add a dynamic object instead")
+    if not present.mass:
+        static = f"'{what}' is static, and stays so; add a dynamic object instead"
+        problems += [f"{key}: {static}" for key in ("mass", "localInertiaDiagonal") if key in arguments]
     if present.mass and arguments.get("mass") == 0:
         problems.append("mass: must be > 0 [kg], got 0: what moves cannot be made static")
     if present.mass and 0.0 in arguments.get("localInertiaDiagonal", ()):

@@ -1,14 +1,12 @@
 """What is wrong with meshes that PyBullet would take without a word."""
 
 import math
-import struct
 from collections.abc import Iterator
 from pathlib import Path
 
 from rpbi.config.pybullet_models import CreateCollisionShape, CreateVisualShape
 
-_STL_HEADER = struct.Struct("<80xI")
-_STL_TRIANGLE_SIZE = 50  # bytes
+SOFT_MESH_FORMATS = (".obj", ".vtk")
 
 
 def mesh_problems(shape: CreateVisualShape | CreateCollisionShape) -> list[tuple[str, str]]:
@@ -27,21 +25,12 @@ def mesh_problems(shape: CreateVisualShape | CreateCollisionShape) -> list[tuple
 
 def _is_binary_stl(path: str) -> bool:
     data = Path(path).read_bytes()
-    if len(data) <= _STL_HEADER.size:
-        return False
-    (triangles,) = _STL_HEADER.unpack_from(data)
-    return len(data) == _STL_HEADER.size + triangles * _STL_TRIANGLE_SIZE
-
-
-SOFT_MESH_FORMATS = (".obj", ".vtk")
+    triangles = int.from_bytes(data[80:84], "little")
+    return len(data) > 84 and len(data) == 84 + 50 * triangles  # a header, and 50 bytes for each triangle
 
 
 def soft_mesh_problems(path: str) -> list[str]:
-    """Returns what is wrong with the mesh of a soft body, a sentence for each fault.
-
-    Args:
-        path: The file, which exists.
-    """
+    """Returns what is wrong with the mesh of a soft body, a file that exists: a sentence for each fault."""
     kind = Path(path).suffix.lower()
     if kind not in SOFT_MESH_FORMATS:
         return [f"expected one of {', '.join(SOFT_MESH_FORMATS)}, got {path}"]
@@ -58,11 +47,9 @@ def _check_obj(lines: list[list[str]]) -> bool:
     """Returns whether the mesh has faces; raises ValueError if a number is none or names no corner."""
     corners = sum(1 for words in lines if words[:1] == ["v"] and _finite(words[1:4]))
     faces = [words[1:] for words in lines if words[:1] == ["f"]]
-    for face in faces:
-        for corner in face:
-            number = int(corner.split("/")[0])
-            if not 1 <= abs(number) <= corners:
-                raise ValueError(f"a face names corner {number} of {corners}")
+    for number in (int(corner.split("/")[0]) for face in faces for corner in face):
+        if not 1 <= abs(number) <= corners:
+            raise ValueError(f"a face names corner {number} of {corners}")
     return bool(faces)
 
 

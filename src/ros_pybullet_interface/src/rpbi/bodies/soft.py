@@ -148,12 +148,16 @@ class SoftObject(Body):
 
 def _load(pb: Client, config: SoftObjectConfig) -> int:
     """Loads a soft body, whose meshes are looked at before: PyBullet may crash on a broken one."""
-    if config.loadSoftBody is not None:
-        load = config.loadSoftBody
-        meshes = {"loadSoftBody.fileName": load.fileName}
-        if load.simFileName is not None:
-            meshes["loadSoftBody.simFileName"] = load.simFileName
-        _refuse_problems(config.name, [(key, soft_mesh_problems(path)) for key, path in meshes.items()])
+    if (load := config.loadSoftBody) is not None:
+        meshes = {"fileName": load.fileName, "simFileName": load.simFileName}
+        problems = [
+            Problem(config.name, f"loadSoftBody.{key}", message)
+            for key, path in meshes.items()
+            if path is not None
+            for message in soft_mesh_problems(path)
+        ]
+        if problems:
+            raise ConfigError(problems)
         if load.useNeoHookean and Path(load.simFileName or load.fileName).suffix.lower() != ".vtk":
             message = "a solid needs tetrahedra (.vtk); for a surface use useMassSpring"
             raise ConfigError([Problem(config.name, "loadSoftBody.useNeoHookean", message)])
@@ -164,14 +168,9 @@ def _load(pb: Client, config: SoftObjectConfig) -> int:
     assert config.loadURDF is not None  # the model demands one of both
     urdf = config.loadURDF.fileName
     files = UrdfDocument(urdf).deformable_meshes()
-    problems = [fault for mesh in files for fault in soft_mesh_problems(mesh)]
+    messages = [message for mesh in files for message in soft_mesh_problems(mesh)]
     if not files:
-        problems = [f"{urdf}: expected a <deformable> with a mesh; rigid objects belong to the list `urdfs`"]
-    _refuse_problems(config.name, [("loadURDF.fileName", problems)])
+        messages = [f"{urdf}: expected a <deformable> with a mesh; rigid objects belong to the list `urdfs`"]
+    if messages:
+        raise ConfigError([Problem(config.name, "loadURDF.fileName", message) for message in messages])
     return load_urdf(pb, config.name, config.loadURDF.kwargs())
-
-
-def _refuse_problems(name: str, problems: list[tuple[str, list[str]]]) -> None:
-    found = [Problem(name, key, message) for key, messages in problems for message in messages]
-    if found:
-        raise ConfigError(found)

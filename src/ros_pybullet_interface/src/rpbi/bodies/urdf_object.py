@@ -1,8 +1,5 @@
 """URDF objects: things with links and joints, but without motors."""
 
-import logging
-from collections.abc import Mapping
-
 import pybullet
 from pydantic import Field
 
@@ -11,7 +8,6 @@ from custom_ros_tools.schema import HzOrOff
 from rpbi.config.pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity
 from rpbi.config.sensors import ContactsConfig
 from rpbi.engine.client import Client
-from rpbi.engine.inputs import Input, PoseInput
 from rpbi.sensors.contact_arrows import contact_sensors
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
@@ -20,8 +16,6 @@ from rpbi.urdf.loading import load_urdf
 
 from .body import Body
 from .body_config import BodyConfig
-
-log = logging.getLogger(__name__)
 
 
 class UrdfObjectConfig(BodyConfig):
@@ -57,27 +51,16 @@ class UrdfObject(Body):
         _refuse_soft(config)
         super().__init__(pb, config.name, load_urdf(pb, config.name, config.loadURDF.kwargs()))
         self.config = config
-        # PyBullet fixes a base without mass.
-        self.has_fixed_base = bool(config.loadURDF.useFixedBase) or pb.getDynamicsInfo(self.body_id, -1)[0] == 0.0
         for index in self.joint_indices:
             self._release(index)
-        if config.resetBaseVelocity is not None and self.has_fixed_base:
-            log.warning("%s: resetBaseVelocity: has no effect: the base is fixed", self.name)
-        elif config.resetBaseVelocity is not None:
-            pb.resetBaseVelocity(self.body_id, **config.resetBaseVelocity.kwargs())
-        if config.object_tf is not None and not self.has_fixed_base:
-            log.warning("%s: object_tf: has no effect: physics moves a base that is not fixed", self.name)
+        # PyBullet fixes a base without mass.
+        is_fixed = bool(config.loadURDF.useFixedBase) or pb.getDynamicsInfo(self.body_id, -1)[0] == 0.0
+        self._start_base(config.resetBaseVelocity, config.object_tf, is_fixed)
 
     def sensors(self) -> tuple[Sensor, ...]:
         """The poses of its links, if they are to be broadcast, and its contacts, if they are asked for."""
         hz = self.config.broadcast_hz
         return ((LinkPoseSensor(self, hz),) if hz else ()) + contact_sensors(self, self.config.contacts)
-
-    def inputs(self) -> Mapping[str, Input]:
-        """Takes `pose`, the pose of the TF frame that its base follows, if it follows one."""
-        if self.config.object_tf is None or not self.has_fixed_base:
-            return {}
-        return {"pose": PoseInput.following(self.config.object_tf, self.set_base_pose)}
 
     def _release(self, index: int) -> None:
         """Leaves of the motor that PyBullet gives each joint what the URDF's friction is.
@@ -108,7 +91,7 @@ def _refuse_soft(config: UrdfObjectConfig) -> None:
     file = config.loadURDF.fileName
     try:
         is_soft = bool(UrdfDocument(file).deformable_meshes())
-    except (ConfigError, OSError):
+    except ConfigError:
         return  # loading it tells what is wrong
     if is_soft:
         message = f"{file} has a <deformable>: soft bodies belong to the list `soft_objects`"

@@ -27,4 +27,5 @@ class VisualObject(ShapeObject):
     example = {"createVisualShape": {"shapeType": "GEOM_SPHERE", "radius": 0.1}, "object_tf": {"tf_id": "FRAME"}}
 
     def __init__(self, pb: Client, config: VisualObjectConfig) -> None:
-        super().__init__(pb, config.name, config.createVisualShape, object_tf=config.object_tf)
+        super().__init__(pb, config.name, config.createVisualShape)
+        self.object_tf = config.object_tf

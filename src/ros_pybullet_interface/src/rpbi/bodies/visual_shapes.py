@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import pybullet
 
-from rpbi.engine.inputs import PoseInput
 from rpbi.geometry import Pose, Quaternion, Vector
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
@@ -59,10 +58,8 @@ class BodyShape(NamedTuple):
 def body_shapes(body: Body) -> list[BodyShape]:
     """Returns the visual shapes of a body; a capsule is a cylinder and two spheres, a soft body has none that stays.
 
-    PyBullet gives their poses in the URDF frames of the links, unlike those of the links themselves.
-
-    Args:
-        body: The body; only the simulation thread may ask.
+    PyBullet gives their poses in the URDF frames of the links, unlike those of the links themselves. Only the
+    simulation thread may ask.
     """
     if body.is_soft:
         return []  # it tells its surface itself
@@ -71,12 +68,7 @@ def body_shapes(body: Body) -> list[BodyShape]:
 
 
 def link_pose(body: Body, link_index: int) -> Pose:
-    """Returns the pose of a link's URDF frame in the world.
-
-    Args:
-        body: The body; only the simulation thread may ask.
-        link_index: PyBullet's index of the link, -1 for the root.
-    """
+    """Returns the pose of a link's URDF frame in the world, -1 the root; only the simulation thread may ask."""
     if link_index == -1:
         return body.base_pose()
     return Pose(*body.pb.getLinkState(body.body_id, link_index, computeForwardKinematics=1)[4:6])
@@ -85,8 +77,8 @@ def link_pose(body: Body, link_index: int) -> Pose:
 def _parts(body: Body, data: Sequence[Any]) -> list[BodyShape]:
     """Returns what a row of PyBullet's visual shapes consists of."""
     _, index, kind, size, file, position, quat, rgba, texture = data
-    link = body.root_link if index == -1 else body.pb.getJointInfo(body.body_id, index)[12].decode()
-    frame = Pose(position, quat)
+    link, frame = body.link_name(index), Pose(position, quat)
+    visual = body.visual if isinstance(body, ShapeObject) else None  # what the object's own file says
 
     def shape(kind: ShapeKind, size: Vector, pose: Pose = frame, **more: Any) -> BodyShape:
         return BodyShape(index, link, kind, size, pose, rgba, **more)
@@ -103,23 +95,20 @@ def _parts(body: Body, data: Sequence[Any]) -> list[BodyShape]:
         ends = [frame @ Pose((0.0, 0.0, z)) for z in (length / 2, -length / 2)]
         return [cylinder, *(shape(ShapeKind.SPHERE, _cube(diameter), end) for end in ends)]
     if kind == pybullet.GEOM_PLANE:
-        surface = frame @ Pose(quat_xyzw=_turned_to(_plane_normal(body)))
+        # PyBullet does not tell the normal of a plane; that of a URDF is taken to be z.
+        normal = visual.planeNormal if visual is not None else None
+        surface = frame @ Pose(quat_xyzw=_turned_to(normal or (0.0, 0.0, 1.0)))
         middle = surface @ Pose((0.0, 0.0, -PLANE_THICKNESS_M / 2))
         return [shape(ShapeKind.BOX, (PLANE_SIZE_M, PLANE_SIZE_M, PLANE_THICKNESS_M), middle)]
     if file:
         return [shape(ShapeKind.MESH, size, mesh_file=file.decode(), is_textured=texture >= 0)]
-    corners = _corners(body)
-    return [shape(ShapeKind.TRIANGLES, size, corners=corners)] if corners else []
+    if visual is None or not visual.vertices or not visual.indices:
+        return []
+    return [shape(ShapeKind.TRIANGLES, size, corners=tuple(visual.vertices[i] for i in visual.indices))]
 
 
 def _cube(edge_m: float) -> Vector:
     return edge_m, edge_m, edge_m
-
-
-def _plane_normal(body: Body) -> Vector:
-    """Returns the normal of a plane, which PyBullet does not tell; that of a URDF is taken to be z."""
-    normal = body.visual.planeNormal if isinstance(body, ShapeObject) else None
-    return normal or (0.0, 0.0, 1.0)
 
 
 def _turned_to(normal: Vector) -> Quaternion:
@@ -132,23 +121,10 @@ def _turned_to(normal: Vector) -> Quaternion:
     return -y / norm, x / norm, 0.0, (1.0 + z) / norm
 
 
-def _corners(body: Body) -> tuple[Vector, ...]:
-    """Returns the corners of a mesh that stands in the object's file itself."""
-    visual = body.visual if isinstance(body, ShapeObject) else None
-    if visual is None or visual.vertices is None:
-        return ()
-    return tuple(visual.vertices[index] for index in visual.indices or ())
-
-
 def link_frame(body: Body, sensors: Iterable[Sensor], link: str) -> str | None:
     """Returns the frame of ours, such as `rpbi/NAME/LINK`, that TF has of a link; None if it has none.
 
     A robot of which the root link alone is told leaves the others to robot_state_publisher: they are taken to be there.
-
-    Args:
-        body: The body.
-        sensors: Its sensors.
-        link: Name of the link.
     """
     for sensor in sensors:
         if isinstance(sensor, LinkPoseSensor):
@@ -161,8 +137,4 @@ def link_frame(body: Body, sensors: Iterable[Sensor], link: str) -> str | None:
 
 def followed_frame(body: Body) -> str | None:
     """Returns the frame that the whole body follows, None if it follows none or has joints that move by themselves."""
-    if isinstance(body, ShapeObject):
-        for taken in body.inputs().values():
-            if isinstance(taken, PoseInput):
-                return taken.tf_id
-    return None
+    return body.object_tf.tf_id if isinstance(body, ShapeObject) and body.object_tf is not None else None

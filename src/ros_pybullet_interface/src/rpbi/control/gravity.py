@@ -16,8 +16,6 @@ class GravityModel:
     turned instead.
 
     Args:
-        world: The client that the robot lives in.
-        model: Its joints.
         load: How it was loaded. What is attached to it, or was changed in it since, is not known here.
     """
 
@@ -58,9 +56,7 @@ class GravityModel:
 
     def _load(self) -> Client:
         pb = Client()
-        arguments = dict(self._load_arguments)
-        for key in ("basePosition", "baseOrientation", "useFixedBase", "useMaximalCoordinates"):
-            arguments.pop(key, None)
-        arguments["fileName"] = resolve_meshes(arguments["fileName"])
-        self._body_id = pb.loadURDF(**arguments, useFixedBase=True)
+        file = resolve_meshes(self._load_arguments["fileName"])
+        kept = {key: self._load_arguments[key] for key in ("flags", "globalScaling") if key in self._load_arguments}
+        self._body_id = pb.loadURDF(file, useFixedBase=True, **kept)
         return pb

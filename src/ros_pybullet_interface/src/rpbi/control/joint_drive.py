@@ -10,14 +10,7 @@ from .motors import Motors
 
 
 class JointDrive:
-    """Runs at most one motion at a time; a newer one replaces it.
-
-    Args:
-        name: Name of the robot.
-        pb: The client that the robot lives in.
-        body_id: PyBullet's id of it.
-        model: Its joints.
-        motors: Its motors.
+    """Runs at most one motion of a robot at a time; a newer one replaces it.
 
     Attributes:
         dt_s: Length of a tick [s].

@@ -22,7 +22,7 @@ class MotionResult(NamedTuple):
 
 
 class Motion(ABC):
-    """Drives some joints of one robot; `Robot.run` starts it, on the simulation thread, where all of it happens.
+    """Drives some joints of one robot; `JointDrive.run` starts it, on the simulation thread, where all of it happens.
 
     Args:
         joints: Indices of the joints that it drives.
@@ -45,12 +45,7 @@ class Motion(ABC):
 
     @abstractmethod
     def begin(self, time_s: float, measured: JointMotion) -> None:
-        """Starts.
-
-        Args:
-            time_s: The world's time now [s].
-            measured: State of all driven joints of the robot.
-        """
+        """Starts at the world's time now [s], from the state of all driven joints of the robot."""
 
     @abstractmethod
     def advance(self, time_s: float, measured: JointMotion) -> JointMotion:
@@ -66,12 +61,7 @@ class Motion(ABC):
         """
 
     def halt(self, reason: str, measured: JointMotion) -> None:
-        """Ends before the goal, because of something from outside; the result tells the reason.
-
-        Args:
-            reason: Why, such as `the simulation was stopped`.
-            measured: State of all driven joints.
-        """
+        """Ends before the goal for a reason from outside, such as `the simulation was stopped`; the result tells it."""
         self.end(False, reason)
 
     def end(self, success: bool, message: str) -> None:

@@ -20,14 +20,10 @@ PERIOD_S = 5.0
 
 
 class LimitReports:
-    """Reports when a joint goes beyond its limits, once until it has come back, and not more often than now and then.
+    """Reports when a joint goes beyond its limits, once until it has come back, and once in `PERIOD_S` at most."""
 
-    Args:
-        name: The robot.
-    """
-
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self, robot_name: str) -> None:
+        self._robot_name = robot_name
         self._beyond: set[int] = set()
         self._reported_s: dict[int, float] = {}
 
@@ -39,7 +35,7 @@ class LimitReports:
         now_s = time.monotonic()
         last_s = self._reported_s.get(joint.index, -PERIOD_S)
         if joint.index not in self._beyond and now_s - last_s >= PERIOD_S:
-            log.warning("%s: %s; %s", self._name, joint.limit_violation(position), what)
+            log.warning("%s: %s; %s", self._robot_name, joint.limit_violation(position), what)
             self._reported_s[joint.index] = now_s
         self._beyond.add(joint.index)
 
@@ -76,15 +72,14 @@ class Motors:
     simulated time, so that whoever stops sending stops the robot.
 
     Args:
-        pb: The client.
-        body_id: PyBullet's id of the robot.
-        model: Its joints.
-        mode: Control mode at the start.
         gains: PyBullet's `positionGain` and `velocityGain` by joint index, where they are not PyBullet's own.
-        limit_reports: Tells of positions beyond the joints' limits.
         enforce_effort_limits: Whether motors are held to the efforts of the URDF.
         timeout_s: Age at which velocity and effort targets expire [s] of the world's time.
-        dt_s: Length of a tick [s].
+
+    Attributes:
+        targets: What the motors are set to by joint index: positions, velocities or efforts, as the control mode says.
+        applied_efforts: Efforts [N m or N] applied in the last tick under torque control, by joint index; PyBullet
+            tells them not.
     """
 
     def __init__(
@@ -97,7 +92,6 @@ class Motors:
         limit_reports: LimitReports,
         enforce_effort_limits: bool,
         timeout_s: float,
-        dt_s: float,
     ) -> None:
         self._pb, self._body_id, self._model = pb, body_id, model
         self._limit_reports = limit_reports
@@ -107,16 +101,12 @@ class Motors:
             index: {key: value for key, value in arguments.items() if key in ("velocityGain", "force")}
             for index, arguments in self._position_arguments.items()
         }
-        self._dt_s = dt_s
-        self._timeout_ticks = max(1, round(timeout_s / dt_s))
+        self._dt_s: float = pb.getPhysicsEngineParameters()["fixedTimeStep"]
+        self._timeout_ticks = max(1, round(timeout_s / self._dt_s))
         self._indices = [joint.index for joint in model.driven]
-        self._targets: dict[int, float] = {}
         self._expiry: dict[int, int] = {}
         """Tick at which the target of a joint expires, by joint index."""
         self._renewed: set[int] = set()
-        self._feed_forward: list[float] = [0.0] * len(self._indices)
-        self.applied_efforts: dict[int, float] = {}
-        """Efforts [N m or N] applied in the last tick under torque control, by joint index; PyBullet tells them not."""
         self.switch(mode)
 
     def switch(self, mode: int) -> None:
@@ -124,14 +114,12 @@ class Motors:
         self.mode = mode
         self._expiry.clear()
         self._renewed.clear()
-        self.applied_efforts = {}
+        self.applied_efforts: dict[int, float] = {}
         states = self._pb.getJointStates(self._body_id, self._indices) if self._indices else ()
-        if mode == pybullet.POSITION_CONTROL:
-            self._targets = {index: state[0] for index, state in zip(self._indices, states)}
-        else:
-            self._targets = dict.fromkeys(self._indices, 0.0)
+        is_held = mode == pybullet.POSITION_CONTROL
+        self.targets = {index: state[0] if is_held else 0.0 for index, state in zip(self._indices, states)}
         for index in self._indices:
-            self._drive(index, self._targets[index])
+            self._drive(index, self.targets[index])
 
     def check(self, target: JointTarget) -> Command:
         """Checks a target against the present control mode; any thread may call it.
@@ -149,7 +137,7 @@ class Motors:
         if command.mode != self.mode:
             return
         for index, value in command.values.items():
-            self._targets[index] = value = self._limited(index, value)
+            self.targets[index] = value = self._limited(index, value)
             if self.mode != pybullet.POSITION_CONTROL:
                 self._renewed.add(index)
             if self.mode != pybullet.TORQUE_CONTROL:
@@ -158,8 +146,9 @@ class Motors:
     def track(self, index: int, position: float, velocity: float) -> None:
         """Sets a joint's position [rad or m] and velocity [rad/s or m/s] at the coming tick, in any control mode.
 
-        To the velocity PyBullet adds its gain times how far the joint is from the position before the tick. So this is
-        the position before it, and the velocity the one that leads to where the joint is to be after it.
+        PyBullet's position motor moves by the velocity, and beyond that takes away a share, its gain, of the difference
+        to the position before the tick. So this is the position before it, and the velocity the one that leads to
+        where the joint is to be after it.
         """
         self._pb.setJointMotorControl2(
             self._body_id,
@@ -170,34 +159,29 @@ class Motors:
             **self._position_arguments[index],
         )
         if self.mode == pybullet.POSITION_CONTROL:
-            self._targets[index] = position + velocity * self._dt_s
+            self.targets[index] = position + velocity * self._dt_s
 
     def release(self, indices: Iterable[int]) -> None:
         """Gives joints that were tracked back: they hold their last position, or stand still under velocity control."""
         for index in indices:
             if self.mode == pybullet.VELOCITY_CONTROL:
-                self._targets[index] = 0.0
-            self._drive(index, self._targets[index])
-
-    @property
-    def targets(self) -> Mapping[int, float]:
-        """What the motors are set to by joint index: positions, velocities or efforts, as the control mode says."""
-        return self._targets
+                self.targets[index] = 0.0
+            self._drive(index, self.targets[index])
 
     def rest(self, positions: Mapping[int, float]) -> None:
         """Takes joints by index as put at positions [rad or m]: there they are held, or driven by nothing any more."""
         for index, position in positions.items():
             self._expiry.pop(index, None)
             self._renewed.discard(index)
-            self._targets[index] = position if self.mode == pybullet.POSITION_CONTROL else 0.0
-            self._drive(index, self._targets[index])
+            self.targets[index] = position if self.mode == pybullet.POSITION_CONTROL else 0.0
+            self._drive(index, self.targets[index])
 
-    def set_feed_forward(self, efforts: Mapping[int, float]) -> None:
-        """Sets efforts [N m or N] by joint index that are added to those of the targets under torque control."""
-        self._feed_forward = [efforts.get(index, 0.0) for index in self._indices]
+    def before_step(self, tick: int, feed_forward: Mapping[int, float]) -> None:
+        """Lets targets expire, and applies efforts, which PyBullet keeps for one tick only.
 
-    def before_step(self, tick: int) -> None:
-        """Lets targets expire, and applies efforts, which PyBullet keeps for one tick only."""
+        Args:
+            feed_forward: Efforts [N m or N] by joint index that are added to the targets under torque control.
+        """
         if self._renewed:
             self._expiry.update(dict.fromkeys(self._renewed, tick + self._timeout_ticks))
             self._renewed.clear()
@@ -205,8 +189,7 @@ class Motors:
             self._expire(tick)
         if self.mode == pybullet.TORQUE_CONTROL and self._indices:
             efforts = [
-                self._limited(index, self._targets[index] + extra)
-                for index, extra in zip(self._indices, self._feed_forward)
+                self._limited(index, self.targets[index] + feed_forward.get(index, 0.0)) for index in self._indices
             ]
             self._pb.setJointMotorControlArray(self._body_id, self._indices, pybullet.TORQUE_CONTROL, forces=efforts)
             self.applied_efforts = dict(zip(self._indices, efforts))
@@ -214,7 +197,7 @@ class Motors:
     def _expire(self, tick: int) -> None:
         for index in [index for index, expiry in self._expiry.items() if tick >= expiry]:
             del self._expiry[index]
-            self._targets[index] = 0.0
+            self.targets[index] = 0.0
             if self.mode == pybullet.VELOCITY_CONTROL:
                 self._drive(index, 0.0)
 

@@ -102,10 +102,7 @@ CATCH_UP_SPEED = (0.5, 0.5, 1.0)
 
 
 def with_planar_joints(path: str) -> str:
-    """Puts a massless chain of joints along x, along y and about z between the world and a robot's root link.
-
-    Args:
-        path: The robot's URDF file.
+    """Puts a massless chain of joints along x, along y and about z between the world and the root link of a URDF file.
 
     Returns:
         A copy of it with the chain, which lasts as long as the process; its root is the fixed end of the chain.
@@ -130,10 +127,7 @@ class PlanarBase:
     there is holds the base up or pushes it away; the set point then stays near the base, as wheels slip.
 
     Args:
-        pb: The client.
         body_id: PyBullet's id of the robot, which was loaded with planar joints.
-        config: Its limits.
-        dt_s: Length of a tick [s].
     """
 
     def __init__(self, pb: Client, body_id: int, config: PlanarBaseConfig, dt_s: float) -> None:

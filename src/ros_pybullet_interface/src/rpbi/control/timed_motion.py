@@ -28,7 +28,6 @@ class TimedMotion(Motion):
     alone.
 
     Args:
-        model: The robot's joints.
         goal: Positions [rad or m] by joint index.
         duration_s: How long it shall take [s].
 

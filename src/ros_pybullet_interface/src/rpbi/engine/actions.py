@@ -57,14 +57,14 @@ def _switch_mode(body: Any, _: Clock, mode: int) -> None:
 
 
 def _stop_motion(body: Any, _: Clock, reason: str) -> bool:
-    was_moving = body.motion is not None
+    was_moving = body.drive.motion is not None
     body.halt(reason)
     return was_moving
 
 
 def _move(body: Any, _: Clock, goal: TimedGoal) -> Motion:
     motion = TimedMotion(body.model, goal.positions, goal.duration_s)
-    body.run(motion)
+    body.drive.run(motion)
     return motion
 
 

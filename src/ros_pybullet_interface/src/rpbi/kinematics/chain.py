@@ -31,10 +31,8 @@ class Chain:
     """A link and the m joints that move it, as a body of its own: PyBullet takes its time for joints that do not.
 
     Args:
-        pb: A private client.
         urdf: What is between the root and the link, see `UrdfDocument.bare`.
         scaling: PyBullet's `globalScaling`.
-        link_name: The link.
         joint_names: The n joints of the robot that a motor can move.
 
     Attributes:
@@ -45,7 +43,7 @@ class Chain:
     def __init__(self, pb: Client, urdf: str, scaling: float, link_name: str, joint_names: Sequence[str]) -> None:
         self.pb = pb
         self.body_id: int = pb.loadURDF(write_description(urdf), useFixedBase=True, globalScaling=scaling)
-        joints = [Joint.from_info(pb.getJointInfo(self.body_id, i)) for i in range(pb.getNumJoints(self.body_id))]
+        joints = Joint.all_of(pb, self.body_id)
         self.link_index = next(joint.index for joint in joints if joint.link == link_name)
         driven = [joint for joint in joints if joint.is_driven]
         self._joint_indices = [joint.index for joint in driven]

@@ -121,11 +121,7 @@ class Kinematics:
 
     @contextmanager
     def _open(self) -> Iterator[None]:
-        """Lets one thread at the client.
-
-        Raises:
-            PhysicsError: If it was closed.
-        """
+        """Lets one thread at the client, or raises PhysicsError if it was closed."""
         with self._lock:
             if not self._disconnect.alive:
                 raise PhysicsError("the robot has gone, and its kinematics with it")
@@ -137,7 +133,7 @@ class Kinematics:
         body_id = pb.loadURDF(
             write_description(self._document.bare()), useFixedBase=True, globalScaling=self._scaling, flags=flags
         )
-        joints = [Joint.from_info(pb.getJointInfo(body_id, i)) for i in range(pb.getNumJoints(body_id))]
+        joints = Joint.all_of(pb, body_id)
         self._root_link = pb.getBodyInfo(body_id)[0].decode()
         pb.removeBody(body_id)
         return joints

@@ -108,21 +108,19 @@ class Reach(NamedTuple):
 
     @classmethod
     def of(cls, anchor: Vector, lengths: Iterable[float], joints: Iterable[Joint | UrdfJoint]) -> Reach:
-        """Returns the reach of a chain.
+        """Returns the reach of a chain of joints that move.
 
         Args:
             anchor: See above.
             lengths: Distances from each joint to the next one, and to the tip [m].
-            joints: The joints that move.
         """
         travel = [max(abs(joint.lower), abs(joint.upper)) for joint in joints if not joint.is_revolute]
         return cls(anchor, sum(lengths) + sum(travel))
 
     def covers(self, position: Sequence[float], tolerance_m: float = 0.0) -> bool:
-        """Returns whether the tip may come as near to a position in the base as counts as reached.
+        """Returns whether the tip may come as near to a position in the base [m] as counts as reached.
 
         Args:
-            position: The position [m].
             tolerance_m: How far off the position it may be beside that [m].
         """
         return math.dist(position, self.anchor) <= self.radius_m + tolerance_m + POSITION_TOLERANCE_M

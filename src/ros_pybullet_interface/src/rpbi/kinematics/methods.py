@@ -26,8 +26,6 @@ class DampedLeastSquares:
     """PyBullet's damped least squares.
 
     Args:
-        chain: The link to move.
-        target: Where it shall be.
         threshold_m: Distance at which to stop [m].
         damping: How unwilling each of the m joints is to move; the least is 1.
     """
@@ -92,18 +90,14 @@ def _selectively_damped(jacobian: np.ndarray, error: np.ndarray) -> np.ndarray:
     """Returns the m joints' step for an error; each singular direction is damped by what it asks of the joints."""
     lengths = np.linalg.norm(jacobian, axis=0)  # how much the link moves with each joint
     step = np.zeros(jacobian.shape[1])
-    for u, sigma, v in zip(*_directions(jacobian)):
+    left, singular_values, right = np.linalg.svd(jacobian, full_matrices=False)
+    for u, sigma, v in zip(left.T, singular_values, right):
         if sigma < 1e-9:
             continue
         moved = np.abs(v) @ lengths / sigma  # what all joints move for this direction, against the 1 that it gains
         largest = min(1.0, 1.0 / moved) * LARGEST_STEP
         step += _clamped(v * (u @ error) / sigma, largest)
     return _clamped(step, LARGEST_STEP)
-
-
-def _directions(jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    u, sigma, vt = np.linalg.svd(jacobian, full_matrices=False)
-    return u.T, sigma, vt
 
 
 def _clamped(step: np.ndarray, largest: float) -> np.ndarray:
@@ -129,8 +123,7 @@ def towards_posture(
     last one spoiled (Liegeois, IEEE Transactions on Systems, Man, and Cybernetics 7(12), 1977).
 
     Args:
-        chain: The link.
-        target: Where it is and shall stay.
+        target: Where the link is and shall stay.
         limits: Limits of its m joints.
         rest: m positions of the posture [rad or m].
         ranges: m weights, 1 at most: a joint may be as far from its rest as its range is wide.

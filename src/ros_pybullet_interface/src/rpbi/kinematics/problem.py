@@ -8,7 +8,6 @@ import pybullet
 
 from .limits import Limits
 
-SOLVERS = (pybullet.IK_DLS, pybullet.IK_SDLS)
 LARGEST = 1e9
 """Largest number that is taken, whatever it means; squares of larger ones are soon beyond what a float can hold."""
 _NULL_SPACE = ("lowerLimits", "upperLimits", "jointRanges", "resetPoses")
@@ -70,7 +69,7 @@ class PybulletProblem:
             raise ValueError(f"{', '.join(missing)}: missing; {', '.join(_NULL_SPACE)} go together")
         if any(value < 0 for value in self.jointDamping):
             raise ValueError(f"jointDamping: values must not be negative, got {_shown(self.jointDamping)}")
-        if self.solver not in SOLVERS:
+        if self.solver not in (pybullet.IK_DLS, pybullet.IK_SDLS):
             raise ValueError(f"solver: expected 0 (damped) or 1 (selectively damped), got {self.solver}")
         if self.maxNumIterations < 0:
             raise ValueError(f"maxNumIterations: must not be negative, got {self.maxNumIterations}")

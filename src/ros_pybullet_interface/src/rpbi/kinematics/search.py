@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -33,11 +33,6 @@ SEED = 0
 LEAST_WEIGHT = 1e-3
 """Least damping and least range of a joint, as a part of the largest."""
 
-SOLVERS: dict[int, Callable[..., Step]] = {
-    pybullet.IK_DLS: DampedLeastSquares,
-    pybullet.IK_SDLS: SelectivelyDampedLeastSquares,
-}
-
 
 class Search:
     """One search.
@@ -59,8 +54,9 @@ class Search:
         self._threshold = min(problem.residualThreshold / POSITION_TOLERANCE_M, 1.0) or THRESHOLD
         damping = _damping(self._of_chain(problem.jointDamping), len(current))
         solver = chain, target, 0.5 * self._threshold * POSITION_TOLERANCE_M, damping
-        self._fast_step = DampedLeastSquares(*solver)
-        self._asked_step = SOLVERS[problem.solver](*solver)
+        self._fast_step: Step = DampedLeastSquares(*solver)
+        is_selective = problem.solver == pybullet.IK_SDLS
+        self._asked_step = SelectivelyDampedLeastSquares(*solver) if is_selective else self._fast_step
         self._iterations_left = JOINT_ITERATIONS // max(1, len(current))
 
     def run(self) -> tuple[np.ndarray, Residual]:

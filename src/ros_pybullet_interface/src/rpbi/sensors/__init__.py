@@ -22,10 +22,7 @@ SENSOR_TYPES = ClassTable(
 
 
 def sensor_class(kind: str) -> type[BodySensor]:
-    """Returns the class of sensors that a body's YAML asks for.
-
-    Args:
-        kind: A key of SENSOR_TYPES whose class is a BodySensor, or `module:Class` of another package.
+    """Returns the class of sensors that a body's YAML asks for by a key of SENSOR_TYPES or by `module:Class`.
 
     Raises:
         ValueError: If there is none.

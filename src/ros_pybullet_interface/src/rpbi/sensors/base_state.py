@@ -10,12 +10,7 @@ from .sensor import Sensor
 
 
 class BaseStateSensor(Sensor):
-    """Pose and twist of the URDF frame of a robot's root link.
-
-    Args:
-        robot: The robot.
-        hz: Rate [Hz].
-    """
+    """Pose and twist of the URDF frame of a robot's root link."""
 
     sample_type = BaseStateSample
 

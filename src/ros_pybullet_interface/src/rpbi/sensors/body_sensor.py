@@ -16,10 +16,6 @@ class BodySensor(Sensor):
     """A sensor of another package, on a body.
 
     A new one is a subclass with a `Config`, a `sample_type` and `read`; see docs/extending.md.
-
-    Args:
-        body: The body.
-        config: What the body's YAML says of it.
     """
 
     Config: ClassVar[type[SensorConfig]] = SensorConfig

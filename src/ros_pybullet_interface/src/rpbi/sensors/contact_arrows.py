@@ -10,13 +10,7 @@ from .sensor import Sensor
 
 
 class ContactArrowsSensor(Sensor):
-    """An arrow for each force on a body.
-
-    Args:
-        contacts: The sensor of the body's contacts.
-        hz: Rate [Hz].
-        metres_per_newton: Length of an arrow by the force.
-    """
+    """An arrow for each force on a body."""
 
     sample_type = ContactArrowsSample
 

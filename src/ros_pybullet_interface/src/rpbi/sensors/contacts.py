@@ -14,16 +14,10 @@ from .sensor import SensedWorld, Sensor
 
 
 class ContactReader:
-    """Contacts of the last tick, by body.
-
-    Args:
-        pb: The client.
-        bodies: The world's bodies by name.
-    """
+    """Contacts of the last tick, by body."""
 
     def __init__(self, pb: Client, bodies: Mapping[str, Body]) -> None:
-        self._pb = pb
-        self._bodies = bodies
+        self._pb, self._bodies = pb, bodies
         self._touches: dict[int, list[Any]] | None = None
         """PyBullet's contact points by body id, as either end; None if it has to be asked."""
         self._by_id: dict[int, Body] = {}
@@ -72,12 +66,7 @@ class ContactReader:
 
 
 class ContactsSensor(Sensor):
-    """All contact points of a body in the last tick.
-
-    Args:
-        body: The body.
-        hz: Rate [Hz].
-    """
+    """All contact points of a body in the last tick."""
 
     sample_type = ContactsSample
 

@@ -64,11 +64,7 @@ class SeededNoise:
 
 
 class Zeroing:
-    """Averages the samples to come.
-
-    Args:
-        count: How many.
-    """
+    """Averages so many samples to come."""
 
     def __init__(self, count: int) -> None:
         self.mean: Future[npt.NDArray[np.float64]] = Future()

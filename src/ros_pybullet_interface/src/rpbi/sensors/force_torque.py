@@ -25,12 +25,6 @@ class ForceTorqueSensor(Sensor):
     with them added it is still wrong, see docs/force_torque.md. So the wrench is what changed the momentum of all links
     below the joint during the last tick, less their weight and less the contact forces on them (Newton-Euler, as an
     impulse balance). That holds for all types of joints, control modes and limits.
-
-    Args:
-        robot: The robot.
-        joint: The joint.
-        config: Its part of the robot's YAML.
-        default_hz: Rate [Hz] if the configuration has none.
     """
 
     Config = ForceTorqueConfig
@@ -80,11 +74,7 @@ class ForceTorqueSensor(Sensor):
         return self._sample
 
     def zero(self, count: int) -> Zeroing:
-        """Takes what the coming samples show on average for zero, as soon as that is known.
-
-        Args:
-            count: Over how many samples; without effect if it is being zeroed already.
-        """
+        """Takes what so many samples to come show on average for zero, unless it is being zeroed already."""
         if self._zeroing is None:
             self._zeroing = Zeroing(count)
         return self._zeroing

@@ -10,12 +10,7 @@ from .sensor import Sensor
 
 
 class JointStateSensor(Sensor):
-    """Positions, velocities and motor efforts of all joints of a robot.
-
-    Args:
-        robot: The robot.
-        hz: Rate [Hz].
-    """
+    """Positions, velocities and motor efforts of all joints of a robot."""
 
     sample_type = JointStateSample
 

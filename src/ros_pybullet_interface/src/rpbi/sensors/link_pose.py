@@ -14,8 +14,6 @@ class LinkPoseSensor(Sensor):
     """Poses of the URDF frames of a body's links in the world.
 
     Args:
-        body: The body.
-        hz: Rate [Hz].
         links: Whether to tell every link as `rpbi/NAME/LINK`; otherwise the root link alone.
         root_frame: TF frame of the root link; without it, it is as any link's.
     """
@@ -25,11 +23,9 @@ class LinkPoseSensor(Sensor):
     def __init__(self, body: Body, hz: float, links: bool = True, root_frame: str | None = None) -> None:
         super().__init__(body.name, hz)
         self._body = body
-        frame = f"rpbi/{body.name}"
         self._indices = body.link_indices if links else ()
-        names = [body.pb.getJointInfo(body.body_id, index)[12].decode() for index in self._indices]
-        self.root_frame = root_frame or f"{frame}/{body.root_link}"
-        self._frames = (self.root_frame, *(f"{frame}/{name}" for name in names))
+        self.root_frame = root_frame or f"rpbi/{body.name}/{body.root_link}"
+        self._frames = (self.root_frame, *(f"rpbi/{body.name}/{body.link_name(index)}" for index in self._indices))
 
     def read(self, tick: int) -> LinkPoseSample:
         """Reads the base and all links."""

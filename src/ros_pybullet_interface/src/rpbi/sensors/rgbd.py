@@ -15,13 +15,8 @@ from .sensor import Sensor
 class RgbdSensor(Sensor):
     """Collects the scene for the renderer while somebody looks at the camera's images.
 
-    Args:
-        config: What the YAML says of it.
-        bodies: The world's bodies by name.
-        clock: The world's clock.
-        topic_name: Its name in topics.
-
     Attributes:
+        topic_name: Its name in topics.
         pose: Pose of the optical frame in the world, None as long as it is unknown.
     """
 

@@ -10,12 +10,7 @@ from rpbi.engine.inputs import Input
 
 
 class SensedWorld(Protocol):
-    """What a sensor may ask of its world, which is a `World`.
-
-    Attributes:
-        pb: The client that it lives in.
-        clock: Its clock.
-    """
+    """What a sensor may ask of its world, which is a `World`."""
 
     pb: Client
     clock: Clock

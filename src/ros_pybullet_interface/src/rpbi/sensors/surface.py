@@ -10,12 +10,7 @@ from .sensor import Sensor
 
 
 class SurfaceSensor(Sensor):
-    """Where the triangles of a soft body's surface are.
-
-    Args:
-        body: The soft body.
-        hz: Rate [Hz].
-    """
+    """Where the triangles of a soft body's surface are."""
 
     sample_type = SurfaceSample
 

@@ -8,12 +8,7 @@ from .sensor import Sensor
 
 
 class TrajectoryStateSensor(Sensor):
-    """Where the joints of a robot's follower of trajectories are to be, and where they are.
-
-    Args:
-        drive: Drives the joints of the robot.
-        follower: Its follower.
-    """
+    """Where the joints of a robot's follower of trajectories are to be, and where they are."""
 
     sample_type = ControllerState
 

@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element
 from custom_ros_tools.errors import ConfigError, Problem
 from rpbi.geometry import Vector
 
-from .files import COMMENT, NOT_XML, mesh_file
+from .files import COMMENT, NOT_XML, beside_or_above, mesh_file
 
 MOVING = ("revolute", "continuous", "prismatic")
 """Types of joints with one axis, which kinematics are solved for."""
@@ -138,9 +138,6 @@ class UrdfDocument:
 
         It loads in half a millisecond where meshes take up to some hundred. Every link has unit mass at its own frame,
         so that PyBullet's frames of mass centres are the links' frames.
-
-        Args:
-            links: The links; None: all.
         """
         kept = [name for name in self.links if links is None or name in links]
         ends = {*kept}
@@ -184,7 +181,8 @@ class UrdfDocument:
         """
         robot = copy.deepcopy(self._root)
         for element in robot.iterfind(".//*[@filename]"):  # meshes and textures
-            element.set("filename", self._found(element.get("filename", "")))
+            name = element.get("filename", "")
+            element.set("filename", str(beside_or_above(name, self._source) or name))
         root = next(link for link in robot.findall("link") if link.get("name") == joints[-1].child)
         if root.find("inertial") is None:
             root.append(_inertial("0"))  # PyBullet gives 1 kg to any link without, unless it is the fixed one
@@ -193,11 +191,6 @@ class UrdfDocument:
         robot[:0] = [*links, root]  # in order, in case of URDF_MAINTAIN_LINK_ORDER
         robot.extend(map(_joint_element, joints))
         return _text(robot)
-
-    def _found(self, name: str) -> str:
-        """Returns where PyBullet finds a file that the URDF names: beside it or in a folder above."""
-        files = (folder / name for folder in self._source.absolute().parents)
-        return next((str(file) for file in files if file.is_file()), name)
 
 
 def chain_urdf(joints: Sequence[UrdfJoint]) -> str:

@@ -35,9 +35,6 @@ def _read(path: Path) -> str:
 def resolve_meshes(path: str) -> str:
     """Makes the meshes of a URDF file loadable by PyBullet, which knows nothing of ROS packages.
 
-    Args:
-        path: The URDF file.
-
     Returns:
         The file itself if it needs nothing, else that of a copy in which every `package://` path, and with them
         every relative one, is absolute.
@@ -82,9 +79,6 @@ def is_temporary(path: str) -> bool:
 def description_for_ros(path: str) -> str:
     """Returns a URDF file as ROS wants it, which does not know where the file is.
 
-    Args:
-        path: The file.
-
     Returns:
         Its text, with relative mesh paths as `file://` addresses; paths of ROS packages stay.
 
@@ -104,19 +98,14 @@ def description_for_ros(path: str) -> str:
 
 
 def mesh_file(mesh: str, source: Path) -> Path:
-    """Returns the file of a mesh.
-
-    Args:
-        mesh: What the URDF says.
-        source: The URDF file.
+    """Returns the file of a mesh, of which the URDF file `source` says `mesh`.
 
     Raises:
         ConfigError: If it belongs to an unknown package or does not exist.
     """
     if _is_of_unknown_package(mesh):
         # PyBullet takes package://FOLDER/FILE for a folder beside the URDF or above it, and its own robots use that.
-        files = (folder / mesh.removeprefix(_PACKAGE) for folder in source.resolve().parents)
-        found = next((file for file in files if file.is_file()), None)
+        found = beside_or_above(mesh.removeprefix(_PACKAGE), source.resolve())
         if found is not None:
             return found
     try:
@@ -126,6 +115,12 @@ def mesh_file(mesh: str, source: Path) -> Path:
     if not file.is_file():
         raise ConfigError([Problem(str(source), mesh, f"no such file: {file}")])
     return file
+
+
+def beside_or_above(name: str, source: Path) -> Path | None:
+    """Returns where PyBullet finds a file that a URDF names: beside it or in a folder above."""
+    files = (folder / name for folder in source.absolute().parents)
+    return next((file for file in files if file.is_file()), None)
 
 
 def _is_of_unknown_package(mesh: str) -> bool:

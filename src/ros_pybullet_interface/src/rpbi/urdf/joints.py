@@ -10,15 +10,10 @@ from typing import NamedTuple
 import pybullet
 
 from custom_ros_tools.errors import UnknownNameError
+from rpbi.engine.client import Client
 
-_TYPE_NAMES = {
-    pybullet.JOINT_REVOLUTE: "JOINT_REVOLUTE",
-    pybullet.JOINT_PRISMATIC: "JOINT_PRISMATIC",
-    pybullet.JOINT_SPHERICAL: "JOINT_SPHERICAL",
-    pybullet.JOINT_PLANAR: "JOINT_PLANAR",
-    pybullet.JOINT_FIXED: "JOINT_FIXED",
-}
-
+_TYPES = ("JOINT_REVOLUTE", "JOINT_PRISMATIC", "JOINT_SPHERICAL", "JOINT_PLANAR", "JOINT_FIXED")
+_TYPE_NAMES = {getattr(pybullet, name): name for name in _TYPES}
 LARGEST = 1e9
 """Positions, velocities and efforts beyond this are no use to anybody, and would not stay finite."""
 LIMIT_ROUNDING = 1e-6
@@ -63,6 +58,11 @@ class Joint:
             max_effort=info[10] if info[10] > 0 else math.inf,
             max_velocity=info[11] if info[11] > 0 else math.inf,
         )
+
+    @classmethod
+    def all_of(cls, pb: Client, body_id: int) -> list[Joint]:
+        """Returns the joints of a body in PyBullet's index order."""
+        return [cls.from_info(pb.getJointInfo(body_id, index)) for index in range(pb.getNumJoints(body_id))]
 
     @property
     def type_name(self) -> str:

@@ -11,20 +11,13 @@ from rpbi.config.asset_files import ROBOT_DESCRIPTION
 from rpbi.engine.client import Client
 
 from .document import UrdfDocument
-from .files import resolve_meshes
+from .files import beside_or_above, resolve_meshes
 
 MESH_FORMATS = (".obj", ".stl", ".dae", ".cdf")
 
 
 def urdf_problems(path: str) -> list[str]:
-    """Returns the problems that are most likely in a URDF file that PyBullet has refused.
-
-    Args:
-        path: The file.
-
-    Returns:
-        A sentence for each; none if the reason is another.
-    """
+    """Returns a sentence for each problem that is likely in a URDF file that PyBullet has refused, if there is any."""
     if path == ROBOT_DESCRIPTION:
         return [f"there is no parameter '{ROBOT_DESCRIPTION}'"]
     try:
@@ -39,7 +32,7 @@ def urdf_problems(path: str) -> list[str]:
     for mesh in document.meshes:
         if Path(mesh).suffix.lower() not in MESH_FORMATS:
             problems.append(f"{path}: mesh '{mesh}' is none of {', '.join(MESH_FORMATS)}")
-        elif not any((folder / mesh).is_file() for folder in Path(path).absolute().parents):
+        elif beside_or_above(mesh, Path(path)) is None:
             problems.append(f"{path}: no such mesh: {mesh} (looked for beside it and in all folders above)")
     return problems
 
@@ -47,16 +40,12 @@ def urdf_problems(path: str) -> list[str]:
 def load_urdf(
     pb: Client, name: str, arguments: Mapping[str, Any], prepare: Callable[[str], str] = resolve_meshes
 ) -> int:
-    """Loads a URDF file.
+    """Loads a URDF file and returns PyBullet's id of the body.
 
     Args:
-        pb: The client.
         name: Name of the body, for messages.
         arguments: Those of `loadURDF`.
         prepare: Returns a file that PyBullet can load in place of `fileName`.
-
-    Returns:
-        PyBullet's id of the body.
 
     Raises:
         ConfigError: If it cannot be loaded; it names what is wrong with the file.

@@ -33,8 +33,6 @@ class Subtree:
     """A link of a jointed body and all links below it.
 
     Args:
-        pb: The client.
-        body_id: PyBullet's id of the body.
         first_link: PyBullet's index of the link, and of the joint that it hangs on.
     """
 

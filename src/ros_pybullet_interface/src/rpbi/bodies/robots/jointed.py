@@ -1,14 +1,13 @@
 """What robots that move and robots that are only shown have in common."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from typing import ClassVar
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from rpbi.bodies.body import Body
 from rpbi.engine.client import Client
-from rpbi.engine.inputs import Input, PoseInput
 from rpbi.kinematics import Kinematics
 from rpbi.sensors.base_state import BaseStateSensor
 from rpbi.sensors.force_torque import ForceTorqueSensor
@@ -28,8 +27,6 @@ class JointedBody(Body):
     """A body that comes from a URDF and stands at its start position.
 
     Args:
-        pb: The client to create it in.
-        config: Its configuration.
         fixed_base: Whether its base is fixed, whatever the configuration says.
 
     Raises:
@@ -52,14 +49,13 @@ class JointedBody(Body):
         self.has_fixed_base = bool(arguments.get("useFixedBase", False)) and not self.base_joints
         super().__init__(pb, config.name, load_urdf(pb, config.name, arguments, self.prepare_urdf))
         self.config = config
-        joints = [Joint.from_info(pb.getJointInfo(self.body_id, i)) for i in self.joint_indices]
+        joints = Joint.all_of(pb, self.body_id)
         self.model = JointModel(joints, self.base_joints)
         self.joints = self.model.own
         self.link_indices = tuple(joint.index for joint in self.joints)
         if self.base_joints:
             self.root_link = joints[self.base_joints - 1].link
-        problems = self._problems()
-        if problems:
+        if problems := self._problems():
             raise ConfigError(problems)
         for index, position in self.start_positions().items():
             pb.resetJointState(self.body_id, index, position)
@@ -68,24 +64,17 @@ class JointedBody(Body):
 
     def sensors(self) -> tuple[Sensor, ...]:
         """Link poses, or that of the root link alone, if they are to be broadcast, and the state of the base."""
-        config = self.config
         sensors: list[Sensor] = []
-        if config.broadcast_link_states:
-            sensors.append(LinkPoseSensor(self, config.broadcast_link_states_hz))
-        elif config.broadcast_root_tf_hz:
-            sensors.append(LinkPoseSensor(self, config.broadcast_root_tf_hz, links=False))
-        base_state_hz = config.base_state_hz
-        if base_state_hz is None:
-            base_state_hz = 0.0 if self.has_fixed_base else DEFAULT_BASE_STATE_HZ
+        if self.config.broadcast_link_states:
+            sensors.append(LinkPoseSensor(self, self.config.broadcast_link_states_hz))
+        elif self.config.broadcast_root_tf_hz:
+            sensors.append(LinkPoseSensor(self, self.config.broadcast_root_tf_hz, links=False))
+        base_state_hz = self.config.base_state_hz
+        if base_state_hz is None and not self.has_fixed_base:
+            base_state_hz = DEFAULT_BASE_STATE_HZ
         if base_state_hz:
             sensors.append(BaseStateSensor(self, base_state_hz))
         return tuple(sensors)
-
-    def inputs(self) -> Mapping[str, Input]:
-        """Takes `pose`, the pose of the TF frame that its base follows, if it follows one."""
-        if self.config.object_tf is None or not self.has_fixed_base:
-            return {}
-        return {"pose": PoseInput.following(self.config.object_tf, self.set_base_pose)}
 
     @cached_property
     def kinematics(self) -> Kinematics:
@@ -95,11 +84,9 @@ class JointedBody(Body):
 
     def start_positions(self) -> dict[int, float]:
         """Returns the start position [rad or m] of each driven joint by index."""
-        configured: dict[str, float] = {}
-        for name, value in self.config.initial_joint_position.items():
-            in_degrees = self.config.initial_revolute_joint_positions_are_deg and self.model[name].is_revolute
-            configured[name] = math.radians(value) if in_degrees else value
-        return {joint.index: configured.get(joint.name, 0.0) for joint in self.model.driven}
+        in_degrees = self.config.initial_revolute_joint_positions_are_deg
+        starts = ((joint, self.config.initial_joint_position.get(joint.name, 0.0)) for joint in self.model.driven)
+        return {joint.index: math.radians(q) if in_degrees and joint.is_revolute else q for joint, q in starts}
 
     def joint_positions(self) -> dict[int, float]:
         """Returns the measured position [rad or m] of each driven joint by index."""
@@ -137,23 +124,24 @@ class JointedBody(Body):
 
     def _problems(self) -> list[Problem]:
         """Returns what in the configuration does not fit the robot."""
-        problems = self._unknown_joints("initial_joint_position", self.config.initial_joint_position)
-        if problems:
+        configured = self.config.initial_joint_position
+        if problems := self._unknown_joints({f"initial_joint_position.{name}": name for name in configured}):
             return problems
         starts = ((self.model.joints[index], position) for index, position in self.start_positions().items())
         return [
             Problem(self.name, f"initial_joint_position.{joint.name}", joint.limit_violation(position))
             for joint, position in starts
-            if joint.name in self.config.initial_joint_position and not joint.allows(position)
+            if joint.name in configured and not joint.allows(position)
         ]
 
-    def _unknown_joints(self, key: str, names: Iterable[str]) -> list[Problem]:
+    def _unknown_joints(self, names: Mapping[str, str]) -> list[Problem]:
+        """Returns a problem for each name, by the key that has it, that is no joint's."""
         problems = []
-        for name in names:
+        for key, name in names.items():
             try:
                 self.model[name]
             except UnknownNameError as error:
-                problems.append(Problem(self.name, f"{key}.{name}", str(error)))
+                problems.append(Problem(self.name, key, str(error)))
         return problems
 
     def _set_alpha(self, alpha: float) -> None:

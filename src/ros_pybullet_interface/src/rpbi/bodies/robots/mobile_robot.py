@@ -17,10 +17,6 @@ class MobileRobot(Robot):
 
     Joints between the world and the root link move it. They are none of the robot's own: neither its joint states nor
     its targets know them.
-
-    Raises:
-        ConfigError: If the configuration does not fit the robot.
-        PhysicsError: If PyBullet cannot load it.
     """
 
     base_joints = len(PLANAR_JOINTS)

@@ -1,16 +1,14 @@
 """Robots: jointed bodies whose motors hold and follow targets."""
 
-import logging
 import re
 from collections.abc import Mapping
 from typing import Any
 
 import pybullet
 
-from custom_ros_tools.errors import Problem, UnknownNameError
+from custom_ros_tools.errors import Problem
 from rpbi.control.gravity import GravityModel
 from rpbi.control.joint_drive import JointDrive
-from rpbi.control.motion import JointMotion, Motion
 from rpbi.control.motors import Command, LimitReports, Motors
 from rpbi.control.trajectories.config import trajectory_problems
 from rpbi.control.trajectories.follower import TrajectoryFollower
@@ -27,18 +25,12 @@ from rpbi.urdf.joints import JointTarget
 from .jointed import JointedBody
 from .robot_config import RobotConfig
 
-log = logging.getLogger(__name__)
-
 
 class Robot(JointedBody):
     """A robot with motors, within the effort and velocity limits of its URDF.
 
     It holds its start position until the first target. Targets of joints that a motion drives are refused until it
     ends.
-
-    Raises:
-        ConfigError: If the configuration does not fit the robot.
-        PhysicsError: If PyBullet cannot load it.
     """
 
     example = {
@@ -66,7 +58,6 @@ class Robot(JointedBody):
             LimitReports(self.name),
             config.enforce_effort_limits,
             config.target_timeout_s,
-            pb.getPhysicsEngineParameters()["fixedTimeStep"],
         )
         self.drive = JointDrive(self.name, pb, self.body_id, self.model, self.motors)
         self.force_torque_sensors = tuple(
@@ -76,12 +67,7 @@ class Robot(JointedBody):
         follower = config.joint_trajectory_controller
         self.follower = None if follower is None else TrajectoryFollower(self.drive, follower)
         self._gravity = GravityModel(pb, self.model, config.loadURDF) if config.gravity_compensation else None
-        if config.resetBaseVelocity is not None and self.has_fixed_base:
-            log.warning("%s: resetBaseVelocity: has no effect: the base is fixed (useFixedBase is set)", self.name)
-        elif config.resetBaseVelocity is not None:
-            pb.resetBaseVelocity(self.body_id, **config.resetBaseVelocity.kwargs())
-        if config.object_tf is not None and not self.has_fixed_base:
-            log.warning("%s: object_tf: has no effect: physics moves a base that is not fixed", self.name)
+        self._start_base(config.resetBaseVelocity, config.object_tf, self.has_fixed_base)
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
@@ -103,18 +89,10 @@ class Robot(JointedBody):
     def before_step(self, tick: int) -> None:
         """Follows the motion, lets targets expire and applies efforts."""
         self.drive.advance(tick)
+        holding: Mapping[int, float] = {}
         if self._gravity is not None and self.motors.mode == pybullet.TORQUE_CONTROL:
-            self.motors.set_feed_forward(self._gravity.efforts(self.base_pose(), self.joint_positions()))
-        self.motors.before_step(tick)
-
-    @property
-    def motion(self) -> Motion | None:
-        """The motion that runs, if any."""
-        return self.drive.motion
-
-    def run(self, motion: Motion) -> None:
-        """Starts a motion, see `JointDrive.run`."""
-        self.drive.run(motion)
+            holding = self._gravity.efforts(self.base_pose(), self.joint_positions())
+        self.motors.before_step(tick, holding)
 
     def halt(self, reason: str) -> None:
         """Ends the motion that runs, if any; its joints hold where they are."""
@@ -122,7 +100,7 @@ class Robot(JointedBody):
 
     def pause(self, reason: str) -> None:
         """Ends the motion that runs, unless it can wait until the world runs again."""
-        if self.motion is not None and not self.motion.can_wait:
+        if self.drive.motion is not None and not self.drive.motion.can_wait:
             self.halt(reason)
 
     def switch_mode(self, mode: int) -> None:
@@ -148,10 +126,6 @@ class Robot(JointedBody):
             return reported
         return tuple(self.motors.applied_efforts.get(joint.index, 0.0) for joint in self.joints)
 
-    def joint_motion(self) -> JointMotion:
-        """Returns measured position [rad or m] and velocity [rad/s or m/s] of each driven joint by index."""
-        return self.drive.measured()
-
     def remove(self) -> None:
         """Takes the robot out of the world; a motion that runs is ended."""
         self.halt("the robot was removed")
@@ -161,7 +135,7 @@ class Robot(JointedBody):
 
     def _check_target(self, target: JointTarget) -> Command:
         command = self.motors.check(target)
-        motion = self.motion
+        motion = self.drive.motion
         driven = [] if motion is None else [self.model.joints[i].name for i in command.values if i in motion.joints]
         if driven:
             raise ValueError(f"a motion drives {', '.join(driven)} until it ends")
@@ -186,15 +160,15 @@ class Robot(JointedBody):
         return {key: gains for key, gains in given.items() if gains is not None}
 
     def _problems(self) -> list[Problem]:
-        problems = [*super()._problems(), *self._trajectory_problems()]
-        driven = self.model.driven
+        driven = [joint.name for joint in self.model.driven]
+        problems = super()._problems()
+        problems += trajectory_problems(self.name, self.config.joint_trajectory_controller, driven)
         for key, gains in self._configured_gains().items():
             path = f"setJointMotorControlArray.{key}"
             if isinstance(gains, Mapping):
-                problems += self._unknown_joints(path, gains)
+                problems += self._unknown_joints({f"{path}.{name}": name for name in gains})
             elif len(gains) not in (1, len(driven)):
-                names = ", ".join(joint.name for joint in driven)
-                message = f"expected 1 number or {len(driven)}, one for each of {names}; got {len(gains)}"
+                message = f"expected 1 number or {len(driven)}, one for each of {', '.join(driven)}; got {len(gains)}"
                 problems.append(Problem(self.name, path, message))
         return [*problems, *self._force_torque_problems(), *self._gravity_problems()]
 
@@ -206,10 +180,6 @@ class Robot(JointedBody):
         message = f"works with revolute, prismatic and fixed joints only; there are {', '.join(others)}"
         return [Problem(self.name, "gravity_compensation", message)]
 
-    def _trajectory_problems(self) -> list[Problem]:
-        names = [joint.name for joint in self.model.driven]
-        return trajectory_problems(self.name, self.config.joint_trajectory_controller, names)
-
     def _force_torque_problems(self) -> list[Problem]:
         problems = []
         joints = [each.joint for each in self.config.enabled_joint_force_torque_sensors]
@@ -220,8 +190,5 @@ class Robot(JointedBody):
             if not re.fullmatch(r"\w+", joint, re.ASCII):
                 message = f"topics are named after joint '{joint}', which only letters, digits and '_' allow"
                 problems.append(Problem(self.name, key, message))
-            try:
-                self.model[joint]
-            except UnknownNameError as error:
-                problems.append(Problem(self.name, key, str(error)))
+            problems += self._unknown_joints({key: joint})
         return problems

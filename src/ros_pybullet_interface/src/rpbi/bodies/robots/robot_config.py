@@ -11,6 +11,12 @@ from rpbi.config.sensors import ContactsConfig, ForceTorqueEntry
 from rpbi.control.planar_base import PlanarBaseConfig
 from rpbi.control.trajectories.config import JointTrajectoryControllerConfig
 
+_NOT_VISUAL = {
+    "joint_trajectory_controller": "a visual robot has no motors that could follow",
+    "contacts": "a visual robot touches nothing",
+    "planar_base": "a visual robot has no physics; its base follows object_tf",
+}
+
 
 class RobotConfig(BodyConfig):
     """A robot, simulated or only shown."""
@@ -81,22 +87,11 @@ class RobotConfig(BodyConfig):
         return value
 
     @model_validator(mode="after")
-    def _follows_only_with_motors(self) -> RobotConfig:
-        if self.joint_trajectory_controller is not None and self.is_visual_robot:
-            raise KeyedError("joint_trajectory_controller", "a visual robot has no motors that could follow")
-        return self
-
-    @model_validator(mode="after")
-    def _touches_only_if_felt(self) -> RobotConfig:
-        if self.contacts is not None and self.is_visual_robot:
-            raise KeyedError("contacts", "a visual robot touches nothing")
-        return self
-
-    @model_validator(mode="after")
-    def _base_moves_one_way_only(self) -> RobotConfig:
+    def _keys_go_together(self) -> RobotConfig:
+        for key, message in _NOT_VISUAL.items() if self.is_visual_robot else ():
+            if getattr(self, key) is not None:
+                raise KeyedError(key, message)
         if self.planar_base is not None:
-            if self.is_visual_robot:
-                raise KeyedError("planar_base", "a visual robot has no physics; its base follows object_tf")
             if self.resetBaseVelocity is not None:
                 raise KeyedError("resetBaseVelocity", "a planar base starts at rest; remove this or planar_base")
             if self.loadURDF.useMaximalCoordinates:

@@ -13,12 +13,7 @@ from .robot_config import RobotConfig
 
 
 class VisualRobot(JointedBody):
-    """A robot without physics: it is put where it shall be, pushes nothing and is pushed by nothing.
-
-    Raises:
-        ConfigError: If the configuration does not fit the robot.
-        PhysicsError: If PyBullet cannot load it.
-    """
+    """A robot without physics: it is put where it shall be, pushes nothing and is pushed by nothing."""
 
     example = {
         "is_visual_robot": True,
@@ -30,6 +25,7 @@ class VisualRobot(JointedBody):
 
     def __init__(self, pb: Client, config: RobotConfig) -> None:
         super().__init__(pb, config, fixed_base=True)
+        self.object_tf = config.object_tf
         self._limit_reports = LimitReports(self.name)
         for link in (-1, *self.joint_indices):
             pb.setCollisionFilterGroupMask(self.body_id, link, 0, 0)

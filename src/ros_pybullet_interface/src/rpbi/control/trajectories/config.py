@@ -64,13 +64,7 @@ class JointTrajectoryControllerConfig(ConfigModel):
 def trajectory_problems(
     name: str, config: JointTrajectoryControllerConfig | None, driven: Iterable[str]
 ) -> list[Problem]:
-    """Returns what in the configuration does not fit a robot.
-
-    Args:
-        name: The robot.
-        config: What its YAML says, if anything.
-        driven: Names of the joints that can be driven.
-    """
+    """Returns what in the configuration does not fit a robot; `driven` names the joints that can be driven."""
     if config is None:
         return []
     known = set(driven)

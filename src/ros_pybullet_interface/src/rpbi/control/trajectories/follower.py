@@ -34,28 +34,22 @@ class CheckedRequest(NamedTuple):
 class TrajectoryFollower:
     """Has a robot follow trajectories, one after the other or spliced into each other.
 
-    Args:
-        drive: Drives the joints of the robot.
-        config: Which joints, and how far they may be off.
+    Attributes:
+        joint_names: The joints that it drives.
     """
 
     def __init__(self, drive: JointDrive, config: JointTrajectoryControllerConfig) -> None:
         self.config = config
-        self._drive = drive
+        self._drive, self._stop_s = drive, config.stop_trajectory_duration
         driven = {joint.name: joint for joint in drive.model.driven}
         self._joints = driven if config.joints is None else {name: driven[name] for name in config.joints}
         self._by_index = {joint.index: joint for joint in self._joints.values()}
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints that it drives."""
-        return tuple(self._joints)
+        self.joint_names = tuple(self._joints)
 
     def check(self, request: TrajectoryRequest, tolerances: GoalTolerances | None = None) -> CheckedRequest:
         """Checks a trajectory as far as it can be without looking at the robot; any thread may call it.
 
         Args:
-            request: The trajectory.
             tolerances: How well it is to be followed; without them it is not looked at.
 
         Raises:
@@ -76,11 +70,7 @@ class TrajectoryFollower:
 
         Args:
             request: What `check` returned.
-            clock: The world's clock.
             feedback: Takes the state at `action_monitor_rate` while the motion lasts.
-
-        Returns:
-            The motion, which tells how it ended.
 
         Raises:
             TrajectoryRefusedError: If its time has passed, the joints cannot get to it, or the control mode forbids it.
@@ -94,7 +84,7 @@ class TrajectoryFollower:
         measured = self._drive.measured()
         for joint_trajectory in request.joint_trajectories:
             index = joint_trajectory.joint.index
-            current = trajectories.get(index) or Trajectory([Knot(now_s, measured[index][:1])])
+            current = trajectories.get(index) or Trajectory.through([Knot(now_s, measured[index][:1])])
             trajectories[index] = joint_trajectory.joined(current, start_s, from_s)
         if not request.joint_trajectories:
             trajectories, from_s = self._stopping(now_s, measured, trajectories or self._by_index), now_s
@@ -109,7 +99,6 @@ class TrajectoryFollower:
 
         Args:
             reason: Why, for whoever waits for it.
-            clock: The world's clock.
             motion: What to stop; if it is not being followed any more, nothing happens. Without it, whatever it is.
         """
         running = self._running
@@ -118,12 +107,9 @@ class TrajectoryFollower:
         trajectories = self._stopping(clock.time_s, self._drive.measured(), running.joints)
         self._run(TrajectoryMotion(self._by_index, trajectories, clock.time_s), reason)
 
-    def state(self, time_s: float) -> ControllerState:
+    def state(self, time_s: float, measured: JointMotion | None = None) -> ControllerState:
         """Returns where the joints are to be and where they are, at the world's time now [s]."""
-        return self._state(time_s, self._drive.measured())
-
-    def _state(self, time_s: float, measured: JointMotion) -> ControllerState:
-        running = self._running
+        running, measured = self._running, measured or self._drive.measured()
         return ControllerState(
             self._drive.name,
             self.joint_names,
@@ -151,10 +137,6 @@ class TrajectoryFollower:
         motion = self._drive.motion
         return motion if isinstance(motion, TrajectoryMotion) else None
 
-    @property
-    def _stop_s(self) -> float:
-        return self.config.stop_trajectory_duration
-
     def _feeding(
         self, feedback: Callable[[ControllerState], None], clock: Clock
     ) -> Callable[[float, JointMotion], None]:
@@ -162,7 +144,7 @@ class TrajectoryFollower:
 
         def on_advance(time_s: float, measured: JointMotion) -> None:
             if schedule.is_due(round(time_s / clock.dt_s)):
-                feedback(self._state(time_s, measured))
+                feedback(self.state(time_s, measured))
 
         return on_advance
 
@@ -181,7 +163,7 @@ class TrajectoryFollower:
         try:
             self._drive.run(motion)
         except ValueError as error:
-            raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, str(error)) from None
+            raise TrajectoryRefusedError(str(error)) from None
 
 
 def _check_time(request: CheckedRequest, start_s: float, from_s: float) -> None:
@@ -192,6 +174,5 @@ def _check_time(request: CheckedRequest, start_s: float, from_s: float) -> None:
         return
     if request.stamp_ns:
         message = f"all points are in the past, the last one by {from_s - start_s - last_s:.6g} s"
-        raise TrajectoryRefusedError(ErrorCode.OLD_HEADER_TIMESTAMP, message)
-    message = f"expected a point after the start, the last one is at {last_s:g} s"
-    raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, message)
+        raise TrajectoryRefusedError(message, ErrorCode.OLD_HEADER_TIMESTAMP)
+    raise TrajectoryRefusedError(f"expected a point after the start, the last one is at {last_s:g} s")

@@ -4,6 +4,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from custom_ros_tools.errors import UnknownNameError
 from rpbi.urdf.joints import Joint
 
@@ -43,7 +45,6 @@ class JointTrajectory(NamedTuple):
         turns takes the short way there.
 
         Args:
-            current: What the joint does now.
             start_s: The world's time at which the trajectory's times begin [s].
             from_s: When it takes over [s]; there is a point after it.
 
@@ -58,7 +59,7 @@ class JointTrajectory(NamedTuple):
             offset = TURN * round((before.position[0] - knot.position[0]) / TURN)
         shifted = self.trajectory.shifted(start_s, (offset,))
         next_knot = knot._replace(time_s=start_s + knot.time_s, position=(knot.position[0] + offset,))
-        bridge = Trajectory([Knot(from_s, *before), next_knot])
+        bridge = Trajectory.through([Knot(from_s, *before), next_knot])
         self._check_bridge(bridge, number, abs(before.velocity[0]))
         return current.spliced(bridge.spliced(shifted, next_knot.time_s), from_s)
 
@@ -80,11 +81,6 @@ def validate_trajectory(
 ) -> tuple[JointTrajectory, ...]:
     """Checks a trajectory as far as it can be without knowing where the joints are; any thread may call it.
 
-    Args:
-        request: The trajectory.
-        joints: The joints that may be driven, by name.
-        may_be_partial: Whether joints may be left out.
-
     Raises:
         TrajectoryRefusedError: If it cannot be followed.
     """
@@ -96,7 +92,7 @@ def validate_trajectory(
         for number, point in enumerate(request.points):
             _check_limits(joint, number, point, column)
         knots = tuple(_knot(point, column) for point in request.points)
-        trajectory = Trajectory(knots)
+        trajectory = Trajectory.through(knots)
         _check_curves(joint, trajectory)
         joint_trajectories.append(JointTrajectory(joint, knots, trajectory))
     return tuple(joint_trajectories)
@@ -115,14 +111,14 @@ def _check_names(request: TrajectoryRequest, joints: Mapping[str, Joint], may_be
     names = request.joint_names
     for name in names:
         if name not in joints:
-            raise TrajectoryRefusedError(ErrorCode.INVALID_JOINTS, str(UnknownNameError("joint", name, joints)))
+            raise TrajectoryRefusedError(str(UnknownNameError("joint", name, joints)), ErrorCode.INVALID_JOINTS)
     if len(set(names)) != len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise TrajectoryRefusedError(ErrorCode.INVALID_JOINTS, f"joint '{twice}' is named more than once")
+        raise TrajectoryRefusedError(f"joint '{twice}' is named more than once", ErrorCode.INVALID_JOINTS)
     missing = [name for name in joints if name not in names]
     if request.points and (missing and not may_be_partial or not names):
         message = f"expected all joints, since allow_partial_joints_goal is off; missing: {', '.join(missing)}"
-        raise TrajectoryRefusedError(ErrorCode.INVALID_JOINTS, message)
+        raise TrajectoryRefusedError(message, ErrorCode.INVALID_JOINTS)
 
 
 def _check_points(request: TrajectoryRequest) -> None:
@@ -130,25 +126,23 @@ def _check_points(request: TrajectoryRequest) -> None:
     for number, point in enumerate(request.points):
         if not previous_s < point.time_s:
             message = f"point {number}: times must increase strictly, got {point.time_s:g} s after {previous_s:g} s"
-            raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, message)
+            raise TrajectoryRefusedError(message)
         previous_s = point.time_s
         if point.accelerations and not point.velocities:
-            message = f"point {number}: accelerations need velocities, got none"
-            raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, message)
+            raise TrajectoryRefusedError(f"point {number}: accelerations need velocities, got none")
         for kind, values in zip(point._fields[1:], point[1:]):
             if len(values) != count and (values or kind == "positions"):
-                message = f"point {number}: expected {kind} of {count} joints, got {len(values)}"
-                raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, message)
+                raise TrajectoryRefusedError(f"point {number}: expected {kind} of {count} joints, got {len(values)}")
             for name, value in zip(request.joint_names, values):
                 if not math.isfinite(value):
                     message = f"point {number}: {kind} must be finite, got {value} for joint '{name}'"
-                    raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, message)
+                    raise TrajectoryRefusedError(message)
 
 
 def _check_limits(joint: Joint, number: int, point: TrajectoryPoint, column: int) -> None:
     position = point.positions[column]
     if not joint.allows(position):
-        raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, f"point {number}: {joint.limit_violation(position)}")
+        raise TrajectoryRefusedError(f"point {number}: {joint.limit_violation(position)}")
     speed = abs(point.velocities[column]) if point.velocities else 0.0
     if speed > joint.max_velocity * ROUNDING:
         raise _too_fast(joint, speed, f"at point {number}")
@@ -156,10 +150,9 @@ def _check_limits(joint: Joint, number: int, point: TrajectoryPoint, column: int
 
 def _check_curves(joint: Joint, trajectory: Trajectory) -> None:
     """Checks what happens between the points."""
-    spans = trajectory.spans()
-    positions = [segment.polynomials[0] for segment, _ in spans]
+    positions = [segment.polynomials[0] for segment in trajectory.segments]
     velocities = [derivative(polynomial) for polynomial in positions]
-    durations_s = [end_s - segment.start_s for segment, end_s in spans]
+    durations_s = np.diff([*(segment.start_s for segment in trajectory.segments), trajectory.end_s]).tolist()
     for number in _beyond(velocities, durations_s, -joint.max_velocity, joint.max_velocity):
         where = f"between points {number} and {number + 1}"
         slack = CURVE_SPEED_SLACK if any(positions[number][2:]) else ROUNDING
@@ -180,11 +173,9 @@ def _beyond(polynomials: Sequence[Polynomial], durations_s: Sequence[float], low
 
 def _too_fast(joint: Joint, speed: float, where: str) -> TrajectoryRefusedError:
     limit = f"its limit is {joint.max_velocity:.6g} {joint.unit}/s"
-    return TrajectoryRefusedError(
-        ErrorCode.INVALID_GOAL, f"joint '{joint.name}' would need {speed:.6g} {joint.unit}/s {where}; {limit}"
-    )
+    return TrajectoryRefusedError(f"joint '{joint.name}' would need {speed:.6g} {joint.unit}/s {where}; {limit}")
 
 
 def _swings_out(joint: Joint, low: float, high: float, where: str) -> TrajectoryRefusedError:
     message = joint.limit_violation(low if low < joint.lower else high)
-    return TrajectoryRefusedError(ErrorCode.INVALID_GOAL, f"{message}, where the curve swings {where}")
+    return TrajectoryRefusedError(f"{message}, where the curve swings {where}")

@@ -17,8 +17,7 @@ class TrajectoryMotion(Motion):
     joints stop where they are. Without tolerances it just ends.
 
     Args:
-        joints: The joints by index.
-        trajectories: Their trajectories, each of one joint, by joint index, in the world's time.
+        trajectories: The joints' trajectories, each of one joint, by joint index, in the world's time.
         from_s: From when on tolerances hold [s].
         tolerances: How far the joints may be off.
         stop_s: How long joints take to stop when it is broken off [s].
@@ -62,12 +61,11 @@ class TrajectoryMotion(Motion):
         """Compares where the joints are with where they were to be, and goes on if they are near enough."""
         if self.on_advance is not None:
             self.on_advance(self._time_s, measured)
-        fault = self._path_problem(measured)
-        if fault:
+        if fault := self._path_problem(measured):
             return self._break_off(ErrorCode.PATH_TOLERANCE_VIOLATED, fault, time_s, measured)
         if self._time_s >= self.end_s:
-            fault = self._goal_problem(measured)
-            if not fault:
+            goal = {} if self._tolerances is None else self._tolerances.goal
+            if not (fault := self._fault_in(goal, measured, "its goal")):
                 self._finish()
             elif self._is_out_of_time(time_s):
                 return self._break_off(ErrorCode.GOAL_TOLERANCE_VIOLATED, fault, time_s, measured)
@@ -89,12 +87,7 @@ class TrajectoryMotion(Motion):
         self.desired = {index: trajectory.sample(time_s) for index, trajectory in self.trajectories.items()}
 
     def _go_on(self, time_s: float) -> JointMotion:
-        """Returns set points with which the joints are at the end of the tick where they are to be then.
-
-        PyBullet's position motor moves by the target velocity, and beyond that takes away a share of the difference
-        between target and position before the step. So the target is where the joint is to be before the step, and the
-        velocity the one that leads to where it is to be after it.
-        """
+        """Returns set points with which the joints are at the end of the tick where they are to be then."""
         before, duration_s = self.desired, time_s - self._time_s
         self._sample(time_s)
         return {
@@ -134,11 +127,6 @@ class TrajectoryMotion(Motion):
             return ""
         return self._fault_in(self._tolerances.path, measured, "its trajectory")
 
-    def _goal_problem(self, measured: JointMotion) -> str:
-        if self._tolerances is None:
-            return ""
-        return self._fault_in(self._tolerances.goal, measured, "its goal")
-
     def _fault_in(self, tolerances: Mapping[int, JointTolerance], measured: JointMotion, what: str) -> str:
         for index, tolerance in tolerances.items():
             if index not in self.joints:
@@ -157,14 +145,13 @@ def stopping(joint: Joint, measured: tuple[float, float], time_s: float, duratio
     """Returns how a joint comes to a stop with constant deceleration, within its limits.
 
     Args:
-        joint: The joint.
         measured: Its position [rad or m] and velocity [rad/s or m/s].
         time_s: Now [s].
         duration_s: How long it may take [s]; 0 is at once.
     """
     position, velocity = measured
     if not duration_s:
-        return Trajectory([Knot(time_s, (position,))])
+        return Trajectory.through([Knot(time_s, (position,))])
     end = position + velocity * duration_s / 2.0
     end = min(max(end, min(joint.lower, position)), max(joint.upper, position))
-    return Trajectory([Knot(time_s, (position,), (velocity,)), Knot(time_s + duration_s, (end,), (0.0,))])
+    return Trajectory.through([Knot(time_s, (position,), (velocity,)), Knot(time_s + duration_s, (end,), (0.0,))])

@@ -18,11 +18,6 @@ _ROOT_TOLERANCE = 1e-9
 """Imaginary part, in parts of the interval, below which a root counts as real."""
 
 
-def constant(position: float) -> Polynomial:
-    """Returns the polynomial of a joint that stands still [rad or m]."""
-    return (position, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
 def line(duration_s: float, p0: float, p1: float) -> Polynomial:
     """Returns the line between two positions [rad or m]."""
     return (p0, (p1 - p0) / duration_s, 0.0, 0.0, 0.0, 0.0)
@@ -56,14 +51,15 @@ def derivative(polynomial: Polynomial) -> Polynomial:
 
 def value_range(polynomial: Polynomial, duration_s: float) -> tuple[float, float]:
     """Returns the least and the greatest value between 0 and a time [s]: at an end or where the derivative vanishes."""
-    values = [_value(polynomial, 0.0), _value(polynomial, duration_s)]
+    times_s = [0.0, duration_s]
     if any(polynomial[2:]):  # else it is a line
         # In parts of the interval, so that roots do not depend on whether it lasts a millisecond or an hour.
         scaled = [c * duration_s**k for k, c in enumerate(derivative(polynomial))]
         roots = np.roots(scaled[::-1])
         real = roots.real[np.abs(roots.imag) < _ROOT_TOLERANCE]
-        values += [_value(polynomial, float(root) * duration_s) for root in real if 0.0 < root < 1.0]
-    return min(values), max(values)
+        times_s += [float(root) * duration_s for root in real if 0.0 < root < 1.0]
+    values = np.polyval(polynomial[::-1], times_s)
+    return float(values.min()), float(values.max())
 
 
 def value_bounds(
@@ -73,20 +69,9 @@ def value_bounds(
 
     A polynomial stays within the hull of its coefficients in the Bernstein basis.
 
-    Args:
-        polynomials: n of them.
-        durations_s: n times [s].
-
     Returns:
-        n lower and n upper bounds.
+        n lower and n upper bounds, for n polynomials and times [s].
     """
     powers = np.asarray(durations_s)[:, np.newaxis] ** np.arange(DEGREE + 1)
     bernstein = (np.asarray(polynomials) * powers) @ _TO_BERNSTEIN.T
     return bernstein.min(axis=1), bernstein.max(axis=1)
-
-
-def _value(polynomial: Polynomial, t: float) -> float:
-    value = 0.0
-    for coefficient in reversed(polynomial):
-        value = value * t + coefficient
-    return value

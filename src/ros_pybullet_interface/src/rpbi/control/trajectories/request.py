@@ -19,20 +19,11 @@ class ErrorCode(IntEnum):
 
 
 class TrajectoryRefusedError(InterfaceError):
-    """A trajectory cannot be followed; nothing has moved.
+    """A trajectory cannot be followed; nothing has moved."""
 
-    Args:
-        code: The kind of fault.
-        message: What is wrong, with the joint's name.
-    """
-
-    def __init__(self, code: ErrorCode, message: str) -> None:
+    def __init__(self, message: str, code: ErrorCode = ErrorCode.INVALID_GOAL) -> None:
         self.code = code
-        self.message = message
-        super().__init__(code, message)
-
-    def __str__(self) -> str:
-        return self.message
+        super().__init__(message)
 
 
 class TrajectoryPoint(NamedTuple):

@@ -30,11 +30,6 @@ def resolved_tolerances(
 ) -> Tolerances:
     """Returns the tolerances of a goal, with those of the configuration where it has none of its own.
 
-    Args:
-        given: What the goal says.
-        constraints: What the configuration says.
-        joints: The joints by name.
-
     Raises:
         TrajectoryRefusedError: If it names an unknown joint, or a number is not finite.
     """
@@ -62,7 +57,7 @@ def _check(given: GoalTolerances, joints: Mapping[str, Joint]) -> None:
         for name, tolerance in tolerances.items():
             if name not in joints:
                 message = f"{kind}: {UnknownNameError('joint', name, joints)}"
-                raise TrajectoryRefusedError(ErrorCode.INVALID_JOINTS, message)
+                raise TrajectoryRefusedError(message, ErrorCode.INVALID_JOINTS)
             if not all(map(math.isfinite, tolerance)):
                 message = f"{kind}: must be finite, got {', '.join(map(str, tolerance))} for joint '{name}'"
-                raise TrajectoryRefusedError(ErrorCode.INVALID_GOAL, message)
+                raise TrajectoryRefusedError(message)

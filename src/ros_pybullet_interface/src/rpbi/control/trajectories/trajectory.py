@@ -10,7 +10,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from .polynomial import Polynomial, constant, cubic, line, quintic
+from .polynomial import Polynomial, cubic, line, quintic
 
 
 class Knot(NamedTuple):
@@ -63,47 +63,37 @@ class Trajectory:
     Two neighbouring knots are joined by a line if one of them has positions alone, by a cubic if both have velocities,
     by a quintic if both have accelerations as well. Before the first knot and after the last the joints stand still.
 
-    Args:
-        knots: At least one, with strictly increasing times, all for the same number of joints, all finite.
-
-    Raises:
-        ValueError: If they are not.
+    Attributes:
+        segments: In the order of time; one that stands still if there is only one knot.
+        start_s: Time of the first knot [s].
+        end_s: Time of the last knot [s].
+        goal: The last knot's positions [rad or m].
     """
 
-    __slots__ = ("_before", "_end", "_starts", "end_s", "segments", "start_s")
+    __slots__ = ("_before", "_end", "_starts", "end_s", "goal", "segments", "start_s")
 
-    segments: tuple[Segment, ...]
-    """In the order of time; one that stands still if there is only one knot."""
-    start_s: float
-    """Time of the first knot [s]."""
-    end_s: float
-    """Time of the last knot [s]."""
-
-    def __init__(self, knots: Sequence[Knot]) -> None:
-        _check(knots)
-        segments = tuple(_segment(before, after) for before, after in zip(knots, knots[1:]))
-        last = knots[-1]
-        self._set(segments or (_standing(last.time_s, last.position),), last.time_s, last.position)
-
-    def _set(self, segments: tuple[Segment, ...], end_s: float, goal: tuple[float, ...]) -> None:
-        self.segments = segments
+    def __init__(self, segments: Sequence[Segment], end_s: float, goal: tuple[float, ...]) -> None:
+        self.segments, self.end_s, self.goal = tuple(segments), end_s, goal
         self._starts = tuple(segment.start_s for segment in segments)
         self.start_s = self._starts[0]
-        self.end_s = end_s
         still = (0.0,) * len(goal)
         self._before = State(_evaluated(segments[0], self.start_s).position, still, still)
         self._end = State(goal, still, still)
 
     @classmethod
-    def _of(cls, segments: Sequence[Segment], end_s: float, goal: tuple[float, ...]) -> Trajectory:
-        trajectory = cls.__new__(cls)
-        trajectory._set(tuple(segments), end_s, goal)
-        return trajectory
+    def through(cls, knots: Sequence[Knot]) -> Trajectory:
+        """Returns the trajectory through knots.
 
-    @property
-    def goal(self) -> tuple[float, ...]:
-        """The last knot's positions [rad or m]."""
-        return self._end.position
+        Args:
+            knots: At least one, with strictly increasing times, all for the same number of joints, all finite.
+
+        Raises:
+            ValueError: If they are not.
+        """
+        _check(knots)
+        segments = [_segment(before, after) for before, after in zip(knots, knots[1:])]
+        last = knots[-1]
+        return cls(segments or [_standing(last.time_s, last.position)], last.time_s, last.position)
 
     def sample(self, time_s: float) -> State:
         """Returns where the joints are to be at a time [s].
@@ -133,7 +123,7 @@ class Trajectory:
         else:
             first, *rest = new.since(at_s).segments
             taken = [first._replace(start_s=at_s), *rest]
-        return Trajectory._of(kept + taken, max(at_s, new.end_s), new.goal)
+        return Trajectory(kept + taken, max(at_s, new.end_s), new.goal)
 
     def shifted(self, by_s: float, by_position: Sequence[float]) -> Trajectory:
         """Returns the same motion at another time [s], from other positions [rad or m], n of them."""
@@ -146,16 +136,12 @@ class Trajectory:
             for segment in self.segments
         ]
         goal = tuple(position + offset for position, offset in zip(self.goal, by_position))
-        return Trajectory._of(segments, self.end_s + by_s, goal)
+        return Trajectory(segments, self.end_s + by_s, goal)
 
     def since(self, time_s: float) -> Trajectory:
         """Returns the same trajectory without the segments that are over at a time [s]."""
         first = max(bisect_right(self._starts, time_s) - 1, 0)
-        return self if first == 0 else Trajectory._of(self.segments[first:], self.end_s, self.goal)
-
-    def spans(self) -> list[tuple[Segment, float]]:
-        """Returns the segments, each with the time [s] at which it ends."""
-        return list(zip(self.segments, (*self._starts[1:], self.end_s)))
+        return self if first == 0 else Trajectory(self.segments[first:], self.end_s, self.goal)
 
 
 def minimum_jerk(start: Sequence[float], goal: Sequence[float], start_s: float, duration_s: float) -> Trajectory:
@@ -174,7 +160,7 @@ def minimum_jerk(start: Sequence[float], goal: Sequence[float], start_s: float, 
         ValueError: If the numbers of positions differ, or something is not finite or not positive.
     """
     still = (0.0,) * len(start)
-    return Trajectory(
+    return Trajectory.through(
         [Knot(start_s, tuple(start), still, still), Knot(start_s + duration_s, tuple(goal), still, still)]
     )
 
@@ -190,7 +176,7 @@ def _evaluated(segment: Segment, time_s: float) -> State:
 
 
 def _standing(start_s: float, position: Sequence[float]) -> Segment:
-    return Segment(start_s, start_s, tuple(map(constant, position)))
+    return Segment(start_s, start_s, tuple((place, 0.0, 0.0, 0.0, 0.0, 0.0) for place in position))
 
 
 def _segment(before: Knot, after: Knot) -> Segment:

@@ -227,7 +227,7 @@ class TrajectoryAction:
             log.warning("%s: could not cancel a goal: %s", self._context.name, error)
 
     def _stop_motion(self, motion: TrajectoryMotion) -> None:
-        if self._context.body.motion is motion:  # else a newer one has replaced it
+        if self._context.body.drive.motion is motion:  # else a newer one has replaced it
             self._context.world.act(self._context.name, "cancel", "cancelled; the joints hold")
 
     def _finish(self, goal: ServerGoalHandle) -> None:
