@@ -81,10 +81,6 @@ class World:
     def from_file(cls, path: str, **options: Any) -> World:
         """Builds the world that a main YAML file describes.
 
-        Args:
-            path: The file.
-            options: Further arguments of the constructor.
-
         Raises:
             ConfigError: If anything in the file, or in a file that it names, is wrong; it tells all of it at once.
         """

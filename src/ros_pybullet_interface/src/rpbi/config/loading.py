@@ -81,14 +81,7 @@ def load_world_dict(data: Mapping[str, Any], file: str, robot_description: str |
 
 
 class _Reader:
-    """Reads one world and collects the problems.
-
-    Args:
-        data: What the main file says.
-        file: Name of the main file, for messages.
-        path: Where it is.
-        robot_description: File of the robot description, if there is one.
-    """
+    """Reads one world and collects the problems."""
 
     def __init__(self, data: Mapping[str, Any], file: str, path: str, robot_description: str | None) -> None:
         self._data = data

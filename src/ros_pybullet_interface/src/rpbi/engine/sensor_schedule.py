@@ -40,11 +40,7 @@ class _Scheduled:
 
 
 class SensorSchedule:
-    """Reads each sensor of a world when it is due.
-
-    Args:
-        clock: The world's clock.
-    """
+    """Reads each sensor of a world when it is due."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock

@@ -93,11 +93,7 @@ class Sink(Protocol):
 
 
 def make_sink(factory: str) -> Sink:
-    """Makes a sink.
-
-    Args:
-        factory: `module:factory`.
-    """
+    """Makes the sink of a `module:factory`."""
     module, _, name = factory.partition(":")
     make: Any = getattr(importlib.import_module(module), name)
     sink: Sink = make()

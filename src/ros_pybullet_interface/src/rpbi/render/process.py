@@ -30,12 +30,7 @@ At idle priority on a busy machine a lot may take long."""
 
 
 class RenderProcess:
-    """Does what the simulator tells until the simulator has gone.
-
-    Args:
-        channel: To the simulator.
-        make_sink: Makes the sink.
-    """
+    """Does what the simulator tells until the simulator has gone."""
 
     def __init__(self, channel: Channel, make_sink: Callable[[], Sink]) -> None:
         self._channel = channel
@@ -151,11 +146,7 @@ class RenderProcess:
 
 
 class ReportHandler(logging.Handler):
-    """Sends what is logged here to the simulator's log.
-
-    Args:
-        channel: To the simulator.
-    """
+    """Sends what is logged here to the simulator's log."""
 
     def __init__(self, channel: Channel) -> None:
         super().__init__(logging.INFO)

@@ -18,9 +18,6 @@ from .topics import FastTopic
 class SamplePublishers:
     """All publishers of a world's samples.
 
-    Args:
-        world: The world.
-
     Attributes:
         cameras: That of the images.
     """

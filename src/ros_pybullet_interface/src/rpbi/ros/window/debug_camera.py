@@ -37,11 +37,7 @@ class DebugCamera:
             self._publisher.publish(_message(self._window.camera()))
 
     def serve(self, ask: Requests) -> None:
-        """Opens the service that returns it and the topic that changes it.
-
-        Args:
-            ask: Reaches the simulation thread.
-        """
+        """Opens the service that returns it and the topic that changes it."""
         self._ask = ask
         serve(GET, self)
         subscribe(RESET, self)
