@@ -249,11 +249,11 @@ class World:
             except Exception as error:
                 blame(body, f"before_step of '{body.name}' at tick {self.clock.tick}", error)
                 raise
-        self._sensors.before_step()
+        self._sensors.act("before_step")
         self.pb.stepSimulation()
         self.contacts.outdate()
         self.clock.advance()
-        self._sensors.after_step()
+        self._sensors.act("after_step")
         return self._sensors.read_due()
 
     def read_rest(self) -> list[Any]:
