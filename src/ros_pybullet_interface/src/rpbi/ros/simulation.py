@@ -47,12 +47,8 @@ class StepBurst:
 class Simulation:
     """Runs, stops and steps a world on the one thread that owns PyBullet.
 
-    All methods are for that thread; others reach it through the world's mailbox.
-
-    Args:
-        world: The world.
-        publishers: Where samples go.
-        helpers: Called at every pass; they must return at once.
+    All methods are for that thread; others reach it through the world's mailbox. Helpers are called at every pass and
+    must return at once.
     """
 
     def __init__(self, world: World, publishers: SamplePublishers, helpers: Sequence[Callable[[], None]]) -> None:

@@ -92,11 +92,8 @@ class WorldMarkers:
     """Publishes every visual shape of the world on a latched topic, all together whenever anything comes or goes.
 
     Each is given in the frame of its link, which TF moves. Shapes of links that are not on TF are given in the world;
-    they are looked at while somebody listens, and all is sent again when one of them has moved.
-
-    Args:
-        world: The world; only the simulation thread may make and poll this.
-        hz: How often to look [Hz] of wall time.
+    they are looked at while somebody listens, and all is sent again when one of them has moved. It looks at a rate
+    [Hz] of wall time; only the simulation thread may make and poll it.
     """
 
     def __init__(self, world: World, hz: float) -> None:
