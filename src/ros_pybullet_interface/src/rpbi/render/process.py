@@ -4,7 +4,7 @@ import faulthandler
 import logging
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -110,20 +110,15 @@ class RenderProcess:
             self._channel.send(Shown(sample.name, sample.stamp_ns))
 
     def _frame(self, scene: Scene, camera: Camera, streams: frozenset[str]) -> Frame:
-        sample = scene.sample
+        sample, intrinsics = scene.sample, camera.intrinsics
         frame = Frame(camera, sample.tick, sample.stamp_ns)
         if streams == {"info"}:
             return frame
-        assert self._mirror is not None
-        self._mirror.show(sample.bodies)
-        return frame._replace(**self._draw(scene, camera, streams))
-
-    def _draw(self, scene: Scene, camera: Camera, streams: frozenset[str]) -> Mapping[str, Any]:
-        sample, intrinsics = scene.sample, camera.intrinsics
         assert self._renderer is not None and self._mirror is not None and sample.camera is not None
+        self._mirror.show(sample.bodies)
         segmentation = "segmentation" in streams
         drawing = self._renderer.draw(intrinsics, sample.camera, segmentation, self._mirror.transparent)
-        images: dict[str, npt.NDArray[Any]] = {}
+        images: dict[str, Any] = {}
         if streams & {"colour", "points"}:
             images["colour"] = _without_alpha(drawing.rgba)
         if streams & {"depth", "points"}:
@@ -132,7 +127,7 @@ class RenderProcess:
                 camera.noise.add_to(images["depth"], sample.tick, intrinsics.near_m, intrinsics.far_m)
         if segmentation:
             images["segmentation"] = self._mirror.to_simulator_ids(drawing.body_ids, scene.body_ids)
-        return images
+        return frame._replace(**images)
 
     def _send_demands(self) -> None:
         now_s = time.monotonic()
