@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
+import pybullet
 from frame_sink import DEMAND_FILE
 
-from rpbi.geometry import Pose
+from rpbi.geometry import Pose, Quaternion
 from rpbi.render.camera import Intrinsics
 from rpbi.render.client import RenderClient
 from rpbi.render.frame import Camera, Demand
@@ -21,6 +23,32 @@ from rpbi.world import World
 INTRINSICS = Intrinsics(width_px=320, height_px=240, fov_deg=50.0, near_m=0.01, far_m=100.0)
 CAMERA = Camera("eye", "rpbi/eye", INTRINSICS)
 ALL = ("colour", "depth", "segmentation")
+
+Array = npt.NDArray[np.floating[Any]]
+
+
+def rotation_matrix(quat_xyzw: Quaternion) -> Array:
+    """Returns the 3x3 rotation of a unit quaternion."""
+    return np.reshape(pybullet.getMatrixFromQuaternion(quat_xyzw), (3, 3))
+
+
+def project(points: Array, camera: Pose, K: Array) -> Array:
+    """Projects points of the world [m], shape (n, 3), into the image of a camera whose optical frame has that pose.
+
+    Returns:
+        Pixels and depth (u, v, z) [px, px, m], shape (n, 3); z <= 0 is behind the camera and its pixels mean nothing.
+    """
+    in_camera = (np.asarray(points) - np.asarray(camera.position)) @ rotation_matrix(camera.quat_xyzw)
+    depth = in_camera[:, 2:]
+    return np.hstack([(in_camera @ K.T)[:, :2] / depth, depth])
+
+
+def back_project(depth_m: Array, K: Array) -> Array:
+    """Returns the points in the optical frame [m] that pixels of these depths [m] see, shape (height, width, 3)."""
+    height, width = depth_m.shape
+    x = (np.arange(width, dtype=depth_m.dtype) - K[0, 2]) / K[0, 0]
+    y = (np.arange(height, dtype=depth_m.dtype) - K[1, 2]) / K[1, 1]
+    return np.stack([depth_m * x, depth_m * y[:, None], depth_m], axis=-1)
 
 
 class Rendering:

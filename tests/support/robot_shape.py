@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pybullet
 from geometry_msgs.msg import Transform
-
-from rpbi.render.camera import rotation_matrix
+from rendering import rotation_matrix
 
 Array = npt.NDArray[np.float64]
 

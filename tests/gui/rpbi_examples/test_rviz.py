@@ -11,14 +11,13 @@ import pytest
 import rosnode
 import yaml
 from PIL import Image, ImageDraw
+from rendering import back_project
 from robot_shape import link_triangles, moved, pose_matrix
 from ros_system import RosSystem, stop_group, wait_until
 from rviz_view import RvizView, find_view
 from sensor_msgs.msg import CameraInfo
 from sensor_msgs.msg import Image as ImageMessage
 from tf2_msgs.msg import TFMessage
-
-from rpbi.render.camera import back_project
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "src/rpbi_examples"
 CONFIG_FILE = EXAMPLES / "rviz/basic_example_kuka_lwr.rviz"

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
+from rendering import rotation_matrix
 from ros_system import RosSystem, wait_until
 from sensor_msgs.msg import Image, PointCloud2
 from tf2_msgs.msg import TFMessage
 
 from rpbi.geometry import Pose
-from rpbi.render.camera import rotation_matrix
 
 SLOW_S = 60.0
 

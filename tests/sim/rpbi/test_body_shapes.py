@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pybullet
 import pytest
+from rendering import back_project, rotation_matrix
 from robot_shape import read_obj
 from scipy.spatial import cKDTree
 from worlds import iiwa, write_world
 
 from rpbi.bodies.visual_shapes import PLANE_SIZE_M, ShapeKind, body_shapes, link_pose
 from rpbi.geometry import Pose
-from rpbi.render.camera import Intrinsics, back_project, depth_in_metres, rotation_matrix, view_matrix
+from rpbi.render.camera import Intrinsics, depth_in_metres, view_matrix
 from rpbi.world import World
 
 EYE = Pose((0.2, -1.6, 0.9), (-0.7933533, 0.0, 0.0, 0.6087614))

@@ -52,7 +52,7 @@ def test_all_that_the_page_lists_is_explained(world: World) -> None:
 
 
 def test_all_frames_of_the_world_are_in_the_table(world: World) -> None:
-    patterns = [re.sub("NAME|LINK", r"\\w+", frame.name) for frame in FRAMES]
+    patterns = [re.sub("NAME|LINK", r"\\w+", name) for name in FRAMES]
     samples = [sample for sample in (*world.step(), *world.read_rest()) if isinstance(sample, LinkPoseSample)]
     assert len(samples) == 5
     for sample in samples:

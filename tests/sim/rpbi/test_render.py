@@ -14,10 +14,10 @@ import numpy as np
 import pybullet
 import pytest
 import worlds
-from rendering import ALL, CAMERA, INTRINSICS, Rendering
+from rendering import ALL, CAMERA, INTRINSICS, Rendering, back_project, project, rotation_matrix
 
 from rpbi.geometry import Pose
-from rpbi.render.camera import Intrinsics, back_project, project, rotation_matrix
+from rpbi.render.camera import Intrinsics
 from rpbi.render.depth import DepthNoise
 from rpbi.render.frame import Camera
 from rpbi.render.mirror import Mirror

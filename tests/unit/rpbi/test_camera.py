@@ -7,17 +7,10 @@ import math
 import numpy as np
 import pybullet
 import pytest
+from rendering import back_project, project, rotation_matrix
 
 from rpbi.geometry import Pose
-from rpbi.render.camera import (
-    Intrinsics,
-    back_project,
-    camera_matrix,
-    depth_in_metres,
-    project,
-    rotation_matrix,
-    view_matrix,
-)
+from rpbi.render.camera import Intrinsics, camera_matrix, depth_in_metres, view_matrix
 
 INTRINSICS = Intrinsics(width_px=640, height_px=480, fov_deg=40.0, near_m=0.1, far_m=10.0)
 QUAT_XYZW = pybullet.getQuaternionFromEuler([0.3, -1.1, 2.0])
@@ -59,11 +52,6 @@ def test_corner_of_the_view_is_the_outer_corner_of_the_first_pixel():
     half_height = math.tan(math.radians(20.0))
     corner = INTRINSICS.K @ [-half_height * 640 / 480, -half_height, 1.0]
     assert corner[:2] == pytest.approx([-0.5, -0.5])
-
-
-def test_rotation_matrix_is_the_one_of_pybullet():
-    expected = np.reshape(pybullet.getMatrixFromQuaternion(QUAT_XYZW), (3, 3))
-    assert rotation_matrix(QUAT_XYZW) == pytest.approx(expected)
 
 
 def test_view_matrix_looks_along_z_with_y_down():

@@ -59,7 +59,7 @@ def test_empty_main_file_is_a_world_with_the_documented_defaults(folder: Path) -
     assert (config.timeStep, config.status_hz, config.real_time_factor) == (0.02, 50.0, 1.0)
     assert config.start_pybullet_after_initialization
     assert config.resetSimulation.kwargs() == config.setPhysicsEngineParameter.kwargs() == {}
-    assert config.search_paths() == ()
+    assert config.setAdditionalSearchPath == ()
 
 
 def test_objects_come_in_the_order_of_types_then_of_files(folder: Path) -> None:
@@ -97,7 +97,7 @@ def test_file_is_sought_beside_the_yaml_then_in_search_paths_then_in_pybullets_d
 
 def test_search_path_may_be_pybullets_data(folder: Path) -> None:
     world = load(folder, setAdditionalSearchPath=["pybullet_data_path", str(folder)])
-    assert world.config.search_paths() == (pybullet_data.getDataPath(), str(folder))
+    assert world.config.setAdditionalSearchPath == (pybullet_data.getDataPath(), str(folder))
 
 
 def test_robot_description_is_a_word_until_a_file_stands_for_it(folder: Path) -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rendering import back_project
 
-from rpbi.render.camera import Intrinsics, back_project
+from rpbi.render.camera import Intrinsics
 from rpbi.render.depth import PointCloud
 
 INTRINSICS = Intrinsics(width_px=32, height_px=24, fov_deg=60.0, near_m=0.1, far_m=5.0)

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from rendering import rotation_matrix
 
-from rpbi.render.camera import rotation_matrix
 from rpbi_examples.motions import TARGET_HEIGHT, FigureEight, camera_pose
 
 

@@ -18,10 +18,6 @@ own_folders.append(str(Path(__file__).parent))
 def config_of(found: Any, base: type[_Kind]) -> type[_Kind]:
     """Returns the model of the YAML of a class.
 
-    Args:
-        found: The class.
-        base: What its `Config` must be a subclass of.
-
     Raises:
         ValueError: If it has none, or another one.
     """
@@ -65,11 +61,6 @@ def blaming(thing: Any, doing: str) -> Iterator[None]:
 
 def check_sample(sample: Any, sample_type: Any, name: str) -> None:
     """Checks what a sensor has read.
-
-    Args:
-        sample: The sample.
-        sample_type: What it should be.
-        name: Name of the sensor, which the sample should have too.
 
     Raises:
         TypeError: If it is something else.

@@ -81,10 +81,6 @@ class World:
     def from_file(cls, path: str, **options: Any) -> World:
         """Builds the world that a main YAML file describes.
 
-        Args:
-            path: The file.
-            options: Further arguments of the constructor.
-
         Raises:
             ConfigError: If anything in the file, or in a file that it names, is wrong; it tells all of it at once.
         """
@@ -253,11 +249,11 @@ class World:
             except Exception as error:
                 blame(body, f"before_step of '{body.name}' at tick {self.clock.tick}", error)
                 raise
-        self._sensors.before_step()
+        self._sensors.act("before_step")
         self.pb.stepSimulation()
         self.contacts.outdate()
         self.clock.advance()
-        self._sensors.after_step()
+        self._sensors.act("after_step")
         return self._sensors.read_due()
 
     def read_rest(self) -> list[Any]:

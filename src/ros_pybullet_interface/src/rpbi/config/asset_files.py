@@ -61,11 +61,9 @@ def _existing_or_description(name: str, info: ValidationInfo) -> str:
 
 
 def find_folder(name: str, file: str) -> str:
-    """Returns the absolute path of a folder that a YAML file names; `find_file` tells how.
+    """Returns the absolute path of a folder that a YAML file names, as `find_file` does.
 
-    Args:
-        name: What the YAML file says; `pybullet_data_path` is the folder of PyBullet's data.
-        file: The YAML file.
+    `pybullet_data_path` is the folder of PyBullet's data.
 
     Raises:
         ValueError: If there is no such folder, or the package is unknown.

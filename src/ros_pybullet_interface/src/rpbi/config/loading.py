@@ -67,28 +67,15 @@ def load_world(path: str, robot_description: str | None = None) -> LoadedWorld:
 
 
 def load_world_dict(data: Mapping[str, Any], file: str, robot_description: str | None = None) -> LoadedWorld:
-    """Does the same as `load_world` with a main file that has been read already.
+    """Does the same as `load_world` with a main file that has been read already; its content is not changed.
 
-    Args:
-        data: What the main file says; it is not changed.
-        file: Its name; `"~config"`, which has no folder, if it came from the parameter server.
-        robot_description: File that the word `robot_description` stands for; without it, the word stays.
-
-    Raises:
-        ConfigError: With all problems of all files.
+    A file of the name `"~config"`, which has no folder, came from the parameter server.
     """
     return _Reader(data, file, file, robot_description).read()
 
 
 class _Reader:
-    """Reads one world and collects the problems.
-
-    Args:
-        data: What the main file says.
-        file: Name of the main file, for messages.
-        path: Where it is.
-        robot_description: File of the robot description, if there is one.
-    """
+    """Reads one world and collects the problems."""
 
     def __init__(self, data: Mapping[str, Any], file: str, path: str, robot_description: str | None) -> None:
         self._data = data

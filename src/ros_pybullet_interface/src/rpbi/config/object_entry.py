@@ -29,10 +29,7 @@ class ObjectEntry(NamedTuple):
 
 
 def parse_object_entry(entry: Any) -> ObjectEntry:
-    """Reads one entry of a list of objects.
-
-    Args:
-        entry: A file name, or a mapping with `file` and the keys that differ.
+    """Reads one entry of a list of objects: a file name, or a mapping with `file` and the keys that differ.
 
     Raises:
         ValueError: If it is neither.

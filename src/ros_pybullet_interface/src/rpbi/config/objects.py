@@ -118,8 +118,7 @@ def parse_section(
 
 
 def _respelt(key: str, spellings: Mapping[str, str]) -> str:
-    match = re.match(r"[^.\[]*", key)
-    first = match[0] if match else ""
+    first = re.split(r"[.\[]", key, maxsplit=1)[0]
     return spellings.get(first, first) + key[len(first) :]
 
 

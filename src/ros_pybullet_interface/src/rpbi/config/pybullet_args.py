@@ -29,10 +29,7 @@ class Constants:
     names: tuple[str, ...]
 
     def parse(self, given: Any) -> int:
-        """Returns the number of one constant.
-
-        Args:
-            given: Its name or number.
+        """Returns the number of one constant, given by its name or number.
 
         Raises:
             ValueError: If it is not of this family.
@@ -69,10 +66,7 @@ class Flags(Constants):
     """A family of PyBullet constants that are bits: `A|B`, a list of names and numbers, or one number."""
 
     def parse(self, given: Any) -> int:
-        """Returns the numbers of all constants, or-ed.
-
-        Args:
-            given: `"A|B"`, a number, or a list of both.
+        """Returns the numbers of all constants, or-ed, of `"A|B"`, a number, or a list of both.
 
         Raises:
             ValueError: If one of them is not of this family.

@@ -126,17 +126,9 @@ class WorldConfig(ConfigModel):
         values = {key: getattr(content, key) for key in cls.model_fields}
         return cls.model_construct(content.model_fields_set & cls.model_fields.keys(), **values)
 
-    def search_paths(self) -> tuple[str, ...]:
-        """Returns the folders to look for files in, as absolute paths."""
-        return self.setAdditionalSearchPath
-
 
 def main_file_model(sections: Mapping[str, type[ConfigModel]]) -> type[WorldConfig]:
-    """Returns the model of a main file, which refuses keys that it does not know.
-
-    Args:
-        sections: Model of the files that a list of the main file names, by list.
-    """
+    """Returns the model of a main file that has these lists of files; it refuses keys that it does not know."""
     return _main_file_model(tuple(sections.items()))
 
 

@@ -8,8 +8,6 @@ from typing import Any, NamedTuple
 from rpbi.control.motion import Motion
 from rpbi.control.timed_motion import TimedMotion
 from rpbi.control.trajectories.request import GoalTolerances, TrajectoryRequest
-from rpbi.geometry import Pose
-from rpbi.urdf.joints import JointTarget
 
 from .clock import Clock
 
@@ -44,18 +42,6 @@ class RecordedTrajectory(NamedTuple):
         return cls(request._replace(stamp_ns=offset_ns), tolerances)
 
 
-def _teleport(body: Any, _: Clock, pose: Pose) -> None:
-    body.teleport(pose)
-
-
-def _set_joint_state(body: Any, _: Clock, target: JointTarget) -> None:
-    body.set_joint_state(target)
-
-
-def _switch_mode(body: Any, _: Clock, mode: int) -> None:
-    body.switch_mode(mode)
-
-
 def _stop_motion(body: Any, _: Clock, reason: str) -> bool:
     was_moving = body.drive.motion is not None
     body.halt(reason)
@@ -76,17 +62,13 @@ def _follow(body: Any, clock: Clock, recorded: RecordedTrajectory) -> Motion:
     return motion
 
 
-def _cancel(body: Any, clock: Clock, reason: str) -> None:
-    body.follower.cancel(reason, clock)
-
-
 ACTIONS: dict[str, Callable[[Any, Clock, Any], Any]] = {
-    "teleport": _teleport,
-    "set_joint_state": _set_joint_state,
-    "switch_mode": _switch_mode,
+    "teleport": lambda body, _, pose: body.teleport(pose),
+    "set_joint_state": lambda body, _, target: body.set_joint_state(target),
+    "switch_mode": lambda body, _, mode: body.switch_mode(mode),
     "stop_motion": _stop_motion,
     "move": _move,
     "follow": _follow,
-    "cancel": _cancel,
+    "cancel": lambda body, clock, reason: body.follower.cancel(reason, clock),
 }
 """Each does something to a body, with the world's clock and a value."""

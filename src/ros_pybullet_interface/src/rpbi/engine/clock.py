@@ -73,16 +73,15 @@ class Schedule:
     def __init__(self, hz: float, dt_ns: int) -> None:
         wanted = max(Fraction(hz).limit_denominator(1_000_000), SLOWEST_HZ) * dt_ns / NS_PER_S
         self.clamped = wanted > 1
-        self._per_tick = min(wanted, Fraction(1))
+        self._numerator, self._denominator = min(wanted, Fraction(1)).as_integer_ratio()
 
     def is_due(self, tick: int, since: int | None = None) -> bool:
         """Tells whether it is due at `tick`, or was at any tick after `since`; at tick 0 it always is."""
-        numerator, denominator = self._per_tick.numerator, self._per_tick.denominator
-        last = tick - 1 if since is None else since
-        return tick * numerator // denominator > last * numerator // denominator
+        return self._count(tick) > self._count(tick - 1 if since is None else since)
 
     def next_due(self, tick: int) -> int:
         """Returns the first tick after `tick` at which it is due."""
-        numerator, denominator = self._per_tick.numerator, self._per_tick.denominator
-        count = tick * numerator // denominator + 1
-        return -(-count * denominator // numerator)
+        return -(-(self._count(tick) + 1) * self._denominator // self._numerator)
+
+    def _count(self, tick: int) -> int:
+        return tick * self._numerator // self._denominator

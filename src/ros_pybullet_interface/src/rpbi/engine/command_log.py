@@ -39,12 +39,7 @@ class CommandLog:
         self.count += 1
 
     def since(self, index: int, most: int = KEPT) -> tuple[int, tuple[WorldCommand, ...]]:
-        """Returns the commands from an index on, as far as they are kept, and the index of the first.
-
-        Args:
-            index: The first to return.
-            most: How many to return at most.
-        """
+        """Returns the commands from an index on, as far as they are kept, and the index of the first."""
         first = max(index, self.count - len(self._kept))
         end = min(first + most, self.count)
         return first, tuple(self._kept[each - self.count] for each in range(first, end))

@@ -31,10 +31,6 @@ def state_hash(tick: int, bodies: Mapping[str, Body]) -> str:
     It is the same in any process, since it depends on nothing but names, in their order, and the bytes of the numbers.
     What motors are set to is no part of it; it shows as soon as something moves by it. Soft bodies are left out: their
     motion is not the same every time.
-
-    Args:
-        tick: The tick.
-        bodies: The bodies by name.
     """
     digest = hashlib.blake2b(struct.pack("<Q", tick), digest_size=DIGEST_BYTES)
     for name in sorted(bodies):
@@ -45,10 +41,6 @@ def state_hash(tick: int, bodies: Mapping[str, Body]) -> str:
 
 def sensors_and_inputs(body: Body, config: BodyConfig) -> tuple[tuple[Sensor, ...], Mapping[str, Input]]:
     """Returns the sensors of a body, those of other packages last, and its inputs by name.
-
-    Args:
-        body: The body.
-        config: Its configuration.
 
     Raises:
         PluginError: If a class of another package fails.
@@ -66,11 +58,6 @@ def _make(body: Body, config: Any) -> Sensor:
 
 class WorldContents:
     """The bodies and cameras of a world with their sensors and inputs, and the log from which it can be rebuilt.
-
-    Args:
-        pb: The client.
-        clock: The world's clock.
-        world: What sensors get to know.
 
     Attributes:
         bodies: By name.

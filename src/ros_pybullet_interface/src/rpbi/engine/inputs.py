@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rpbi.config.pybullet_models import ObjectTf
-from rpbi.geometry import Pose
+from rpbi.geometry import Pose, normalized
 
 FARTHEST_M = 1e6
 """Beyond this a body would not stay finite [m]."""
@@ -61,8 +61,6 @@ def check_pose(pose: Pose) -> Pose:
         raise ValueError(f"pose must be finite, got {position}, {quat}")
     if max(map(abs, position)) > FARTHEST_M:
         raise ValueError(f"position must be within +-{FARTHEST_M:g} m, got {position}")
-    norm = math.hypot(*quat)
-    if norm < 1e-6:
+    if math.hypot(*quat) < 1e-6:
         raise ValueError(f"quaternion must not be zero, got {quat}")
-    x, y, z, w = (component / norm for component in quat)
-    return Pose((position[0], position[1], position[2]), (x, y, z, w))
+    return Pose((position[0], position[1], position[2]), normalized(quat))

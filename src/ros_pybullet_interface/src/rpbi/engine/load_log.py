@@ -135,7 +135,7 @@ def _set_up(pb: Client, config: WorldConfig) -> None:
     """Clears the client and sets gravity, time step and the engine's parameters."""
     pb.resetSimulation(**config.resetSimulation.kwargs())
     pb.is_deformable = bool((config.resetSimulation.flags or 0) & pybullet.RESET_USE_DEFORMABLE_WORLD)
-    for path in config.search_paths():
+    for path in config.setAdditionalSearchPath:
         pb.setAdditionalSearchPath(path)
     gravity = config.setGravity
     pb.setGravity(gravity.gravX, gravity.gravY, gravity.gravZ)

@@ -33,11 +33,7 @@ class Mailbox:
     ) -> None:
         """Leaves a value in a slot; one that was not taken yet is replaced, or merged with it.
 
-        Args:
-            slot: The slot.
-            value: The value.
-            merge: Joins a value that waits with this one.
-            generation: The generation that the value is of, if one of an earlier generation is to be dropped.
+        A value of a `generation` that is not the present one is dropped.
         """
         with self._lock:
             if generation not in (None, self.generation):

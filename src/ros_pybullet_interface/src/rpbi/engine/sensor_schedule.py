@@ -40,11 +40,7 @@ class _Scheduled:
 
 
 class SensorSchedule:
-    """Reads each sensor of a world when it is due.
-
-    Args:
-        clock: The world's clock.
-    """
+    """Reads each sensor of a world when it is due."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -90,22 +86,13 @@ class SensorSchedule:
             self._warned.add((sensor.name, sensor.hz))
             log.warning("%s: %s Hz is more than a sample a tick; it gets one a tick", sensor.name, sensor.hz)
 
-    def before_step(self) -> None:
-        """Lets sensors act that do so before the physics of each tick."""
+    def act(self, method: str) -> None:
+        """Calls `before_step` or `after_step` of the sensors that act at every tick."""
         for sensor in self._watching:
             try:
-                sensor.before_step(self._clock.tick)
+                getattr(sensor, method)(self._clock.tick)
             except Exception as error:
-                blame(sensor, f"before_step of '{sensor.name}' at tick {self._clock.tick}", error)
-                raise
-
-    def after_step(self) -> None:
-        """Lets the same sensors act after it."""
-        for sensor in self._watching:
-            try:
-                sensor.after_step(self._clock.tick)
-            except Exception as error:
-                blame(sensor, f"after_step of '{sensor.name}' at tick {self._clock.tick}", error)
+                blame(sensor, f"{method} of '{sensor.name}' at tick {self._clock.tick}", error)
                 raise
 
     def read_due(self) -> list[Any]:

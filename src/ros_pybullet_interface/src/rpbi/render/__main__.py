@@ -7,10 +7,10 @@ import argparse
 import logging
 import signal
 import socket
-from functools import partial
+
+from custom_ros_tools.plugins import find
 
 from .channel import Channel
-from .frame import make_sink
 from .priority import give_way
 from .process import RenderProcess, ReportHandler
 
@@ -31,7 +31,7 @@ def main() -> None:
     logger.setLevel(logging.INFO)
     logger.propagate = False
     logger.addHandler(ReportHandler(channel))
-    RenderProcess(channel, partial(make_sink, arguments.sink)).run()
+    RenderProcess(channel, find(arguments.sink)).run()
 
 
 if __name__ == "__main__":

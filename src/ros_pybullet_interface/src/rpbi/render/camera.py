@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pybullet
 
 from rpbi.geometry import Pose
 
@@ -80,28 +81,12 @@ def camera_matrix(projection: Array, width_px: int, height_px: int) -> Array:
 
 
 def view_matrix(camera: Pose) -> Array:
-    """Returns the 4x4 matrix from the world to the eye frame.
-
-    Args:
-        camera: Pose of the optical frame in the world.
-    """
-    rotation = rotation_matrix(camera.quat_xyzw)
+    """Returns the 4x4 matrix from the world to the eye frame, of the pose of an optical frame in the world."""
+    position, quat_xyzw = camera.inverse()
     optical_from_world = np.eye(4)
-    optical_from_world[:3, :3] = rotation.T
-    optical_from_world[:3, 3] = -rotation.T @ np.asarray(camera.position)
+    optical_from_world[:3, :3] = np.reshape(pybullet.getMatrixFromQuaternion(quat_xyzw), (3, 3))
+    optical_from_world[:3, 3] = position
     return OPTICAL_TO_EYE @ optical_from_world
-
-
-def rotation_matrix(quat_xyzw: tuple[float, float, float, float]) -> Array:
-    """Returns the 3x3 rotation of a unit quaternion."""
-    x, y, z, w = quat_xyzw
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def depth_in_metres(buffer: npt.NDArray[np.float32], intrinsics: Intrinsics) -> npt.NDArray[np.float32]:
@@ -122,36 +107,3 @@ def depth_in_metres(buffer: npt.NDArray[np.float32], intrinsics: Intrinsics) -> 
     inverse *= far
     inverse += near * buffer
     return np.divide(near * far, inverse, out=inverse)
-
-
-def project(points: Array, camera: Pose, K: Array) -> Array:
-    """Projects points of the world into the image.
-
-    Args:
-        points: n points in the world [m], shape (n, 3).
-        camera: Pose of the optical frame in the world.
-        K: 3x3 camera matrix.
-
-    Returns:
-        Pixels and depth (u, v, z) [px, px, m], shape (n, 3); z <= 0 is behind the camera and its pixels mean
-        nothing.
-    """
-    in_camera = (np.asarray(points) - np.asarray(camera.position)) @ rotation_matrix(camera.quat_xyzw)
-    depth = in_camera[:, 2:]
-    return np.hstack([(in_camera @ K.T)[:, :2] / depth, depth])
-
-
-def back_project(depth_m: Array, K: Array) -> Array:
-    """Returns the points that the pixels of a depth image see.
-
-    Args:
-        depth_m: Depths z [m], shape (height, width).
-        K: 3x3 camera matrix.
-
-    Returns:
-        Points in the optical frame [m], shape (height, width, 3).
-    """
-    height, width = depth_m.shape
-    x = (np.arange(width, dtype=depth_m.dtype) - K[0, 2]) / K[0, 0]
-    y = (np.arange(height, dtype=depth_m.dtype) - K[1, 2]) / K[1, 1]
-    return np.stack([depth_m * x, depth_m * y[:, None], depth_m], axis=-1)

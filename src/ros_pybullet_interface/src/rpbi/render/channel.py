@@ -11,13 +11,10 @@ _CHUNK = 1 << 18
 
 
 class Channel:
-    """Sends and receives picklable objects, each with its length before it.
+    """Sends and receives picklable objects over a connected stream socket, each with its length before it.
 
     What the other side does not take yet waits here, so whoever sends has to see to it that this stays
     bounded. It is for one thread.
-
-    Args:
-        connection: A connected stream socket.
     """
 
     def __init__(self, connection: socket.socket) -> None:

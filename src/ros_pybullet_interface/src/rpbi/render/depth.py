@@ -43,11 +43,7 @@ class DepthNoise(NamedTuple):
 
 
 class PointCloud:
-    """Turns the images of one camera into points, in place and all at once.
-
-    Args:
-        intrinsics: The camera.
-    """
+    """Turns the images of one camera into points, in place and all at once."""
 
     def __init__(self, intrinsics: Intrinsics) -> None:
         K = intrinsics.K

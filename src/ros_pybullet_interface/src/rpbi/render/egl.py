@@ -81,14 +81,8 @@ class Egl:
         ):
             raise EglError("EGL has no such configuration")
         surface = self._surface(width_px, height_px)
-        context = self._call(
-            "eglCreateContext",
-            c_void_p,
-            self._display,
-            self._config,
-            c_void_p(self._context),
-            _integers([_NONE]),
-        )
+        none = _integers([_NONE])
+        context = self._call("eglCreateContext", c_void_p, self._display, self._config, self._context, none)
         if not (count.value and surface and context):
             raise EglError("EGL cannot make a surface or context")
         self._use(surface, context)
@@ -110,9 +104,7 @@ class Egl:
         return surface
 
     def _use(self, surface: int | None, context: int | None) -> None:
-        if not self._call(
-            "eglMakeCurrent", c_uint, self._display, c_void_p(surface), c_void_p(surface), c_void_p(context)
-        ):
+        if not self._call("eglMakeCurrent", c_uint, self._display, surface, surface, context):
             raise EglError("EGL cannot make the context current")
         self._context = context
 

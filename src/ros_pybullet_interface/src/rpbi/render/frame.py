@@ -1,8 +1,7 @@
 """What the renderer process makes, and for whom."""
 
-import importlib
 from collections.abc import Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -90,15 +89,3 @@ class Sink(Protocol):
 
     def close(self) -> None:
         """Ends it."""
-
-
-def make_sink(factory: str) -> Sink:
-    """Makes a sink.
-
-    Args:
-        factory: `module:factory`.
-    """
-    module, _, name = factory.partition(":")
-    make: Any = getattr(importlib.import_module(module), name)
-    sink: Sink = make()
-    return sink

@@ -10,12 +10,7 @@ from .frame import Camera, Demand
 
 
 class SetUp(NamedTuple):
-    """To the renderer, first of all.
-
-    Attributes:
-        cameras: All cameras.
-        use_egl: Whether to try the fast renderer.
-    """
+    """To the renderer, first of all: the cameras, and whether to try the fast renderer."""
 
     cameras: tuple[Camera, ...]
     use_egl: bool
@@ -52,11 +47,7 @@ class Scene(NamedTuple):
 
 
 class Ready(NamedTuple):
-    """To the simulator: the renderer draws.
-
-    Attributes:
-        renderer: `EGL` or `TinyRenderer`, with what is known of it.
-    """
+    """To the simulator: what draws, `EGL` or `TinyRenderer` with what is known of it."""
 
     renderer: str
 
@@ -68,12 +59,7 @@ class Taken(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """To the simulator: the frame of a synchronous camera was handed on, or nobody looks at it.
-
-    Attributes:
-        camera: The camera.
-        stamp_ns: Stamp of the scene [ns].
-    """
+    """To the simulator: the frame of a synchronous camera of that stamp [ns] was handed on, or nobody looks at it."""
 
     camera: str
     stamp_ns: int
@@ -86,12 +72,7 @@ class Demanded(NamedTuple):
 
 
 class Report(NamedTuple):
-    """To the simulator: something for its log.
-
-    Attributes:
-        level: As in `logging`.
-        text: The sentence.
-    """
+    """To the simulator: something for its log, at a level of `logging`."""
 
     level: int
     text: str

@@ -18,11 +18,7 @@ log = logging.getLogger(__name__)
 
 
 class Mirror:
-    """A world without physics, built from the load log and posed from scenes.
-
-    Args:
-        pb: The client that it fills.
-    """
+    """A world without physics, built from the load log and posed from scenes."""
 
     def __init__(self, pb: Client) -> None:
         self._pb = pb

@@ -4,7 +4,7 @@ import faulthandler
 import logging
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -30,12 +30,7 @@ At idle priority on a busy machine a lot may take long."""
 
 
 class RenderProcess:
-    """Does what the simulator tells until the simulator has gone.
-
-    Args:
-        channel: To the simulator.
-        make_sink: Makes the sink.
-    """
+    """Does what the simulator tells until the simulator has gone."""
 
     def __init__(self, channel: Channel, make_sink: Callable[[], Sink]) -> None:
         self._channel = channel
@@ -115,20 +110,15 @@ class RenderProcess:
             self._channel.send(Shown(sample.name, sample.stamp_ns))
 
     def _frame(self, scene: Scene, camera: Camera, streams: frozenset[str]) -> Frame:
-        sample = scene.sample
+        sample, intrinsics = scene.sample, camera.intrinsics
         frame = Frame(camera, sample.tick, sample.stamp_ns)
         if streams == {"info"}:
             return frame
-        assert self._mirror is not None
-        self._mirror.show(sample.bodies)
-        return frame._replace(**self._draw(scene, camera, streams))
-
-    def _draw(self, scene: Scene, camera: Camera, streams: frozenset[str]) -> Mapping[str, Any]:
-        sample, intrinsics = scene.sample, camera.intrinsics
         assert self._renderer is not None and self._mirror is not None and sample.camera is not None
+        self._mirror.show(sample.bodies)
         segmentation = "segmentation" in streams
         drawing = self._renderer.draw(intrinsics, sample.camera, segmentation, self._mirror.transparent)
-        images: dict[str, npt.NDArray[Any]] = {}
+        images: dict[str, Any] = {}
         if streams & {"colour", "points"}:
             images["colour"] = _without_alpha(drawing.rgba)
         if streams & {"depth", "points"}:
@@ -137,7 +127,7 @@ class RenderProcess:
                 camera.noise.add_to(images["depth"], sample.tick, intrinsics.near_m, intrinsics.far_m)
         if segmentation:
             images["segmentation"] = self._mirror.to_simulator_ids(drawing.body_ids, scene.body_ids)
-        return images
+        return frame._replace(**images)
 
     def _send_demands(self) -> None:
         now_s = time.monotonic()
@@ -151,11 +141,7 @@ class RenderProcess:
 
 
 class ReportHandler(logging.Handler):
-    """Sends what is logged here to the simulator's log.
-
-    Args:
-        channel: To the simulator.
-    """
+    """Sends what is logged here to the simulator's log."""
 
     def __init__(self, channel: Channel) -> None:
         super().__init__(logging.INFO)

@@ -123,9 +123,6 @@ class EglRenderer:
 
     All its calls must come from the thread that made it.
 
-    Args:
-        cameras: All cameras that will draw.
-
     Raises:
         EglError: If it cannot be loaded or does not draw as it should. Some failures end the process instead.
     """
@@ -176,12 +173,7 @@ class EglRenderer:
 
 
 def open_renderer(cameras: Sequence[Camera], use_egl: bool = True) -> Renderer:
-    """Returns the fastest renderer that works, with a client of its own.
-
-    Args:
-        cameras: All cameras that will draw.
-        use_egl: Whether to try EGL at all.
-    """
+    """Returns the fastest renderer that works, with a client of its own."""
     if use_egl and cameras:
         try:
             return EglRenderer(cameras)

@@ -1,10 +1,10 @@
 """Values that enter a world as text that reads back exactly."""
 
-import importlib
 import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from custom_ros_tools.plugins import find
 from custom_ros_tools.schema import ConfigModel
 
 PAIRS = "pairs"
@@ -74,10 +74,9 @@ def _class_name(value: Any) -> str:
 
 def _class_of(name: str) -> type:
     """Returns a class of values; no other can be named, so that a file cannot have just anything called."""
-    module, _, class_name = name.partition(":")
     try:
-        found = getattr(importlib.import_module(module), class_name)
-    except (ImportError, AttributeError, ValueError) as error:
+        found = find(name)
+    except ValueError as error:
         raise ValueError(f"'{name}' is not known here: {error}") from None
     if isinstance(found, type) and (
         issubclass(found, ConfigModel) or (issubclass(found, tuple) and hasattr(found, "_fields"))

@@ -159,6 +159,17 @@ class Replay:
         return done
 
 
+_CHANGES: dict[str, Callable[[World, str, Any], Any]] = {
+    "input": World.take_input,
+    "add": lambda world, _, arguments: world.add(*arguments),
+    "remove": lambda world, name, _: world.remove(name),
+    "dynamics": World.change_dynamics,
+    "halt": lambda world, _, reason: world.halt(reason),
+    "pause": lambda world, _, reason: world.pause(reason),
+}
+"""What can happen to a world beside the actions on its bodies."""
+
+
 def apply_command(world: World, command: RecordedCommand) -> None:
     """Does to a world what was done when a command was recorded.
 
@@ -166,25 +177,11 @@ def apply_command(world: World, command: RecordedCommand) -> None:
         InterfaceError: If the world refuses.
         ValueError: If the command cannot be read, or is none that this world knows.
     """
-    value = from_text(command.data)
+    name, what, value = command.name, command.what, from_text(command.data)
     try:
-        _apply(world, command.name, command.what, value)
+        if what in _CHANGES:
+            _CHANGES[what](world, name, value)
+        else:
+            world.act(name, what, value)
     except (KeyError, TypeError, AttributeError) as error:
-        raise ValueError(f"'{command.what}' of '{command.name}' makes no sense in this world: {error!r}") from error
-
-
-def _apply(world: World, name: str, what: str, value: Any) -> None:
-    if what == "input":
-        world.take_input(name, value)
-    elif what == "add":
-        world.add(*value)
-    elif what == "remove":
-        world.remove(name)
-    elif what == "dynamics":
-        world.change_dynamics(name, value)
-    elif what == "halt":
-        world.halt(value)
-    elif what == "pause":
-        world.pause(value)
-    else:
-        world.act(name, what, value)
+        raise ValueError(f"'{what}' of '{name}' makes no sense in this world: {error!r}") from error

@@ -1,35 +1,18 @@
 """Headers of messages: names of TF frames, and stamps of the world's clock."""
 
-from typing import NamedTuple
-
 import genpy
 
 from rpbi.engine.clock import NS_PER_S
 
 _prefix = ""
 
-
-class Frame(NamedTuple):
-    """Frames that the node puts on TF.
-
-    Attributes:
-        name: Their name, with `NAME` for a body and `LINK` for one of its links.
-        meaning: Which bodies have them, in a sentence.
-    """
-
-    name: str
-    meaning: str
-
-
-FRAMES = (
-    Frame("rpbi/world", "The world, parent of all others. Poses in YAML, topics and services are in it."),
-    Frame("rpbi/NAME", "A dynamic object with `broadcast_hz`."),
-    Frame(
-        "rpbi/NAME/LINK",
-        "URDF frames of links: all of a robot with `broadcast_link_states`, its root link with "
-        "`broadcast_root_tf_hz`, all of a URDF object with `broadcast_hz`.",
-    ),
-)
+FRAMES = {
+    "rpbi/world": "The world, parent of all others. Poses in YAML, topics and services are in it.",
+    "rpbi/NAME": "A dynamic object with `broadcast_hz`.",
+    "rpbi/NAME/LINK": "URDF frames of links: all of a robot with `broadcast_link_states`, its root link with "
+    "`broadcast_root_tf_hz`, all of a URDF object with `broadcast_hz`.",
+}
+"""Frames that the node puts on TF, with `NAME` for a body and `LINK` for one of its links: which bodies have them."""
 
 
 def use_prefix(prefix: str | None) -> None:

@@ -49,10 +49,6 @@ TOPIC_INPUTS: dict[str, Topic] = {
 def topic_input(key: str, taken: Input) -> Topic:
     """Returns the topic of an input.
 
-    Args:
-        key: Its name on its body.
-        taken: The input.
-
     Raises:
         ConfigError: If it comes from another package and has no topic that can be found.
     """

@@ -94,7 +94,7 @@ class SimulatorNode:
         self._simulation = Simulation(self._world, publishers, helpers)
         ask = Requests(self._simulation)
         self._objects = ObjectLifecycle(self._simulation, ask, publishers)
-        loading = {"search_paths": config.search_paths(), ROBOT_DESCRIPTION: description}
+        loading = {"search_paths": config.setAdditionalSearchPath, ROBOT_DESCRIPTION: description}
         context = NodeContext(self._simulation, ask, self._objects, loading)
         window.serve(ask)
         for service in NODE_SERVICES:

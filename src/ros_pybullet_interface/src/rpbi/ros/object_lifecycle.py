@@ -21,11 +21,6 @@ class ObjectLifecycle:
     """Adds, removes and resets, one at a time; any thread but the simulation's may ask for it.
 
     It opens the topics and services of all that is in the world at the start.
-
-    Args:
-        simulation: What runs the world.
-        ask: Asks the simulation thread.
-        publishers: Where samples go.
     """
 
     def __init__(self, simulation: Simulation, ask: Requests, publishers: SamplePublishers) -> None:

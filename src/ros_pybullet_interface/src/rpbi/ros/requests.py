@@ -19,11 +19,7 @@ GIVE_UP_AFTER_S = 30.0
 
 
 class Requests:
-    """Has the simulation thread make calls and waits for their results.
-
-    Args:
-        simulation: Whose loop makes the calls.
-    """
+    """Has the simulation thread make calls and waits for their results."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation

@@ -12,9 +12,6 @@ class RosNode:
 
     The simulator does not use it: it must never wait for ROS time, and this does.
 
-    Args:
-        name: Name of the node.
-
     Attributes:
         tf: TF.
     """

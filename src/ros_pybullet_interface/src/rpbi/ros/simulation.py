@@ -23,11 +23,7 @@ BURST_S = 0.01
 
 
 class StepBurst:
-    """Counts the ticks of one request; whoever asked waits for `done`.
-
-    Args:
-        steps: How many ticks.
-    """
+    """Counts the ticks of one request; whoever asked waits for `done`."""
 
     def __init__(self, steps: int) -> None:
         self.done: Future[tuple[int, int]] = Future()
@@ -51,12 +47,8 @@ class StepBurst:
 class Simulation:
     """Runs, stops and steps a world on the one thread that owns PyBullet.
 
-    All methods are for that thread; others reach it through the world's mailbox.
-
-    Args:
-        world: The world.
-        publishers: Where samples go.
-        helpers: Called at every pass; they must return at once.
+    All methods are for that thread; others reach it through the world's mailbox. Helpers are called at every pass and
+    must return at once.
     """
 
     def __init__(self, world: World, publishers: SamplePublishers, helpers: Sequence[Callable[[], None]]) -> None:
@@ -133,9 +125,6 @@ class Simulation:
 
     def step_n(self, steps: int) -> Future[tuple[int, int]]:
         """Goes some ticks on, as fast as it goes; other requests are served meanwhile, a stop ends it.
-
-        Args:
-            steps: How many ticks; 0 is none.
 
         Returns:
             The last tick and its stamp [ns], once everything of it has been handed to every subscriber.

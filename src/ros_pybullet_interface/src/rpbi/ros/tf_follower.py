@@ -79,11 +79,6 @@ def fault_in(transform: TransformStamped) -> str | None:
 def refusal(slot: str, taken: Input, error: Exception) -> Exception:
     """Returns why a value is refused: what its check says, or what went wrong in another package.
 
-    Args:
-        slot: Where the value was to go.
-        taken: The input.
-        error: What was raised.
-
     Raises:
         Exception: The error, if it is a bug of this package.
     """
@@ -95,13 +90,7 @@ def refusal(slot: str, taken: Input, error: Exception) -> Exception:
 
 
 class _Followed:
-    """A pose input and what is known of its frame.
-
-    Args:
-        name: The body or sensor.
-        slot: Where its pose goes.
-        pose_input: What it follows.
-    """
+    """A pose input and what is known of its frame."""
 
     def __init__(self, name: str, slot: str, pose_input: PoseInput) -> None:
         self.name, self.slot, self.pose_input = name, slot, pose_input

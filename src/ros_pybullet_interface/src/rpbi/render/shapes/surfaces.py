@@ -38,15 +38,14 @@ class Surface(NamedTuple):
 
 def box(half_extents: Sequence[float]) -> Surface:
     """Returns a box about the origin, each side with its own normal."""
-    sides = [_square(axis, sign) for axis in np.eye(3) for sign in (1.0, -1.0)]
-    unit = _joined(sides)
+    unit = _joined([_square(sign * axis) for axis in np.eye(3) for sign in (1.0, -1.0)])
     return unit._replace(points=unit.points * np.asarray(half_extents))
 
 
 def plane(normal: Sequence[float]) -> Surface:
     """Returns a large square through the origin, visible from both sides."""
     upwards = np.asarray(normal) / np.linalg.norm(normal)
-    both = _joined([_square(upwards, 1.0), _square(upwards, -1.0)])
+    both = _joined([_square(upwards), _square(-upwards)])
     on_plane = both.points - (both.points @ upwards)[:, None] * upwards
     return both._replace(points=PLANE_HALF_WIDTH_M * on_plane)
 
@@ -83,9 +82,8 @@ def mesh(points: Array, triangles: npt.NDArray[Any], normals: Array | None = Non
     return Surface(corners.reshape(-1, 3), np.repeat(flat, 3, axis=0), np.arange(corners.size // 3).reshape(-1, 3))
 
 
-def _square(axis: Array, sign: float) -> Surface:
-    """Returns the side of a cube of edge 2 whose outward normal is `sign * axis`, of unit length."""
-    outward = sign * np.asarray(axis)
+def _square(outward: Array) -> Surface:
+    """Returns the side of a cube of edge 2 that has this outward normal of unit length."""
     first = np.roll(np.eye(3)[np.argmax(np.abs(outward))], 1)
     u = np.cross(outward, first)
     u /= np.linalg.norm(u)

@@ -26,9 +26,6 @@ class Transparency:
     """Keeps account of the transparent shapes among bodies that come and go.
 
     PyBullet's EGL plugin goes on telling the shapes of removed bodies, before those of later bodies with the same id.
-
-    Args:
-        pb: The client.
     """
 
     def __init__(self, pb: Client) -> None:

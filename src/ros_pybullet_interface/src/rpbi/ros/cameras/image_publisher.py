@@ -82,13 +82,7 @@ def sink_arguments(node_name: str, argv: Sequence[str]) -> list[str]:
 
 
 class _Topic(StateTopic):
-    """A topic that also counts who has ever come.
-
-    Args:
-        topic: Its name.
-        message_type: Its ROS type.
-        waits: Whether it waits until each message is taken, instead of dropping some.
-    """
+    """A topic that also counts who has ever come; one that `waits` does so until each message is taken."""
 
     def __init__(self, topic: str, message_type: type, waits: bool) -> None:
         self.seen = 0

@@ -25,11 +25,7 @@ LONGEST_WAIT_S = 20.0
 
 
 class ScenePublisher:
-    """Feeds the renderer process, and has cameras read only while somebody looks at their images.
-
-    Args:
-        world: The world that the cameras are in.
-    """
+    """Feeds the renderer process, and has cameras read only while somebody looks at their images."""
 
     def __init__(self, world: World) -> None:
         self._world = world

@@ -46,12 +46,7 @@ CLOUD_TOPIC = (
 
 
 def camera_topics(topic_name: str, pointcloud: bool) -> dict[str, tuple[str, Topic]]:
-    """Returns the streams and topics of a camera by their relative names.
-
-    Args:
-        topic_name: What it is called in topics.
-        pointcloud: Whether it has point clouds.
-    """
+    """Returns the streams and topics of a camera by their relative names."""
     rows = (*IMAGE_TOPICS, CLOUD_TOPIC) if pointcloud else IMAGE_TOPICS
     return {topic.name.format(name=topic_name): (stream, topic) for stream, topic in rows}
 

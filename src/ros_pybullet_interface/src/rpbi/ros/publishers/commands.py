@@ -28,11 +28,7 @@ MOST_IN_A_MESSAGE = 25
 
 
 class _Reader:
-    """Who gets commands, and up to which they have been sent.
-
-    Args:
-        send: Takes a message.
-    """
+    """Who gets commands, and up to which they have been sent."""
 
     def __init__(self, send: Callable[[WorldCommands], None]) -> None:
         self.send = send
@@ -52,11 +48,7 @@ class _CommandTopic(FastTopic):
 
 
 class CommandPublisher:
-    """Publishes what a world was built from, and its commands, a few at each pass of the loop.
-
-    Args:
-        world: The world.
-    """
+    """Publishes what a world was built from, and its commands, a few at each pass of the loop."""
 
     def __init__(self, world: World) -> None:
         self._world = world

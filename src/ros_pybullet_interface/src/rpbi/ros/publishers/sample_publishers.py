@@ -18,9 +18,6 @@ from .topics import FastTopic
 class SamplePublishers:
     """All publishers of a world's samples.
 
-    Args:
-        world: The world.
-
     Attributes:
         cameras: That of the images.
     """
@@ -92,10 +89,7 @@ class SamplePublishers:
 class TickPublisher:
     """Publishes everything of a tick: the time first, then the samples.
 
-    Args:
-        world: The world.
-        publishers: Where samples go.
-        idle_ticks: How many ticks pass between two calls of `publish_idle` were the world running.
+    So many `idle_ticks` would pass between two calls of `publish_idle` were the world running.
     """
 
     def __init__(self, world: World, publishers: SamplePublishers, idle_ticks: int) -> None:

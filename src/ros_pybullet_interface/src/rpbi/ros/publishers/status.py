@@ -54,11 +54,7 @@ def _warn_of_rivals() -> None:
 
 
 class ClockPublisher:
-    """Simulated time on /clock, of which the simulator is the only source.
-
-    Args:
-        world: The world; its configuration has the most messages a second of wall time.
-    """
+    """Simulated time on /clock, of which the simulator is the only source."""
 
     def __init__(self, world: World) -> None:
         self._clock, config = world.clock, world.config
@@ -150,12 +146,7 @@ class StatusPublisher:
 
 
 class StatePublisher:
-    """Publishes how the simulation is doing, at a rate of the wall clock, and its hash, at a rate of the world's.
-
-    Args:
-        world: The world.
-        pacer: What keeps it in step with the wall clock.
-    """
+    """Publishes how the simulation is doing, at a rate of the wall clock, and its hash, at a rate of the world's."""
 
     def __init__(self, world: World, pacer: Pacer) -> None:
         self._world, self._pacer = world, pacer

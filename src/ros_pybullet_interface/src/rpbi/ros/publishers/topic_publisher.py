@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
@@ -21,25 +21,19 @@ SampleKey = tuple[type, str]
 """Type and name of the samples of a sensor: sensors of a body may have its name."""
 
 
-class _Route(NamedTuple):
-    """Where the samples of one sensor go."""
-
-    topic: FastTopic
-    to_message: Callable[[Any, int], Any]
-
-
 class TopicPublisher:
     """Samples of sensors, each on a topic of its own."""
 
     def __init__(self) -> None:
-        self._routes: dict[SampleKey, _Route] = {}
+        self._routes: dict[SampleKey, tuple[FastTopic, Callable[[Any, int], Any]]] = {}
+        """The topic of each sensor, and what makes its messages."""
         self._last: dict[SampleKey, tuple[Any, int]] = {}
 
     def open(self, key: SampleKey, row: Topic) -> None:
         """Advertises the topic of a sensor; any thread may call it."""
         assert row.handler is not None  # rows of samples have one
         topic = FastTopic(row.name.format(name=key[1]), row.message_type)
-        self._routes = {**self._routes, key: _Route(topic, row.handler)}
+        self._routes = {**self._routes, key: (topic, row.handler)}
 
     def publish(self, sample: Any, stamp_ns: int) -> None:
         """Sends a sample.
@@ -50,11 +44,12 @@ class TopicPublisher:
         key = type(sample), sample.name
         self._last[key] = sample, stamp_ns
         route = self._routes.get(key)  # there is none as long as the body is new
-        if route is not None and route.topic.has_subscribers:
+        if route is not None and route[0].has_subscribers:
+            topic, to_message = route
             try:
-                route.topic.publish(route.to_message(sample, stamp_ns))
+                topic.publish(to_message(sample, stamp_ns))
             except Exception as error:
-                blame(route.to_message, f"the message of '{sample.name}'", error)
+                blame(to_message, f"the message of '{sample.name}'", error)
                 raise
 
     def serve_late(self) -> None:
@@ -71,10 +66,9 @@ class TopicPublisher:
     def forget(self, key: SampleKey) -> FastTopic | None:
         """Drops what it keeps of a sensor; returns its topic, which is left to close."""
         self._last.pop(key, None)
-        routes = dict(self._routes)
-        route = routes.pop(key, None)
-        self._routes = routes
-        return None if route is None else route.topic
+        topic, _ = self._routes.get(key, (None, None))
+        self._routes = {other: route for other, route in self._routes.items() if other != key}
+        return topic
 
 
 class TransformPublisher:

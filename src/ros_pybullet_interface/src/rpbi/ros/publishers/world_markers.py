@@ -1,7 +1,6 @@
 """The whole world as markers for RViz, which otherwise knows robots only."""
 
 import math
-from typing import NamedTuple
 from urllib.parse import quote
 
 import rospy
@@ -80,23 +79,12 @@ STILL = 1e-4
 _Key = tuple[str, int]
 
 
-class _Loose(NamedTuple):
-    """A shape that no frame of TF carries along."""
-
-    key: _Key
-    body: Body
-    shape: BodyShape
-
-
 class WorldMarkers:
     """Publishes every visual shape of the world on a latched topic, all together whenever anything comes or goes.
 
     Each is given in the frame of its link, which TF moves. Shapes of links that are not on TF are given in the world;
-    they are looked at while somebody listens, and all is sent again when one of them has moved.
-
-    Args:
-        world: The world; only the simulation thread may make and poll this.
-        hz: How often to look [Hz] of wall time.
+    they are looked at while somebody listens, and all is sent again when one of them has moved. It looks at a rate
+    [Hz] of wall time; only the simulation thread may make and poll it.
     """
 
     def __init__(self, world: World, hz: float) -> None:
@@ -104,7 +92,8 @@ class WorldMarkers:
         self._rate = WallRate(hz)
         self._seen: tuple[object, ...] = ()
         self._markers: dict[_Key, Marker] = {}
-        self._loose: list[_Loose] = []
+        self._loose: list[tuple[_Key, Body, BodyShape]] = []
+        """Shapes that no frame of TF carries along."""
         self._shown: dict[_Key, Pose] = {}
         """Where the loose ones were when they were last sent."""
         self._publisher = rospy.Publisher(MARKERS.name, MarkerArray, queue_size=100, latch=True)
@@ -139,7 +128,7 @@ class WorldMarkers:
             pose = self._shown[key] = link_pose(body, shape.link_index) @ shape.pose_in_link
             if not _is_finite(pose):
                 return
-            self._loose.append(_Loose(key, body, shape))
+            self._loose.append((key, body, shape))
         self._markers[key] = shape_marker(*key, shape, frame, pose)
 
     def _look_at_loose(self) -> None:

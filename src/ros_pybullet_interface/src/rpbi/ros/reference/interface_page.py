@@ -74,7 +74,7 @@ def interface_page(world: World, definitions: Mapping[str, str]) -> str:
     parts += ["## Objects", OBJECTS, *_tables({**_owners(of_bodies), **WITH_CONTROL_MSGS}, definitions)]
     parts += ["## Cameras", CAMERAS, *_tables({each: [""] for each in of_cameras}, definitions)]
     parts += ["## PyBullet's window", WINDOW, *_tables(of_window, definitions)]
-    parts += ["## Frames", table(("frame", "meaning"), ((code(name), text) for name, text in FRAMES)), FOLLOWED]
+    parts += ["## Frames", table(("frame", "meaning"), ((code(name), text) for name, text in FRAMES.items())), FOLLOWED]
     parts += ["## Parameters", _parameters(), "## Other nodes", OTHERS, "## Messages and services of ours"]
     for name, text in definitions.items():
         parts += [f"### {name}", block("", text)]

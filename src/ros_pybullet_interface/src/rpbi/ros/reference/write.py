@@ -20,11 +20,7 @@ _FIRST_LINE = re.compile(r"# yaml-language-server: .*/(\w+)\.schema\.json\n")
 
 
 def reference_files(root: Path) -> dict[Path, str]:
-    """Returns what the files should have that are written from the code.
-
-    Args:
-        root: The workspace.
-    """
+    """Returns what the files should have that are written from the code."""
     nodes = {node: json_schema(model, node) for node, model in NODE_CONFIGS.items()}
     world = reference_world()
     try:

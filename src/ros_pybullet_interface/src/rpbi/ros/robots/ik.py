@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import fields, replace
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
@@ -64,30 +64,8 @@ def move_by_ik(context: BodyContext, problem: CalculateInverseKinematicsProblem)
     context.world.put(f"{context.name}/target", target)
 
 
-class LinkResidual(NamedTuple):
-    """How far a link is from where it was to be.
-
-    Attributes:
-        position_m: Distance [m].
-        orientation_rad: Angle [rad], None if any orientation would do.
-    """
-
-    position_m: float
-    orientation_rad: float | None
-
-    @property
-    def is_near(self) -> bool:
-        """Whether that is no more than joints within their tolerances may make of it."""
-        return self.position_m <= NEAR_M and (self.orientation_rad or 0.0) <= NEAR_RAD
-
-    def in_words(self, link: str) -> str:
-        """Returns it as part of a message."""
-        angle = "" if self.orientation_rad is None else f" and {self.orientation_rad:.3g} rad"
-        return f"link '{link}' is {self.position_m * 1e3:.3g} mm{angle} from its target"
-
-
-def residual_of_robot(context: BodyContext, message: CalculateInverseKinematicsProblem) -> LinkResidual:
-    """Measures where the link of a problem is now, against the problem's target in the world.
+def arrival(context: BodyContext, message: CalculateInverseKinematicsProblem) -> tuple[bool, str]:
+    """Returns whether the link of a problem is now near the problem's target in the world, and in words how far off.
 
     Raises:
         InterfaceError: If the robot has gone.
@@ -95,12 +73,14 @@ def residual_of_robot(context: BodyContext, message: CalculateInverseKinematicsP
     robot: JointedBody = context.body
     base, positions = context.ask_body(lambda: (robot.base_pose(), robot.joint_positions()))
     pose = base @ robot.kinematics.forward(list(positions.values()), message.link_name)
-    angle = None
+    off_m, off_rad, angle = math.dist(pose.position, message.targetPosition), 0.0, ""
     if message.targetOrientation:
         target = message.targetOrientation
         cosine = abs(sum(a * b for a, b in zip(pose.quat_xyzw, target))) / math.hypot(*target)
-        angle = 2.0 * math.acos(min(1.0, cosine))
-    return LinkResidual(math.dist(pose.position, message.targetPosition), angle)
+        off_rad = 2.0 * math.acos(min(1.0, cosine))
+        angle = f" and {off_rad:.3g} rad"
+    is_near = off_m <= NEAR_M and off_rad <= NEAR_RAD
+    return is_near, f"link '{message.link_name}' is {off_m * 1e3:.3g} mm{angle} from its target"
 
 
 def solve_for_robot(context: BodyContext, message: CalculateInverseKinematicsProblem) -> PybulletSolution:

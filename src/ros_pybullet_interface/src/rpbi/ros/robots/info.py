@@ -44,29 +44,11 @@ def robot_info(context: BodyContext, _: RobotInfoRequest) -> RobotInfoResponse:
 
 
 def _joint_info(info: tuple, joint: Joint) -> JointInfo:
-    """Returns what PyBullet's `getJointInfo` returns as a message."""
-    return JointInfo(
-        jointIndex=info[0],
-        jointName=info[1].decode(),
-        jointType=info[2],
-        jointTypeStr=joint.type_name,
-        qIndex=info[3],
-        uIndex=info[4],
-        flags=info[5],
-        jointDamping=info[6],
-        jointFriction=info[7],
-        jointLowerLimit=info[8],
-        jointUpperLimit=info[9],
-        jointMaxForce=info[10],
-        jointMaxVelocity=info[11],
-        linkName=info[12].decode(),
-        jointAxis=Point(*info[13]),
-        parentFramePos=Point(*info[14]),
-        parentFrameOrn=Quaternion(*info[15]),
-        parentIndex=info[16],
-        is_fixed=joint.is_fixed,
-        is_revolute=joint.is_revolute,
-    )
+    """Returns what PyBullet's `getJointInfo` returns as a message, whose fields have the same order."""
+    index, name, joint_type, *numbers, link, axis, position, quat, parent = info
+    place = Point(*axis), Point(*position), Quaternion(*quat), parent
+    kind = joint_type, joint.type_name
+    return JointInfo(index, name.decode(), *kind, *numbers, link.decode(), *place, joint.is_fixed, joint.is_revolute)
 
 
 def publish_description(context: BodyContext) -> Callable[[], None] | None:

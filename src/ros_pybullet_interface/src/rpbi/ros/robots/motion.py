@@ -14,7 +14,7 @@ from rpbi.ros.endpoints import Answer
 from rpbi.ros.services.body_context import BodyContext
 from rpbi.urdf.joints import JointTarget
 
-from .ik import residual_of_robot, solve_for_robot
+from .ik import arrival, solve_for_robot
 
 
 def move_to_joint_state(context: BodyContext, request: ResetJointStateRequest) -> Answer:
@@ -22,8 +22,7 @@ def move_to_joint_state(context: BodyContext, request: ResetJointStateRequest) -
     state = request.joint_state
     target = JointTarget(state.name, state.position, state.velocity, state.effort)
     positions = target.values_of("position", "the goal of a motion is a position")
-    result = _move(context, context.body.model.resolve_driven(target.names, positions), request.duration)
-    return Answer(result.success, result.message)
+    return Answer(*_move(context, context.body.model.resolve_driven(target.names, positions), request.duration))
 
 
 def move_to_initial_joint_state(context: BodyContext, request: ResetJointStateRequest) -> Answer:
@@ -31,8 +30,7 @@ def move_to_initial_joint_state(context: BodyContext, request: ResetJointStateRe
 
     The state in the request is not looked at.
     """
-    result = _move(context, context.body.start_positions(), request.duration)
-    return Answer(result.success, result.message)
+    return Answer(*_move(context, context.body.start_positions(), request.duration))
 
 
 def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> Answer:
@@ -47,9 +45,8 @@ def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> An
     result = _move(context, goal, request.duration)
     if not result.success:
         return Answer(False, result.message)
-    residual = residual_of_robot(context, request.problem)
-    message = f"{result.message}; {residual.in_words(request.problem.link_name)}"
-    return Answer(residual.is_near, message)
+    is_near, distance = arrival(context, request.problem)
+    return Answer(is_near, f"{result.message}; {distance}")
 
 
 def set_control_mode(context: BodyContext, request: SetStringRequest) -> Answer:

@@ -136,9 +136,6 @@ class TrajectoryAction:
 
     actionlib holds its lock while it calls back, and takes it to answer. So neither the simulation thread answers a
     goal nor a callback waits for the simulation thread: both leave what is to be done to a thread of the action's own.
-
-    Args:
-        context: The robot and the way to it.
     """
 
     def __init__(self, context: BodyContext) -> None:

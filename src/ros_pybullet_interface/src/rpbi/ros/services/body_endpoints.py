@@ -134,12 +134,7 @@ BODY_PARTS: tuple[Callable[[BodyContext], Callable[[], None] | None], ...] = (
 
 
 class BodyEndpoints:
-    """Opens services, topics and other parts of bodies, and closes them with the body.
-
-    Args:
-        simulation: The loop that runs the world.
-        ask: Reaches the simulation thread.
-    """
+    """Opens services, topics and other parts of bodies, and closes them with the body."""
 
     def __init__(self, simulation: Simulation, ask: Requests) -> None:
         self._simulation, self._ask = simulation, ask

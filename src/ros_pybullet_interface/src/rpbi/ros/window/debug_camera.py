@@ -18,11 +18,7 @@ HZ = 30.0
 
 
 class DebugCamera:
-    """Publishes where the window looks from while somebody listens.
-
-    Args:
-        window: The window, None if there is none; then what is asked is answered by that.
-    """
+    """Publishes where the window looks from while somebody listens; without a window, what is asked is refused."""
 
     def __init__(self, window: Window | None) -> None:
         self._window = window
@@ -37,11 +33,7 @@ class DebugCamera:
             self._publisher.publish(_message(self._window.camera()))
 
     def serve(self, ask: Requests) -> None:
-        """Opens the service that returns it and the topic that changes it.
-
-        Args:
-            ask: Reaches the simulation thread.
-        """
+        """Opens the service that returns it and the topic that changes it."""
         self._ask = ask
         serve(GET, self)
         subscribe(RESET, self)

@@ -23,11 +23,7 @@ WINDOW_TOPICS = (CAMERA, KEYBOARD, MOUSE, IMAGE, NUMBERS)
 
 
 class WindowTopics:
-    """Opens the topics of the window that the configuration asks for, and says so if there is no window.
-
-    Args:
-        world: The world.
-    """
+    """Opens the topics of the window that the configuration asks for, and says so if there is no window."""
 
     def __init__(self, world: World) -> None:
         self._camera = DebugCamera(world.window)
@@ -39,11 +35,7 @@ class WindowTopics:
             self.polls = (self._camera.poll, *_open(world.window, world.config, world.clock))
 
     def serve(self, ask: Requests) -> None:
-        """Opens what needs the simulation thread to answer.
-
-        Args:
-            ask: Reaches it.
-        """
+        """Opens what needs the simulation thread to answer."""
         self._camera.serve(ask)
 
 
