@@ -72,7 +72,7 @@ class Rendering:
             world.log,
             lambda: {name: body.body_id for name, body in world.bodies.items()},
             "frame_sink:FolderSink",
-            [f"--folder={folder}"],
+            ["--keep-priority", f"--folder={folder}"],  # what it draws is asked here, not who goes first
             use_egl,
         )
 
@@ -107,7 +107,7 @@ class Rendering:
         self.until(path.exists, f"{path.name} came")
         return np.load(path)
 
-    def until(self, condition: Callable[[], Any], what: str, timeout_s: float = 60.0) -> None:
+    def until(self, condition: Callable[[], Any], what: str, timeout_s: float = 120.0) -> None:
         """Looks after the process until a condition holds."""
         end_s = time.monotonic() + timeout_s
         while not condition():

@@ -11,7 +11,6 @@ import socket
 from custom_ros_tools.plugins import find
 
 from .channel import Channel
-from .priority import give_way
 from .process import RenderProcess, ReportHandler
 
 
@@ -22,8 +21,6 @@ def main() -> None:
     parser.add_argument("--sink", required=True, help="module:factory of what takes the frames")
     parser.add_argument("--keep-priority", action="store_true", help="do not give way to others, such as physics")
     arguments, _ = parser.parse_known_args()
-    if not arguments.keep_priority:
-        give_way()
     # Ctrl-C goes to the whole process group; the simulator decides when we end.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     channel = Channel(socket.socket(fileno=arguments.socket))
@@ -31,7 +28,7 @@ def main() -> None:
     logger.setLevel(logging.INFO)
     logger.propagate = False
     logger.addHandler(ReportHandler(channel))
-    RenderProcess(channel, find(arguments.sink)).run()
+    RenderProcess(channel, find(arguments.sink), not arguments.keep_priority).run()
 
 
 if __name__ == "__main__":

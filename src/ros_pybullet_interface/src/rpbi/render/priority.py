@@ -2,22 +2,24 @@
 
 import contextlib
 import os
+from pathlib import Path
 
 
 def give_way() -> None:
-    """Lets physics go first: what is idle gets only what nobody else needs."""
+    """Lets physics go before all threads of this process: what is idle gets only what nobody else needs."""
     try:
-        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+        _schedule(os.getpid(), os.SCHED_IDLE)
     except OSError:  # some containers do not allow it
         os.nice(19)
 
 
 def take_part(process_id: int) -> None:
-    """Lets an idle process run as others do, because somebody waits for it.
-
-    Args:
-        process_id: The process; it may be this one.
-    """
+    """Lets an idle process, which may be this one, run as others do, because somebody waits for it."""
     with contextlib.suppress(OSError):  # it may be gone, or this not allowed
-        for thread_id in os.listdir(f"/proc/{process_id}/task"):
-            os.sched_setscheduler(int(thread_id), os.SCHED_OTHER, os.sched_param(0))
+        _schedule(process_id, os.SCHED_OTHER)
+
+
+def _schedule(process_id: int, policy: int) -> None:
+    for thread in Path(f"/proc/{process_id}/task").iterdir():
+        with contextlib.suppress(ProcessLookupError):  # threads come and go
+            os.sched_setscheduler(int(thread.name), policy, os.sched_param(0))

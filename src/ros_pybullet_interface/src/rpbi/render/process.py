@@ -16,7 +16,7 @@ from .egl import EglError
 from .frame import NO_DEMAND, Camera, Demand, Frame, Sink
 from .messages import CameraAdded, CameraRemoved, Demanded, Ready, Report, Scene, SetUp, Shown, Taken, WorldChanged
 from .mirror import Mirror
-from .priority import take_part
+from .priority import give_way, take_part
 from .renderers import Renderer, open_renderer
 
 log = logging.getLogger(__name__)
@@ -30,11 +30,12 @@ At idle priority on a busy machine a lot may take long."""
 
 
 class RenderProcess:
-    """Does what the simulator tells until the simulator has gone."""
+    """Does what the simulator tells until the simulator has gone; once it is up, it gives way to others if told so."""
 
-    def __init__(self, channel: Channel, make_sink: Callable[[], Sink]) -> None:
+    def __init__(self, channel: Channel, make_sink: Callable[[], Sink], gives_way: bool) -> None:
         self._channel = channel
         self._make_sink = make_sink
+        self._gives_way = gives_way
         self._cameras: dict[str, Camera] = {}
         self._demands: dict[str, Demand] = {}
         self._looked_s = 0.0
@@ -71,6 +72,8 @@ class RenderProcess:
         self._mirror = Mirror(self._renderer.pb)
         self._channel.send(Ready(self._renderer.name))
         self._sink = self._make_sink()
+        if self._gives_way:  # not before: on a busy machine it would take minutes until it is up
+            give_way()
         for camera in message.cameras:
             self._add(camera)
 
