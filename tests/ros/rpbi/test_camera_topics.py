@@ -89,12 +89,14 @@ def test_viewer_that_comes_late_to_a_world_that_stands_still_gets_its_image_and_
     assert stamps_ns == sorted(set(stamps_ns))
 
 
-def test_killed_renderer_comes_back_and_no_joint_state_is_missing(ros, placed):
+def test_idle_renderer_that_is_killed_comes_back_and_no_joint_state_is_missing(ros, placed):
     colour = ros.listen(COLOUR, Image)
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     simulator = ros.simulator(world(ros), use_sim_time=True)
     colour.wait_for(3)
     (killed,) = renderers(simulator)
+    threads = [int(thread) for thread in os.listdir(f"/proc/{killed}/task")]
+    assert {os.sched_getscheduler(thread) for thread in threads} == {os.SCHED_IDLE}, "physics goes first"
     os.kill(killed, signal.SIGKILL)
     wait_until(lambda: renderers(simulator) not in ([], [killed]), "there is another renderer")
     before = len(colour.messages)
