@@ -310,6 +310,12 @@ def test_tasks_of_users_are_named_by_module_and_class(urdf):
     assert (positions["left_1"], positions["left_2"]) == pytest.approx((-0.1, -0.2), abs=2e-3)
 
 
+def test_what_a_task_of_a_user_refuses_is_told_with_its_place(urdf):
+    task = "{name: upright, type: 'level_task:Level', frame: left_hnd}"
+    with pytest.raises(ConfigError, match=r"costs\[0\]: unknown link 'left_hnd'.*; did you mean 'left_hand'"):
+        make(urdf, f"costs: [{task}]")
+
+
 @pytest.mark.parametrize(
     ("module", "library", "extra"),
     [("tasks", "pinocchio", "ik"), ("tasks", "daqp", "ik"), ("trajectory", "casadi", "mpc")],

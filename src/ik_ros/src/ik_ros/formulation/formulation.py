@@ -150,10 +150,8 @@ class TaskSet:
         for key, config in formulation.entries():
             if config.name in self.parts:
                 raise KeyedError(f"{key}.name", f"there is another task '{config.name}'")
-            try:
+            with blaming(key):
                 task = task_class(config.type)(config, self.robot)
-            except KeyedError as error:
-                raise KeyedError(f"{key}.{error.key}", error.message) from None
             self.parts[config.name] = Part(task, key.startswith("constraints"))
         self.main = self._main(formulation.main_task)
         if self.main is not None and not self.parts[self.main].is_hard:

@@ -38,9 +38,11 @@ class TaskConfig(ConfigModel):
 
 @contextmanager
 def blaming(key: str) -> Iterator[None]:
-    """Raises what is said of unknown names and wrong values as a `KeyedError` of an option."""
+    """Raises what is said of unknown names and wrong values as a `KeyedError` of an option, or of keys inside of it."""
     try:
         yield
+    except KeyedError as error:
+        raise KeyedError(f"{key}.{error.key}", error.message) from None
     except (UnknownNameError, ValueError) as error:
         raise KeyedError(key, str(error)) from None
 
