@@ -61,7 +61,7 @@ def test_problems_become_targets_that_reach(ros, solver):
 
 @pytest.mark.quick
 def test_problems_of_the_release_are_taken_on_the_same_topic_and_by_service(ros):
-    start_solver(ros, "trac_ik")
+    start_solver(ros, "trac_ik", timeout=5.0)
     targets = ros.listen("joint_states/target", JointState)
     pose = forward(BENT)
     translation = Vector3(pose.position.x, pose.position.y, pose.position.z)

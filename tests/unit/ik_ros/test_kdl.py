@@ -224,10 +224,10 @@ def test_a_mimic_that_makes_no_sense_is_named(tmp_path, mimic, message):
         planar_arm(tmp_path, more=LIMITED + mimic)
 
 
-@pytest.mark.parametrize("solver", ["trac_ik", "pybullet"])
+@pytest.mark.parametrize(("solver", "options"), [("trac_ik", {"timeout": 5.0}), ("pybullet", {})])
 @pytest.mark.parametrize("field", [{"position_tolerance": (0.0, 0.01, 0.0)}, {"rotation_tolerance": (0.0, 0.0, 1.0)}])
-def test_tolerances_are_refused_by_solvers_that_cannot_make_use_of_them(tmp_path, solver, field):
-    arm = planar_arm(tmp_path, solver=solver)
+def test_tolerances_are_refused_by_solvers_that_cannot_make_use_of_them(tmp_path, solver, options, field):
+    arm = planar_arm(tmp_path, solver=solver, **options)
     with pytest.raises(ValueError, match=f"{next(iter(field))}: '{solver}' takes none above .*solver 'kdl'"):
         arm.solve(IKProblem(target=Pose((0.3, 0.3, 0.0)), **field))
     small = IKProblem(
