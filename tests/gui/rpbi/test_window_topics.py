@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-import rospy
+from node_world import publishing
 from pybullet_window import SLOW_S, floating_ball, middle, mostly, open_window, window
 from ros_system import wait_until
 from rosgraph_msgs.msg import Log
@@ -79,6 +79,11 @@ def happened(listener):
     return [(each.key, each.state) for each in list(listener.messages) if each.state != HELD]
 
 
+def camera_orders():
+    """Returns the context of a publisher that tells the window's camera where to go."""
+    return publishing("/rpbi/reset_debug_visualizer_camera", ResetDebugVisualizerCamera)
+
+
 def present_camera(ros):
     """Returns the window's camera as numbers: distance, yaw, pitch, target."""
     camera = ros.call("/rpbi/get_debug_visualizer_camera", GetDebugVisualizerCamera).debug_visualizer_config
@@ -140,11 +145,10 @@ def test_mouse_tells_where_it_moves_and_what_its_buttons_do(screen, place, mouse
 def test_camera_goes_where_it_is_sent_and_tells_where_the_mouse_has_turned_it(ros, screen, place):
     told = ros.listen("/rpbi/debug_visualizer_camera", ResetDebugVisualizerCamera)
     told.wait_for(1, SLOW_S)
-    publisher = rospy.Publisher("/rpbi/reset_debug_visualizer_camera", ResetDebugVisualizerCamera, queue_size=1)
-    wait_until(publisher.get_num_connections, "the simulator listens")
     wanted = (2.5, 50.0, -30.0, 0.25, 0.0, 0.5)
-    publisher.publish(ResetDebugVisualizerCamera(*wanted[:3], wanted[3:]))
-    wait_until(lambda: present_camera(ros) == pytest.approx(wanted), "it looks from there", SLOW_S)
+    with camera_orders() as publisher:
+        publisher.publish(ResetDebugVisualizerCamera(*wanted[:3], wanted[3:]))
+        wait_until(lambda: present_camera(ros) == pytest.approx(wanted), "it looks from there", SLOW_S)
 
     move(screen, place, 240, 180)
     screen.run("xdotool", "keydown", "ctrl", "mousedown", "1")
@@ -172,24 +176,22 @@ def test_camera_goes_where_it_is_sent_and_tells_where_the_mouse_has_turned_it(ro
 def test_camera_that_makes_no_sense_is_refused_and_named(ros, place, values, complaint):
     before = present_camera(ros)
     logs = ros.listen("/rosout", Log)
-    publisher = rospy.Publisher("/rpbi/reset_debug_visualizer_camera", ResetDebugVisualizerCamera, queue_size=1)
-    wait_until(publisher.get_num_connections, "the simulator listens")
     wait_until(lambda: logs.is_connected, "the log is heard")
+    with camera_orders() as publisher:
 
-    def is_told():
-        publisher.publish(ResetDebugVisualizerCamera(*values))
-        time.sleep(0.2)
-        return any(f"message refused: {complaint}" in log.msg for log in logs.messages)
+        def is_told():
+            publisher.publish(ResetDebugVisualizerCamera(*values))
+            time.sleep(0.2)
+            return any(f"message refused: {complaint}" in log.msg for log in logs.messages)
 
-    wait_until(is_told, f"{complaint} is refused")
+        wait_until(is_told, f"{complaint} is refused")
     assert present_camera(ros) == before
 
 
 def test_images_show_what_the_window_shows(ros, screen, place):
-    publisher = rospy.Publisher("/rpbi/reset_debug_visualizer_camera", ResetDebugVisualizerCamera, queue_size=1)
-    wait_until(publisher.get_num_connections, "the simulator listens")
-    publisher.publish(ResetDebugVisualizerCamera(*CAMERA.values()))
-    wait_until(lambda: present_camera(ros)[0] == pytest.approx(2.0), "it looks from there", SLOW_S)
+    with camera_orders() as publisher:
+        publisher.publish(ResetDebugVisualizerCamera(*CAMERA.values()))
+        wait_until(lambda: present_camera(ros)[0] == pytest.approx(2.0), "it looks from there", SLOW_S)
     images = ros.listen("/rpbi/visualizer_image", Image)
     numbers = ros.listen("/rpbi/visualizer_image_int", Int64MultiArray)
     numbers.wait_for(2, SLOW_S)

@@ -24,7 +24,7 @@ LOGGING = "who logs something waits for a master that hangs"
 SENDERS = {
     "a publisher's implementation": (r"\bself\.impl\b", "self.inner"),
     "the list of connections": (r"\bself\.connections\b", "self.links"),
-    "the sockets of connections": (r"\bself\.socket\b", "self.wire"),
+    "the sockets of connections": (r"\b(self|conn)\.socket\b", r"\1.wire"),
     "no list of connections of its own": (
         r"new_connections = self\.connections\[:\]",
         "new_connections = self.connections",

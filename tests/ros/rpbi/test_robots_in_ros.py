@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import rospy
 import tf2_ros
-from node_world import add, main_config, objects, remove
+from node_world import add, main_config, objects, publishing, remove
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
 from worlds import iiwa
@@ -86,12 +86,11 @@ def test_two_worlds_share_a_master_and_a_tf_tree(ros, tmp_path):
             namespace=f"/{side}/",
         )
     assert objects(ros, "/left/") == objects(ros, "/right/") == {"iiwa": "robot"}
-    target = rospy.Publisher("/left/rpbi/iiwa/joint_states/target", JointState, queue_size=1)
-    wait_until(target.get_num_connections, "the left world listens")
-    target.publish(JointState(name=[FIRST], position=[0.5]))
     left = ros.listen("/left/rpbi/iiwa/joint_states", JointState)
     right = ros.listen("/right/rpbi/iiwa/joint_states", JointState)
-    wait_until(lambda: left.messages and left.messages[-1].position[0] > 0.45, "the left arm moves")
+    with publishing("/left/rpbi/iiwa/joint_states/target", JointState) as target:
+        target.publish(JointState(name=[FIRST], position=[0.5]))
+        wait_until(lambda: left.messages and left.messages[-1].position[0] > 0.45, "the left arm moves")
     assert abs(right.wait_for(1)[-1].position[0]) < 0.01, "the right arm does not"
     buffer = tf2_ros.Buffer(debug=False)
     tf2_ros.TransformListener(buffer)

@@ -11,6 +11,7 @@ import rosgraph
 import rospy
 import tf2_ros
 from geometry_msgs.msg import WrenchStamped
+from node_world import publishing
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -94,13 +95,12 @@ def test_panda_works_the_ros_way(ros, position):
     trajectory = JointTrajectory(joint_names=[f"panda_joint{i}" for i in range(1, 8)])
     goal = [0.4, *[start[name] for name in trajectory.joint_names[1:]]]
     trajectory.points = [JointTrajectoryPoint(positions=goal, time_from_start=rospy.Duration(1.0))]
-    command = rospy.Publisher("/rpbi/panda/joint_trajectory_controller/command", JointTrajectory, queue_size=1)
-    wait_until(command.get_num_connections, "the controller listens")
-    command.publish(trajectory)
-    wait_until(
-        lambda: abs(dict(zip(states.messages[-1].name, states.messages[-1].position))["panda_joint1"] - 0.4) < 0.01,
-        "it follows a trajectory",
-    )
+    with publishing("/rpbi/panda/joint_trajectory_controller/command", JointTrajectory) as command:
+        command.publish(trajectory)
+        wait_until(
+            lambda: abs(dict(zip(states.messages[-1].name, states.messages[-1].position))["panda_joint1"] - 0.4) < 0.01,
+            "it follows a trajectory",
+        )
 
 
 def test_panda_swings(ros):
