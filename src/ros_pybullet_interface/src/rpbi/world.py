@@ -79,7 +79,7 @@ class World:
 
     @classmethod
     def from_file(cls, path: str, **options: Any) -> World:
-        """Builds the world that a main YAML file describes.
+        """Builds the world that a main YAML file describes; the options are further arguments of the constructor.
 
         Raises:
             ConfigError: If anything in the file, or in a file that it names, is wrong; it tells all of it at once.

@@ -42,7 +42,7 @@ def as_pose(transform: Transform) -> Pose:
 
 
 class TransformTopic:
-    """Sends the transform from one frame to another to /tf with the present stamp; nothing while both stay the same.
+    """Sends the transform from one frame to another to /tf with the present stamp; nothing while neither has changed.
 
     While simulated time stands still, the same stamp again would make each listener warn of a repeated one. Who comes
     then gets the last one all the same, since the topic is latched.

@@ -43,7 +43,7 @@ class JointTask(Task):
         self.bounds = goal, goal
 
     def previous(self, problem: IKProblem, most: int) -> list[np.ndarray]:
-        """Returns k positions of each of a problem's previous solutions [rad or m], newest last, so many at most.
+        """Returns k positions of each of a problem's newest previous solutions [rad or m], the newest last.
 
         Raises:
             KeyedError: If one of them lacks one of the k joints; it names both.

@@ -114,7 +114,7 @@ class Task(ABC):
         """Returns what it wants, for one configuration."""
 
     def residual(self, beyond: np.ndarray) -> Residual:
-        """Returns how far off it is when its k numbers are that far outside their bounds; here all are lengths."""
+        """Returns how far off it is when its k numbers are so far off their bounds [m or rad]; here all are lengths."""
         return Residual(math.hypot(*beyond.tolist()), 0.0)
 
     def size(self, residual: Residual) -> float:

@@ -160,8 +160,9 @@ class SolverNode:
     def _solve_alone(self, read: Callable[[genpy.Message], IKProblem], message: genpy.Message) -> IKSolution:
         """Returns the answer of the solver itself, with neither start nor targets of the problems on the topic."""
         try:
+            problem = read(message)
             with self._solving:
-                return self._solver.solve(self._base.with_poses_in_it(read(message), message.header.frame_id))
+                return self._solver.solve(self._base.with_poses_in_it(problem, message.header.frame_id))
         except (InterfaceError, ValueError) as error:
             return IKSolution(False, str(error), (), ())
 

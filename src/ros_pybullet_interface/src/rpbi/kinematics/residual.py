@@ -25,7 +25,7 @@ class Residual(NamedTuple):
         return max(self.position_m / POSITION_TOLERANCE_M, self.orientation_rad / ORIENTATION_TOLERANCE_RAD)
 
     def in_words(self, link: str, has_orientation: bool, target: str = "its target") -> str:
-        """Returns whether a link has reached a target, with an orientation or any, and how far off it is."""
+        """Returns whether a link has reached a target, maybe of its orientation too, and how far off it is."""
         angle = f" and {self.orientation_rad:.3g} rad" if has_orientation else ""
         if self.size <= 1.0:
             return f"'{link}' is within {self.position_m * 1e3:.3g} mm{angle} of {target}"

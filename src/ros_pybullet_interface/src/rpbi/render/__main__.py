@@ -28,7 +28,7 @@ def main() -> None:
     logger.setLevel(logging.INFO)
     logger.propagate = False
     logger.addHandler(ReportHandler(channel))
-    RenderProcess(channel, find(arguments.sink), not arguments.keep_priority).run()
+    RenderProcess(channel, lambda: find(arguments.sink)(), not arguments.keep_priority).run()
 
 
 if __name__ == "__main__":

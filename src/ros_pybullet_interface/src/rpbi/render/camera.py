@@ -82,10 +82,10 @@ def camera_matrix(projection: Array, width_px: int, height_px: int) -> Array:
 
 def view_matrix(camera: Pose) -> Array:
     """Returns the 4x4 matrix from the world to the eye frame, of the pose of an optical frame in the world."""
-    position, quat_xyzw = camera.inverse()
+    rotation = np.reshape(pybullet.getMatrixFromQuaternion(camera.quat_xyzw), (3, 3))
     optical_from_world = np.eye(4)
-    optical_from_world[:3, :3] = np.reshape(pybullet.getMatrixFromQuaternion(quat_xyzw), (3, 3))
-    optical_from_world[:3, 3] = position
+    optical_from_world[:3, :3] = rotation.T
+    optical_from_world[:3, 3] = -rotation.T @ np.asarray(camera.position)
     return OPTICAL_TO_EYE @ optical_from_world
 
 

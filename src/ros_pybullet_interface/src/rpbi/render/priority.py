@@ -2,24 +2,27 @@
 
 import contextlib
 import os
-from pathlib import Path
 
 
 def give_way() -> None:
     """Lets physics go before all threads of this process: what is idle gets only what nobody else needs."""
-    try:
-        _schedule(os.getpid(), os.SCHED_IDLE)
-    except OSError:  # some containers do not allow it
-        os.nice(19)
+    for thread_id in _threads(os.getpid()):
+        with contextlib.suppress(ProcessLookupError):
+            try:
+                os.sched_setscheduler(thread_id, os.SCHED_IDLE, os.sched_param(0))
+            except PermissionError:  # some containers do not allow it
+                os.setpriority(os.PRIO_PROCESS, thread_id, 19)
 
 
 def take_part(process_id: int) -> None:
     """Lets an idle process, which may be this one, run as others do, because somebody waits for it."""
-    with contextlib.suppress(OSError):  # it may be gone, or this not allowed
-        _schedule(process_id, os.SCHED_OTHER)
+    for thread_id in _threads(process_id):
+        with contextlib.suppress(OSError):  # it may be gone, or this not allowed
+            os.sched_setscheduler(thread_id, os.SCHED_OTHER, os.sched_param(0))
 
 
-def _schedule(process_id: int, policy: int) -> None:
-    for thread in Path(f"/proc/{process_id}/task").iterdir():
-        with contextlib.suppress(ProcessLookupError):  # threads come and go
-            os.sched_setscheduler(int(thread.name), policy, os.sched_param(0))
+def _threads(process_id: int) -> list[int]:
+    """Returns the threads of a process, none if it is gone."""
+    with contextlib.suppress(OSError):
+        return [int(name) for name in os.listdir(f"/proc/{process_id}/task")]
+    return []

@@ -56,7 +56,11 @@ class RenderProcess:
         try:
             while not self._channel.closed and os.getppid() == self._parent:
                 faulthandler.dump_traceback_later(STUCK_AFTER_S, exit=True)
-                for message in self._channel.receive():
+                messages = self._channel.receive()
+                if self._gives_way and self._sink is not None and not self._channel.closed:
+                    give_way()  # not before it is up: on a busy machine that would take minutes
+                    self._gives_way = False
+                for message in messages:
                     self._do[type(message)](message)
                 self._send_demands()
                 self._channel.flush()
@@ -72,14 +76,13 @@ class RenderProcess:
         self._mirror = Mirror(self._renderer.pb)
         self._channel.send(Ready(self._renderer.name))
         self._sink = self._make_sink()
-        if self._gives_way:  # not before: on a busy machine it would take minutes until it is up
-            give_way()
         for camera in message.cameras:
             self._add(camera)
 
     def _add(self, camera: Camera) -> None:
         assert self._renderer is not None and self._sink is not None
         if camera.synchronous:  # physics waits for it, so it has nobody to give way to
+            self._gives_way = False
             take_part(os.getpid())
         try:
             self._renderer.make_room(camera.intrinsics)

@@ -25,6 +25,8 @@ class ForceTorqueSensor(Sensor):
     with them added it is still wrong, see docs/force_torque.md. So the wrench is what changed the momentum of all links
     below the joint during the last tick, less their weight and less the contact forces on them (Newton-Euler, as an
     impulse balance). That holds for all types of joints, control modes and limits.
+
+    It is read at `default_hz` unless its part of the robot's YAML, the configuration, has a rate.
     """
 
     Config = ForceTorqueConfig

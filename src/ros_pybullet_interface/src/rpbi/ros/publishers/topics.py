@@ -16,8 +16,8 @@ class StateTopic(rospy.SubscribeListener):
     """A topic whose last message can be given to subscribers that come while the world stands still.
 
     A stopped world in simulated time has nothing new, and the same again would repeat stamps; so who comes late is
-    served alone. One thread at a time publishes and serves. With `queue_size` None, publishing waits until each
-    subscriber has taken its message.
+    served alone. One thread at a time publishes and serves. Of `queue_size` messages kept for
+    each subscriber the oldest are dropped; with None, publishing waits until each has taken its message.
     """
 
     def __init__(self, topic: str, message_type: type, queue_size: int | None = QUEUE_SIZE) -> None:
