@@ -91,7 +91,11 @@ class Mouse:
 
 @pytest.fixture(scope="module")
 def mouse(example, screen):
-    return Mouse(screen)
+    try:
+        return Mouse(screen)
+    except TimeoutError as error:
+        said = [example.output(process)[-3000:] for process in example.processes]
+        raise TimeoutError("\n".join([str(error), *map(str, screen.windows()), *said])) from None
 
 
 @pytest.mark.parametrize("way", [(0.0, 0.0, 0.1), (-0.08, 0.0, 0.0)], ids=["up", "away"])
