@@ -17,7 +17,7 @@ from std_msgs.msg import Int64
 NODES = {"simulator": "/ros_pybullet_interface", "camera": "/ros_pybullet_interface_camera"}
 TARGET_HZ = 50.0
 WARM_UP_SHARE = 0.1
-"""Share of the time after which memory counts; buffers fill and caches grow before."""
+"""Share of the time after which memory and handles count; buffers fill and caches grow before."""
 
 
 class Count:
@@ -58,20 +58,22 @@ def main() -> None:
     processes = {name: process_of(node) for name, node in NODES.items()}
     held: dict[str, list[float]] = {name: [] for name in processes}
     time.sleep(WARM_UP_SHARE * arguments.seconds)
-    handles_before = sum(map(handles, processes.values()))
+    handle_counts: list[float] = []
     for count in counts.values():
         count.restart()
     start_s = time.monotonic()
     while time.monotonic() - start_s < arguments.seconds:
         for name, process_id in processes.items():
             held[name].append(memory_mb(process_id))
+        handle_counts.append(sum(map(handles, processes.values())))
         time.sleep(min(1.0, arguments.seconds / 100))
     wall_s = time.monotonic() - start_s
+    first, last = _ends(handle_counts)
     found = {
         "wall_s": wall_s,
         "memory_mb": {name: statistics.median(values) for name, values in held.items()},
         "growth": {name: _growth(values) for name, values in held.items()},
-        "new_handles": sum(map(handles, processes.values())) - handles_before,
+        "new_handles": last - first,  # a call to the master takes one for a moment, once a second
         **{name: count.number for name, count in counts.items()},
         "longest_gaps_s": {name: count.longest_gap_s for name, count in counts.items()},
     }
@@ -85,10 +87,15 @@ def _control(robot: str, joint: str) -> None:
         time.sleep(1.0 / TARGET_HZ)
 
 
+def _ends(values: list[float]) -> tuple[float, float]:
+    """Returns the medians of the first and of the last tenth."""
+    tenth = max(1, len(values) // 10)
+    return statistics.median(values[:tenth]), statistics.median(values[-tenth:])
+
+
 def _growth(values: list[float]) -> float:
     """Returns how much the last tenth is above the first, as a share of the first."""
-    tenth = max(1, len(values) // 10)
-    first, last = statistics.median(values[:tenth]), statistics.median(values[-tenth:])
+    first, last = _ends(values)
     return last / first - 1.0
 
 

@@ -59,7 +59,7 @@ class Mouse:
 
     def __init__(self, screen):
         self._screen = screen
-        self._window = wait_until(lambda: find_view(screen), "RViz is open", SLOW_S)
+        self._window = wait_until(lambda: find_view(screen), "RViz is open", SLOW_S, every_s=0.5)
         self._view = RvizView(CONFIG_FILE, self._window.width, self._window.height)
 
     def drag(self, start, end):
