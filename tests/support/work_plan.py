@@ -44,7 +44,7 @@ def _is_quick(item: pytest.Item) -> bool:
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     """Returns how many workers `-n auto` means: one more than processors, since tests of ROS often wait."""
-    files = [argument.split("::")[0] for argument in config.args]
+    files = [argument.split("::")[0] for argument in getattr(config, "args", ())]
     wanted = (os.cpu_count() or 1) + 1
     if all(Path(file).is_file() for file in files):
         wanted = min(wanted, len(set(files)))

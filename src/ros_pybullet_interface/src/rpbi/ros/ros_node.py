@@ -4,6 +4,7 @@ from typing import Any
 
 import rospy
 
+from custom_ros_tools.ros.lifecycle.run_node import leave_ros_on_signals
 from custom_ros_tools.tf import TfInterface
 
 
@@ -17,7 +18,8 @@ class RosNode:
     """
 
     def __init__(self, name: str) -> None:
-        rospy.init_node(name)
+        rospy.init_node(name, disable_signals=True)
+        leave_ros_on_signals()
         self.tf = TfInterface()
 
     def __getattr__(self, name: str) -> Any:

@@ -6,6 +6,7 @@ blocked (see `custom_ros_tools.ros.node`), and is waited for where it is safe to
 inherit the block, which leaves their end to this process.
 """
 
+import atexit
 import contextlib
 import logging
 import os
@@ -114,6 +115,28 @@ def _leaving_ros_on_interrupt() -> Iterator[None]:
     finally:
         _interrupt()
         thread.join(LONGEST_FAREWELL_S)
+
+
+def leave_ros_on_signals() -> None:
+    """Shuts ROS down on SIGINT or SIGTERM in a thread of its own, for a script that `run_node` does not run.
+
+    Call it in the main thread, after `rospy.init_node(..., disable_signals=True)`.
+    """
+    reading, writing = os.pipe()
+
+    def wait_and_leave() -> None:
+        os.read(reading, 1)
+        rospy.signal_shutdown("interrupted, or at its end")
+
+    def leave() -> None:
+        os.write(writing, b".")
+        thread.join(LONGEST_FAREWELL_S)
+
+    thread = threading.Thread(target=wait_and_leave, name="interrupts", daemon=True)
+    thread.start()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: os.write(writing, b"."))  # all that is safe wherever the script happens to be
+    atexit.register(leave)
 
 
 def _interrupt() -> None:
