@@ -1,4 +1,6 @@
-"""Drives the joints of one robot: its motors, and the motion that sets their targets."""
+"""Drives the joints of one robot: its motors, and the targets or the motion that they follow."""
+
+from collections.abc import Iterable
 
 import pybullet
 
@@ -6,18 +8,32 @@ from rpbi.engine.client import Client
 from rpbi.urdf.joints import JointModel
 
 from .motion import JointMotion, Motion
-from .motors import Motors
+from .motors import Command, Motors
+from .target_stream import TargetStreams
 
 
 class JointDrive:
-    """Runs at most one motion of a robot at a time; a newer one replaces it.
+    """Follows targets, and runs at most one motion of a robot at a time; a newer one replaces it.
+
+    Args:
+        interpolation: What moves joints from one position target of a stream to the next: `hold`, `linear` or `smooth`.
+        buffer_s: Longest delay of targets to even out how late they come [s].
 
     Attributes:
         dt_s: Length of a tick [s].
         motion: The motion that runs, if any.
     """
 
-    def __init__(self, name: str, pb: Client, body_id: int, model: JointModel, motors: Motors) -> None:
+    def __init__(
+        self,
+        name: str,
+        pb: Client,
+        body_id: int,
+        model: JointModel,
+        motors: Motors,
+        interpolation: str,
+        buffer_s: float,
+    ) -> None:
         self.name = name
         self.model = model
         self.motors = motors
@@ -25,6 +41,23 @@ class JointDrive:
         self.motion: Motion | None = None
         self._pb, self._body_id = pb, body_id
         self._has_begun = False
+        self._interpolates = interpolation != "hold"
+        self._streams = TargetStreams(motors, self.dt_s, interpolation == "smooth", buffer_s)
+
+    def follow(self, commands: Iterable[Command]) -> None:
+        """Follows targets from now on, unless the control mode has changed since they were checked."""
+        if self._interpolates and self.motors.mode == pybullet.POSITION_CONTROL:
+            self._streams.follow(commands)
+        else:
+            for command in commands:
+                self.motors.follow(command)
+
+    def drop_targets(self, joints: Iterable[int] | None = None) -> None:
+        """Forgets the streams of targets of joints, or all targets."""
+        if joints is None:
+            self._streams.clear()
+        else:
+            self._streams.drop(joints)
 
     def measured(self) -> JointMotion:
         """Returns measured position [rad or m] and velocity [rad/s or m/s] of each driven joint by index."""
@@ -41,6 +74,7 @@ class JointDrive:
         if self.motors.mode == pybullet.TORQUE_CONTROL:
             raise ValueError("the robot is under TORQUE_CONTROL, where nothing holds it to a position")
         self.halt("a newer motion replaced it")
+        self._streams.drop(motion.joints)
         self.motion, self._has_begun = motion, False
 
     def halt(self, reason: str) -> None:
@@ -53,8 +87,9 @@ class JointDrive:
             self._end(self.motion)
 
     def advance(self, tick: int) -> None:
-        """Sets the motors to where the motion is to be after this tick; does nothing without a motion."""
+        """Sets the motors to where targets and motion are to be after this tick."""
         motion = self.motion
+        self._streams.advance(tick, frozenset() if motion is None else motion.joints)
         if motion is None:
             return
         measured = self.measured()

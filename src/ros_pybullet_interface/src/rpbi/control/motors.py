@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import math
 import time
@@ -46,6 +47,8 @@ QUANTITIES = {
     pybullet.TORQUE_CONTROL: "effort",
 }
 """What a target is in each control mode."""
+MOST_WAITING = 100
+"""Targets that wait for one tick."""
 MODE_NAMES = {getattr(pybullet, name): name for name in ("POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL")}
 
 
@@ -55,14 +58,25 @@ class Command(NamedTuple):
     Attributes:
         mode: The control mode.
         values: Positions, velocities or efforts by joint index.
+        velocities: With positions, the velocities to have there, for the same joints; empty if they are not given.
+        stamp_ns: When it was sent, by the sender's clock [ns], 0 if that is not known.
     """
 
     mode: int
     values: dict[int, float]
+    velocities: Mapping[int, float] = {}
+    stamp_ns: int = 0
 
     def merged(self, newer: Command) -> Command:
         """Returns both as one: the newer one wins joint by joint, or as a whole if the mode changed between them."""
-        return Command(self.mode, self.values | newer.values) if self.mode == newer.mode else newer
+        return newer._replace(values=self.values | newer.values, velocities={}) if self.mode == newer.mode else newer
+
+
+def joined(older: tuple[Command, ...], newer: tuple[Command, ...]) -> tuple[Command, ...]:
+    """Returns the commands of both, the last ones merged if there are too many."""
+    if len(older) < MOST_WAITING:
+        return older + newer
+    return (*older[:-1], older[-1].merged(*newer))
 
 
 class Motors:
@@ -130,18 +144,29 @@ class Motors:
         """
         mode = self.mode
         values = target.values_of(QUANTITIES[mode], f"the robot is under {MODE_NAMES[mode]}")
-        return Command(mode, self._model.resolve(target.names, values))
+        resolved = self._model.resolve(target.names, values)
+        velocities: Mapping[int, float] = {}
+        if mode == pybullet.POSITION_CONTROL and len(target.velocity) == len(target.names):
+            with contextlib.suppress(ValueError):  # they are an aid: without them the positions are followed
+                velocities = self._model.resolve(target.names, target.velocity)
+        return Command(mode, resolved, velocities, target.stamp_ns)
 
     def follow(self, command: Command) -> None:
         """Follows a target from now on, unless the control mode has changed since it was checked."""
         if command.mode != self.mode:
             return
         for index, value in command.values.items():
-            self.targets[index] = value = self._limited(index, value)
+            self.targets[index] = value = self.limited(index, value)
             if self.mode != pybullet.POSITION_CONTROL:
                 self._renewed.add(index)
             if self.mode != pybullet.TORQUE_CONTROL:
                 self._drive(index, value)
+
+    def hold(self, positions: Mapping[int, float]) -> None:
+        """Holds joints by index at positions [rad or m], which are within their limits."""
+        for index, position in positions.items():
+            self.targets[index] = position
+            self._drive(index, position)
 
     def track(self, index: int, position: float, velocity: float) -> None:
         """Sets a joint's position [rad or m] and velocity [rad/s or m/s] at the coming tick, in any control mode.
@@ -189,7 +214,7 @@ class Motors:
             self._expire(tick)
         if self.mode == pybullet.TORQUE_CONTROL and self._indices:
             efforts = [
-                self._limited(index, self.targets[index] + feed_forward.get(index, 0.0)) for index in self._indices
+                self.limited(index, self.targets[index] + feed_forward.get(index, 0.0)) for index in self._indices
             ]
             self._pb.setJointMotorControlArray(self._body_id, self._indices, pybullet.TORQUE_CONTROL, forces=efforts)
             self.applied_efforts = dict(zip(self._indices, efforts))
@@ -201,7 +226,7 @@ class Motors:
             if self.mode == pybullet.VELOCITY_CONTROL:
                 self._drive(index, 0.0)
 
-    def _limited(self, index: int, value: float) -> float:
+    def limited(self, index: int, value: float) -> float:
         """Returns a position, velocity or effort within what the joint can do."""
         joint = self._model.joints[index]
         if self.mode == pybullet.POSITION_CONTROL:

@@ -21,7 +21,7 @@ from .tf_follower import TfFollower, refusal
 
 def _joint_target(message: JointState) -> JointTarget:
     """Returns all that a message has; which of it counts is up to the robot's control mode."""
-    return JointTarget(message.name, message.position, message.velocity, message.effort)
+    return JointTarget(message.name, message.position, message.velocity, message.effort, message.header.stamp.to_nsec())
 
 
 def _twist(message: geometry_msgs.msg.Twist) -> Twist:

@@ -14,6 +14,7 @@ from rpbi.engine.client import Client
 
 _TYPES = ("JOINT_REVOLUTE", "JOINT_PRISMATIC", "JOINT_SPHERICAL", "JOINT_PLANAR", "JOINT_FIXED")
 _TYPE_NAMES = {getattr(pybullet, name): name for name in _TYPES}
+QUANTITIES = ("position", "velocity", "effort")
 LARGEST = 1e9
 """Positions, velocities and efforts beyond this are no use to anybody, and would not stay finite."""
 LIMIT_ROUNDING = 1e-6
@@ -111,12 +112,14 @@ class JointTarget(NamedTuple):
         position: n positions [rad or m], or none.
         velocity: n velocities [rad/s or m/s], or none.
         effort: n torques or forces [N m or N], or none.
+        stamp_ns: When it was sent, by the sender's clock [ns], 0 if that is not known.
     """
 
     names: Sequence[str]
     position: Sequence[float] = ()
     velocity: Sequence[float] = ()
     effort: Sequence[float] = ()
+    stamp_ns: int = 0
 
     def values_of(self, quantity: str, reason: str) -> Sequence[float]:
         """Returns the values of one quantity.
@@ -130,7 +133,7 @@ class JointTarget(NamedTuple):
         """
         values: Sequence[float] = getattr(self, quantity)
         if not values and self.names:
-            given = " and ".join(each for each in self._fields[1:] if getattr(self, each)) or "no values"
+            given = " and ".join(each for each in QUANTITIES if getattr(self, each)) or "no values"
             raise WrongQuantityError(f"expected {quantity}, since {reason}; got {given}")
         return values
 

@@ -9,7 +9,7 @@ import pybullet
 from custom_ros_tools.errors import Problem
 from rpbi.control.gravity import GravityModel
 from rpbi.control.joint_drive import JointDrive
-from rpbi.control.motors import Command, LimitReports, Motors
+from rpbi.control.motors import Command, LimitReports, Motors, joined
 from rpbi.control.trajectories.config import trajectory_problems
 from rpbi.control.trajectories.follower import TrajectoryFollower
 from rpbi.engine.client import Client
@@ -59,7 +59,15 @@ class Robot(JointedBody):
             config.enforce_effort_limits,
             config.target_timeout_s,
         )
-        self.drive = JointDrive(self.name, pb, self.body_id, self.model, self.motors)
+        self.drive = JointDrive(
+            self.name,
+            pb,
+            self.body_id,
+            self.model,
+            self.motors,
+            config.target_interpolation,
+            config.target_buffer_s,
+        )
         self.force_torque_sensors = tuple(
             ForceTorqueSensor(self, self.model[each.joint], each, config.joint_state_publisher_hz)
             for each in config.enabled_joint_force_torque_sensors
@@ -83,7 +91,7 @@ class Robot(JointedBody):
 
     def inputs(self) -> Mapping[str, Input]:
         """Takes `target`, a JointTarget of what the control mode asks for, beside the pose of its base."""
-        target = Input(self._check_target, self.motors.follow, merge=Command.merged)
+        target = Input(self._check_target, self.drive.follow, merge=joined)
         return {**super().inputs(), "target": target}
 
     def before_step(self, tick: int) -> None:
@@ -107,13 +115,16 @@ class Robot(JointedBody):
         """Changes PyBullet's control mode, if it is another one; a motion that runs is ended."""
         if mode != self.motors.mode:
             self.halt("the control mode was changed")
+            self.drive.drop_targets()
             self.motors.switch(mode)
 
     def set_joint_state(self, target: JointTarget) -> None:
         """Puts joints somewhere at once, where the motors then hold them; a motion that runs is ended."""
         super().set_joint_state(target)
         self.halt("its joints were put elsewhere")
-        self.motors.rest(self.model.resolve(target.names, target.position))
+        positions = self.model.resolve(target.names, target.position)
+        self.drive.drop_targets(positions)
+        self.motors.rest(positions)
 
     def teleport(self, pose: Pose) -> None:
         """Puts the base link's URDF frame at a pose in the world, at rest; a motion that runs is ended."""
@@ -133,13 +144,13 @@ class Robot(JointedBody):
             self._gravity.close()
         super().remove()
 
-    def _check_target(self, target: JointTarget) -> Command:
+    def _check_target(self, target: JointTarget) -> tuple[Command]:
         command = self.motors.check(target)
         motion = self.drive.motion
         driven = [] if motion is None else [self.model.joints[i].name for i in command.values if i in motion.joints]
         if driven:
             raise ValueError(f"a motion drives {', '.join(driven)} until it ends")
-        return command
+        return (command,)
 
     def _gains(self) -> dict[int, dict[str, float]]:
         """Returns PyBullet's gains by joint index; what does not fit was found before."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from custom_ros_tools.schema import Hz, HzOrOff, KeyedError, ListOf, Seconds, Switch
+from custom_ros_tools.schema import Hz, HzOrOff, KeyedError, ListOf, NonNegative, Seconds, Switch
 from rpbi.bodies.body_config import BodyConfig
 from rpbi.config.pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity, SetJointMotorControlArray
 from rpbi.config.sensors import ContactsConfig, ForceTorqueEntry
@@ -42,6 +44,17 @@ class RobotConfig(BodyConfig):
     )
     target_timeout_s: Seconds = Field(
         0.5, description="Age at which velocity and torque targets expire, in the world's time; positions never do."
+    )
+    target_interpolation: Literal["hold", "linear", "smooth"] = Field(
+        "smooth",
+        description="How it moves from one position target of a stream to the next: at once, at constant velocity, or "
+        "with rounded corners.",
+    )
+    target_buffer_s: NonNegative = Field(
+        0.01,
+        description="Longest delay of position targets of a stream, which evens out how late they come by their "
+        "stamps; 0 is none.",
+        json_schema_extra={"unit": "s"},
     )
     enforce_effort_limits: Switch = Field(True, description="Whether motors are held to the efforts of the URDF.")
     gravity_compensation: Switch = Field(

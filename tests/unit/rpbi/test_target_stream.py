@@ -1,0 +1,151 @@
+"""Streams of position targets: when they are played, and what is between them."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+
+import pytest
+
+from rpbi.control.target_stream import Arrivals, TargetStream
+
+DT_S = 0.002
+PERIOD = 10
+"""Of the streams here [ticks]."""
+
+
+def stamp_ns(tick: float) -> int:
+    return round((1.0 + tick * DT_S) * 1e9)
+
+
+def play(
+    targets: Sequence[tuple[int, float, int]],
+    ticks: int,
+    *,
+    smooth: bool = True,
+    buffer_s: float = 0.01,
+    velocities: Sequence[float] | None = None,
+) -> list[float]:
+    """Returns the set point after each tick of a joint at 0 that gets targets: tick, position, stamp."""
+    stream = TargetStream(Arrivals(DT_S, buffer_s), {0: 0.0}, smooth)
+    waiting = list(enumerate(targets))
+    positions = []
+    for tick in range(ticks):
+        while waiting and waiting[0][1][0] <= tick:
+            number, (_, position, stamp) = waiting.pop(0)
+            slopes = {} if velocities is None else {0: velocities[number] * DT_S}
+            stream.take(tick, {0: position}, slopes, stamp)
+        positions.append(stream.advance(tick + 1.0)[0])
+    return positions
+
+
+def largest_change_of_velocity(positions: Sequence[float]) -> float:
+    """Returns the largest second difference, over the tick squared [rad/s^2]."""
+    triples = zip(positions, positions[1:], positions[2:])
+    return max(abs(a - 2.0 * b + c) for a, b, c in triples) / DT_S**2
+
+
+def test_a_single_target_acts_at_the_next_tick():
+    assert play([(5, 0.7, 0)], 8) == [0.0] * 5 + [0.7] * 3
+
+
+def test_targets_far_apart_act_at_once():
+    far = round(0.25 / DT_S)
+    positions = play([(0, 0.1, 0), (far, 0.5, 0), (2 * far, 0.2, 0)], 2 * far + 1)
+    assert set(positions) == {0.1, 0.5, 0.2}
+    assert positions[far] == 0.5
+
+
+def test_a_regular_stream_is_a_quadratic_b_spline():
+    knots = [0.0, 0.0, 0.3, -0.2, 0.5, 0.4]
+    positions = play([(number * PERIOD, knot, 0) for number, knot in enumerate(knots)], len(knots) * PERIOD)
+    for number in range(2, len(knots)):
+        before, at, after = knots[number - 2 : number + 1]
+        for tick in range(PERIOD):
+            u = (tick + 1) / PERIOD
+            expected = 0.5 * (1 - u) ** 2 * before + (0.5 + u - u * u) * at + 0.5 * u * u * after
+            assert positions[number * PERIOD + tick] == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("smooth", [True, False], ids=["smooth", "linear"])
+@pytest.mark.parametrize("seed", range(20))
+def test_whatever_comes_when_it_never_leaves_the_hull_and_ends_at_the_last_target(seed, smooth):
+    rng = random.Random(seed)
+    targets, tick, sent = [], 0, 0.0
+    for _ in range(80):
+        tick += rng.choice((0, 1, 3, 9, 10, 11, 30, 120))
+        sent = max(sent + rng.uniform(-1.0, 20.0), tick - 15.0)
+        targets.append((tick, rng.uniform(-1.0, 1.0), rng.choice((0, stamp_ns(sent), 17))))
+    positions = play(targets, tick + 300, smooth=smooth)
+    low = high = 0.0
+    waiting = list(targets)
+    for now, position in enumerate(positions):
+        while waiting and waiting[0][0] <= now:
+            low, high = min(low, waiting[0][1]), max(high, waiting[0][1])
+            waiting.pop(0)
+        assert low - 1e-12 <= position <= high + 1e-12
+    assert positions[-1] == targets[-1][1]
+
+
+def delayed(rng: random.Random, count: int) -> list[tuple[int, float, int]]:
+    """Returns targets of constant velocity, some of which come up to four ticks too late."""
+    return [
+        (number * PERIOD + rng.choice((0, 0, 0, 1, 4)), 0.03 * number, stamp_ns(number * PERIOD))
+        for number in range(count)
+    ]
+
+
+def test_stamps_even_out_what_comes_late():
+    targets = delayed(random.Random(3), 80)
+    start = 40 * PERIOD
+    evened = play(targets, 80 * PERIOD)[start:]
+    as_they_come = play([(tick, position, 0) for tick, position, _ in targets], 80 * PERIOD)[start:]
+    without_buffer = play(targets, 80 * PERIOD, buffer_s=0.0)[start:]
+    assert largest_change_of_velocity(evened) < 1e-6
+    assert largest_change_of_velocity(as_they_come) > 5.0
+    assert largest_change_of_velocity(without_buffer) > 5.0
+
+
+def test_the_buffer_is_the_longest_delay():
+    """A single target that is far too late does not delay all that follow by as much."""
+    targets = [(number * PERIOD, 0.03 * number, stamp_ns(number * PERIOD)) for number in range(40)]
+    late = targets.copy()
+    late[20] = (targets[21][0] - 1, *targets[20][1:])
+    expected, positions = (play(each, 40 * PERIOD, buffer_s=0.004) for each in (targets, late))
+    lag_ticks = (expected[-1] - positions[-1]) / (0.03 / PERIOD)
+    assert lag_ticks == pytest.approx(0.004 / DT_S, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "stamp",
+    [lambda n: 0, lambda n: stamp_ns(0), lambda n: stamp_ns(-n * PERIOD), lambda n: stamp_ns(3 * n * PERIOD)],
+    ids=["none", "the same", "backwards", "another clock"],
+)
+def test_stamps_that_make_no_sense_do_not_count(stamp):
+    ticks = 60 * PERIOD
+    expected = play([(n * PERIOD, 0.03 * n, stamp_ns(n * PERIOD)) for n in range(60)], ticks)
+    positions = play([(n * PERIOD, 0.03 * n, stamp(n)) for n in range(60)], ticks)
+    assert positions[-PERIOD:] == pytest.approx(expected[-PERIOD:], abs=1e-9)
+
+
+def test_targets_at_every_tick_are_not_delayed():
+    positions = play([(tick, 0.01 * tick, 0) for tick in range(50)], 50)
+    assert positions == [0.01 * tick for tick in range(50)]
+
+
+def test_velocities_make_it_a_cubic_that_lags_by_one_period():
+    def position(tick: float) -> float:
+        return 1e-8 * tick**3 - 2e-6 * tick**2 + 1e-4 * tick
+
+    def velocity(tick: float) -> float:
+        return (3e-8 * tick**2 - 4e-6 * tick + 1e-4) / DT_S
+
+    ticks = [number * PERIOD for number in range(20)]
+    positions = play([(tick, position(tick), 0) for tick in ticks], 200, velocities=[velocity(tick) for tick in ticks])
+    for tick in range(2 * PERIOD, 200):
+        assert positions[tick] == pytest.approx(position(tick + 1 - PERIOD), abs=1e-12)
+
+
+def test_velocities_that_do_not_fit_do_not_count():
+    targets = [(number * PERIOD, 0.03 * number, 0) for number in range(20)]
+    assert play(targets, 250, velocities=[0.0] * 20) == play(targets, 250)
