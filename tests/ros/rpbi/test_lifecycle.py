@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 import rospy
 import yaml
+from camera_world import renderers
 from node_world import Rosout, add, main_config, registrations, remove
 from ros_system import wait_until
 from std_msgs.msg import Int64
@@ -79,6 +80,14 @@ def test_ctrl_c_in_every_state(ros, tmp_path, state, simulated):
     process = ros.simulator(_config(tmp_path, **STATES[state]), use_sim_time=simulated)
     if state == "with a camera":
         wait_until(lambda: registrations(f"{NODE}_camera"), "the camera is up")
+    _interrupt(ros, process)
+
+
+def test_a_camera_that_hangs_is_killed_and_leaves_no_registrations(ros, tmp_path):
+    process = ros.simulator(_config(tmp_path, rgbd_sensor=CAMERA))
+    wait_until(lambda: registrations(f"{NODE}_camera"), "the camera is up")
+    (renderer,) = renderers(process)
+    os.kill(renderer, signal.SIGSTOP)
     _interrupt(ros, process)
 
 

@@ -154,8 +154,13 @@ class RenderClient:
                 bodies = tuple(body for body in scene.sample.bodies if body.name != name)
                 scenes[camera] = scene._replace(sample=scene.sample._replace(bodies=bodies))
 
-    def stop(self) -> None:
-        """Ends the process, and waits for that for a moment."""
+    def stop(self) -> bool:
+        """Ends the process, and waits for that for a moment.
+
+        Returns:
+            False if it had to be killed.
+        """
+        was_killed = False
         if self._channel is not None:
             self._channel.close()
             self._channel = None
@@ -165,8 +170,10 @@ class RenderClient:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
+                was_killed = True
             self._process = None
         self._start_at_s = float("inf")
+        return not was_killed
 
     def _start(self) -> None:
         ours, theirs = socket.socketpair()

@@ -66,6 +66,11 @@ class ImagePublisher:
         rospy.signal_shutdown("the simulator has ended")
 
 
+def camera_node(simulator: str) -> str:
+    """Returns the name of the node of the renderer process, of the simulator's name."""
+    return f"{simulator}_camera"
+
+
 def sink_arguments(node_name: str, argv: Sequence[str]) -> list[str]:
     """Returns the arguments with which the renderer process is the simulator's companion.
 
@@ -78,7 +83,7 @@ def sink_arguments(node_name: str, argv: Sequence[str]) -> list[str]:
     """
     remappings = [item for item in argv if ":=" in item and not item.startswith(("__name:=", "__log:=", "_"))]
     namespace = [item for item in argv if item.startswith("__ns:=")]
-    return [*remappings, *namespace, f"__name:={node_name.rsplit('/', 1)[-1]}_camera"]
+    return [*remappings, *namespace, f"__name:={camera_node(node_name.rsplit('/', 1)[-1])}"]
 
 
 class _Topic(StateTopic):

@@ -1,12 +1,15 @@
 """Where scenes go: to the renderer process, which publishes the images."""
 
+import contextlib
 import sys
 import time
 import zlib
 from collections.abc import Callable, Mapping
 from functools import partial
 
+import rosgraph
 import rospy
+from rosnode import cleanup_master_blacklist
 
 from custom_ros_tools.errors import PhysicsError
 from rpbi.render.camera import Intrinsics
@@ -18,7 +21,7 @@ from rpbi.samples import SceneSample
 from rpbi.sensors.rgbd import RgbdSensor
 from rpbi.world import World
 
-from .image_publisher import SINK, sink_arguments
+from .image_publisher import SINK, camera_node, sink_arguments
 
 LONGEST_WAIT_S = 20.0
 """How long the world waits for a synchronous camera before it stands still [s] of wall time."""
@@ -109,7 +112,8 @@ class ScenePublisher:
         """Ends the process, which is in a hurry now: it has to take its leave of the ROS master first."""
         if self._renderer.process_id is not None:
             take_part(self._renderer.process_id)  # on a busy machine it might not get to its end otherwise
-        self._renderer.stop()
+        if not self._renderer.stop():
+            _unregister(camera_node(rospy.get_name()))
 
     def _take_over(self, cameras: Mapping[str, RgbdSensor]) -> None:
         for name, sensor in self._sensors.items():
@@ -133,6 +137,12 @@ class ScenePublisher:
                 raise PhysicsError(f"camera '{name}' is synchronous: {missing} after {LONGEST_WAIT_S:g} s")
             if not condition():
                 self._renderer.wait(0.02)
+
+
+def _unregister(node: str) -> None:
+    """Takes leave of the ROS master for a node that had to be killed."""
+    with contextlib.suppress(OSError, rosgraph.MasterException):
+        cleanup_master_blacklist(rosgraph.Master(rospy.get_name()), [node])
 
 
 def _camera(sensor: RgbdSensor) -> Camera:
