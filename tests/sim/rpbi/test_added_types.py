@@ -52,7 +52,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .body_sensor import BodySensor
+from .sensor import BodySensor
 
 
 class HeightSample(NamedTuple):

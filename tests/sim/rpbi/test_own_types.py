@@ -159,7 +159,7 @@ def test_a_world_and_what_comes_into_it_can_be_recorded(world):
         (thing(sensors=[{**EYE, "type": "nowhere:Eye"}]), r"thing.yaml: sensors\[0\].type: no module 'nowhere'"),
         (
             thing(sensors=[{**EYE, "type": CONVEYOR}]),
-            r"sensors\[0\].type: expected a subclass of rpbi.sensors.body_sensor:BodySensor, got 'my_robot_lab.c",
+            r"sensors\[0\].type: expected a subclass of rpbi.sensors.sensor:BodySensor, got 'my_robot_lab.c",
         ),
         (thing(sensors=[gauge("NoConfig")]), r"sensors\[0\].type: expected a Config in 'faulty_lab:NoConfig' that is"),
         (thing(sensors=[{**EYE, "hz": 0}]), r"thing.yaml: sensors\[0\].hz: must be > 0 \[Hz\], got 0"),

@@ -1,7 +1,7 @@
 """PyBullet's constants by name, as YAML files say them."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from functools import reduce
 from operator import or_
 from typing import Any
@@ -23,10 +23,12 @@ class Constants:
     Attributes:
         kind: What they are, for messages.
         names: Their names in PyBullet.
+        own: Numbers of names that PyBullet does not have.
     """
 
     kind: str
     names: tuple[str, ...]
+    own: Mapping[str, int] = field(default_factory=dict, hash=False)
 
     def parse(self, given: Any) -> int:
         """Returns the number of one constant, given by its name or number.
@@ -43,7 +45,7 @@ class Constants:
     def _named(self, name: str) -> int:
         if name not in self.names:
             raise ValueError(f"unknown {self.kind} '{name}'{hint(name, self.names)}")
-        return int(getattr(pybullet, name))
+        return self.own[name] if name in self.own else int(getattr(pybullet, name))
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_before_validator_function(self.parse, handler(source))
@@ -107,7 +109,13 @@ SHAPE_TYPES = Constants(
         *("GEOM_PLANE", "GEOM_MESH", "GEOM_HEIGHTFIELD"),
     ),
 )
-CONTROL_MODES = Constants("control mode", ("POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL"))
+IMPEDANCE_CONTROL = 100
+"""Joints are held by springs and dampers; a control mode that PyBullet does not have."""
+CONTROL_MODES = Constants(
+    "control mode",
+    ("POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL", "IMPEDANCE_CONTROL"),
+    {"IMPEDANCE_CONTROL": IMPEDANCE_CONTROL},
+)
 SOLVER_TYPES = Constants("constraint solver type", _starting_with("CONSTRAINT_SOLVER_LCP_"))
 VISUALIZER_FLAGS = Constants("visualizer flag", _starting_with("COV_"))
 RESET_FLAGS = Flags("reset flag", _starting_with("RESET_USE_"))

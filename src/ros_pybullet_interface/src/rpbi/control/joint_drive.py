@@ -8,7 +8,7 @@ from rpbi.engine.client import Client
 from rpbi.urdf.joints import JointModel
 
 from .motion import JointMotion, Motion
-from .motors import Command, Motors
+from .motors import POSITION_MODES, Command, Motors
 from .target_stream import TargetStreams
 
 
@@ -46,7 +46,7 @@ class JointDrive:
 
     def follow(self, commands: Iterable[Command]) -> None:
         """Follows targets from now on, unless the control mode has changed since they were checked."""
-        if self._interpolates and self.motors.mode == pybullet.POSITION_CONTROL:
+        if self._interpolates and self.motors.mode in POSITION_MODES:
             self._streams.follow(commands)
         else:
             for command in commands:

@@ -6,11 +6,12 @@ import contextlib
 import logging
 import math
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any, NamedTuple
 
 import pybullet
 
+from rpbi.config.pybullet_args import CONTROL_MODES, IMPEDANCE_CONTROL
 from rpbi.engine.client import Client
 from rpbi.urdf.joints import Joint, JointModel, JointTarget
 
@@ -45,11 +46,14 @@ QUANTITIES = {
     pybullet.POSITION_CONTROL: "position",
     pybullet.VELOCITY_CONTROL: "velocity",
     pybullet.TORQUE_CONTROL: "effort",
+    IMPEDANCE_CONTROL: "position",
 }
 """What a target is in each control mode."""
 MOST_WAITING = 100
 """Targets that wait for one tick."""
-MODE_NAMES = {getattr(pybullet, name): name for name in ("POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL")}
+MODE_NAMES = {CONTROL_MODES.parse(name): name for name in CONTROL_MODES.names}
+POSITION_MODES = (pybullet.POSITION_CONTROL, IMPEDANCE_CONTROL)
+"""Modes in which targets are positions, which hold."""
 
 
 class Command(NamedTuple):
@@ -92,8 +96,10 @@ class Motors:
 
     Attributes:
         targets: What the motors are set to by joint index: positions, velocities or efforts, as the control mode says.
-        applied_efforts: Efforts [N m or N] applied in the last tick under torque control, by joint index; PyBullet
-            tells them not.
+        leads: Position [rad or m] and velocity that springs are to hold at the coming tick, by joint index, where they
+            are not those of the targets.
+        applied_efforts: Efforts [N m or N] applied in the last tick, by joint index, where not PyBullet's motors but
+            torque targets, springs or a controller made them; PyBullet tells them not.
     """
 
     def __init__(
@@ -129,8 +135,9 @@ class Motors:
         self._expiry.clear()
         self._renewed.clear()
         self.applied_efforts: dict[int, float] = {}
+        self.leads: dict[int, tuple[float, float]] = {}
         states = self._pb.getJointStates(self._body_id, self._indices) if self._indices else ()
-        is_held = mode == pybullet.POSITION_CONTROL
+        is_held = mode in POSITION_MODES
         self.targets = {index: state[0] if is_held else 0.0 for index, state in zip(self._indices, states)}
         for index in self._indices:
             self._drive(index, self.targets[index])
@@ -146,7 +153,7 @@ class Motors:
         values = target.values_of(QUANTITIES[mode], f"the robot is under {MODE_NAMES[mode]}")
         resolved = self._model.resolve(target.names, values)
         velocities: Mapping[int, float] = {}
-        if mode == pybullet.POSITION_CONTROL and len(target.velocity) == len(target.names):
+        if mode in POSITION_MODES and len(target.velocity) == len(target.names):
             with contextlib.suppress(ValueError):  # they are an aid: without them the positions are followed
                 velocities = self._model.resolve(target.names, target.velocity)
         return Command(mode, resolved, velocities, target.stamp_ns)
@@ -157,7 +164,7 @@ class Motors:
             return
         for index, value in command.values.items():
             self.targets[index] = value = self.limited(index, value)
-            if self.mode != pybullet.POSITION_CONTROL:
+            if self.mode not in POSITION_MODES:
                 self._renewed.add(index)
             if self.mode != pybullet.TORQUE_CONTROL:
                 self._drive(index, value)
@@ -175,15 +182,18 @@ class Motors:
         to the position before the tick. So this is the position before it, and the velocity the one that leads to
         where the joint is to be after it.
         """
-        self._pb.setJointMotorControl2(
-            self._body_id,
-            index,
-            pybullet.POSITION_CONTROL,
-            targetPosition=position,
-            targetVelocity=velocity,
-            **self._position_arguments[index],
-        )
-        if self.mode == pybullet.POSITION_CONTROL:
+        if self.mode == IMPEDANCE_CONTROL:
+            self.leads[index] = position, velocity
+        else:
+            self._pb.setJointMotorControl2(
+                self._body_id,
+                index,
+                pybullet.POSITION_CONTROL,
+                targetPosition=position,
+                targetVelocity=velocity,
+                **self._position_arguments[index],
+            )
+        if self.mode in POSITION_MODES:
             self.targets[index] = position + velocity * self._dt_s
 
     def release(self, indices: Iterable[int]) -> None:
@@ -198,14 +208,37 @@ class Motors:
         for index, position in positions.items():
             self._expiry.pop(index, None)
             self._renewed.discard(index)
-            self.targets[index] = position if self.mode == pybullet.POSITION_CONTROL else 0.0
+            self.targets[index] = position if self.mode in POSITION_MODES else 0.0
             self._drive(index, self.targets[index])
 
-    def before_step(self, tick: int, feed_forward: Mapping[int, float]) -> None:
+    def seize(self, indices: Iterable[int]) -> None:
+        """Holds joints by index, which something else has driven, where they are."""
+        states = {index: self._pb.getJointState(self._body_id, index)[0] for index in indices}
+        for index in states:
+            self.applied_efforts.pop(index, None)
+        self.rest(states)
+
+    def let_go(self, indices: Iterable[int]) -> None:
+        """Leaves joints by index to who will `push` them."""
+        for index in indices:
+            self._expiry.pop(index, None)
+            self._renewed.discard(index)
+            self._release(index)
+
+    def push(self, efforts: Mapping[int, float]) -> None:
+        """Applies efforts [N m or N] by joint index for one tick, within the joints' own."""
+        limited = {index: self._limited_effort(index, effort) for index, effort in efforts.items()}
+        self._pb.setJointMotorControlArray(
+            self._body_id, list(limited), pybullet.TORQUE_CONTROL, forces=list(limited.values())
+        )
+        self.applied_efforts.update(limited)
+
+    def before_step(self, tick: int, feed_forward: Mapping[int, float], driven_by_others: Collection[int] = ()) -> None:
         """Lets targets expire, and applies efforts, which PyBullet keeps for one tick only.
 
         Args:
             feed_forward: Efforts [N m or N] by joint index that are added to the targets under torque control.
+            driven_by_others: Joints by index that are left alone.
         """
         if self._renewed:
             self._expiry.update(dict.fromkeys(self._renewed, tick + self._timeout_ticks))
@@ -213,11 +246,8 @@ class Motors:
         if self._expiry:
             self._expire(tick)
         if self.mode == pybullet.TORQUE_CONTROL and self._indices:
-            efforts = [
-                self.limited(index, self.targets[index] + feed_forward.get(index, 0.0)) for index in self._indices
-            ]
-            self._pb.setJointMotorControlArray(self._body_id, self._indices, pybullet.TORQUE_CONTROL, forces=efforts)
-            self.applied_efforts = dict(zip(self._indices, efforts))
+            driven = [index for index in self._indices if index not in driven_by_others]
+            self.push({index: self.targets[index] + feed_forward.get(index, 0.0) for index in driven})
 
     def _expire(self, tick: int) -> None:
         for index in [index for index, expiry in self._expiry.items() if tick >= expiry]:
@@ -229,27 +259,30 @@ class Motors:
     def limited(self, index: int, value: float) -> float:
         """Returns a position, velocity or effort within what the joint can do."""
         joint = self._model.joints[index]
-        if self.mode == pybullet.POSITION_CONTROL:
+        if self.mode in POSITION_MODES:
             self._limit_reports.take(joint, value, "it goes to the limit")
             return min(max(value, joint.lower), joint.upper)
         if self.mode == pybullet.VELOCITY_CONTROL:
-            limit = joint.max_velocity
-        elif self.mode == pybullet.TORQUE_CONTROL and self._enforce_effort_limits:
-            limit = joint.max_effort
-        else:
-            return value
+            return min(max(value, -joint.max_velocity), joint.max_velocity)
+        return self._limited_effort(index, value)
+
+    def _limited_effort(self, index: int, value: float) -> float:
+        limit = self._model.joints[index].max_effort if self._enforce_effort_limits else math.inf
         return min(max(value, -limit), limit)
 
     def _drive(self, index: int, value: float) -> None:
-        """Sets the set point of one motor; PyBullet keeps it. Under torque control the motor is released."""
+        """Sets the set point of one motor; PyBullet keeps it. Under torque control and impedance it is released."""
         if self.mode == pybullet.POSITION_CONTROL:
             arguments = {"targetPosition": value, **self._position_arguments[index]}
         elif self.mode == pybullet.VELOCITY_CONTROL:
             arguments = {"targetVelocity": value, **self._velocity_arguments[index]}
         else:
-            arguments = {"force": 0.0}
-        mode = pybullet.VELOCITY_CONTROL if self.mode == pybullet.TORQUE_CONTROL else self.mode
-        self._pb.setJointMotorControl2(self._body_id, index, mode, **arguments)
+            self._release(index)
+            return
+        self._pb.setJointMotorControl2(self._body_id, index, self.mode, **arguments)
+
+    def _release(self, index: int) -> None:
+        self._pb.setJointMotorControl2(self._body_id, index, pybullet.VELOCITY_CONTROL, force=0.0)
 
     def _arguments(self, joint: Joint, gains: Mapping[int, Mapping[str, float]]) -> dict[str, Any]:
         """Returns what PyBullet's position motor of a joint is told beside its set point."""

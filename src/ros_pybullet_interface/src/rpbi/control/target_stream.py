@@ -13,9 +13,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-import pybullet
-
-from .motors import Command, Motors, joined
+from .motors import POSITION_MODES, Command, Motors, joined
 
 LONGEST_PERIOD_S = 0.2
 """Targets that are farther apart than this [s] are no stream: each acts at once."""
@@ -235,7 +233,7 @@ class TargetStreams:
                 self._drive(tick, stream)
 
     def _take(self, tick: int, command: Command, driven: frozenset[int]) -> None:
-        if command.mode != pybullet.POSITION_CONTROL or self._motors.mode != command.mode:
+        if command.mode not in POSITION_MODES or self._motors.mode != command.mode:
             return
         goal = {
             index: self._motors.limited(index, value) for index, value in command.values.items() if index not in driven

@@ -24,12 +24,14 @@ class Input:
         apply: Acts on the newest value, on the simulation thread, before the tick.
         merge: Joins a value that still waits with a newer one; without it the newer one replaces it.
         ros_topic: Where to find the topic of an input from another package, a Topic, as `module:NAME`.
+        owner: What stands for `{name}` in the topic's name; the body or sensor if it is empty.
     """
 
     check: Callable[[Any], Any]
     apply: Callable[[Any], None]
     merge: Callable[[Any, Any], Any] | None = None
     ros_topic: str = ""
+    owner: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

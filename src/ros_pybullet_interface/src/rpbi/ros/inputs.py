@@ -95,7 +95,7 @@ class Inputs:
 
     def _subscribe(self, name: str, key: str, taken: Input) -> rospy.Subscriber:
         row = topic_input(key, taken)
-        topic, slot, value = rospy.resolve_name(row.name.format(name=name)), f"{name}/{key}", row.handler
+        topic, slot, value = rospy.resolve_name(row.name.format(name=taken.owner or name)), f"{name}/{key}", row.handler
         assert value is not None  # rows of inputs have one
 
         def take(message: Any) -> None:

@@ -3,8 +3,7 @@
 from custom_ros_tools.plugins import ClassTable, find_class
 from rpbi.config.sensors import SensorConfig
 
-from .body_sensor import BodySensor
-from .sensor import Sensor
+from .sensor import BodySensor, Sensor
 
 SENSOR_TYPES = ClassTable(
     {
@@ -13,6 +12,7 @@ SENSOR_TYPES = ClassTable(
         "base_state": "rpbi.sensors.base_state:BaseStateSensor",
         "force_torque": "rpbi.sensors.force_torque:ForceTorqueSensor",
         "trajectory_state": "rpbi.sensors.trajectory_state:TrajectoryStateSensor",
+        "controller_state": "rpbi.sensors.controller_state:ControllerStateSensor",
         "contacts": "rpbi.sensors.contacts:ContactsSensor",
         "contact_arrows": "rpbi.sensors.contact_arrows:ContactArrowsSensor",
         "surface": "rpbi.sensors.surface:SurfaceSensor",

@@ -1,9 +1,12 @@
 """What every sensor has in common."""
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar, Protocol
 
+from rpbi.config.sensors import SensorConfig
 from rpbi.engine.client import Client
 from rpbi.engine.clock import Clock
 from rpbi.engine.inputs import Input
@@ -63,3 +66,17 @@ class Sensor(ABC):
     def inputs(self) -> Mapping[str, Input]:
         """Returns what the sensor takes while the world runs, by name."""
         return {}
+
+
+class BodySensor(Sensor):
+    """A sensor of another package, on a body.
+
+    A new one is a subclass with a `Config`, a `sample_type` and `read`; see docs/extending.md.
+    """
+
+    Config: ClassVar[type[SensorConfig]] = SensorConfig
+
+    def __init__(self, body: Any, config: Any) -> None:
+        super().__init__(f"{body.name}/{config.name}", config.hz)
+        self.body = body
+        self.config = config

@@ -2,20 +2,27 @@
 
 import re
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
+import numpy as np
 import pybullet
 
 from custom_ros_tools.errors import Problem
-from rpbi.control.gravity import GravityModel
+from rpbi.config.pybullet_args import IMPEDANCE_CONTROL
+from rpbi.control.controllers.controller import Arm, RobotState
+from rpbi.control.controllers.impedance import joint_impedance
+from rpbi.control.controllers.manager import ControllerManager, ControllerSwitch, NewGains, controller_problems
 from rpbi.control.joint_drive import JointDrive
 from rpbi.control.motors import Command, LimitReports, Motors, joined
+from rpbi.control.robot_model import RobotModel
 from rpbi.control.trajectories.config import trajectory_problems
 from rpbi.control.trajectories.follower import TrajectoryFollower
 from rpbi.engine.client import Client
 from rpbi.engine.inputs import Input
 from rpbi.geometry import Pose
 from rpbi.sensors.contact_arrows import contact_sensors
+from rpbi.sensors.controller_state import ControllerStateSensor
 from rpbi.sensors.force_torque import ForceTorqueSensor
 from rpbi.sensors.joint_state import JointStateSensor
 from rpbi.sensors.sensor import Sensor
@@ -46,6 +53,7 @@ class Robot(JointedBody):
     }
 
     def __init__(self, pb: Client, config: RobotConfig) -> None:
+        self._robot_model: RobotModel | None = None
         super().__init__(pb, config)
         assert config.setJointMotorControlArray is not None  # the model demands it
         mode = config.setJointMotorControlArray.controlMode
@@ -74,7 +82,10 @@ class Robot(JointedBody):
         )
         follower = config.joint_trajectory_controller
         self.follower = None if follower is None else TrajectoryFollower(self.drive, follower)
-        self._gravity = GravityModel(pb, self.model, config.loadURDF) if config.gravity_compensation else None
+        self.controllers = ControllerManager(self._arm(), config.controllers, self.motors)
+        joints = self.model.driven
+        self._stiffness = config.impedance.by_joint("stiffness", joints)
+        self._damping_ratio = config.impedance.by_joint("damping_ratio", joints)
         self._start_base(config.resetBaseVelocity, config.object_tf, self.has_fixed_base)
 
     @classmethod
@@ -87,20 +98,66 @@ class Robot(JointedBody):
         joint_states = JointStateSensor(self, self.config.joint_state_publisher_hz)
         trajectory = () if self.follower is None else (TrajectoryStateSensor(self.drive, self.follower),)
         contacts = contact_sensors(self, self.config.contacts)
-        return (joint_states, *self.force_torque_sensors, *trajectory, *contacts, *super().sensors())
+        controllers = (
+            ControllerStateSensor(self.name, self.controllers, name, each.state_hz)
+            for name, each in self.config.controllers.items()
+            if each.state_hz
+        )
+        return (joint_states, *controllers, *self.force_torque_sensors, *trajectory, *contacts, *super().sensors())
 
     def inputs(self) -> Mapping[str, Input]:
         """Takes `target`, a JointTarget of what the control mode asks for, beside the pose of its base."""
         target = Input(self._check_target, self.drive.follow, merge=joined)
-        return {**super().inputs(), "target": target}
+        return {**super().inputs(), "target": target, **self._controller_inputs()}
 
     def before_step(self, tick: int) -> None:
-        """Follows the motion, lets targets expire and applies efforts."""
+        """Follows the motion, has controllers compute, lets targets expire and applies efforts."""
         self.drive.advance(tick)
+        mode, driven = self.motors.mode, self.controllers.driven
         holding: Mapping[int, float] = {}
-        if self._gravity is not None and self.motors.mode == pybullet.TORQUE_CONTROL:
-            holding = self._gravity.efforts(self.base_pose(), self.joint_positions())
-        self.motors.before_step(tick, holding)
+        if (
+            driven
+            or mode == IMPEDANCE_CONTROL
+            or (mode == pybullet.TORQUE_CONTROL and self.config.gravity_compensation)
+        ):
+            state = self._state()
+            if driven:
+                self.controllers.advance(state, tick)
+            if mode == IMPEDANCE_CONTROL:
+                self._spring(state)
+            elif mode == pybullet.TORQUE_CONTROL and self.config.gravity_compensation:
+                efforts = self.robot_model.gravity(state.base, state.position)
+                holding = {joint.index: effort for joint, effort in zip(self.model.driven, efforts.tolist())}
+        self.motors.before_step(tick, holding, self.controllers.driven)
+
+    @property
+    def robot_model(self) -> RobotModel:
+        """Its dynamics and kinematics."""
+        if self._robot_model is None:
+            self._robot_model = RobotModel(self.pb, self.model, self.config.loadURDF)
+        return self._robot_model
+
+    def switch_controllers(self, switch: ControllerSwitch) -> None:
+        """Stops and starts controllers; a motion of joints that they drive from then on is ended.
+
+        Raises:
+            UnknownNameError: If there is none of a name.
+            ValueError: If two would drive one joint; then nothing has changed.
+        """
+        taken = self.controllers.switch(switch)
+        if self.drive.motion is not None and taken & self.drive.motion.joints:
+            self.halt("a controller drives its joints")
+            self.motors.let_go(taken)
+        self.drive.drop_targets(taken)
+
+    def set_controller_gains(self, gains: NewGains) -> None:
+        """Changes the keys of a controller; one that is active begins again where the robot is.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+            ValueError: If they do not fit.
+        """
+        self.controllers.configure(gains)
 
     def halt(self, reason: str) -> None:
         """Ends the motion that runs, if any; its joints hold where they are."""
@@ -117,6 +174,7 @@ class Robot(JointedBody):
             self.halt("the control mode was changed")
             self.drive.drop_targets()
             self.motors.switch(mode)
+            self.motors.let_go(self.controllers.driven)
 
     def set_joint_state(self, target: JointTarget) -> None:
         """Puts joints somewhere at once, where the motors then hold them; a motion that runs is ended."""
@@ -125,6 +183,7 @@ class Robot(JointedBody):
         positions = self.model.resolve(target.names, target.position)
         self.drive.drop_targets(positions)
         self.motors.rest(positions)
+        self.motors.let_go(self.controllers.driven & positions.keys())
 
     def teleport(self, pose: Pose) -> None:
         """Puts the base link's URDF frame at a pose in the world, at rest; a motion that runs is ended."""
@@ -132,16 +191,17 @@ class Robot(JointedBody):
         super().teleport(pose)
 
     def efforts(self, reported: tuple[float, ...]) -> tuple[float, ...]:
-        """Returns the motors' efforts [N m or N] of all joints; PyBullet does not report those of torque control."""
-        if self.motors.mode != pybullet.TORQUE_CONTROL:
+        """Returns the motors' efforts [N m or N] of all joints; PyBullet does not report those that were applied."""
+        applied = self.motors.applied_efforts
+        if not applied:
             return reported
-        return tuple(self.motors.applied_efforts.get(joint.index, 0.0) for joint in self.joints)
+        return tuple(applied.get(joint.index, effort) for joint, effort in zip(self.joints, reported))
 
     def remove(self) -> None:
         """Takes the robot out of the world; a motion that runs is ended."""
         self.halt("the robot was removed")
-        if self._gravity is not None:
-            self._gravity.close()
+        if self._robot_model is not None:
+            self._robot_model.close()
         super().remove()
 
     def _check_target(self, target: JointTarget) -> tuple[Command]:
@@ -150,7 +210,59 @@ class Robot(JointedBody):
         driven = [] if motion is None else [self.model.joints[i].name for i in command.values if i in motion.joints]
         if driven:
             raise ValueError(f"a motion drives {', '.join(driven)} until it ends")
+        driven = [self.model.joints[i].name for i in command.values if i in self.controllers.driven]
+        if driven:
+            raise ValueError(f"a controller drives {', '.join(driven)} until it is stopped")
         return (command,)
+
+    def _state(self) -> RobotState:
+        measured = self.drive.measured()
+        positions, velocities = zip(*measured.values()) if measured else ((), ())
+        return RobotState(self.base_pose(), positions, velocities)
+
+    def _spring(self, state: RobotState) -> None:
+        """Applies the efforts of the springs of IMPEDANCE_CONTROL, and those that balance gravity and motion."""
+        motors, model = self.motors, self.robot_model
+        wanted = [motors.leads.get(joint.index, (motors.targets[joint.index], 0.0)) for joint in model.joints]
+        motors.leads.clear()
+        if not wanted:
+            return
+        positions, velocities = np.array(wanted).T
+        springs = joint_impedance(
+            model.mass_matrix(state.position),
+            self._stiffness,
+            self._damping_ratio,
+            positions - state.position,
+            np.array(state.velocity),
+            velocities,
+            self.drive.dt_s,
+        )
+        efforts = springs + model.bias(state.base, state.position, state.velocity)
+        indices = (joint.index for joint in model.joints)
+        driven = self.controllers.driven
+        motors.push({index: effort for index, effort in zip(indices, efforts.tolist()) if index not in driven})
+
+    def _arm(self) -> Arm:
+        links = {joint.link: joint.index for joint in self.joints}
+        none = np.zeros(0, np.int64)
+        dt_s: float = self.pb.getPhysicsEngineParameters()["fixedTimeStep"]
+        return Arm(self.name, self.pb, self.body_id, self.robot_model, links, none, dt_s)
+
+    def _controller_inputs(self) -> dict[str, Input]:
+        """Returns what controllers take: `CONTROLLER/INPUT`."""
+        return {
+            f"{name}/{key}": Input(
+                partial(self._check_controller_input, name, key),
+                partial(self.controllers.take, name, key),
+                ros_topic=topic,
+                owner=f"{self.name}/{name}",
+            )
+            for name in self.controllers.names
+            for key, topic in self.controllers.of(name).inputs.items()
+        }
+
+    def _check_controller_input(self, name: str, key: str, value: Any) -> Any:
+        return self.controllers.of(name).check(key, value)
 
     def _gains(self) -> dict[int, dict[str, float]]:
         """Returns PyBullet's gains by joint index; what does not fit was found before."""
@@ -181,15 +293,25 @@ class Robot(JointedBody):
             elif len(gains) not in (1, len(driven)):
                 message = f"expected 1 number or {len(driven)}, one for each of {', '.join(driven)}; got {len(gains)}"
                 problems.append(Problem(self.name, path, message))
-        return [*problems, *self._force_torque_problems(), *self._gravity_problems()]
+        problems += controller_problems(self.name, self._arm(), self.config.controllers)
+        for key in ("stiffness", "damping_ratio"):
+            try:
+                self.config.impedance.by_joint(key, self.model.driven)
+            except ValueError as error:
+                problems.append(Problem(self.name, f"impedance.{key}", str(error).removeprefix(f"{key}: ")))
+        return [*problems, *self._force_torque_problems(), *self._model_problems()]
 
-    def _gravity_problems(self) -> list[Problem]:
+    def _model_problems(self) -> list[Problem]:
         """PyBullet's inverse dynamics know joints of one axis only."""
         others = [joint.name for joint in self.joints if not (joint.is_driven or joint.is_fixed)]
-        if not (self.config.gravity_compensation and others):
-            return []
+        motors = self.config.setJointMotorControlArray
+        needs = {
+            "gravity_compensation": self.config.gravity_compensation,
+            "controllers": self.config.controllers,
+            "setJointMotorControlArray.controlMode": motors is not None and motors.controlMode == IMPEDANCE_CONTROL,
+        }
         message = f"works with revolute, prismatic and fixed joints only; there are {', '.join(others)}"
-        return [Problem(self.name, "gravity_compensation", message)]
+        return [Problem(self.name, key, message) for key, needed in needs.items() if needed and others]
 
     def _force_torque_problems(self) -> list[Problem]:
         problems = []

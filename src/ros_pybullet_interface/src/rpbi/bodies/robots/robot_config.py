@@ -6,14 +6,17 @@ from typing import Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from custom_ros_tools.schema import Hz, HzOrOff, KeyedError, ListOf, NonNegative, Seconds, Switch
+from custom_ros_tools.schema import Hz, HzOrOff, KeyedError, ListOf, Name, NonNegative, Seconds, Switch
 from rpbi.bodies.body_config import BodyConfig
 from rpbi.config.pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity, SetJointMotorControlArray
 from rpbi.config.sensors import ContactsConfig, ForceTorqueEntry
+from rpbi.control.controllers.entry import ControllerEntry
+from rpbi.control.controllers.impedance import JointSprings
 from rpbi.control.planar_base import PlanarBaseConfig
 from rpbi.control.trajectories.config import JointTrajectoryControllerConfig
 
 _NOT_VISUAL = {
+    "controllers": "a visual robot has no motors to drive",
     "joint_trajectory_controller": "a visual robot has no motors that could follow",
     "contacts": "a visual robot touches nothing",
     "planar_base": "a visual robot has no physics; its base follows object_tf",
@@ -75,6 +78,8 @@ class RobotConfig(BodyConfig):
     enabled_joint_force_torque_sensors: ListOf[ForceTorqueEntry] = Field(
         (), description="Joints with a force-torque sensor: names, or mappings with all of its keys."
     )
+    controllers: dict[Name, ControllerEntry] = Field({}, description="Controllers that live in the tick, by name.")
+    impedance: JointSprings = Field(JointSprings(), description="Springs and dampers of IMPEDANCE_CONTROL.")
     joint_trajectory_controller: JointTrajectoryControllerConfig | None = Field(
         None, description="Follower of trajectories, for planners; {} has the usual settings."
     )
@@ -102,7 +107,7 @@ class RobotConfig(BodyConfig):
     @model_validator(mode="after")
     def _keys_go_together(self) -> RobotConfig:
         for key, message in _NOT_VISUAL.items() if self.is_visual_robot else ():
-            if getattr(self, key) is not None:
+            if getattr(self, key) not in (None, {}):
                 raise KeyedError(key, message)
         if self.planar_base is not None:
             if self.resetBaseVelocity is not None:

@@ -9,9 +9,12 @@ from visualization_msgs.msg import Marker, MarkerArray
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.plugins import full_name
 from ros_pybullet_interface.msg import ContactPoint, Contacts
+from ros_pybullet_interface.msg import ControllerState as ControllerStateMessage
+from rpbi.control.controllers.manager import ControllerSample
 from rpbi.control.trajectories.trajectory import ControllerState
 from rpbi.ros.endpoints import Topic, find_topic
 from rpbi.ros.headers import prefixed, to_ros_time, world_frame
+from rpbi.ros.robots.controller_messages import controller_state_message
 from rpbi.ros.robots.trajectory_messages import CONTROLLER, JointTrajectoryControllerState, state_message
 from rpbi.samples import (
     BaseStateSample,
@@ -106,6 +109,12 @@ def _header(stamp_ns: int) -> Header:
 
 
 TOPICS: dict[type, Topic] = {
+    ControllerSample: Topic(
+        "rpbi/{name}/state",
+        ControllerStateMessage,
+        controller_state_message,
+        "Whether the controller drives its joints, and what it tells of itself; `state_hz` of the controller.",
+    ),
     WrenchSample: Topic(
         "rpbi/{name}/ft_sensor",
         WrenchStamped,

@@ -100,13 +100,13 @@ def _window(world: World) -> Iterator[Endpoint]:
 
 def _inputs(world: World, name: str) -> Iterator[Endpoint]:
     for slot, taken in world.inputs.items():
-        owner, key = slot.split("/")
+        owner, key = slot.split("/", 1)
         if owner != name:
             continue
         if isinstance(taken, PoseInput):
             yield Endpoint(FOLLOWS, taken.tf_id, "", f"{taken.hz:g} Hz; {name}")
         else:
-            yield _topic(SUBSCRIBES, topic_input(key, taken), "", name)
+            yield _topic(SUBSCRIBES, topic_input(key, taken), "", taken.owner or name)
 
 
 def _topic(kind: str, row: Topic, note: str, owner: str = "") -> Endpoint:

@@ -17,6 +17,7 @@ from ros_pybullet_interface.srv import (
     ResetJointState,
     RobotInfo,
     SetJointState,
+    SwitchControllers,
 )
 from rpbi.bodies import Body
 from rpbi.bodies.robots.jointed import JointedBody
@@ -25,6 +26,7 @@ from rpbi.engine.inputs import PoseInput, check_pose
 from rpbi.geometry import Pose
 from rpbi.ros.endpoints import Answer, Service, Topic, of, serve, subscribe
 from rpbi.ros.requests import Requests
+from rpbi.ros.robots.controllers import controllers, robots_with_controllers, set_gains, switch_controllers
 from rpbi.ros.robots.ik import inverse_kinematics, move_by_ik, moved_by_ik
 from rpbi.ros.robots.info import publish_description, robot_info
 from rpbi.ros.robots.motion import (
@@ -104,6 +106,8 @@ BODY_SERVICES = (
     Service("rpbi/{name}/set_joint_state", SetJointState, set_joint_state, of(JointedBody)),
     Service("rpbi/{name}/ft_sensor", Empty, zero_force_torque, force_torque_sensors),
     Service("rpbi/{name}/set_control_mode", SetString, set_control_mode, of(Robot)),
+    Service("rpbi/{name}/switch_controllers", SwitchControllers, switch_controllers, robots_with_controllers),
+    Service("rpbi/{name}/set_gains", SetString, set_gains, controllers),
     Service("rpbi/{name}/stop_motion", Trigger, stop_motion, of(Robot)),
     Service("rpbi/{name}/move_to_joint_state", ResetJointState, move_to_joint_state, of(Robot)),
     Service("rpbi/{name}/move_to_initial_joint_state", ResetJointState, move_to_initial_joint_state, of(Robot)),

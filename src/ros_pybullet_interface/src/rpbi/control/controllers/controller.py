@@ -1,0 +1,127 @@
+"""What every controller has in common: it turns the state of a robot into efforts or set points, tick by tick."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import ConfigDict, Field
+
+from custom_ros_tools.schema import ConfigModel, HzOrOff, ListOf, Switch, Text
+from rpbi.control.robot_model import RobotModel
+from rpbi.engine.client import Client
+from rpbi.geometry import Pose
+
+Array = npt.NDArray[np.float64]
+
+
+class ControllerConfig(ConfigModel):
+    """An entry of a robot's `controllers`; a controller with more keys has a subclass of this as its `Config`."""
+
+    model_config = ConfigDict(json_schema_extra={"additionalProperties": True})  # those of subclasses
+
+    type: Text = Field(description="What it is: a key of CONTROLLERS, or `module:Class`.")
+    active: Switch = Field(True, description="Whether it drives its joints from the start on.")
+    joints: ListOf[Text] | None = Field(None, description="The joints that it drives; all, if they are not named.")
+    state_hz: HzOrOff = Field(50.0, description="Rate of its state; 0 is off.")
+
+
+class RobotState(NamedTuple):
+    """The measured state of a robot before a tick.
+
+    Attributes:
+        base: Pose of the root link in the world.
+        position: Positions of all n driven joints [rad or m], in the order of `RobotModel.joints`.
+        velocity: Their velocities [rad/s or m/s].
+    """
+
+    base: Pose
+    position: tuple[float, ...]
+    velocity: tuple[float, ...]
+
+
+class SetPoints(NamedTuple):
+    """Where the joints of a controller are to be after the tick, moved there by PyBullet's motors.
+
+    Attributes:
+        position: One for each of its joints [rad or m].
+    """
+
+    position: Array
+
+
+class Arm(NamedTuple):
+    """The robot of a controller, and its part of it.
+
+    Attributes:
+        name: The robot.
+        pb: The client that it lives in.
+        body_id: Its id there.
+        model: Its dynamics and kinematics.
+        links: PyBullet's indices of its links by name.
+        chosen: The places of the controller's joints among the driven ones, shape (m,).
+        dt_s: Length of a tick [s].
+    """
+
+    name: str
+    pb: Client
+    body_id: int
+    model: RobotModel
+    links: Mapping[str, int]
+    chosen: npt.NDArray[np.int64]
+    dt_s: float
+
+    def link_pose(self, link: int) -> Pose:
+        """Returns the measured pose in the world of the URDF frame of a link, by PyBullet's index."""
+        state = self.pb.getLinkState(self.body_id, link, computeForwardKinematics=True)
+        return Pose(state[4], state[5])
+
+
+class Controller(ABC):
+    """Drives some joints of one robot, on the simulation thread, before the physics of each tick.
+
+    A new one is a subclass with a `Config` and `compute`; see docs/controllers.md.
+
+    Args:
+        arm: The robot.
+        config: What YAML says.
+
+    Raises:
+        ValueError: If they do not fit.
+    """
+
+    Config: ClassVar[type[ControllerConfig]] = ControllerConfig
+    inputs: ClassVar[Mapping[str, str]] = {}
+    """Where to find the Topic of each thing that it takes while it runs, as `module:NAME`, by the name in `targets`."""
+
+    def __init__(self, arm: Arm, config: Any) -> None:
+        self.arm = arm
+        self.config = config
+
+    def check(self, key: str, value: Any) -> Any:
+        """Returns what `targets` shall have of a value that came by topic; any thread calls it.
+
+        Raises:
+            ValueError: If the value is refused.
+        """
+        return value
+
+    def start(self, state: RobotState, tick: int) -> None:  # noqa: B027 (many need nothing)
+        """Begins, before the first `compute`, from the measured state."""
+
+    @abstractmethod
+    def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array | SetPoints:
+        """Returns the efforts [N m or N] of its m joints, shape (m,), or set points, for one tick.
+
+        Args:
+            state: The robot before the tick.
+            targets: The newest value of each input that came since the start, by name.
+            tick: The world's tick.
+        """
+
+    def report(self) -> Mapping[str, float]:
+        """Returns numbers that tell how it does, by name, for its topic of state."""
+        return {}

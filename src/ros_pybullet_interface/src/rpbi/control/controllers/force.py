@@ -1,0 +1,58 @@
+"""A force along one axis, and motion across it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, field_validator
+
+from custom_ros_tools.schema import NonNegative, Positive, Unit, Vec3
+
+from .cartesian_impedance import CartesianImpedanceConfig, CartesianImpedanceController
+from .controller import Arm, Array
+from .impedance import damping_of
+
+
+class ForceConfig(CartesianImpedanceConfig):
+    """Keys of `force`, beside those of `cartesian_impedance`."""
+
+    axis: Vec3 = Field((0.0, 0.0, -1.0), description="Where it pushes, in the world.")
+    force: Annotated[NonNegative, Unit("N")] = Field(10.0, le=1000.0, description="With what force.")
+    approach_speed: Annotated[Positive, Unit("m/s")] = Field(
+        0.05, description="How fast it moves along the axis as long as nothing is there."
+    )
+
+    @field_validator("axis")
+    @classmethod
+    def _has_a_direction(cls, axis: tuple[float, float, float]) -> tuple[float, float, float]:
+        if np.linalg.norm(axis) < 1e-6:
+            raise ValueError(f"expected a direction, got {list(axis)}")
+        return axis
+
+
+class ForceController(CartesianImpedanceController):
+    """Pushes along an axis with a given force, and holds a point at a target pose across it.
+
+    A damper along the axis limits the speed as long as nothing is there; once something is, it does not move and the
+    force is the one asked for. The target's place along the axis does not count.
+    """
+
+    Config = ForceConfig
+
+    def __init__(self, arm: Arm, config: Any) -> None:
+        super().__init__(arm, config)
+        axis = np.array(config.axis) / np.linalg.norm(config.axis)
+        side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+        side /= np.linalg.norm(side)
+        self._turn = np.column_stack((axis, side, np.cross(axis, side)))
+        self._push = np.concatenate((config.force * axis, np.zeros(3)))
+
+    def _springs(self, mobility: Array) -> tuple[Array, Array, Array]:
+        config, turn = self.config, self._turn
+        stiffness = np.repeat((config.stiffness, config.rotational_stiffness), 3)
+        stiffness[0] = 0.0
+        damping = damping_of(mobility, turn, stiffness, config.damping_ratio)
+        damping[0] = config.force / config.approach_speed
+        both = np.kron(np.eye(2), turn)
+        return both * stiffness @ both.T, both * damping @ both.T, self._push

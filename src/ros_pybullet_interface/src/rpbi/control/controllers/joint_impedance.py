@@ -1,0 +1,94 @@
+"""Springs and dampers at the joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rpbi.control.target_stream import Arrivals, TargetStream
+from rpbi.urdf.joints import JointTarget
+
+from .controller import Arm, Array, Controller, ControllerConfig, RobotState
+from .impedance import JointSprings, joint_impedance
+
+BUFFER_S = 0.01
+"""Longest delay of targets to even out how late they come [s]."""
+
+
+class JointImpedanceConfig(JointSprings, ControllerConfig):
+    """Keys of `joint_impedance`."""
+
+
+class JointImpedanceController(Controller):
+    """Holds joints at targets as springs and dampers do; gravity and Coriolis forces are compensated.
+
+    `target` has positions [rad or m], and efforts [N m or N] to add if it has any.
+    """
+
+    Config = JointImpedanceConfig
+    inputs = {"target": "rpbi.ros.robots.controller_messages:JOINT_TARGET"}
+
+    def __init__(self, arm: Arm, config: JointImpedanceConfig) -> None:
+        super().__init__(arm, config)
+        self._joints = [arm.model.joints[place] for place in arm.chosen]
+        self._places = {joint.name: place for place, joint in enumerate(self._joints)}
+        self._stiffness = config.by_joint("stiffness", self._joints)
+        self._ratio = config.by_joint("damping_ratio", self._joints)
+
+    def check(self, key: str, value: JointTarget) -> JointTarget:
+        """Takes targets for some or all of its joints."""
+        positions = value.values_of("position", "its targets are positions")
+        for name, position in zip(value.names, positions, strict=True):
+            joint = self._joint(name)
+            if not joint.allows(position):
+                raise ValueError(joint.limit_violation(position))
+        for name in value.names:
+            self._joint(name)
+        if not np.isfinite([*positions, *value.effort]).all():
+            raise ValueError(f"targets must be finite, got {list(positions)}, efforts {list(value.effort)}")
+        if value.effort and len(value.effort) != len(value.names):
+            raise ValueError(f"expected one effort for each of the {len(value.names)} joints, got {len(value.effort)}")
+        return value
+
+    def start(self, state: RobotState, tick: int) -> None:
+        """Holds what is measured."""
+        held = {place: state.position[chosen] for place, chosen in enumerate(self.arm.chosen)}
+        self._stream = TargetStream(Arrivals(self.arm.dt_s, BUFFER_S), held, smooth=True)
+        self._push = np.zeros(len(held))
+        self._taken: Any = None
+        self._goal = dict(held)
+
+    def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array:
+        """Returns the efforts of springs, dampers and what balances gravity and motion."""
+        self._take(targets.get("target"), tick)
+        before = np.array(list(self._stream.set_points.values()))
+        after = np.array(list(self._stream.advance(tick + 1.0).values()))
+        chosen, model, dt_s = self.arm.chosen, self.arm.model, self.arm.dt_s
+        mass = model.mass_matrix(state.position)[np.ix_(chosen, chosen)]
+        self._error = before - np.array(state.position)[chosen]
+        velocity = np.array(state.velocity)[chosen]
+        springs = joint_impedance(
+            mass, self._stiffness, self._ratio, self._error, velocity, (after - before) / dt_s, dt_s
+        )
+        return springs + model.bias(state.base, state.position, state.velocity)[chosen] + self._push
+
+    def report(self) -> Mapping[str, float]:
+        """Returns how far each joint is from where it is to be [rad or m]."""
+        return {f"error/{joint.name}": float(error) for joint, error in zip(self._joints, self._error)}
+
+    def _take(self, target: JointTarget | None, tick: int) -> None:
+        if target is None or target is self._taken:
+            return
+        self._taken = target
+        places = [self._places[name] for name in target.names]
+        self._goal = self._goal | dict(zip(places, map(float, target.position)))
+        self._stream.take(tick, self._goal, {}, target.stamp_ns)
+        if target.effort:
+            self._push[places] = target.effort
+
+    def _joint(self, name: str) -> Any:
+        if name not in self._places:
+            raise ValueError(f"'{name}' is none of its joints: {', '.join(self._places)}")
+        return self._joints[self._places[name]]

@@ -1,0 +1,296 @@
+"""The controllers of one robot: which of them drive its joints, and what becomes of those that fail."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from custom_ros_tools.errors import InterfaceError, Problem, UnknownNameError
+from rpbi.control.motors import Motors
+from rpbi.plugins import blame
+
+from . import controller_class
+from .controller import Arm, Controller, ControllerConfig, RobotState, SetPoints
+
+log = logging.getLogger(__name__)
+
+SLOW_TICKS = 50
+"""A controller is stopped when it has needed more than a tick's time for so many ticks in a row."""
+
+
+class ControllerSample(NamedTuple):
+    """How a controller does.
+
+    Attributes:
+        name: `ROBOT/CONTROLLER`.
+        type: What it is, as YAML says.
+        active: Whether it drives its joints.
+        message: Why it does not; empty if it was stopped by request.
+        values: What it tells of itself, by name.
+    """
+
+    name: str
+    type: str
+    active: bool
+    message: str
+    values: Mapping[str, float]
+
+
+class ControllerSwitch(NamedTuple):
+    """Controllers to start and to stop.
+
+    Attributes:
+        start: Names of those to start.
+        stop: Names of those to stop, first.
+    """
+
+    start: Sequence[str]
+    stop: Sequence[str]
+
+
+class NewGains(NamedTuple):
+    """Another configuration of a controller.
+
+    Attributes:
+        name: The controller.
+        config: All of its keys.
+    """
+
+    name: str
+    config: ControllerConfig
+
+
+class _Managed:
+    """A controller and what is known of it here."""
+
+    def __init__(self, name: str, arm: Arm, config: ControllerConfig) -> None:
+        self.name, self.arm = name, arm
+        self.indices = [arm.model.joints[place].index for place in arm.chosen]
+        self.targets: dict[str, Any] = {}
+        self.active = self.has_begun = False
+        self.message = ""
+        self.slow = 0
+        self.configure(config)
+
+    def configure(self, config: ControllerConfig) -> None:
+        """Makes it anew; one that is active begins again where the robot is."""
+        self.controller = controller_class(config.type)(self.arm, config)
+        self.config = config
+        self.has_begun = False
+
+    def compute(self, state: RobotState, tick: int) -> np.ndarray | SetPoints:
+        """Returns what it wants, which is finite.
+
+        Raises:
+            Exception: Whatever it raises.
+        """
+        if not self.has_begun:
+            self.controller.start(state, tick)
+            self.has_begun = True
+        wanted = self.controller.compute(state, self.targets, tick)
+        numbers = np.asarray(wanted.position if isinstance(wanted, SetPoints) else wanted, np.float64)
+        if numbers.shape != (len(self.indices),):
+            raise ValueError(
+                f"expected one number for each of its {len(self.indices)} joints, got shape {numbers.shape}"
+            )
+        if not np.isfinite(numbers).all():
+            raise ValueError(f"what it wants is not finite: {numbers.tolist()}")
+        return SetPoints(numbers) if isinstance(wanted, SetPoints) else numbers
+
+
+class ControllerManager:
+    """Runs the controllers of one robot that are active; one joint is driven by one of them at most.
+
+    Args:
+        arm: The robot; which joints each controller drives is chosen here.
+        configs: What YAML says, by name.
+        motors: The robot's motors.
+
+    Raises:
+        ConfigError: If a configuration does not fit.
+    """
+
+    def __init__(self, arm: Arm, configs: Mapping[str, ControllerConfig], motors: Motors) -> None:
+        self._motors = motors
+        self._arm = arm
+        self._managed = {name: _Managed(name, self._arm_of(config), config) for name, config in configs.items()}
+        self.driven: frozenset[int] = frozenset()
+        """Joints that a controller drives, by PyBullet's index."""
+        self.switch(ControllerSwitch([name for name, config in configs.items() if config.active], []))
+
+    @property
+    def names(self) -> list[str]:
+        """The names of all controllers."""
+        return list(self._managed)
+
+    def of(self, name: str) -> Controller:
+        """Returns a controller.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        return self._named(name).controller
+
+    def check_switch(self, switch: ControllerSwitch) -> None:
+        """Checks that controllers can be started and stopped.
+
+        Raises:
+            UnknownNameError: If there is none of a name.
+            ValueError: If two would drive one joint.
+        """
+        for name in (*switch.start, *switch.stop):
+            self._named(name)
+        drivers: dict[int, str] = {}
+        for name in self._after(switch):
+            for index in self._managed[name].indices:
+                if index in drivers:
+                    joint = next(joint.name for joint in self._arm.model.joints if joint.index == index)
+                    raise ValueError(f"'{name}' and '{drivers[index]}' both drive '{joint}': stop one of them")
+                drivers[index] = name
+
+    def switch(self, switch: ControllerSwitch) -> frozenset[int]:
+        """Stops and starts controllers; joints that none drives any more hold where they are.
+
+        Returns:
+            The joints that a controller drives which none drove before.
+
+        Raises:
+            UnknownNameError: If there is none of a name.
+            ValueError: If two would drive one joint; then nothing has changed.
+        """
+        self.check_switch(switch)
+        active = self._after(switch)
+        before = self.driven
+        for name, managed in self._managed.items():
+            if managed.active != (name in active):
+                managed.active, managed.has_begun, managed.message, managed.slow = name in active, False, "", 0
+                managed.targets.clear()
+        self._drive_others(before)
+        return self.driven - before
+
+    def configure(self, gains: NewGains) -> None:
+        """Changes the keys of a controller, such as its gains.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+            ValueError: If they do not fit.
+        """
+        self._named(gains.name).configure(gains.config)
+
+    def config(self, name: str) -> ControllerConfig:
+        """Returns the keys of a controller.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        return self._named(name).config
+
+    def take(self, name: str, key: str, value: Any) -> None:
+        """Hands a controller the newest value of an input."""
+        self._managed[name].targets[key] = value
+
+    def advance(self, state: RobotState, tick: int) -> None:
+        """Has the active controllers drive their joints for one tick; one that fails is stopped and named."""
+        for managed in self._managed.values():
+            if managed.active:
+                self._advance(managed, state, tick)
+
+    def sample(self, robot: str, name: str) -> ControllerSample:
+        """Returns how a controller does."""
+        managed = self._managed[name]
+        values = managed.controller.report() if managed.active and managed.has_begun else {}
+        return ControllerSample(f"{robot}/{name}", managed.config.type, managed.active, managed.message, values)
+
+    def _advance(self, managed: _Managed, state: RobotState, tick: int) -> None:
+        begin_ns = time.thread_time_ns()
+        try:
+            wanted = managed.compute(state, tick)
+        except Exception as error:
+            self._fail(managed, _cause(managed.controller, error))
+            return
+        took_s = (time.thread_time_ns() - begin_ns) * 1e-9
+        managed.slow = managed.slow + 1 if took_s > managed.arm.dt_s else 0
+        if managed.slow >= SLOW_TICKS:
+            self._fail(managed, f"it needs {took_s * 1e3:.3g} ms for a tick of {managed.arm.dt_s * 1e3:.3g} ms")
+        elif isinstance(wanted, SetPoints):
+            measured = (state.position[place] for place in managed.arm.chosen)
+            for index, before, after in zip(managed.indices, measured, wanted.position.tolist()):
+                self._motors.track(index, before, (after - before) / managed.arm.dt_s)
+        else:
+            self._motors.push(dict(zip(managed.indices, wanted.tolist())))
+
+    def _fail(self, managed: _Managed, message: str) -> None:
+        log.error("%s: controller '%s' is stopped, its joints hold: %s", self._arm.name, managed.name, message)
+        before = self.driven
+        managed.active, managed.message = False, message
+        self._drive_others(before)
+
+    def _drive_others(self, before: frozenset[int]) -> None:
+        """Notes who is driven now; those that were before hold, and those that were not leave the motors."""
+        self.driven = frozenset(
+            index for managed in self._managed.values() if managed.active for index in managed.indices
+        )
+        self._motors.seize(before - self.driven)
+        self._motors.let_go(self.driven - before)
+
+    def _after(self, switch: ControllerSwitch) -> list[str]:
+        """Returns the names of those that are active after a switch."""
+        stays = {name for name, managed in self._managed.items() if managed.active} - set(switch.stop)
+        return [name for name in self._managed if name in stays or name in switch.start]
+
+    def _named(self, name: str) -> _Managed:
+        if name not in self._managed:
+            raise UnknownNameError("controller", name, list(self._managed))
+        return self._managed[name]
+
+    def _arm_of(self, config: ControllerConfig) -> Arm:
+        return self._arm._replace(chosen=chosen_joints(self._arm, config.joints))
+
+
+def chosen_joints(arm: Arm, names: Iterable[str] | None) -> np.ndarray:
+    """Returns the places among the driven joints of those that are named, of all if none are.
+
+    Raises:
+        UnknownNameError: If the robot has no such joint, or no motor can move it.
+    """
+    known = [joint.name for joint in arm.model.joints]
+    if names is None:
+        return np.arange(len(known))
+    for name in names:
+        if name not in known:
+            raise UnknownNameError("driven joint", name, known)
+    return np.array([known.index(name) for name in names], np.int64)
+
+
+def _cause(controller: Controller, error: Exception) -> str:
+    """Tells what went wrong in a controller, and where if it is of another package."""
+    try:
+        blame(controller, "compute", error)
+    except InterfaceError as blamed:
+        return str(blamed)
+    return f"{type(error).__name__}: {error}"
+
+
+def controller_problems(robot: str, arm: Arm, configs: Mapping[str, ControllerConfig]) -> list[Problem]:
+    """Returns what does not fit in the controllers of a robot."""
+    problems = []
+    drivers: dict[int, str] = {}
+    for name, config in configs.items():
+        key = f"controllers.{name}"
+        try:
+            chosen = chosen_joints(arm, config.joints)
+            controller_class(config.type)(arm._replace(chosen=chosen), config)
+        except (InterfaceError, ValueError) as error:
+            problems.append(Problem(robot, key, str(error)))
+            continue
+        for place in chosen.tolist() if config.active else ():
+            if place in drivers:
+                joint = arm.model.joints[place].name
+                problems.append(Problem(robot, key, f"'{drivers[place]}' drives '{joint}' already: only one is active"))
+                break
+            drivers[place] = name
+    return problems
