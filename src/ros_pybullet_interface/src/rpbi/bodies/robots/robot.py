@@ -11,7 +11,7 @@ import pybullet
 from custom_ros_tools.errors import Problem
 from rpbi.config.pybullet_args import IMPEDANCE_CONTROL
 from rpbi.control.controllers.controller import Arm, RobotState
-from rpbi.control.controllers.impedance import joint_impedance
+from rpbi.control.controllers.impedance import ExternalEfforts, joint_impedance
 from rpbi.control.controllers.manager import ControllerManager, ControllerSwitch, NewGains, controller_problems
 from rpbi.control.joint_drive import JointDrive
 from rpbi.control.motors import Command, LimitReports, Motors, joined
@@ -85,6 +85,7 @@ class Robot(JointedBody):
         self.controllers = ControllerManager(self._arm(), config.controllers, self.motors)
         joints = self.model.driven
         self._stiffness = config.impedance.by_joint("stiffness", joints)
+        self._external = ExternalEfforts(len(joints), self.drive.dt_s)
         self._damping_ratio = config.impedance.by_joint("damping_ratio", joints)
         self._start_base(config.resetBaseVelocity, config.object_tf, self.has_fixed_base)
 
@@ -174,6 +175,7 @@ class Robot(JointedBody):
             self.halt("the control mode was changed")
             self.drive.drop_targets()
             self.motors.switch(mode)
+            self._external = ExternalEfforts(len(self.model.driven), self.drive.dt_s)
             self.motors.let_go(self.controllers.driven)
 
     def set_joint_state(self, target: JointTarget) -> None:
@@ -228,15 +230,19 @@ class Robot(JointedBody):
         if not wanted:
             return
         positions, velocities = np.array(wanted).T
+        mass, velocity = model.mass_matrix(state.position), np.array(state.velocity)
+        self._external.update(velocity)
         springs = joint_impedance(
-            model.mass_matrix(state.position),
+            mass,
             self._stiffness,
             self._damping_ratio,
             positions - state.position,
-            np.array(state.velocity),
+            velocity,
             velocities,
+            self._external.estimate,
             self.drive.dt_s,
         )
+        self._external.note(mass, springs, velocity)
         efforts = springs + model.bias(state.base, state.position, state.velocity)
         indices = (joint.index for joint in model.joints)
         driven = self.controllers.driven

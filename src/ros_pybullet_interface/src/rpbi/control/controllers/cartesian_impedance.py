@@ -14,8 +14,19 @@ from rpbi.engine.inputs import check_pose
 from rpbi.geometry import Pose, rotated
 
 from .controller import Arm, Array, Controller, ControllerConfig, RobotState
-from .impedance import DampingRatio, cartesian_impedance, damping_of, joint_impedance, turn_between
+from .impedance import (
+    DampingRatio,
+    ExternalEfforts,
+    cartesian_impedance,
+    columns_solved,
+    damping_of,
+    joint_impedance,
+    turn_between,
+)
 from .joint_impedance import BUFFER_S
+
+ROUNDING = 1e-6 * np.eye(6)
+"""Keeps the mobility of a singular arm invertible."""
 
 
 class PoseTarget(NamedTuple):
@@ -72,6 +83,9 @@ class CartesianImpedanceController(Controller):
         self._goal = self._pose()
         self._stream = TargetStream(Arrivals(self.arm.dt_s, BUFFER_S), _components(self._goal), smooth=True)
         self._posture = np.array(state.position)[self.arm.chosen]
+        self._external = ExternalEfforts(len(self._posture), self.arm.dt_s)
+        self._ones, self._zeros = np.ones_like(self._posture), np.zeros_like(self._posture)
+        self._posture_stiffness = self.config.posture_stiffness * self._ones
         self._taken: Any = None
 
     def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array:
@@ -83,19 +97,27 @@ class CartesianImpedanceController(Controller):
         jacobian = arm.model.jacobian(state.base, q, self._link, self.config.point)[:, chosen]
         mass = arm.model.mass_matrix(q)[np.ix_(chosen, chosen)]
         joint_velocity = np.array(state.velocity)[chosen]
-        by_effort = np.linalg.solve(mass, jacobian.T)  # (m, 6): acceleration of the joints by force at the point
-        mobility = jacobian @ by_effort
+        by_force = columns_solved(mass, jacobian)
+        mobility = jacobian @ by_force.T
         velocity = jacobian @ joint_velocity
         pose = self._pose()
         turn = turn_between(pose.quat_xyzw, wanted[3:])
         self._error = np.concatenate((np.subtract(wanted[:3], pose.position), turn))
+        self._external.update(joint_velocity)
+        external = self._external.estimate
         stiffness, damping, push = self._springs(mobility)
-        self._wrench = cartesian_impedance(mobility, stiffness, damping, self._error, velocity, push, dt_s)
+        self._wrench = cartesian_impedance(
+            mobility, stiffness, damping, self._error, velocity, push, by_force @ external, dt_s
+        )
         efforts: Array = jacobian.T @ self._wrench
-        efforts += arm.model.bias(state.base, q, state.velocity)[chosen]
         if self.config.posture_stiffness:
-            efforts += self._hold_posture(mass, jacobian, by_effort, mobility, np.array(q)[chosen], joint_velocity)
-        return efforts
+            pull = joint_impedance(
+                mass, self._posture_stiffness, self._ones, self._posture - np.array(q)[chosen], joint_velocity,
+                self._zeros, external, dt_s
+            )  # fmt: skip
+            efforts += pull - jacobian.T @ np.linalg.solve(mobility + ROUNDING, by_force @ pull)
+        self._external.note(mass, efforts, joint_velocity)
+        return efforts + arm.model.bias(state.base, q, state.velocity)[chosen]
 
     def report(self) -> Mapping[str, float]:
         """Returns how far it is from the target, and with what force and moment it pulls, in the world's axes."""
@@ -112,19 +134,6 @@ class CartesianImpedanceController(Controller):
         stiffness = np.repeat((config.stiffness, config.rotational_stiffness), 3)
         damping = damping_of(mobility, np.eye(3), stiffness, config.damping_ratio)
         return np.diag(stiffness), np.diag(damping), np.zeros(6)
-
-    def _hold_posture(
-        self, mass: Array, jacobian: Array, by_effort: Array, mobility: Array, q: Array, velocity: Array
-    ) -> Array:
-        """Returns efforts that pull joints to their posture without accelerating the point (Khatib, 1987)."""
-        count = len(q)
-        stiffness = np.full(count, self.config.posture_stiffness)
-        pull = joint_impedance(
-            mass, stiffness, np.ones(count), self._posture - q, velocity, np.zeros(count), self.arm.dt_s
-        )
-        inertia = np.linalg.inv(mobility + 1e-6 * np.eye(6))
-        efforts: Array = pull - jacobian.T @ (inertia @ (by_effort.T @ pull))
-        return efforts
 
     def _pose(self) -> Pose:
         pose = self.arm.link_pose(self._link)

@@ -2,7 +2,7 @@
 
 An explicit spring of stiffness k on a mass m oscillates, and then diverges, once k dt^2 / m is large. Here the spring
 is evaluated where the joint will be after the tick, which the mass matrix tells (Tan, Liu and Turk, "Stable
-Proportional-Derivative Controllers", 2011).
+Proportional-Derivative Controllers", 2011) and what else acts on the joint, which is estimated.
 """
 
 from __future__ import annotations
@@ -22,6 +22,9 @@ from rpbi.urdf.joints import Joint
 Array = npt.NDArray[np.float64]
 
 DampingRatio = Annotated[float, Field(ge=0.0, le=2.0)]
+SMOOTHED_S = 0.01
+"""Time constant of the estimate of external efforts [s]."""
+_EYE = np.eye(6)
 LARGEST_MASS_KG = 100.0
 """Of a direction in which the arm can hardly move, for damping."""
 
@@ -53,6 +56,32 @@ class JointSprings(ConfigModel):
         return np.array([given.get(name, default) for name in names])
 
 
+class ExternalEfforts:
+    """Estimates what acts on n joints beside the efforts that a controller knows of, from how they accelerate.
+
+    Args:
+        count: How many joints there are.
+        dt_s: Length of a tick [s].
+    """
+
+    def __init__(self, count: int, dt_s: float) -> None:
+        self.estimate = np.zeros(count)
+        """n efforts [N m or N], smoothed by a first-order filter of 10 ms."""
+        self._dt_s = dt_s
+        self._share = 1.0 - math.exp(-dt_s / SMOOTHED_S)
+        self._last: tuple[Array, Array, Array] | None = None
+
+    def update(self, velocity: Array) -> None:
+        """Takes the velocities [rad/s or m/s] after the tick of the last `note`."""
+        if self._last is not None:
+            mass, net, before = self._last
+            self.estimate += self._share * (mass @ (velocity - before) / self._dt_s - net - self.estimate)
+
+    def note(self, mass: Array, net: Array, velocity: Array) -> None:
+        """Notes the mass matrix, the efforts of a tick beyond the bias, and the velocities before it."""
+        self._last = mass, net, velocity
+
+
 def joint_impedance(
     mass: Array,
     stiffness: Array,
@@ -60,6 +89,7 @@ def joint_impedance(
     error: Array,
     velocity: Array,
     wanted_velocity: Array,
+    external: Array,
     dt_s: float,
 ) -> Array:
     """Returns the efforts of springs and dampers at n joints.
@@ -71,17 +101,26 @@ def joint_impedance(
         error: How far each joint is from where it is to be [rad or m], positive if it is to move forward.
         velocity: n measured velocities [rad/s or m/s].
         wanted_velocity: n velocities that joints are to have.
+        external: n efforts [N m or N] that something else applies.
         dt_s: Length of a tick [s].
     """
     damping = 2.0 * damping_ratio * np.sqrt(stiffness * mass.diagonal())
-    ahead = stiffness * (error - velocity * dt_s) + damping * (wanted_velocity - velocity)
-    accelerations = np.linalg.solve(mass + np.diag(damping * dt_s + stiffness * dt_s**2), ahead)
-    efforts: Array = mass @ accelerations
+    ahead = stiffness * (error - velocity * dt_s) + damping * (wanted_velocity - velocity) + external
+    stiff = mass.copy()
+    stiff.flat[:: len(mass) + 1] += damping * dt_s + stiffness * dt_s**2
+    efforts: Array = mass @ np.linalg.solve(stiff, ahead) - external
     return efforts
 
 
 def cartesian_impedance(
-    mobility: Array, stiffness: Array, damping: Array, error: Array, velocity: Array, push: Array, dt_s: float
+    mobility: Array,
+    stiffness: Array,
+    damping: Array,
+    error: Array,
+    velocity: Array,
+    push: Array,
+    external: Array,
+    dt_s: float,
 ) -> Array:
     """Returns force and moment of a spring and damper at a point of an arm.
 
@@ -92,11 +131,23 @@ def cartesian_impedance(
         error: From where the point is to where it is to be: way [m] and turn [rad], shape (6,).
         velocity: Of the point [m/s] and of the link's rotation [rad/s], shape (6,).
         push: A force [N] and moment [N m] beside the spring, shape (6,).
+        external: How what else acts on the arm accelerates the point [m/s^2, rad/s^2], shape (6,).
         dt_s: Length of a tick [s].
     """
-    ahead = stiffness @ (error - velocity * dt_s) - damping @ velocity + push
-    wrench: Array = np.linalg.solve(np.eye(6) + (damping * dt_s + stiffness * dt_s**2) @ mobility, ahead)
+    by_acceleration = damping * dt_s + stiffness * dt_s**2
+    ahead = stiffness @ (error - velocity * dt_s) - damping @ velocity + push - by_acceleration @ external
+    wrench: Array = np.linalg.solve(_EYE + by_acceleration @ mobility, ahead)
     return wrench
+
+
+def columns_solved(matrix: Array, rows: Array) -> Array:
+    """Returns the solutions of one system of n equations for k right sides, given and returned as rows, shape (k, n).
+
+    One by one, since LAPACK solves several at once in threads of its own, which on a busy machine wait for each other
+    for many times as long as the sums take.
+    """
+    solved: Array = np.linalg.solve(np.broadcast_to(matrix, (len(rows), *matrix.shape)), rows[:, :, None])[:, :, 0]
+    return solved
 
 
 def damping_of(mobility: Array, turn: Array, stiffness: Array, ratio: float) -> Array:
@@ -111,8 +162,8 @@ def damping_of(mobility: Array, turn: Array, stiffness: Array, ratio: float) -> 
     Returns:
         6 dampings [N s/m, N m s/rad].
     """
-    linear, angular = (np.einsum("ji,jk,ki->i", turn, part, turn) for part in (mobility[:3, :3], mobility[3:, 3:]))
-    masses = 1.0 / np.maximum(np.concatenate((linear, angular)), 1.0 / LARGEST_MASS_KG)
+    along = [(turn * (part @ turn)).sum(0) for part in (mobility[:3, :3], mobility[3:, 3:])]
+    masses = 1.0 / np.maximum(np.concatenate(along), 1.0 / LARGEST_MASS_KG)
     dampings: Array = 2.0 * ratio * np.sqrt(stiffness * masses)
     return dampings
 

@@ -11,7 +11,7 @@ from rpbi.control.target_stream import Arrivals, TargetStream
 from rpbi.urdf.joints import JointTarget
 
 from .controller import Arm, Array, Controller, ControllerConfig, RobotState
-from .impedance import JointSprings, joint_impedance
+from .impedance import ExternalEfforts, JointSprings, joint_impedance
 
 BUFFER_S = 0.01
 """Longest delay of targets to even out how late they come [s]."""
@@ -57,6 +57,7 @@ class JointImpedanceController(Controller):
         held = {place: state.position[chosen] for place, chosen in enumerate(self.arm.chosen)}
         self._stream = TargetStream(Arrivals(self.arm.dt_s, BUFFER_S), held, smooth=True)
         self._push = np.zeros(len(held))
+        self._external = ExternalEfforts(len(held), self.arm.dt_s)
         self._taken: Any = None
         self._goal = dict(held)
 
@@ -69,10 +70,20 @@ class JointImpedanceController(Controller):
         mass = model.mass_matrix(state.position)[np.ix_(chosen, chosen)]
         self._error = before - np.array(state.position)[chosen]
         velocity = np.array(state.velocity)[chosen]
-        springs = joint_impedance(
-            mass, self._stiffness, self._ratio, self._error, velocity, (after - before) / dt_s, dt_s
+        bias = model.bias(state.base, state.position, state.velocity)[chosen]
+        self._external.update(velocity)
+        efforts: Array = self._push + joint_impedance(
+            mass,
+            self._stiffness,
+            self._ratio,
+            self._error,
+            velocity,
+            (after - before) / dt_s,
+            self._external.estimate,
+            dt_s,
         )
-        return springs + model.bias(state.base, state.position, state.velocity)[chosen] + self._push
+        self._external.note(mass, efforts, velocity)
+        return efforts + bias
 
     def report(self) -> Mapping[str, float]:
         """Returns how far each joint is from where it is to be [rad or m]."""
