@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from rpbi.config.pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ObjectTf
+from rpbi.config.pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, MovingTf
 from rpbi.config.sensors import ContactsConfig
 from rpbi.engine.client import Client
 from rpbi.sensors.contact_arrows import contact_sensors
@@ -18,7 +18,7 @@ class CollisionObjectConfig(BodyConfig):
     createVisualShape: CreateVisualShape = Field(description="What it looks like.")
     createCollisionShape: CreateCollisionShape = Field(description="What it feels like.")
     changeDynamics: ChangeDynamics | None = Field(None, description="Friction, restitution and the like.")
-    object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, it stays at the origin.")
+    object_tf: MovingTf | None = Field(None, description="TF frame to follow; without it, it stays at the origin.")
     contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
 
 
@@ -36,7 +36,7 @@ class CollisionObject(ShapeObject):
 
     def __init__(self, pb: Client, config: CollisionObjectConfig) -> None:
         super().__init__(pb, config.name, config.createVisualShape, config.createCollisionShape)
-        self.object_tf = config.object_tf
+        self._follow(config.object_tf)
         if config.changeDynamics is not None:
             pb.changeDynamics(self.body_id, -1, **config.changeDynamics.kwargs())
         self._contacts = config.contacts
