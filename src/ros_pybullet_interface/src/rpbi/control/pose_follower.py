@@ -157,7 +157,7 @@ class PoseFollower:
             way = math.dist(path.goal.position, pose.position)
             turn = math.hypot(*rotation_between(path.goal.quat_xyzw, pose.quat_xyzw))
             jump = f"'{self._object_tf.tf_id}' jumped by {way:.3g} m and {turn:.3g} rad"
-            log.warning("%s: %s before tick %d: it was put there, at rest", self.name, jump, tick)
+            log.warning("%s: TF: %s: it was put there at tick %d, at rest", self.name, jump, tick)
         return self._begin(pose)
 
     def _begin(self, pose: Pose) -> PosePath:
