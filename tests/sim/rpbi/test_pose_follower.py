@@ -209,7 +209,10 @@ def test_an_arm_on_a_base_that_moves_and_turns_keeps_to_its_path_and_holds_its_j
 
 
 def test_what_pybullet_gives_no_velocity_is_put_where_tf_says(build):
-    plate = {"name": "plate", "loadURDF": {"fileName": "cube.urdf", "useFixedBase": True, "useMaximalCoordinates": True}}
+    plate = {
+        "name": "plate",
+        "loadURDF": {"fileName": "cube.urdf", "useFixedBase": True, "useMaximalCoordinates": True},
+    }
     world = build(urdfs=({**plate, "object_tf": {"tf_id": "plate"}},))
     for x in (1.0, 1.2):
         world.put("plate/pose", Pose((x, 0.0, 0.0)))
@@ -235,7 +238,11 @@ def test_dynamic_and_urdf_objects_tell_how_they_move_if_asked(build):
     falling = ball(basePosition=[0.0, 0.0, 5.0], base_state_hz=100)
     cube = {"name": "cube", "loadURDF": {"fileName": "cube_small.urdf", "basePosition": [3.0, 0.0, 5.0]}}
     turning = {"angularVelocity": [0.0, 0.0, 2.0], "linearVelocity": [0.5, 0.0, 0.0]}
-    world = build(falling, ball("silent", basePosition=[1.0, 0.0, 5.0]), urdfs=({**cube, "base_state_hz": 100, "resetBaseVelocity": turning},))
+    world = build(
+        falling,
+        ball("silent", basePosition=[1.0, 0.0, 5.0]),
+        urdfs=({**cube, "base_state_hz": 100, "resetBaseVelocity": turning},),
+    )
     samples = [one for _ in range(50) for one in world.step() if isinstance(one, BaseStateSample)]
     assert [one.name for one in samples] == ["ball", "cube"] * 5
     drop, turn = samples[-2:]

@@ -20,9 +20,12 @@ INTERVALS = 5
 LONGEST_GROWTH = 2
 """How many times as long as the longest before it an interval may count; a longer one is a pause."""
 JUMP_S = 0.1
-"""What takes longer than this at the largest speeds is a jump [s], unless poses come as slowly."""
+"""What takes longer than this at the largest speeds is a jump [s], and longer than two periods of the stream."""
 QUIET_S = 5.0
 """How long no further jump is told of [s] of the world's time."""
+
+MOST_TICKS = 10_000
+"""Over so many ticks a path is smoothed at most."""
 
 _Numbers = npt.NDArray[np.float64]
 
@@ -162,7 +165,7 @@ class PoseFollower:
 
     def _begin(self, pose: Pose) -> PosePath:
         tf, dt_s = self._object_tf, self._dt_s
-        ticks = max(1, round(1.0 / (tf.hz * dt_s)))
+        ticks = min(max(1, round(1.0 / (tf.hz * dt_s))), MOST_TICKS)
         self._path = PosePath(pose, ticks, tf.max_speed * dt_s, tf.max_angular_speed * dt_s)
         self._rest_at(pose)
         return self._path

@@ -55,7 +55,7 @@ class TfListener:
         rospy.Subscriber("/tf_static", TFMessage, self._take, self._buffer.set_transform_static, queue_size=QUEUE_SIZE)
 
     def pose(self, parent: str, child: str) -> tuple[Pose, int] | None:
-        """Returns the newest pose of a frame in another and its stamp [ns], 0 if it is static; None if there is none."""
+        """Returns the newest pose of a frame in another and its stamp [ns], 0 if static; None if there is none."""
         try:
             found = self._buffer.lookup_transform(parent, child, rospy.Time(0))
         except tf2_ros.TransformException:
@@ -105,7 +105,7 @@ def refusal(slot: str, taken: Input, error: Exception) -> Exception:
     raise error
 
 
-class _Followed:
+class Followed:
     """A pose input and what is known of its frame.
 
     It is looked at when it comes, about once a period: a look at other times would find now more, now less of a motion.
@@ -117,11 +117,11 @@ class _Followed:
         self.tf_id = pose_input.tf_id
         self.period_s = 1.0 / pose_input.hz
         self.since_s = time.monotonic()
-        self.looked_s = -math.inf
+        self.looked_s = self.news_s = -math.inf
         self.last_pose: Pose | None = None
         self.last_stamp_ns = -1
-        self.news_s = self.news_time_s = 0.0
-        """When its stamp last changed [s], in wall time and in the world's."""
+        self.news_time_s = 0.0
+        """The world's time at which its stamp last changed [s]; `news_s` is that in wall time."""
         self.is_stale = False
         self.quiet_until_s = 0.0
 
@@ -157,13 +157,13 @@ class TfFollower:
 
     def __init__(self, put: Callable[[str, Any], None], time_s: Callable[[], float]) -> None:
         self._put, self._time_s = put, time_s
-        self._followed: tuple[_Followed, ...] = ()
+        self._followed: tuple[Followed, ...] = ()
         self._listener: TfListener | None = None
         self._warn = ThrottledWarning(period_s=30.0)
 
     def follow(self, name: str, slot: str, pose_input: PoseInput) -> None:
         """Begins to follow a frame for a body or sensor."""
-        self._followed = (*self._followed, _Followed(name, slot, pose_input))
+        self._followed = (*self._followed, Followed(name, slot, pose_input))
         if self._listener is None:
             self._listener = TfListener()
             threading.Thread(target=self._run, args=(self._listener,), name="tf follower", daemon=True).start()
@@ -195,7 +195,7 @@ class TfFollower:
                 next_s = min(next_s, due_s)
             listener.something_came.wait(max(next_s - time.monotonic(), 0.001))
 
-    def _look(self, listener: TfListener, followed: _Followed, now_s: float) -> None:
+    def _look(self, listener: TfListener, followed: Followed, now_s: float) -> None:
         found = listener.pose(world_frame(), followed.tf_id)
         if found is None:
             if followed.last_pose is None and now_s - followed.since_s > TF_MISSING_AFTER_S:
@@ -214,7 +214,7 @@ class TfFollower:
                 if followed in self._followed:  # else it has gone meanwhile
                     self._warn(followed.slot, f"TF refused: {reason}")
 
-    def _tell_if_stale(self, followed: _Followed, stamp_ns: int, now_s: float) -> None:
+    def _tell_if_stale(self, followed: Followed, stamp_ns: int, now_s: float) -> None:
         """Tells once that nothing new has come of a frame, unless it is static, and once that something has again."""
         time_s = self._time_s()
         if followed.is_new(stamp_ns, now_s, time_s):
