@@ -11,7 +11,7 @@ import pybullet
 
 from custom_ros_tools.errors import PhysicsError
 from custom_ros_tools.schema import ConfigModel
-from rpbi.config.pybullet_models import MovingTf, ObjectTf, ResetBaseVelocity
+from rpbi.config.pybullet_models import ObjectTf, ResetBaseVelocity
 from rpbi.control.pose_follower import PoseFollower
 from rpbi.engine.client import Client
 from rpbi.engine.inputs import Input, PoseInput
@@ -71,7 +71,7 @@ class Body:
         return {-1: self.pb.getBodyInfo(self.body_id)[0].decode(), **names}
 
     def _start_base(
-        self, velocity: ResetBaseVelocity | None, object_tf: MovingTf | None = None, is_fixed: bool = False
+        self, velocity: ResetBaseVelocity | None, object_tf: ObjectTf | None = None, is_fixed: bool = False
     ) -> None:
         """Has a fixed base follow its TF frame, and gives any other its start velocity; warns of what has no effect."""
         if is_fixed:
@@ -84,7 +84,7 @@ class Body:
         if object_tf is not None:
             log.warning("%s: object_tf: has no effect: physics moves a base that is not fixed", self.name)
 
-    def _follow(self, object_tf: MovingTf | None) -> None:
+    def _follow(self, object_tf: ObjectTf | None) -> None:
         """Has a fixed base move along the poses of its TF frame, if there is one.
 
         What was loaded with `useMaximalCoordinates` is put there: PyBullet takes no velocity of such a base.

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from rpbi.config.pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, MovingTf
+from rpbi.config.pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ObjectTf
 from rpbi.config.sensors import ContactsConfig
 from rpbi.engine.client import Client
 from rpbi.sensors.contact_arrows import contact_sensors
@@ -18,7 +18,7 @@ class CollisionObjectConfig(BodyConfig):
     createVisualShape: CreateVisualShape = Field(description="What it looks like.")
     createCollisionShape: CreateCollisionShape = Field(description="What it feels like.")
     changeDynamics: ChangeDynamics | None = Field(None, description="Friction, restitution and the like.")
-    object_tf: MovingTf | None = Field(None, description="TF frame to follow; without it, it stays at the origin.")
+    object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, it stays at the origin.")
     contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
 
 

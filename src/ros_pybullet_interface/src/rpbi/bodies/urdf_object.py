@@ -5,7 +5,7 @@ from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import HzOrOff
-from rpbi.config.pybullet_models import LoadURDF, MovingTf, ResetBaseVelocity
+from rpbi.config.pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity
 from rpbi.config.sensors import ContactsConfig
 from rpbi.engine.client import Client
 from rpbi.sensors.base_state import BaseStateSensor
@@ -23,7 +23,7 @@ class UrdfObjectConfig(BodyConfig):
     """An object that comes from a URDF and has no motors."""
 
     loadURDF: LoadURDF = Field(description="Its description and where its base is.")
-    object_tf: MovingTf | None = Field(None, description="TF frame that a fixed base follows.")
+    object_tf: ObjectTf | None = Field(None, description="TF frame that a fixed base follows.")
     resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity of a floating base.")
     broadcast_hz: HzOrOff = Field(0.0, description="Rate of its links' poses on TF; 0 is off.")
     base_state_hz: HzOrOff = Field(

@@ -202,13 +202,11 @@ class ObjectTf(ConfigModel):
     hz: Hz = Field(30.0, description="How often to look.")
     timeout_s: Seconds = Field(0.5, description="Without anything new for so long, it is reported as stale.")
 
-
-class MovingTf(ObjectTf):
-    """A TF frame that a body follows with a velocity, which what it touches feels."""
-
-    max_speed: Annotated[Positive, Field(le=100.0), Unit("m/s")] = Field(5.0, description="Largest speed.")
+    max_speed: Annotated[Positive, Field(le=100.0), Unit("m/s")] = Field(
+        5.0, description="Largest speed of what can be touched."
+    )
     max_angular_speed: Annotated[Positive, Field(le=100.0), Unit("rad/s")] = Field(
-        10.0, description="Fastest rotation."
+        10.0, description="Fastest rotation of what can be touched."
     )
 
 

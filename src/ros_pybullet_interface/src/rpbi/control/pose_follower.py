@@ -9,7 +9,7 @@ from collections import deque
 import numpy as np
 import numpy.typing as npt
 
-from rpbi.config.pybullet_models import MovingTf
+from rpbi.config.pybullet_models import ObjectTf
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose, cross, dot, minus, normalized, rotation_between, scaled
 
@@ -114,7 +114,7 @@ class PoseFollower:
         centre: The pose of its centre of mass, which PyBullet moves, in the frame that follows.
     """
 
-    def __init__(self, pb: Client, name: str, body_id: int, centre: Pose, object_tf: MovingTf) -> None:
+    def __init__(self, pb: Client, name: str, body_id: int, centre: Pose, object_tf: ObjectTf) -> None:
         self.name = name
         self._pb, self._body_id, self._centre = pb, body_id, centre
         self._object_tf = object_tf

@@ -6,7 +6,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from custom_ros_tools.schema import Hz, HzOrOff, KeyedError, ListOf, Seconds, Switch
 from rpbi.bodies.body_config import BodyConfig
-from rpbi.config.pybullet_models import LoadURDF, MovingTf, ResetBaseVelocity, SetJointMotorControlArray
+from rpbi.config.pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity, SetJointMotorControlArray
 from rpbi.config.sensors import ContactsConfig, ForceTorqueEntry
 from rpbi.control.planar_base import PlanarBaseConfig
 from rpbi.control.trajectories.config import JointTrajectoryControllerConfig
@@ -65,7 +65,7 @@ class RobotConfig(BodyConfig):
     joint_trajectory_controller: JointTrajectoryControllerConfig | None = Field(
         None, description="Follower of trajectories, for planners; {} has the usual settings."
     )
-    object_tf: MovingTf | None = Field(None, description="TF frame that a fixed or visual base follows.")
+    object_tf: ObjectTf | None = Field(None, description="TF frame that a fixed or visual base follows.")
     resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity of a floating base.")
     do_log_joint_limit_violations: Switch = Field(
         True, description="Whether a visual robot that is beyond its joints' limits is reported."
