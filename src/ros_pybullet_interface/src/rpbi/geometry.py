@@ -54,6 +54,11 @@ def scaled(factor: float, a: Vector) -> Vector:
     return factor * a[0], factor * a[1], factor * a[2]
 
 
+def dot(a: Vector, b: Vector) -> float:
+    """Returns the scalar product of two vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
 def cross(a: Vector, b: Vector) -> Vector:
     """Returns the cross product of two vectors."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
@@ -69,6 +74,17 @@ def rotated_back(quat_xyzw: Quaternion, a: Vector) -> Vector:
     """Returns a vector in the axes of a frame of that orientation."""
     x, y, z, w = quat_xyzw
     return rotated((-x, -y, -z, w), a)
+
+
+def rotation_between(start: Quaternion, end: Quaternion) -> Vector:
+    """Returns the rotation vector [rad] that leads from one orientation to another, the shorter way."""
+    w0, w1 = start[3], end[3]
+    v0, v1 = start[:3], end[:3]
+    x, y, z = minus(minus(scaled(w0, v1), scaled(w1, v0)), cross(v1, v0))
+    w = w0 * w1 + dot(v0, v1)
+    sine = math.hypot(x, y, z)
+    angle = 2.0 * math.atan2(sine, abs(w))
+    return scaled(math.copysign(angle / sine if sine > 1e-12 else 2.0, w), (x, y, z))
 
 
 class Twist(NamedTuple):

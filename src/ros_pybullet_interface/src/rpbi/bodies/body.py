@@ -12,6 +12,7 @@ import pybullet
 from custom_ros_tools.errors import PhysicsError
 from custom_ros_tools.schema import ConfigModel
 from rpbi.config.pybullet_models import ObjectTf, ResetBaseVelocity
+from rpbi.control.pose_follower import PoseFollower
 from rpbi.engine.client import Client
 from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Pose, Twist, cross, minus, plus
@@ -19,6 +20,9 @@ from rpbi.samples import BodyState
 from rpbi.sensors.sensor import Sensor
 
 log = logging.getLogger(__name__)
+
+_MULTI_BODY = 2
+"""The type in PyBullet's `getDynamicsInfo` of what has joints in reduced coordinates, or could have."""
 
 
 class Body:
@@ -52,6 +56,8 @@ class Body:
         inertial = pb.getDynamicsInfo(body_id, -1)
         self.inertial_pose_in_base = Pose(inertial[3], inertial[4])
         self._base_pose_in_inertial = self.inertial_pose_in_base.inverse()
+        self.pose_follower: PoseFollower | None = None
+        """What moves its base, which is fixed, along the poses of `object_tf`; None if it is put there."""
         self.dynamics_changes = 0
         """How often its dynamics were changed, for those who keep what they know of them."""
 
@@ -69,7 +75,7 @@ class Body:
     ) -> None:
         """Has a fixed base follow its TF frame, and gives any other its start velocity; warns of what has no effect."""
         if is_fixed:
-            self.object_tf = object_tf
+            self._follow(object_tf)
             if velocity is not None:
                 log.warning("%s: resetBaseVelocity: has no effect: the base is fixed", self.name)
             return
@@ -77,6 +83,16 @@ class Body:
             self.pb.resetBaseVelocity(self.body_id, **velocity.kwargs())
         if object_tf is not None:
             log.warning("%s: object_tf: has no effect: physics moves a base that is not fixed", self.name)
+
+    def _follow(self, object_tf: ObjectTf | None) -> None:
+        """Has a fixed base move along the poses of its TF frame, if there is one.
+
+        What was loaded with `useMaximalCoordinates` is put there: PyBullet takes no velocity of such a base.
+        """
+        self.object_tf = object_tf
+        if object_tf is not None and self.pb.getDynamicsInfo(self.body_id, -1)[10] == _MULTI_BODY:
+            centre = self.inertial_pose_in_base
+            self.pose_follower = PoseFollower(self.pb, self.name, self.body_id, centre, object_tf)
 
     def before_step(self, tick: int) -> None:
         """Acts just before the physics of each tick; bodies that need nothing leave it."""
@@ -109,7 +125,10 @@ class Body:
 
     def inputs(self) -> Mapping[str, Input]:
         """Returns what the body takes while the world runs, by name: the `pose` of the TF frame that it follows."""
-        return {} if self.object_tf is None else {"pose": PoseInput.following(self.object_tf, self.set_base_pose)}
+        if self.object_tf is None:
+            return {}
+        apply = self.set_base_pose if self.pose_follower is None else self.pose_follower.take
+        return {"pose": PoseInput.following(self.object_tf, apply)}
 
     def base_pose(self) -> Pose:
         """Returns the pose of the base link's URDF frame in the world."""
@@ -120,7 +139,7 @@ class Body:
         self.pb.resetBasePositionAndOrientation(self.body_id, *(pose @ self.inertial_pose_in_base))
 
     def base_twist(self) -> Twist:
-        """Returns the twist of the base link's URDF frame in the world; of a base that TF puts somewhere it is 0."""
+        """Returns the twist of the base link's URDF frame in the world."""
         linear, angular = self.pb.getBaseVelocity(self.body_id)  # of the centre of mass
         centre = self.pb.getBasePositionAndOrientation(self.body_id)[0]
         return Twist(plus(linear, cross(angular, minus(self.base_pose().position, centre))), angular)
@@ -129,6 +148,8 @@ class Body:
         """Puts the base link's URDF frame at a pose in the world, at rest."""
         self.set_base_pose(pose)
         self.pb.resetBaseVelocity(self.body_id, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        if self.pose_follower is not None:
+            self.pose_follower.put(pose)
 
     def state(self) -> BodyState:
         """Returns where the body is."""

@@ -36,7 +36,7 @@ class CollisionObject(ShapeObject):
 
     def __init__(self, pb: Client, config: CollisionObjectConfig) -> None:
         super().__init__(pb, config.name, config.createVisualShape, config.createCollisionShape)
-        self.object_tf = config.object_tf
+        self._follow(config.object_tf)
         if config.changeDynamics is not None:
             pb.changeDynamics(self.body_id, -1, **config.changeDynamics.kwargs())
         self._contacts = config.contacts

@@ -6,6 +6,7 @@ from custom_ros_tools.schema import HzOrOff, Position, Positive, Quat
 from rpbi.config.pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ResetBaseVelocity
 from rpbi.config.sensors import ContactsConfig
 from rpbi.engine.client import Client
+from rpbi.sensors.base_state import BaseStateSensor
 from rpbi.sensors.contact_arrows import contact_sensors
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
@@ -25,6 +26,7 @@ class DynamicObjectConfig(BodyConfig):
     baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Start orientation, x, y, z, w.")
     resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity.")
     broadcast_hz: HzOrOff = Field(0.0, description="Rate of its pose on TF; 0 is off.")
+    base_state_hz: HzOrOff = Field(0.0, description="Rate of its pose and velocity on `base_state`; 0 is off.")
     contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
 
 
@@ -39,6 +41,7 @@ class DynamicObject(ShapeObject):
         "changeDynamics": {},
         "baseMass": 1.0,
         "broadcast_hz": 50.0,
+        "base_state_hz": 50.0,
         "contacts": {},
     }
 
@@ -54,12 +57,14 @@ class DynamicObject(ShapeObject):
         )
         pb.changeDynamics(self.body_id, -1, **config.changeDynamics.kwargs())
         self._start_base(config.resetBaseVelocity)
-        self._broadcast_hz = config.broadcast_hz
-        self._contacts = config.contacts
+        self.config = config
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """Its pose, if it is to be broadcast, and its contacts, if they are asked for."""
-        contacts = contact_sensors(self, self._contacts)
-        if not self._broadcast_hz:
-            return contacts
-        return (LinkPoseSensor(self, self._broadcast_hz, links=False, root_frame=f"rpbi/{self.name}"), *contacts)
+        """Its pose, the state of its base and its contacts, each if it is asked for."""
+        frame, config = f"rpbi/{self.name}", self.config
+        sensors: list[Sensor] = []
+        if config.broadcast_hz:
+            sensors.append(LinkPoseSensor(self, config.broadcast_hz, links=False, root_frame=frame))
+        if config.base_state_hz:
+            sensors.append(BaseStateSensor(self, config.base_state_hz, frame))
+        return (*sensors, *contact_sensors(self, config.contacts))

@@ -8,6 +8,7 @@ from custom_ros_tools.schema import HzOrOff
 from rpbi.config.pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity
 from rpbi.config.sensors import ContactsConfig
 from rpbi.engine.client import Client
+from rpbi.sensors.base_state import BaseStateSensor
 from rpbi.sensors.contact_arrows import contact_sensors
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
@@ -25,6 +26,9 @@ class UrdfObjectConfig(BodyConfig):
     object_tf: ObjectTf | None = Field(None, description="TF frame that a fixed base follows.")
     resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity of a floating base.")
     broadcast_hz: HzOrOff = Field(0.0, description="Rate of its links' poses on TF; 0 is off.")
+    base_state_hz: HzOrOff = Field(
+        0.0, description="Rate of its root link's pose and velocity on `base_state`; 0 is off."
+    )
     contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
 
 
@@ -43,6 +47,7 @@ class UrdfObject(Body):
     example = {
         "loadURDF": {"fileName": "cube.urdf", "useFixedBase": True},
         "broadcast_hz": 50.0,
+        "base_state_hz": 50.0,
         "contacts": {},
         "object_tf": {"tf_id": "FRAME"},
     }
@@ -58,9 +63,14 @@ class UrdfObject(Body):
         self._start_base(config.resetBaseVelocity, config.object_tf, is_fixed)
 
     def sensors(self) -> tuple[Sensor, ...]:
-        """The poses of its links, if they are to be broadcast, and its contacts, if they are asked for."""
-        hz = self.config.broadcast_hz
-        return ((LinkPoseSensor(self, hz),) if hz else ()) + contact_sensors(self, self.config.contacts)
+        """The poses of its links, the state of its base and its contacts, each if it is asked for."""
+        config = self.config
+        sensors: list[Sensor] = []
+        if config.broadcast_hz:
+            sensors.append(LinkPoseSensor(self, config.broadcast_hz))
+        if config.base_state_hz:
+            sensors.append(BaseStateSensor(self, config.base_state_hz))
+        return (*sensors, *contact_sensors(self, config.contacts))
 
     def _release(self, index: int) -> None:
         """Leaves of the motor that PyBullet gives each joint what the URDF's friction is.

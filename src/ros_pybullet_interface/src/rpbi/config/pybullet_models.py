@@ -31,6 +31,7 @@ from custom_ros_tools.schema import (
     Quat,
     Rgb,
     Rgba,
+    Seconds,
     Switch,
     Text,
     Unit,
@@ -199,6 +200,14 @@ class ObjectTf(ConfigModel):
 
     tf_id: FrameId = Field(description="Name of the frame.")
     hz: Hz = Field(30.0, description="How often to look.")
+    timeout_s: Seconds = Field(0.5, description="Without anything new for so long, it is reported as stale.")
+
+    max_speed: Annotated[Positive, Field(le=100.0), Unit("m/s")] = Field(
+        5.0, description="Largest speed of what can be touched."
+    )
+    max_angular_speed: Annotated[Positive, Field(le=100.0), Unit("rad/s")] = Field(
+        10.0, description="Fastest rotation of what can be touched."
+    )
 
 
 class LoadSoftBody(PybulletModel):

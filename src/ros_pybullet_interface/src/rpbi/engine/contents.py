@@ -10,6 +10,7 @@ from rpbi.bodies import Body, BodyConfig
 from rpbi.config.loading import LoadedWorld
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.config.sensors import FIRST_TOPIC_NAME, RgbdSensorConfig
+from rpbi.control.pose_follower import PoseFollower
 from rpbi.plugins import blaming
 from rpbi.sensors import sensor_class
 from rpbi.sensors.contacts import ContactReader
@@ -61,7 +62,7 @@ class WorldContents:
 
     Attributes:
         bodies: By name.
-        stepping: The bodies that act before each tick.
+        stepping: The bodies that act before each tick, and what moves bases along poses.
         cameras: By name; a new dictionary whenever one comes or goes.
         inputs: By slot, `NAME/INPUT`; a new dictionary whenever one comes or goes.
         sensors: When each is due.
@@ -74,7 +75,7 @@ class WorldContents:
         self._clock = clock
         self._world = world
         self.bodies: dict[str, Body] = {}
-        self.stepping: list[Body] = []
+        self.stepping: list[Body | PoseFollower] = []
         self.cameras: dict[str, RgbdSensor] = {}
         self.inputs: dict[str, Input] = {}
         self.sensors = SensorSchedule(clock)
@@ -107,6 +108,8 @@ class WorldContents:
                 raise
         except ConfigError as error:
             raise ConfigError([Problem(file or name, each.key, each.message) for each in error.problems]) from None
+        if body.pose_follower is not None:
+            self.stepping.append(body.pose_follower)
         if type(body).before_step is not Body.before_step:
             self.stepping.append(body)
         return body
@@ -132,10 +135,8 @@ class WorldContents:
         if name in self.cameras:
             self.cameras = {other: camera for other, camera in self.cameras.items() if other != name}
         else:
-            body = self.bodies.get(name)
             self._append(LogEntry(name, "remove"))
-            if body in self.stepping:
-                self.stepping.remove(body)
+            self.stepping[:] = [each for each in self.stepping if each.name != name]
         self.sensors.remove(name)
         self.inputs = {slot: taken for slot, taken in self.inputs.items() if slot.split("/")[0] != name}
 

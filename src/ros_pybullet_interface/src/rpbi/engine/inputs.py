@@ -41,15 +41,17 @@ class PoseInput(Input):
     Attributes:
         tf_id: The frame to follow.
         hz: How often to look [Hz], in wall time.
+        timeout_s: Without anything new for so long, it is stale [s].
     """
 
     tf_id: str
     hz: float
+    timeout_s: float
 
     @classmethod
     def following(cls, object_tf: ObjectTf, apply: Callable[[Pose], None]) -> PoseInput:
         """Follows the frame that YAML names under `object_tf`."""
-        return cls(check_pose, apply, tf_id=object_tf.tf_id, hz=object_tf.hz)
+        return cls(check_pose, apply, tf_id=object_tf.tf_id, hz=object_tf.hz, timeout_s=object_tf.timeout_s)
 
 
 def check_pose(pose: Pose) -> Pose:

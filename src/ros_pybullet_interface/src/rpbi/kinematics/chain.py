@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rpbi.engine.client import Client
-from rpbi.geometry import Pose, Quaternion
+from rpbi.geometry import Pose, Quaternion, rotation_between
 from rpbi.urdf.files import write_description
 from rpbi.urdf.joints import Joint
 
@@ -70,11 +70,7 @@ class Chain:
         position, quat = self.pose()
         way = [goal - here for goal, here in zip(target.position, position)]
         if target.quat_xyzw is not None:
-            x, y, z, w = self.pb.getDifferenceQuaternion(quat, target.quat_xyzw)
-            sine = math.hypot(x, y, z)
-            angle = 2.0 * math.atan2(sine, abs(w))  # the shorter way round
-            scale = math.copysign(angle / sine if sine > 1e-12 else 2.0, w)
-            way += [x * scale, y * scale, z * scale]
+            way += rotation_between(quat, target.quat_xyzw)
         return np.array(way)
 
     def residual(self, target: Target, q: np.ndarray) -> Residual:

@@ -64,7 +64,7 @@ class Inputs:
     """Subscribes to what the world takes; refused messages change nothing and are named now and then.
 
     Args:
-        world: The world; only its `put` is used.
+        world: The world; only its `put` and the time of its clock are used.
     """
 
     def __init__(self, world: World) -> None:
@@ -72,7 +72,7 @@ class Inputs:
         self._warn = ThrottledWarning()
         self._warn_seldom = ThrottledWarning(period_s=60.0)  # a controller made for another mode sends on and on
         self._subscribers: dict[str, list[rospy.Subscriber]] = {}
-        self._tf = TfFollower(world.put)
+        self._tf = TfFollower(world.put, lambda: world.clock.time_s)
 
     def open(self, name: str, inputs: Mapping[str, Input]) -> None:
         """Connects the inputs of a body or sensor."""

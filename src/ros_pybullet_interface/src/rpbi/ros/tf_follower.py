@@ -25,6 +25,10 @@ TF_MISSING_AFTER_S = 5.0
 """How long a TF frame may be missing before that is worth a warning [s] of wall time."""
 LONGEST_NAP_S = 0.1
 """How soon a new frame to follow is noticed [s] of wall time."""
+EARLY, LATE = 0.75, 1.5
+"""Shares of a period: from the first on, a transform that comes is looked at; where more are to come, till the last."""
+STALE_AGAIN_AFTER_S = 30.0
+"""How soon it is told again that a frame is stale [s] of wall time."""
 QUEUE_SIZE = 100
 NORM_TOLERANCE = 0.01
 """How far the square of a quaternion's length may be from 1, as for tf2."""
@@ -34,22 +38,31 @@ class TfListener:
     """What is known of TF; `tf2_ros.TransformListener` does the same without looking at what comes.
 
     tf2 refuses by itself what is no transform, but prints two lines on the console each time, however often it comes.
+
+    Attributes:
+        watched: Frames of which it is told when they come.
+        came_s: When each of them last came [s] of wall time.
+        something_came: Set whenever one comes.
     """
 
     def __init__(self) -> None:
+        self.watched: frozenset[str] = frozenset()
+        self.came_s: dict[str, float] = {}
+        self.something_came = threading.Event()
         self._buffer = tf2_ros.Buffer()
         self._warn = ThrottledWarning()
         rospy.Subscriber("/tf", TFMessage, self._take, self._buffer.set_transform, queue_size=QUEUE_SIZE)
         rospy.Subscriber("/tf_static", TFMessage, self._take, self._buffer.set_transform_static, queue_size=QUEUE_SIZE)
 
-    def pose(self, parent: str, child: str) -> Pose | None:
-        """Returns the newest pose of a frame in another, None if there is none."""
+    def pose(self, parent: str, child: str) -> tuple[Pose, int] | None:
+        """Returns the newest pose of a frame in another and its stamp [ns], 0 if static; None if there is none."""
         try:
-            transform = self._buffer.lookup_transform(parent, child, rospy.Time(0)).transform
+            found = self._buffer.lookup_transform(parent, child, rospy.Time(0))
         except tf2_ros.TransformException:
             return None
-        position, quat = transform.translation, transform.rotation
-        return Pose((position.x, position.y, position.z), (quat.x, quat.y, quat.z, quat.w))
+        position, quat = found.transform.translation, found.transform.rotation
+        pose = Pose((position.x, position.y, position.z), (quat.x, quat.y, quat.z, quat.w))
+        return pose, found.header.stamp.to_nsec()
 
     def _take(self, message: TFMessage, store: Callable[[TransformStamped, str], None]) -> None:
         sender = message._connection_header.get("callerid", "")
@@ -57,6 +70,9 @@ class TfListener:
             fault = fault_in(transform)
             if fault is None:
                 store(transform, sender)
+                if transform.child_frame_id in self.watched:
+                    self.came_s[transform.child_frame_id] = time.monotonic()
+                    self.something_came.set()
             else:
                 self._warn(f"TF from {sender}", f"'{transform.child_frame_id}' refused: {fault}")
 
@@ -89,32 +105,65 @@ def refusal(slot: str, taken: Input, error: Exception) -> Exception:
     raise error
 
 
-class _Followed:
-    """A pose input and what is known of its frame."""
+class Followed:
+    """A pose input and what is known of its frame.
+
+    It is looked at when it comes, about once a period: a look at other times would find now more, now less of a motion.
+    Where nothing comes, since the frame moves with others, it is looked at after a period.
+    """
 
     def __init__(self, name: str, slot: str, pose_input: PoseInput) -> None:
         self.name, self.slot, self.pose_input = name, slot, pose_input
         self.tf_id = pose_input.tf_id
         self.period_s = 1.0 / pose_input.hz
-        self.due_s = self.since_s = time.monotonic()
+        self.since_s = time.monotonic()
+        self.looked_s = self.news_s = -math.inf
         self.last_pose: Pose | None = None
+        self.last_stamp_ns = -1
+        self.news_time_s = 0.0
+        """The world's time at which its stamp last changed [s]; `news_s` is that in wall time."""
+        self.is_stale = False
+        self.quiet_until_s = 0.0
+
+    def due_s(self, came_s: float) -> float:
+        """Returns when to look at it, if it last came at a time."""
+        if came_s <= self.looked_s:
+            return self.looked_s + self.period_s
+        is_early = came_s < self.news_s + EARLY * self.period_s
+        return self.looked_s + LATE * self.period_s if is_early else came_s
+
+    def is_new(self, stamp_ns: int, now_s: float, time_s: float) -> bool:
+        """Notes its stamp; tells whether that is another one."""
+        self.news_time_s = min(self.news_time_s, time_s)  # the world was reset
+        if stamp_ns == self.last_stamp_ns:
+            return False
+        self.last_stamp_ns, self.news_s, self.news_time_s = stamp_ns, now_s, time_s
+        return True
+
+    def age_s(self, now_s: float, time_s: float) -> float:
+        """Returns for how long its stamp has been the same, in wall time or in the world's, whichever is less."""
+        return min(now_s - self.news_s, time_s - self.news_time_s)
 
 
 class TfFollower:
     """Looks up the TF frames that poses follow, in one thread, by wall time.
 
     It listens to TF only once there is something to follow.
+
+    Args:
+        put: Hands a pose to a slot of the world.
+        time_s: Returns the world's time [s], by which a frame grows stale.
     """
 
-    def __init__(self, put: Callable[[str, Any], None]) -> None:
-        self._put = put
-        self._followed: tuple[_Followed, ...] = ()
+    def __init__(self, put: Callable[[str, Any], None], time_s: Callable[[], float]) -> None:
+        self._put, self._time_s = put, time_s
+        self._followed: tuple[Followed, ...] = ()
         self._listener: TfListener | None = None
         self._warn = ThrottledWarning(period_s=30.0)
 
     def follow(self, name: str, slot: str, pose_input: PoseInput) -> None:
         """Begins to follow a frame for a body or sensor."""
-        self._followed = (*self._followed, _Followed(name, slot, pose_input))
+        self._followed = (*self._followed, Followed(name, slot, pose_input))
         if self._listener is None:
             self._listener = TfListener()
             threading.Thread(target=self._run, args=(self._listener,), name="tf follower", daemon=True).start()
@@ -133,22 +182,30 @@ class TfFollower:
     def _run(self, listener: TfListener) -> None:
         while not rospy.is_shutdown():
             followed = self._followed
-            now_s = time.monotonic()
+            listener.watched = frozenset(each.tf_id for each in followed)
+            listener.something_came.clear()
+            now_s = next_s = time.monotonic()
+            next_s += LONGEST_NAP_S
             for each in followed:
-                if now_s >= each.due_s:
-                    each.due_s = now_s + each.period_s
+                due_s = each.due_s(listener.came_s.get(each.tf_id, -math.inf))
+                if now_s >= due_s:
+                    each.looked_s = now_s
                     self._look(listener, each, now_s)
-            next_s = min((each.due_s for each in followed), default=now_s + LONGEST_NAP_S)
-            time.sleep(min(max(next_s - time.monotonic(), 0.001), LONGEST_NAP_S))
+                    due_s = now_s + each.period_s
+                next_s = min(next_s, due_s)
+            listener.something_came.wait(max(next_s - time.monotonic(), 0.001))
 
-    def _look(self, listener: TfListener, followed: _Followed, now_s: float) -> None:
-        pose = listener.pose(world_frame(), followed.tf_id)
-        if pose is None:
+    def _look(self, listener: TfListener, followed: Followed, now_s: float) -> None:
+        found = listener.pose(world_frame(), followed.tf_id)
+        if found is None:
             if followed.last_pose is None and now_s - followed.since_s > TF_MISSING_AFTER_S:
                 self._warn(
                     followed.slot, f"no TF from '{world_frame()}' to '{followed.tf_id}' so far; it stays where it is"
                 )
-        elif pose != followed.last_pose:
+            return
+        pose, stamp_ns = found
+        self._tell_if_stale(followed, stamp_ns, now_s)
+        if pose != followed.last_pose:
             followed.last_pose = pose
             try:
                 self._put(followed.slot, pose)
@@ -156,3 +213,18 @@ class TfFollower:
                 reason = refusal(followed.slot, followed.pose_input, error)
                 if followed in self._followed:  # else it has gone meanwhile
                     self._warn(followed.slot, f"TF refused: {reason}")
+
+    def _tell_if_stale(self, followed: Followed, stamp_ns: int, now_s: float) -> None:
+        """Tells once that nothing new has come of a frame, unless it is static, and once that something has again."""
+        time_s = self._time_s()
+        if followed.is_new(stamp_ns, now_s, time_s):
+            if followed.is_stale:
+                followed.is_stale = False
+                rospy.loginfo("%s: TF of '%s' comes again", followed.slot, followed.tf_id)
+            return
+        age_s = followed.age_s(now_s, time_s)
+        if stamp_ns and not followed.is_stale and age_s > followed.pose_input.timeout_s:
+            if now_s >= followed.quiet_until_s:
+                followed.is_stale, followed.quiet_until_s = True, now_s + STALE_AGAIN_AFTER_S
+                stale = f"TF of '{followed.tf_id}' is stale"
+                rospy.logwarn("%s: %s: nothing new for %.2g s; it stays there", followed.slot, stale, age_s)

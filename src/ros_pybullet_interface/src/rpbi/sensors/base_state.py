@@ -1,4 +1,4 @@
-"""Where the base of a robot is and how it moves."""
+"""Where a base is and how it moves."""
 
 import math
 
@@ -10,19 +10,23 @@ from .sensor import Sensor
 
 
 class BaseStateSensor(Sensor):
-    """Pose and twist of the URDF frame of a robot's root link."""
+    """Pose and twist of the URDF frame of a body's root link.
+
+    Args:
+        frame: The name of that frame; without it, `rpbi/NAME/ROOT_LINK`.
+    """
 
     sample_type = BaseStateSample
 
-    def __init__(self, robot: Body, hz: float) -> None:
-        super().__init__(robot.name, hz)
-        self._robot = robot
-        self._frame = f"rpbi/{robot.name}/{robot.root_link}"
+    def __init__(self, body: Body, hz: float, frame: str | None = None) -> None:
+        super().__init__(body.name, hz)
+        self._body = body
+        self._frame = frame or f"rpbi/{body.name}/{body.root_link}"
 
     def read(self, tick: int) -> BaseStateSample:
         """Reads the base; its velocity is that of the frame's origin, not of the centre of mass."""
-        pose = self._robot.base_pose()
-        twist = self._robot.base_twist()
+        pose = self._body.base_pose()
+        twist = self._body.base_twist()
         if not math.isfinite(sum(pose.position) + sum(twist.linear) + sum(twist.angular)):
             raise PhysicsError(f"{self.name}: base is not finite any more at tick {tick}: {pose.position}, {twist}")
         return BaseStateSample(self.name, self._frame, pose, twist.seen_from(pose.quat_xyzw))

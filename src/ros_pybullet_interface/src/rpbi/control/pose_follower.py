@@ -1,0 +1,185 @@
+"""Bodies that follow a stream of poses with a velocity, which what they touch feels."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections import deque
+
+import numpy as np
+import numpy.typing as npt
+
+from rpbi.config.pybullet_models import ObjectTf
+from rpbi.engine.client import Client
+from rpbi.geometry import Pose, cross, dot, minus, normalized, rotation_between, scaled
+
+log = logging.getLogger(__name__)
+
+INTERVALS = 5
+"""How many intervals between poses tell how far apart they come."""
+LONGEST_GROWTH = 2
+"""How many times as long as the longest before it an interval may count; a longer one is a pause."""
+JUMP_S = 0.1
+"""What takes longer than this at the largest speeds is a jump [s], and longer than two periods of the stream."""
+QUIET_S = 5.0
+"""How long no further jump is told of [s] of the world's time."""
+
+MOST_TICKS = 10_000
+"""Over so many ticks a path is smoothed at most."""
+
+_Numbers = npt.NDArray[np.float64]
+
+
+class PosePath:
+    """Smooths a stream of poses that are held until the next one comes; all by ticks.
+
+    From each pose on it goes straight there, in the longest of the last few intervals between poses, or longer if the
+    speeds ask for it. The path is the mean of that line over a number of ticks: the velocity changes evenly, and what
+    lies between the poses is never left, so nothing overshoots. Quaternions are averaged as vectors, signs aligned.
+
+    Args:
+        start: Where it begins, at rest.
+        ticks: In how many ticks poses are expected to follow each other; the mean is over as many.
+        max_step: Longest way in a tick [m].
+        max_turn: Largest turn in a tick [rad].
+    """
+
+    def __init__(self, start: Pose, ticks: int, max_step: float, max_turn: float) -> None:
+        self._max_step, self._max_turn = max_step, max_turn
+        self._intervals = deque([ticks], maxlen=INTERVALS)
+        self._taken_at: int | None = None
+        self.goal = start
+        self._line = _numbers(start)
+        self._step = np.zeros(7)
+        self._line_ticks = 0
+        self._window = deque([self._line] * ticks)
+        self._sum = self._line * ticks
+        self.ticks_left = 0
+        """In how many ticks it is at its goal, at rest."""
+
+    @property
+    def period(self) -> int:
+        """In how many ticks poses follow each other at most."""
+        return max(self._intervals)
+
+    def ticks_to(self, pose: Pose) -> float:
+        """Returns in how many ticks the largest speeds lead from the end of the line to a pose."""
+        way = _numbers(pose, self._line) - self._line
+        turn = 4.0 * math.tan(math.asin(np.linalg.norm(way[3:]) / 2.0))  # at the speed in the middle of the line
+        return max(float(np.linalg.norm(way[:3])) / self._max_step, turn / self._max_turn)
+
+    def take(self, pose: Pose, tick: int) -> None:
+        """Goes to a pose that has come before a tick."""
+        if self._taken_at is not None:
+            self._intervals.append(min(tick - self._taken_at, LONGEST_GROWTH * self.period))
+        self._taken_at = tick
+        self.goal = pose
+        self._line = np.append(self._line[:3], self._line[3:] / np.linalg.norm(self._line[3:]))
+        self._line_ticks = max(self.period, math.ceil(self.ticks_to(pose)))
+        self._step = (_numbers(pose, self._line) - self._line) / self._line_ticks
+        self.ticks_left = self._line_ticks + len(self._window) - 1
+
+    def next(self) -> Pose:
+        """Goes on by a tick, and returns where it is then."""
+        if self._line_ticks:
+            self._line_ticks -= 1
+            self._line = self._line + self._step
+        self._window.append(self._line)
+        self._sum += self._line - self._window.popleft()
+        self.ticks_left -= 1
+        if self.ticks_left <= 0:
+            return self.goal
+        x, y, z, *quat = (self._sum / len(self._window)).tolist()
+        return Pose((x, y, z), normalized(quat))
+
+
+def _numbers(pose: Pose, near: _Numbers | None = None) -> _Numbers:
+    """Returns position and quaternion, the latter with the sign that is nearer to another one."""
+    numbers = np.array([*pose.position, *pose.quat_xyzw])
+    if near is not None and numbers[3:] @ near[3:] < 0.0:
+        numbers[3:] *= -1.0
+    return numbers
+
+
+class PoseFollower:
+    """Moves a fixed base of one PyBullet body along a stream of poses.
+
+    A base without mass moves at the velocity that it is set to, and contacts are solved with that velocity: what lies
+    on it is carried, what is before it pushed, what it slides along rubbed, and nothing holds it up. So it gets, before
+    each tick, the velocity that leads to where it is to be after it. The first pose, and any beyond a jump, is where it
+    is put at once, at rest.
+
+    Args:
+        name: The body, for messages.
+        centre: The pose of its centre of mass, which PyBullet moves, in the frame that follows.
+    """
+
+    def __init__(self, pb: Client, name: str, body_id: int, centre: Pose, object_tf: ObjectTf) -> None:
+        self.name = name
+        self._pb, self._body_id, self._centre = pb, body_id, centre
+        self._object_tf = object_tf
+        self._dt_s: float = pb.getPhysicsEngineParameters()["fixedTimeStep"]
+        self._path: PosePath | None = None
+        self._waiting: Pose | None = None
+        self._is_moving = False
+        self._quiet_until = 0
+        """Tick from which on a jump is told of again."""
+
+    def take(self, pose: Pose) -> None:
+        """Goes to a pose from the next tick on, the first time at once."""
+        if self._path is None:
+            self.put(pose)
+        else:
+            self._waiting = pose @ self._centre
+
+    def put(self, pose: Pose) -> None:
+        """Puts the frame that follows somewhere at once, at rest."""
+        self._waiting = None
+        self._begin(pose @ self._centre)
+
+    def before_step(self, tick: int) -> None:
+        """Gives the base the velocity of the coming tick."""
+        path = self._path
+        if path is None:
+            return
+        if self._waiting is not None:
+            path = self._aim(path, self._waiting, tick)
+        if path.ticks_left:
+            self._drive_to(path.next())
+        elif self._is_moving:
+            self._rest_at(path.goal)
+
+    def _aim(self, path: PosePath, pose: Pose, tick: int) -> PosePath:
+        """Has the path lead to a pose; beyond a jump it begins anew there."""
+        self._waiting = None
+        if path.ticks_to(pose) <= max(JUMP_S / self._dt_s, 2 * path.period):
+            path.take(pose, tick)
+            return path
+        if tick >= self._quiet_until:
+            self._quiet_until = tick + round(QUIET_S / self._dt_s)
+            way = math.dist(path.goal.position, pose.position)
+            turn = math.hypot(*rotation_between(path.goal.quat_xyzw, pose.quat_xyzw))
+            jump = f"'{self._object_tf.tf_id}' jumped by {way:.3g} m and {turn:.3g} rad"
+            log.warning("%s: TF: %s: it was put there at tick %d, at rest", self.name, jump, tick)
+        return self._begin(pose)
+
+    def _begin(self, pose: Pose) -> PosePath:
+        tf, dt_s = self._object_tf, self._dt_s
+        ticks = min(max(1, round(1.0 / (tf.hz * dt_s))), MOST_TICKS)
+        self._path = PosePath(pose, ticks, tf.max_speed * dt_s, tf.max_angular_speed * dt_s)
+        self._rest_at(pose)
+        return self._path
+
+    def _rest_at(self, pose: Pose) -> None:
+        self._pb.resetBasePositionAndOrientation(self._body_id, *pose)  # which takes its velocity too
+        self._is_moving = False
+
+    def _drive_to(self, pose: Pose) -> None:
+        """Sets the velocity that leads to a pose in a tick."""
+        position, quat = self._pb.getBasePositionAndOrientation(self._body_id)
+        way, turn = minus(pose.position, position), rotation_between(quat, pose.quat_xyzw)
+        # PyBullet moves a base that turns by way + turn x way, so it is told less: the inverse of that
+        across = cross(turn, way)
+        told = minus(way, scaled(1.0 / (1.0 + dot(turn, turn)), minus(across, cross(turn, across))))
+        self._pb.resetBaseVelocity(self._body_id, scaled(1.0 / self._dt_s, told), scaled(1.0 / self._dt_s, turn))
+        self._is_moving = True

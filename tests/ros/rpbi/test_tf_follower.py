@@ -1,0 +1,111 @@
+"""Bodies that follow TF over ROS: they carry what lies on them, and it is said when TF ceases."""
+
+from __future__ import annotations
+
+import pytest
+import rospy
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry
+from node_world import Rosout, main_config, publishing
+from tf2_msgs.msg import TFMessage
+from worlds import box
+
+from rpbi.config.pybullet_models import ObjectTf
+from rpbi.engine.inputs import PoseInput
+from rpbi.ros.tf_follower import Followed
+
+SPEED = 0.3
+STALE = "hand/pose: TF of 'hand' is stale"
+AGAIN = "hand/pose: TF of 'hand' comes again"
+
+
+@pytest.fixture
+def load_states(ros):
+    """Starts a box on a hand that follows TF, and a shelf that follows static TF; its state, 50 times a second."""
+    hand, shelf = box("hand", (0.6, 0.3, 0.05)), box("shelf")
+    for body in (hand, shelf):
+        del body["baseMass"]
+    hand["object_tf"] = {"tf_id": "hand", "hz": 50}
+    shelf["object_tf"] = {"tf_id": "shelf", "hz": 50}
+    load = box("load", (0.05, 0.05, 0.05), basePosition=[0.0, 0.0, 0.1], base_state_hz=50)
+    ros.start(["rosrun", "tf2_ros", "static_transform_publisher", *"5 0 0 0 0 0 rpbi/world shelf".split()])
+    ros.simulator(main_config(ros.folder, collision=(hand, shelf), dynamic=(load,), timeStep=0.002), use_sim_time=True)
+    states = ros.listen("/rpbi/load/base_state", Odometry)
+    states.wait_for(1)
+    return states
+
+
+def _hand_at(x, stamp):
+    transform = TransformStamped(child_frame_id="hand")
+    transform.header.frame_id, transform.header.stamp = "rpbi/world", stamp
+    transform.transform.translation.x, transform.transform.rotation.w = x, 1.0
+    return TFMessage([transform])
+
+
+def _along(states, publisher, seconds):
+    """Moves the hand by the world's time, at each state of what lies on it; returns how far, and the states.
+
+    It speeds up and slows down with 1 m/s^2, which friction can hold.
+    """
+    first = count = len(states.messages)
+    begin = states.messages[-1].header.stamp
+    t = 0.0
+    while t < seconds:
+        count += 1
+        stamp = states.wait_for(count)[count - 1].header.stamp
+        t = min((stamp - begin).to_sec(), seconds)
+        rising, falling = min(t, SPEED), max(0.0, t - seconds + SPEED)
+        x = 0.5 * rising**2 + SPEED * (t - rising) - 0.5 * falling**2
+        publisher.publish(_hand_at(x, stamp))
+    return x, states.messages[first:]
+
+
+def test_a_hand_that_tf_moves_carries_a_box_and_when_tf_ceases_that_is_said_once(ros, load_states):
+    rosout = Rosout(ros)
+    with publishing("/tf", TFMessage) as publisher:
+        far, states = _along(load_states, publisher, 1.5)
+        assert max(state.twist.twist.linear.x for state in states) > 0.9 * SPEED
+        rosout.wait_for([STALE])
+        assert abs(load_states.messages[-1].twist.twist.linear.x) < 1e-3
+        assert load_states.messages[-1].pose.pose.position.x == pytest.approx(far, abs=0.05)
+        publisher.publish(_hand_at(far, rospy.Time.from_sec(load_states.messages[-1].header.stamp.to_sec() + 0.001)))
+        rosout.wait_for([AGAIN])
+    count = len(load_states.messages)
+    load_states.wait_for(count + 50)
+    assert len(rosout.logs(STALE)) == 1
+    assert not rosout.logs("'shelf'"), "static TF never changes"
+
+
+@pytest.mark.parametrize(
+    ("sent_ms", "seen_ms"),
+    [
+        (range(3, 500, 10), [30]),  # each third
+        (range(3, 500, 33), [33]),  # each, though it comes a moment before or after a period
+        (range(3, 500, 34), [34]),
+        ((3 + 33 * n + (0, 4)[n % 2] for n in range(15)), [29, 37]),
+        (range(3, 500, 100), [100]),
+    ],
+)
+def test_a_stream_is_looked_at_when_it_comes_and_at_even_intervals(sent_ms, seen_ms):
+    followed = Followed("hand", "hand/pose", PoseInput.following(ObjectTf(tf_id="hand", hz=30), print))
+    sent_ms = list(sent_ms)
+    seen = []
+    for now_ms in range(1, 490):
+        came_ms = max((sent for sent in sent_ms if sent <= now_ms), default=-1)
+        if now_ms / 1e3 >= followed.due_s(came_ms / 1e3):
+            followed.looked_s = now_ms / 1e3
+            if followed.is_new(came_ms, now_ms / 1e3, 0.0) and came_ms >= 0:
+                assert now_ms - came_ms <= 1, "it is looked at later than it came"
+                seen.append(now_ms)
+    gaps = {later - earlier for earlier, later in zip(seen[1:], seen[2:])}
+    assert sorted(gaps) == seen_ms
+
+
+def test_a_frame_that_comes_by_others_is_looked_at_after_each_period():
+    followed = Followed("hand", "hand/pose", PoseInput.following(ObjectTf(tf_id="hand", hz=50), print))
+    looks = []
+    for now_ms in range(1000):
+        if now_ms / 1e3 >= followed.due_s(-1.0):
+            followed.looked_s = now_ms / 1e3
+            looks.append(now_ms)
+    assert len(looks) == 50
