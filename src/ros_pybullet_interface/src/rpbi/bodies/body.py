@@ -20,6 +20,9 @@ from rpbi.sensors.sensor import Sensor
 
 log = logging.getLogger(__name__)
 
+MAXIMAL_COORDINATES = 1
+"""PyBullet's type of bodies that the solver of rigid bodies moves, where `getDynamicsInfo` tells it."""
+
 
 class Body:
     """A body in one PyBullet client.
@@ -49,7 +52,8 @@ class Body:
         self.link_indices = self.joint_indices
         """PyBullet's indices of all links but the root."""
         self.root_link: str = pb.getBodyInfo(body_id)[0].decode()
-        inertial = pb.getDynamicsInfo(body_id, -1)
+        self._given_dynamics: dict[str, Any] = {}
+        inertial = self.dynamics_info(-1)
         self.inertial_pose_in_base = Pose(inertial[3], inertial[4])
         self._base_pose_in_inertial = self.inertial_pose_in_base.inverse()
         self.dynamics_changes = 0
@@ -63,6 +67,27 @@ class Body:
     def _link_names(self) -> dict[int, str]:
         names = {index: self.pb.getJointInfo(self.body_id, index)[12].decode() for index in self.joint_indices}
         return {-1: self.pb.getBodyInfo(self.body_id)[0].decode(), **names}
+
+    def dynamics_info(self, link: int) -> tuple[Any, ...]:
+        """Returns what PyBullet's `getDynamicsInfo` tells of a link, by index.
+
+        Of a body in maximal coordinates PyBullet does not tell the inertial frame, restitution, stiffness and damping of
+        contacts, and leaves in their places what it last told of another: here are those that the body has.
+        """
+        info: tuple[Any, ...] = self.pb.getDynamicsInfo(self.body_id, link)
+        if info[10] != MAXIMAL_COORDINATES:
+            return info
+        restitution, *damping_and_stiffness = (
+            self._given_dynamics.get(key, default)
+            for key, default in (("restitution", 0.0), ("contactDamping", -1.0), ("contactStiffness", -1.0))
+        )
+        inertial_frame = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
+        return (*info[:3], *inertial_frame, restitution, *info[6:8], *damping_and_stiffness, *info[10:])
+
+    def change_dynamics(self, link: int, **arguments: Any) -> None:
+        """Calls PyBullet's `changeDynamics` for a link, by index."""
+        self.pb.changeDynamics(self.body_id, link, **arguments)
+        self._given_dynamics.update(arguments)
 
     def _start_base(
         self, velocity: ResetBaseVelocity | None, object_tf: ObjectTf | None = None, is_fixed: bool = False

@@ -11,7 +11,7 @@ from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
 
 from .body_config import BodyConfig
-from .shape_object import ShapeObject
+from .shape_object import MaximalCoordinates, ShapeObject
 
 
 class DynamicObjectConfig(BodyConfig):
@@ -23,6 +23,7 @@ class DynamicObjectConfig(BodyConfig):
     baseMass: Positive = Field(description="Mass.", json_schema_extra={"unit": "kg"})
     basePosition: Position = Field((0.0, 0.0, 0.0), description="Start position.")
     baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Start orientation, x, y, z, w.")
+    useMaximalCoordinates: MaximalCoordinates = False
     resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity.")
     broadcast_hz: HzOrOff = Field(0.0, description="Rate of its pose on TF; 0 is off.")
     contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
@@ -51,8 +52,9 @@ class DynamicObject(ShapeObject):
             baseMass=config.baseMass,
             basePosition=config.basePosition,
             baseOrientation=config.baseOrientation,
+            useMaximalCoordinates=config.useMaximalCoordinates,
         )
-        pb.changeDynamics(self.body_id, -1, **config.changeDynamics.kwargs())
+        self.change_dynamics(-1, **config.changeDynamics.kwargs())
         self._start_base(config.resetBaseVelocity)
         self._broadcast_hz = config.broadcast_hz
         self._contacts = config.contacts
