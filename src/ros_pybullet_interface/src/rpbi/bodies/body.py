@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, ClassVar
@@ -22,6 +23,8 @@ log = logging.getLogger(__name__)
 
 MAXIMAL_COORDINATES = 1
 """PyBullet's type of bodies that the solver of rigid bodies moves, where `getDynamicsInfo` tells it."""
+UNNAMED_LINK = "link0"
+"""PyBullet's name of the only link of a shape, which it leaves out in maximal coordinates."""
 
 
 class Body:
@@ -51,7 +54,8 @@ class Body:
         self.joint_indices = tuple(range(pb.getNumJoints(body_id)))
         self.link_indices = self.joint_indices
         """PyBullet's indices of all links but the root."""
-        self.root_link: str = pb.getBodyInfo(body_id)[0].decode()
+        self._base_link: str = pb.getBodyInfo(body_id)[0].decode() or UNNAMED_LINK
+        self.root_link = self._base_link
         self._given_dynamics: dict[str, Any] = {}
         inertial = self.dynamics_info(-1)
         self.inertial_pose_in_base = Pose(inertial[3], inertial[4])
@@ -66,7 +70,7 @@ class Body:
     @cached_property
     def _link_names(self) -> dict[int, str]:
         names = {index: self.pb.getJointInfo(self.body_id, index)[12].decode() for index in self.joint_indices}
-        return {-1: self.pb.getBodyInfo(self.body_id)[0].decode(), **names}
+        return {-1: self._base_link, **names}
 
     def dynamics_info(self, link: int) -> tuple[Any, ...]:
         """Returns what PyBullet's `getDynamicsInfo` tells of a link, by index.
@@ -81,11 +85,18 @@ class Body:
             self._given_dynamics.get(key, default)
             for key, default in (("restitution", 0.0), ("contactDamping", -1.0), ("contactStiffness", -1.0))
         )
+        mass, friction, inertia = info[:3]
+        if mass:
+            inertia = tuple(moment or math.inf for moment in inertia)  # PyBullet tells 0 when it has kept 1/inf
         inertial_frame = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
-        return (*info[:3], *inertial_frame, restitution, *info[6:8], *damping_and_stiffness, *info[10:])
+        front = (mass, friction, inertia, *inertial_frame, restitution)
+        return (*front, *info[6:8], *damping_and_stiffness, *info[10:])
 
     def change_dynamics(self, link: int, **arguments: Any) -> None:
         """Calls PyBullet's `changeDynamics` for a link, by index."""
+        if "localInertiaDiagonal" in arguments:
+            # Without the mass PyBullet makes a body in maximal coordinates a static one.
+            arguments.setdefault("mass", self.dynamics_info(link)[0])
         self.pb.changeDynamics(self.body_id, link, **arguments)
         self._given_dynamics.update(arguments)
 

@@ -2,6 +2,7 @@
 
 from pydantic import Field
 
+from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import HzOrOff, Position, Positive, Quat
 from rpbi.config.pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ResetBaseVelocity
 from rpbi.config.sensors import ContactsConfig
@@ -44,6 +45,9 @@ class DynamicObject(ShapeObject):
     }
 
     def __init__(self, pb: Client, config: DynamicObjectConfig) -> None:
+        if config.useMaximalCoordinates and pb.is_deformable:
+            message = "soft bodies do not feel what moves in maximal coordinates; remove it in a deformable world"
+            raise ConfigError([Problem(config.name, "useMaximalCoordinates", message)])
         super().__init__(
             pb,
             config.name,
