@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from .scene import CLOSED_FORM, GRAVITY, MAXIMAL, Table, ball, box, box_floor, plane_floor, run, scene, velocity
+from .scene import CLOSED_FORM, GRAVITY, MAXIMAL, Cell, Span, Table, ball, box, box_floor, plane_floor, run, scene, velocity
 
 FRICTION = 0.5
 HALF_M = (0.05, 0.05, 0.02)
@@ -83,7 +83,7 @@ def sliding_by_setting() -> Table:
     """The worst over all directions and yaws, by setting, time step and speed."""
     rows = []
     for name, keys in SETTINGS.items():
-        cells = []
+        cells: list[Cell] = []
         for time_step_s, speed_m_s in ((0.001, 0.5), (0.001, 2.0), (0.002, 2.0)):
             found = [
                 slide(direction, yaw, speed_m_s, time_step_s, **keys)
@@ -91,10 +91,10 @@ def sliding_by_setting() -> Table:
                 for yaw in YAWS_DEG
             ]
             forces = [each.force for each in found]
-            off = max(abs(each.off_deg) for each in found)
-            cells.append(f"{min(forces):.3f} to {max(forces):.3f}, {off:.1f}")
+            cells += [Span(min(forces), max(forces)), round(max(abs(each.off_deg) for each in found), 1)]
         rows.append((name, tuple(cells)))
-    return Table(("", "1 kHz, 0.5 m/s", "1 kHz, 2 m/s", "500 Hz, 2 m/s"), rows)
+    names = ("1 kHz, 0.5 m/s", "1 kHz, 2 m/s", "500 Hz, 2 m/s")
+    return Table(("", *(f"{what}, {name}" for name in names for what in ("force", "off [deg]"))), rows)
 
 
 KINDS = {"default": {}, "maximal": MAXIMAL}

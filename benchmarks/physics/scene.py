@@ -22,6 +22,19 @@ CLOSED_FORM = "closed form"
 """The column of a table that tells what is right."""
 
 
+class Span(NamedTuple):
+    """The least and the most of what was measured in several ways."""
+
+    least: float
+    most: float
+
+    def __str__(self) -> str:
+        return f"{self.least:.3f} to {self.most:.3f}"
+
+
+Cell = float | str | Span
+
+
 class Table(NamedTuple):
     """What was measured of one thing.
 
@@ -31,7 +44,7 @@ class Table(NamedTuple):
     """
 
     columns: tuple[str, ...]
-    rows: list[tuple[str, tuple[float | str, ...]]]
+    rows: list[tuple[str, tuple[Cell, ...]]]
 
     def markdown(self) -> str:
         """Returns it as the page has it."""
@@ -46,18 +59,20 @@ class Table(NamedTuple):
             cells = dict(zip(self.columns[1:], values))
             closed = cells.pop(CLOSED_FORM, None)
             floor = closed if isinstance(closed, float) else None
-            found += [
-                Result("physics", f"{about}: {name}, {column}", value, "", floor)
-                for column, value in cells.items()
-                if isinstance(value, float)
-            ]
+            for column, value in cells.items():
+                parts = value._asdict() if isinstance(value, Span) else {"": value}
+                found += [
+                    Result("physics", ", ".join(filter(None, (f"{about}: {name}", column, part))), number, "", floor)
+                    for part, number in parts.items()
+                    if isinstance(number, float)
+                ]
         return found
 
 
-def _shown(value: float | str) -> str:
+def _shown(value: Cell) -> str:
     """Returns a cell; what is less than a millionth is told as 0."""
-    if isinstance(value, str):
-        return value
+    if isinstance(value, (str, Span)):
+        return str(value)
     return "0" if abs(value) < 1e-6 else f"{value:.4g}"
 
 
