@@ -135,6 +135,12 @@ def plane_floor(**more: Any) -> dict[str, Any]:
     return {**box_floor(), "createCollisionShape": plane, **more}
 
 
+def floor_of_tf(**more: Any) -> dict[str, Any]:
+    """Returns a floor whose upper side is 0.5 m above its frame, which TF has to put there."""
+    shape = {"shapeType": "GEOM_BOX", "halfExtents": [3.0, 3.0, 0.5]}
+    return {**box_floor(), "createVisualShape": shape, "createCollisionShape": shape, "object_tf": {"tf_id": "floor"}, **more}
+
+
 def box(name: str, half_m: Sequence[float], height_m: float | None = None, yaw: float = 0.0, **more: Any) -> Any:
     """Returns a box of 1 kg, without damping.
 

@@ -20,16 +20,16 @@ MASS_KG = 2.0
 def weighing() -> Table:
     """What the floor feels of a soft cube of 2 kg, by time step and stiffness of the cube."""
     rows = []
-    for pascals in (4e3, 4e4, 4e5):
+    for pascals in (4e3, 4e5):
         cells: list[Cell] = []
-        for time_step_s in (0.008, 0.004, 0.002, 0.001):
+        for time_step_s in (0.032, 0.016, 0.008, 0.004):
             cells.append(_weight(time_step_s, pascals))
         rows.append((f"`NeoHookeanMu: {pascals:.1e}`", (*cells, MASS_KG * GRAVITY)))
-    return Table(("force on the floor [N]", "8 ms", "4 ms", "2 ms", "1 ms", CLOSED_FORM), rows)
+    return Table(("force on the floor [N]", "32 ms", "16 ms", "8 ms", "4 ms", CLOSED_FORM), rows)
 
 
 def _weight(time_step_s: float, pascals: float) -> float | str:
-    """Returns the mean force over a second, after a second of rest [N], or how it ended."""
+    """Returns the mean force over a second, after half a second [N], or how it ended."""
     with tempfile.TemporaryDirectory(prefix="rpbi-bench-") as folder:
         cube: dict[str, Any] = {
             "fileName": _write_cube(Path(folder)),
@@ -48,7 +48,7 @@ def _weight(time_step_s: float, pascals: float) -> float | str:
         soft = [{"name": "cube", "loadSoftBody": cube, "surface_hz": 0}]
         with scene(time_step_s, main=main, collision_objects=[floor], soft_objects=soft) as world:
             try:
-                run(world, 1.0)
+                run(world, 0.5)
                 force = floor_force(world, 1.0)
                 highest = max(node[2] for node in world.bodies["cube"].state().nodes)
             except PhysicsError:

@@ -40,27 +40,30 @@ GRIPPER = f"""<robot name="gripper">{_link("mount", 1.0)}{_link("lift", 1.0)}
 </robot>"""
 """Two fingers, each of which presses with 10 N at most."""
 PUSHER = f"""<robot name="pusher">{_link("mount", 1.0)}
-{_link("head", 1.0, '<geometry><box size="0.02 0.08 0.02"/></geometry>', 0.2)}
+{_link("head", 1.0, '<geometry><box size="0.02 0.08 0.02"/></geometry>', 0.0)}
 {_slide("mount", "head", "1 0 0")}
 </robot>"""
 TIP = '<geometry><sphere radius="0.01"/></geometry>'
 
 
-def _gantry(friction: float) -> str:
-    """Returns a tip that pushes down with 20 N at most; along x it feels 6 kg, along y 2 kg."""
+FACE = '<geometry><box size="0.04 0.04 0.02"/></geometry>'
+
+
+def _gantry(tool: str, friction: float) -> str:
+    """Returns a tool that pushes down with 20 N at most; along x it feels 6 kg, along y 2 kg."""
     return f"""<robot name="gantry">{_link("mount", 1.0)}{_link("x", 4.0)}{_link("y", 1.0)}
-{_link("z", 1.0, TIP, friction)}
+{_link("z", 1.0, tool, friction)}
 {_slide("mount", "x", "1 0 0")}{_slide("x", "y", "0 1 0")}{_slide("y", "z", "0 0 1", PRESS_N)}
 </robot>"""
 
 
-def _robot(name: str, urdf: str, position: list[float], yaw: float = 0.0) -> dict[str, Any]:
+def _robot(name: str, urdf: str, position: list[float], yaw: float = 0.0, **more: Any) -> dict[str, Any]:
     return {
         "name": name,
         "urdf": urdf,
         "loadURDF": {"useFixedBase": True, "basePosition": position, "baseOrientation": quat_about_z(yaw)},
         "setJointMotorControlArray": {"controlMode": "POSITION_CONTROL"},
-        **TOLD,
+        **more,
     }
 
 
@@ -75,26 +78,45 @@ def _move(world: World, robot: str, seconds: float, target: Callable[[float], di
     return samples
 
 
+FIRM = {"contactStiffness": 10_000.0, "contactDamping": 200.0}
+"""Contacts that share a load, since none is stiffer than the others."""
+GRASPS: dict[str, tuple[float, dict[str, Any], dict[str, Any]]] = {
+    "1 ms": (0.001, {}, {}),
+    "1 ms, `numSolverIterations: 200`": (0.001, {"numSolverIterations": 200, "solverResidualThreshold": 0.0}, {}),
+    "1 ms, `frictionAnchor: true`": (0.001, {}, {"frictionAnchor": True}),
+    "1 ms, `spinningFriction: 0.01`": (0.001, {}, {"spinningFriction": 0.01, "rollingFriction": 1e-6}),
+    "**1 ms, `contactStiffness: 1.0e+4`, `contactDamping: 200`**": (0.001, {}, FIRM),
+    "2 ms, the same": (0.002, {}, FIRM),
+    "4.17 ms, the same": (1 / 240, {}, FIRM),
+}
+
+
 def grasping() -> Table:
-    """How far a box of 1 kg slips in a grasp of two fingers that hold it with 10 N each at friction 1, and turns."""
+    """How far a box of 1 kg slips and turns in a grasp of two fingers that hold it with 10 N each at friction 1."""
     rows = []
-    for time_step_s in (1 / 240, 0.002, 0.001):
+    for name, (time_step_s, engine, dynamics) in GRASPS.items():
         cells: list[Cell] = []
         for keys in KINDS.values():
-            thing = box("box", (0.05, 0.03, 0.05), changeDynamics={"lateralFriction": 1.0}, **keys)
-            robots = [_robot("gripper", GRIPPER, [0.0, 0.0, 0.05])]
-            with scene(
-                time_step_s, collision_objects=[box_floor(**keys)], dynamic_objects=[thing], robots=robots
-            ) as world:
-                grip = {"left_joint": 0.05, "right_joint": 0.05}
-                _move(world, "gripper", 0.5, lambda share: grip)
-                _move(world, "gripper", 1.0, lambda share: {"lift_joint": 0.2 * share})
-                start = _in_fingers(world)
-                run(world, 5.0)
-                cells += [1000.0 * (start - _in_fingers(world)), _tilt_deg(world, "box")]
-        rows.append((f"{1000 * time_step_s:.3g} ms", tuple(cells)))
+            cells += _grasp(time_step_s, engine, dynamics, keys)
+        rows.append((name, tuple(cells)))
     names = (f"{what}, {kind}" for kind in KINDS for what in ("slips [mm]", "turns [deg]"))
-    return Table(("grasp, 5 s", *names), rows)
+    return Table(("grasp, 3 s", *names), rows)
+
+
+def _grasp(
+    time_step_s: float, engine: dict[str, Any], dynamics: dict[str, Any], keys: dict[str, Any]
+) -> tuple[float, float]:
+    """Returns how far a box slips [mm] and turns [deg] once it has been lifted."""
+    thing = box("box", (0.05, 0.03, 0.05), changeDynamics={"lateralFriction": 1.0, **dynamics}, **keys)
+    robots = [_robot("gripper", GRIPPER, [0.0, 0.0, 0.05])]
+    floors = [box_floor(**keys)]
+    with scene(time_step_s, engine, collision_objects=floors, dynamic_objects=[thing], robots=robots) as world:
+        grip = {"left_joint": 0.05, "right_joint": 0.05}
+        _move(world, "gripper", 0.5, lambda share: grip)
+        _move(world, "gripper", 1.0, lambda share: {"lift_joint": 0.2 * share})
+        start = _in_fingers(world)
+        run(world, 2.0)
+        return 1000.0 * (start - _in_fingers(world)), _tilt_deg(world, "box")
 
 
 def _in_fingers(world: World) -> float:
@@ -118,7 +140,7 @@ def pushing() -> Table:
         x, y = math.cos(yaw), math.sin(yaw)
         for keys in KINDS.values():
             thing = box("box", (0.05, 0.05, 0.02), yaw=yaw, changeDynamics={"lateralFriction": FRICTION}, **keys)
-            robots = [_robot("pusher", PUSHER, [-0.065 * x, -0.065 * y, 0.011], yaw)]
+            robots = [_robot("pusher", PUSHER, [-0.065 * x, -0.065 * y, 0.011], yaw, **TOLD)]
             with scene(collision_objects=[box_floor(**keys)], dynamic_objects=[thing], robots=robots) as world:
                 samples = _move(world, "pusher", 3.0, lambda share: {"head_joint": 0.3 * share})
                 at = world.bodies["box"].base_pose().position
@@ -131,34 +153,50 @@ def pushing() -> Table:
     return Table(("push, 0.3 m", *names), rows)
 
 
+MANY = {"numSolverIterations": 500, "solverResidualThreshold": 0.0}
+WIPES: dict[str, tuple[dict[str, Any], dict[str, Any] | None]] = {
+    "tip on table": ({}, None),
+    "pad": ({}, FIRM),
+    "pad, 500 iterations": (MANY, FIRM),
+}
+
+
 def wiping() -> Table:
-    """Friction over that of Coulomb's law, and how far off its direction is, of a tip that wipes a table."""
+    """Friction over that of Coulomb's law, and how far off its direction is, of what a gantry drags over a table."""
     rows = []
     for degrees in (0.0, 20.0, 45.0, 70.0, 90.0):
         cells: list[Cell] = []
-        for with_pad in (False, True):
-            found, off = _wipe(math.radians(degrees), with_pad)
-            cells += [found, off]
-        closed = math.degrees(math.atan2(6.0 * math.cos(math.radians(degrees)), 2.0 * math.sin(math.radians(degrees))))
-        rows.append((f"along {degrees:g} deg", (*cells, abs(90.0 - closed - degrees))))
-    names = (f"{what}, {how}" for how in ("tip on table", "pad under the tip") for what in ("force", "off [deg]"))
+        x, y = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+        for engine, pad in WIPES.values():
+            cells += _wipe(x, y, engine, pad)
+        by_masses = abs(math.degrees(math.atan2(2.0 * y, 6.0 * x)) - degrees)
+        rows.append((f"along {degrees:g} deg", (*cells, by_masses)))
+    names = (f"{what}, {how}" for how in WIPES for what in ("force", "off [deg]"))
     return Table(("wipe", *names, "off by the masses [deg]"), rows)
 
 
-def _wipe(direction: float, with_pad: bool) -> tuple[float, float]:
-    """Returns friction on the table over that of Coulomb's law, and how far it is off the motion [deg]."""
-    x, y = math.cos(direction), math.sin(direction)
-    gap = 0.02 if with_pad else 0.0
-    pad = {"baseMass": 0.1, "changeDynamics": {"lateralFriction": FRICTION}, **MAXIMAL}
-    things = [box("pad", (0.03, 0.03, 0.01), **pad)] if with_pad else []
-    robots = [_robot("gantry", _gantry(4.0 if with_pad else FRICTION), [0.0, 0.0, 0.011 + gap])]
+def _wipe(x: float, y: float, engine: dict[str, Any], pad: dict[str, Any] | None) -> tuple[float, float]:
+    """Returns friction on the table over that of Coulomb's law, and how far it is off the motion [deg].
+
+    Args:
+        x: Direction of the motion.
+        y: The same.
+        engine: Keys of `setPhysicsEngineParameter`.
+        pad: Keys of `changeDynamics` of a pad in maximal coordinates under the tool; without it, the tool is a tip on
+            the table.
+    """
+    if pad is None:
+        things, tool = [], _robot("gantry", _gantry(TIP, FRICTION), [0.0, 0.0, 0.011])
+    else:
+        dynamics = {"lateralFriction": FRICTION, **pad}
+        things = [box("pad", (0.03, 0.03, 0.01), baseMass=0.1, changeDynamics=dynamics, **MAXIMAL)]
+        tool = _robot("gantry", _gantry(FACE, 4.0), [0.0, 0.0, 0.0305])
     table = box_floor(**MAXIMAL, **TOLD)
-    with scene(
-        gravity=(0.0, 0.0, 0.0), collision_objects=[table], dynamic_objects=things, robots=robots
-    ) as world:
+    objects = {"collision_objects": [table], "dynamic_objects": things, "robots": [tool]}
+    with scene(engine=engine, gravity=(0.0, 0.0, 0.0), **objects) as world:
         _move(world, "gantry", 0.2, lambda share: {"z_joint": -0.1})
-        samples = _move(world, "gantry", 1.0, lambda s: {"x_joint": 0.1 * s * x, "y_joint": 0.1 * s * y})
-    forces = [each.force for each in samples if isinstance(each, ContactsSample) and each.name == "floor"][500:]
+        samples = _move(world, "gantry", 1.0, lambda share: {"x_joint": 0.1 * share * x, "y_joint": 0.1 * share * y})
+    forces = [each.force for each in samples if isinstance(each, ContactsSample)][500:]
     force_x, force_y, force_z = (sum(each[axis] for each in forces) / len(forces) for axis in range(3))
     off = math.atan2(x * force_y - y * force_x, x * force_x + y * force_y)
     return math.hypot(force_x, force_y) / (FRICTION * abs(force_z)), abs(math.degrees(off))
