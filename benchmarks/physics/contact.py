@@ -29,9 +29,7 @@ def resting() -> Table:
     for time_step_s in steps_s:
         for keys in KINDS.values():
             thing = box("box", (HALF_M, HALF_M, HALF_M), **keys)
-            with scene(
-                time_step_s, collision_objects=[box_floor(**TOLD, **keys)], dynamic_objects=[thing]
-            ) as world:
+            with scene(time_step_s, collision_objects=[box_floor(**TOLD, **keys)], dynamic_objects=[thing]) as world:
                 run(world, 2.0)
                 depths.append(1000.0 * (HALF_M - height(world, "box")))
                 forces.append(floor_force(world, 0.5))
@@ -51,9 +49,7 @@ def stiffness() -> Table:
                 for keys in KINDS.values():
                     more = {"changeDynamics": dynamics, **keys}
                     thing = ball("it", HALF_M, **more) if name == "ball" else box("it", (HALF_M,) * 3, **more)
-                    with scene(
-                        time_step_s, collision_objects=[box_floor(**keys)], dynamic_objects=[thing]
-                    ) as world:
+                    with scene(time_step_s, collision_objects=[box_floor(**keys)], dynamic_objects=[thing]) as world:
                         run(world, 3.0)
                         found.append(1000.0 * (HALF_M - height(world, "it")))
             closed = 1000.0 * GRAVITY / (contacts * value)

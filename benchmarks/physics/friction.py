@@ -76,9 +76,7 @@ def slide(
     start = {"linearVelocity": [speed_m_s * x, speed_m_s * y, 0.0]}
     keys = {"resetBaseVelocity": start, "changeDynamics": {"lateralFriction": FRICTION}, **(box_keys or {})}
     thing = box("box", HALF_M, yaw=math.radians(yaw_deg), **keys)
-    with scene(
-        time_step_s, engine, collision_objects=[floor(**(floor_keys or {}))], dynamic_objects=[thing]
-    ) as world:
+    with scene(time_step_s, engine, collision_objects=[floor(**(floor_keys or {}))], dynamic_objects=[thing]) as world:
         if floor is floor_of_tf:
             world.put("floor/pose", Pose((0.0, 0.0, -0.5)))
         run(world, 0.02)

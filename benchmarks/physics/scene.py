@@ -70,10 +70,10 @@ class Table(NamedTuple):
 
 
 def _shown(value: Cell) -> str:
-    """Returns a cell; what is less than a millionth is told as 0."""
+    """Returns a cell; what is less than 0.0001 is told as 0."""
     if isinstance(value, (str, Span)):
         return str(value)
-    return "0" if abs(value) < 1e-6 else f"{value:.4g}"
+    return "0" if abs(value) < 1e-4 else f"{value:.4g}"
 
 
 @contextlib.contextmanager
@@ -138,7 +138,13 @@ def plane_floor(**more: Any) -> dict[str, Any]:
 def floor_of_tf(**more: Any) -> dict[str, Any]:
     """Returns a floor whose upper side is 0.5 m above its frame, which TF has to put there."""
     shape = {"shapeType": "GEOM_BOX", "halfExtents": [3.0, 3.0, 0.5]}
-    return {**box_floor(), "createVisualShape": shape, "createCollisionShape": shape, "object_tf": {"tf_id": "floor"}, **more}
+    return {
+        **box_floor(),
+        "createVisualShape": shape,
+        "createCollisionShape": shape,
+        "object_tf": {"tf_id": "floor"},
+        **more,
+    }
 
 
 def box(name: str, half_m: Sequence[float], height_m: float | None = None, yaw: float = 0.0, **more: Any) -> Any:
