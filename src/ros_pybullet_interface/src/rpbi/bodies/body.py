@@ -94,9 +94,9 @@ class Body:
 
     def change_dynamics(self, link: int, **arguments: Any) -> None:
         """Calls PyBullet's `changeDynamics` for a link, by index."""
-        if "localInertiaDiagonal" in arguments:
-            # Without the mass PyBullet makes a body in maximal coordinates a static one.
-            arguments.setdefault("mass", self.dynamics_info(link)[0])
+        info = self.dynamics_info(link)
+        if info[10] == MAXIMAL_COORDINATES and "localInertiaDiagonal" in arguments:
+            arguments.setdefault("mass", info[0])  # without it PyBullet makes the body a static one
         self.pb.changeDynamics(self.body_id, link, **arguments)
         self._given_dynamics.update(arguments)
 
