@@ -75,8 +75,8 @@ class Body:
     def dynamics_info(self, link: int) -> tuple[Any, ...]:
         """Returns what PyBullet's `getDynamicsInfo` tells of a link, by index.
 
-        Of a body in maximal coordinates PyBullet does not tell the inertial frame, restitution, and stiffness and damping
-        of contacts, and leaves in their places what it last told of another: here are those that the body was given.
+        Of a body in maximal coordinates PyBullet tells neither the inertial frame nor restitution nor stiffness and
+        damping of contacts, and leaves in their places what it last told of another: here is what the body was given.
         """
         info: tuple[Any, ...] = self.pb.getDynamicsInfo(self.body_id, link)
         if info[10] != MAXIMAL_COORDINATES:
