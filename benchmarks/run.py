@@ -18,7 +18,9 @@ from typing import Any
 
 from result import Result, table
 
-BENCHMARKS = ("loop", "many", "load", "camera", "latency", "free_run", "reset", "tables", "ik", "ik_nodes")
+BENCHMARKS = (
+    *("loop", "many", "load", "camera", "latency", "free_run", "reset", "tables", "ik", "ik_nodes", "physics"),
+)
 WHEN_NAMED = ("soak",)
 """Those that take too long to run with the others."""
 FIND_RENDERER = """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, ClassVar
@@ -21,8 +22,12 @@ from rpbi.sensors.sensor import Sensor
 
 log = logging.getLogger(__name__)
 
+MAXIMAL_COORDINATES = 1
+"""PyBullet's type of bodies that the solver of rigid bodies moves, where `getDynamicsInfo` tells it."""
 _MULTI_BODY = 2
-"""The type in PyBullet's `getDynamicsInfo` of what has joints in reduced coordinates, or could have."""
+"""The same of what has joints in reduced coordinates, or could have."""
+UNNAMED_LINK = "link0"
+"""PyBullet's name of the only link of a shape, which it leaves out in maximal coordinates."""
 
 
 class Body:
@@ -52,8 +57,10 @@ class Body:
         self.joint_indices = tuple(range(pb.getNumJoints(body_id)))
         self.link_indices = self.joint_indices
         """PyBullet's indices of all links but the root."""
-        self.root_link: str = pb.getBodyInfo(body_id)[0].decode()
-        inertial = pb.getDynamicsInfo(body_id, -1)
+        self._base_link: str = pb.getBodyInfo(body_id)[0].decode() or UNNAMED_LINK
+        self.root_link = self._base_link
+        self._given_dynamics: dict[str, Any] = {}
+        inertial = self.dynamics_info(-1)
         self.inertial_pose_in_base = Pose(inertial[3], inertial[4])
         self._base_pose_in_inertial = self.inertial_pose_in_base.inverse()
         self.pose_follower: PoseFollower | None = None
@@ -68,7 +75,35 @@ class Body:
     @cached_property
     def _link_names(self) -> dict[int, str]:
         names = {index: self.pb.getJointInfo(self.body_id, index)[12].decode() for index in self.joint_indices}
-        return {-1: self.pb.getBodyInfo(self.body_id)[0].decode(), **names}
+        return {-1: self._base_link, **names}
+
+    def dynamics_info(self, link: int) -> tuple[Any, ...]:
+        """Returns what PyBullet's `getDynamicsInfo` tells of a link, by index.
+
+        Of a body in maximal coordinates PyBullet tells neither the inertial frame nor restitution nor stiffness and
+        damping of contacts, and leaves in their places what it last told of another: here is what the body was given.
+        """
+        info: tuple[Any, ...] = self.pb.getDynamicsInfo(self.body_id, link)
+        if info[10] != MAXIMAL_COORDINATES:
+            return info
+        restitution, *damping_and_stiffness = (
+            self._given_dynamics.get(key, default)
+            for key, default in (("restitution", 0.0), ("contactDamping", -1.0), ("contactStiffness", -1.0))
+        )
+        mass, friction, inertia = info[:3]
+        if mass:
+            inertia = tuple(moment or math.inf for moment in inertia)  # PyBullet tells 0 when it has kept 1/inf
+        inertial_frame = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
+        front = (mass, friction, inertia, *inertial_frame, restitution)
+        return (*front, *info[6:8], *damping_and_stiffness, *info[10:])
+
+    def change_dynamics(self, link: int, **arguments: Any) -> None:
+        """Calls PyBullet's `changeDynamics` for a link, by index."""
+        info = self.dynamics_info(link)
+        if info[10] == MAXIMAL_COORDINATES and "localInertiaDiagonal" in arguments:
+            arguments.setdefault("mass", info[0])  # without it PyBullet makes the body a static one
+        self.pb.changeDynamics(self.body_id, link, **arguments)
+        self._given_dynamics.update(arguments)
 
     def _start_base(
         self, velocity: ResetBaseVelocity | None, object_tf: ObjectTf | None = None, is_fixed: bool = False

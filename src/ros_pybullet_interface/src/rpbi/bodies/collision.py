@@ -9,7 +9,7 @@ from rpbi.sensors.contact_arrows import contact_sensors
 from rpbi.sensors.sensor import Sensor
 
 from .body_config import BodyConfig
-from .shape_object import ShapeObject
+from .shape_object import MaximalCoordinates, ShapeObject
 
 
 class CollisionObjectConfig(BodyConfig):
@@ -18,6 +18,7 @@ class CollisionObjectConfig(BodyConfig):
     createVisualShape: CreateVisualShape = Field(description="What it looks like.")
     createCollisionShape: CreateCollisionShape = Field(description="What it feels like.")
     changeDynamics: ChangeDynamics | None = Field(None, description="Friction, restitution and the like.")
+    useMaximalCoordinates: MaximalCoordinates = False
     object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, it stays at the origin.")
     contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
 
@@ -35,10 +36,16 @@ class CollisionObject(ShapeObject):
     }
 
     def __init__(self, pb: Client, config: CollisionObjectConfig) -> None:
-        super().__init__(pb, config.name, config.createVisualShape, config.createCollisionShape)
+        super().__init__(
+            pb,
+            config.name,
+            config.createVisualShape,
+            config.createCollisionShape,
+            useMaximalCoordinates=config.useMaximalCoordinates,
+        )
         self._follow(config.object_tf)
         if config.changeDynamics is not None:
-            pb.changeDynamics(self.body_id, -1, **config.changeDynamics.kwargs())
+            self.change_dynamics(-1, **config.changeDynamics.kwargs())
         self._contacts = config.contacts
 
     def sensors(self) -> tuple[Sensor, ...]:

@@ -2,6 +2,7 @@
 
 from pydantic import Field
 
+from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import HzOrOff, Position, Positive, Quat
 from rpbi.config.pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ResetBaseVelocity
 from rpbi.config.sensors import ContactsConfig
@@ -12,7 +13,7 @@ from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
 
 from .body_config import BodyConfig
-from .shape_object import ShapeObject
+from .shape_object import MaximalCoordinates, ShapeObject
 
 
 class DynamicObjectConfig(BodyConfig):
@@ -24,6 +25,7 @@ class DynamicObjectConfig(BodyConfig):
     baseMass: Positive = Field(description="Mass.", json_schema_extra={"unit": "kg"})
     basePosition: Position = Field((0.0, 0.0, 0.0), description="Start position.")
     baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Start orientation, x, y, z, w.")
+    useMaximalCoordinates: MaximalCoordinates = False
     resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity.")
     broadcast_hz: HzOrOff = Field(0.0, description="Rate of its pose on TF; 0 is off.")
     base_state_hz: HzOrOff = Field(0.0, description="Rate of its pose and velocity on `base_state`; 0 is off.")
@@ -46,6 +48,9 @@ class DynamicObject(ShapeObject):
     }
 
     def __init__(self, pb: Client, config: DynamicObjectConfig) -> None:
+        if config.useMaximalCoordinates and pb.is_deformable:
+            message = "soft bodies do not feel what moves in maximal coordinates; remove it in a deformable world"
+            raise ConfigError([Problem(config.name, "useMaximalCoordinates", message)])
         super().__init__(
             pb,
             config.name,
@@ -54,8 +59,9 @@ class DynamicObject(ShapeObject):
             baseMass=config.baseMass,
             basePosition=config.basePosition,
             baseOrientation=config.baseOrientation,
+            useMaximalCoordinates=config.useMaximalCoordinates,
         )
-        pb.changeDynamics(self.body_id, -1, **config.changeDynamics.kwargs())
+        self.change_dynamics(-1, **config.changeDynamics.kwargs())
         self._start_base(config.resetBaseVelocity)
         self.config = config
 

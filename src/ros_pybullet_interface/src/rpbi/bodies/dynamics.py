@@ -10,7 +10,7 @@ from pydantic.alias_generators import to_camel
 from custom_ros_tools.errors import PhysicsError, UnknownNameError
 from rpbi.config.pybullet_models import ChangeDynamics
 
-from .body import Body
+from .body import MAXIMAL_COORDINATES, Body
 
 
 class LinkDynamics(NamedTuple):
@@ -27,7 +27,7 @@ class LinkDynamics(NamedTuple):
         spinning_friction: Friction about the contact normal.
         contact_damping: Damping of contacts [N s/m], -1 as long as it is not set.
         contact_stiffness: Stiffness of contacts [N/m], -1 as long as it is not set.
-        body_type: PyBullet's: 1 rigid, 2 multi, 3 soft.
+        body_type: PyBullet's: 1 rigid (in maximal coordinates), 2 multi, 3 soft.
         collision_margin: Margin around the shape [m].
     """
 
@@ -121,7 +121,7 @@ def read_dynamics(body: Body, link: str) -> LinkDynamics:
     Raises:
         UnknownNameError: If the body has no such link.
     """
-    return LinkDynamics(*body.pb.getDynamicsInfo(body.body_id, link_index(body, link)))
+    return LinkDynamics(*body.dynamics_info(link_index(body, link)))
 
 
 def change_dynamics(body: Body, link: str, change: ChangeDynamics) -> None:
@@ -139,7 +139,7 @@ def change_dynamics(body: Body, link: str, change: ChangeDynamics) -> None:
         PhysicsError: If PyBullet refuses.
     """
     index = link_index(body, link)
-    present = LinkDynamics(*body.pb.getDynamicsInfo(body.body_id, index))
+    present = LinkDynamics(*body.dynamics_info(index))
     arguments = change.kwargs()
     if problems := _problems(body, index, present, arguments):
         raise ValueError("; ".join(problems))
@@ -147,7 +147,7 @@ def change_dynamics(body: Body, link: str, change: ChangeDynamics) -> None:
         ratio = arguments["mass"] / present.mass
         arguments.setdefault("localInertiaDiagonal", [ratio * moment for moment in present.local_inertia_diagonal])
     try:
-        body.pb.changeDynamics(body.body_id, index, **arguments)
+        body.change_dynamics(index, **arguments)
     except pybullet.error as error:
         raise PhysicsError(f"{body.name}: {error}") from error
     if arguments.keys() & _OF_CONTACTS:
@@ -177,7 +177,7 @@ def _problems(body: Body, index: int, present: LinkDynamics, arguments: dict[str
         problems.append("localInertiaDiagonal: must be > 0 [kg m^2] each")
     if arguments.get("contactStiffness") == 0:
         problems.append("contactStiffness: must be > 0 [N/m], got 0: nothing would keep bodies apart")
-    if not body.pb.getCollisionShapeData(body.body_id, index):
+    if present.body_type != MAXIMAL_COORDINATES and not body.pb.getCollisionShapeData(body.body_id, index):
         problems += [f"{key}: '{what}' has no collision shape" for key in arguments if key in _OF_CONTACTS]
     if index < 0 or body.pb.getJointInfo(body.body_id, index)[2] == pybullet.JOINT_FIXED:
         problems += [f"{key}: '{what}' hangs on no joint that moves" for key in arguments if key in _OF_JOINTS]

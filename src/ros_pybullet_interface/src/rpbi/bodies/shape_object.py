@@ -1,13 +1,24 @@
 """Objects made of one visual and perhaps one collision shape."""
 
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.schema import Switch
 from rpbi.config.pybullet_models import CreateCollisionShape, CreateVisualShape
 from rpbi.engine.client import Client
 
 from .body import Body
 from .mesh_checks import mesh_problems
+
+MaximalCoordinates = Annotated[
+    Switch,
+    Field(
+        description="Whether the solver of rigid bodies moves it; between two such objects friction is the same in all "
+        "directions, see docs/physics.md."
+    ),
+]
 
 
 class ShapeObject(Body):

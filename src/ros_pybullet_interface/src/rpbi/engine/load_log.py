@@ -32,7 +32,7 @@ def _problems(body: Body) -> Iterator[str]:
     pb, body_id = body.pb, body.body_id
     links = {index: f"link '{body.link_name(index)}'" for index in (-1, *body.joint_indices)}
     for index, link in links.items():
-        mass, _, inertia, position, quat = pb.getDynamicsInfo(body_id, index)[:5]
+        mass, _, inertia, position, quat = body.dynamics_info(index)[:5]
         if not _are_finite((mass, *inertia, *position, *quat)):
             yield f"{link}: its mass, inertia or centre of mass is"
     for index in body.joint_indices:
