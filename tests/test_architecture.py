@@ -111,6 +111,11 @@ FAMILIES = {
     "body": ("rpbi.bodies:BODY_TYPES", "rpbi.bodies.body:Body", "concepts.md"),
     "sensor": ("rpbi.sensors:SENSOR_TYPES", "rpbi.sensors.sensor:Sensor", "concepts.md"),
     "solver": ("ik_ros.solvers:SOLVERS", "ik_ros.solver:Solver", "ik_solvers.md"),
+    "controller": (
+        "rpbi.control.controllers:CONTROLLERS",
+        "rpbi.control.controllers.controller:Controller",
+        "controllers.md",
+    ),
     "task": ("ik_ros.tasks:TASKS", "ik_ros.formulation.task:Task", "ik_tasks.md"),
 }
 """Table, base class and page of each family of plug-ins; their files are where the table is."""

@@ -16,7 +16,9 @@ from ros_system import wait_until
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from ros_pybullet_interface.srv import ResetJointState
+from custom_ros_tools.srv import SetString
+from ros_pybullet_interface.msg import Contacts, ControllerState
+from ros_pybullet_interface.srv import ResetJointState, SwitchControllers
 from rpbi_examples.motions import CIRCLE_CENTRE, CIRCLE_RADIUS
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -145,3 +147,31 @@ def test_twin_shows_a_metre_beside_what_the_arm_does(ros, position):
         return math.dist(there, start) > 0.05 and math.dist((here[0], here[1] + 1.0, here[2]), there) < 0.05
 
     wait_until(shows_it, "the twin moves as the arm does")
+
+
+def test_it_wipes_a_table_with_the_force_asked_for(ros):
+    states = ros.listen("/rpbi/kuka_lwr/wipe/state", ControllerState)
+    contacts = ros.listen("/rpbi/kuka_lwr/contacts", Contacts)
+    launch(ros, "wiping_example", real_time_factor=2)
+
+    def force(message: Contacts) -> float:
+        return sum(point.normal_force for point in message.points if point.other_body == "table")
+
+    def wipes() -> bool:
+        last = dict(zip(states.messages[-1].value_names, states.messages[-1].values)) if states.messages else {}
+        return abs(last.get("force/y", 0.0)) > 4.0
+
+    wait_until(wipes, "it moves against the friction of the table")
+    begin = len(contacts.messages)
+    contacts.wait_for(begin + 100)
+    forces = [force(message) for message in contacts.messages[begin:]]
+    assert math.sqrt(sum((each - 20.0) ** 2 for each in forces) / len(forces)) < 1.0
+    assert max(map(force, contacts.messages)) < 25.0
+    switch = rospy.ServiceProxy("/rpbi/kuka_lwr/switch_controllers", SwitchControllers)
+    assert switch(stop=["wipe"]).success
+    refused = switch(start=["wash"])
+    assert not refused.success and "wash" in refused.message
+    softer = rospy.ServiceProxy("/rpbi/kuka_lwr/wipe/set_gains", SetString)
+    assert not softer("{force: -1}").success
+    assert softer("{force: 5}").success and switch(start=["wipe"]).success
+    wait_until(lambda: abs(force(contacts.messages[-1]) - 5.0) < 0.5, "it presses with 5 N")

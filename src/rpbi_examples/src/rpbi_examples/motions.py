@@ -18,6 +18,10 @@ CIRCLE_PERIOD_S = 6.0
 """Time of one round [s]."""
 CIRCLE_CENTRE = (0.55, 0.30, 0.85)
 """Centre of the left hand's circle in the world [m]; the right hand's has the opposite y."""
+WIPED_M = 0.3
+"""Length of the line that is wiped [m]."""
+WIPING_PERIOD_S = 4.0
+"""Time to wipe it forth and back [s]."""
 POINTING_DOWN = (0.0, 1.0, 0.0, 0.0)
 """Orientation of the hands as x, y, z, w: their z axis down."""
 ORBIT_RADIUS = 2.0
@@ -69,6 +73,11 @@ def hand_position(time_s: float, side: float) -> Vector:
     angle = 2.0 * math.pi * time_s / CIRCLE_PERIOD_S
     x, y, z = CIRCLE_CENTRE
     return x, side * (y + CIRCLE_RADIUS * math.sin(angle)), z + CIRCLE_RADIUS * (1.0 - math.cos(angle))
+
+
+def wiped(time_s: float) -> float:
+    """Returns how far a wiping hand is from the middle of its line [m] at a time since the start [s]."""
+    return WIPED_M / 2.0 * math.sin(2.0 * math.pi * time_s / WIPING_PERIOD_S)
 
 
 def camera_pose(time_s: float) -> tuple[Vector, Array]:

@@ -5,21 +5,24 @@ import sys
 import threading
 
 import rospy
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import Point, PoseStamped, Quaternion, Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Int64
+from std_msgs.msg import Header, Int64
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.services import call_service, get_srv_handler
-from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem, JointInfo
+from custom_ros_tools.tf import TfInterface
+from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem, Contacts, JointInfo
 from ros_pybullet_interface.srv import ResetEffState, RobotInfo, RobotInfoResponse
-from rpbi_examples.motions import POINTING_DOWN, PlanarPose, Route, Swing, hand_position
+from rpbi_examples.motions import POINTING_DOWN, PlanarPose, Route, Swing, hand_position, wiped
 
 HZ = 50.0
 """How often targets are sent."""
 LINK = "lbr_iiwa_link_7"
+SETTLING_S = 0.5
+"""How long the arm presses before it wipes [s]."""
 APPROACH_S = 3.0
 """Time for the way to the circles [s]."""
 
@@ -37,6 +40,11 @@ def drive_around() -> None:
 def dual_arm_example() -> None:
     """Has the hands of two robots, which the arguments name, the left one first, draw mirrored circles."""
     run_node("dual_arm_example", _draw)
+
+
+def wiping_example() -> None:
+    """Has the KUKA of the wiping example wipe back and forth once it touches the table."""
+    run_node("wiping_example", _wipe)
 
 
 def _robot_name() -> str:
@@ -117,3 +125,22 @@ def _problem(time_s: float, side: float) -> CalculateInverseKinematicsProblem:
     return CalculateInverseKinematicsProblem(
         link_name=LINK, targetPosition=hand_position(time_s, side), targetOrientation=POINTING_DOWN
     )
+
+
+def _wipe() -> None:
+    touched: list[str] = []
+    while "table" not in touched:
+        touched = [point.other_body for point in rospy.wait_for_message("rpbi/kuka_lwr/contacts", Contacts).points]
+    rospy.sleep(SETTLING_S)
+    position, quat = TfInterface().wait_for_tf("rpbi/world", "rpbi/kuka_lwr/end_effector_ball")
+    publisher = rospy.Publisher("rpbi/kuka_lwr/wipe/target", PoseStamped, queue_size=1)
+    target = PoseStamped(header=Header(frame_id="rpbi/world"))
+    target.pose.orientation = Quaternion(*quat)
+    rate = rospy.Rate(HZ)
+    start = rospy.Time.now()
+    while not rospy.is_shutdown():
+        target.header.stamp = rospy.Time.now()
+        way = wiped((target.header.stamp - start).to_sec())
+        target.pose.position = Point(position[0], position[1] + way, position[2])
+        publisher.publish(target)
+        rate.sleep()
