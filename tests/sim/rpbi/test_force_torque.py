@@ -22,10 +22,9 @@ DT_S = 0.001
 
 def make_world(folder, mode="POSITION_CONTROL", sensors=None, main=None, description=None, fixed=True, **robot):
     (folder / "arm.urdf").write_text(description or urdf())
-    file, flags = str(folder / "arm.urdf"), "URDF_USE_INERTIA_FROM_FILE"
     config = {
         "name": "arm",
-        "loadURDF": {"fileName": file, "useFixedBase": fixed, "flags": flags},
+        "loadURDF": {"fileName": str(folder / "arm.urdf"), "useFixedBase": fixed},
         "setJointMotorControlArray": {"controlMode": mode},
         "joint_state_publisher_hz": 1000,
         "enabled_joint_force_torque_sensors": JOINTS if sensors is None else sensors,

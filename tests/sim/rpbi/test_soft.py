@@ -79,9 +79,14 @@ def test_forces_of_the_floor_carry_its_weight_roughly(build, tmp_path):
 
 @pytest.fixture
 def resting(build, tmp_path):
-    """A soft cube that has been at rest for longer than PyBullet lets bodies lie awake, beside a body that TF moves."""
+    """A soft cube that has been at rest for longer than PyBullet leaves one awake, below a body that TF moves."""
     shape = {"shapeType": "GEOM_BOX", "halfExtents": [0.3, 0.3, 0.05]}
-    press = {"name": "press", "createVisualShape": shape, "createCollisionShape": shape, "object_tf": {"tf_id": "press"}}
+    press = {
+        "name": "press",
+        "createVisualShape": shape,
+        "createCollisionShape": shape,
+        "object_tf": {"tf_id": "press"},
+    }
     world = build(
         block(tmp_path, load={"basePosition": [0, 0, 0.11], "NeoHookeanDamping": 0.5}, contacts={"hz": 250}),
         collision=(GROUND, press),

@@ -113,6 +113,11 @@ class UrdfDocument:
         return {joint.name: joint for joint in map(_read_joint, self._joints)}
 
     @property
+    def links_without_inertial(self) -> set[str]:
+        """Names of the links of which it tells neither mass nor inertia."""
+        return {link.get("name", "") for link in self._root.findall("link") if link.find("inertial") is None}
+
+    @property
     def is_soft(self) -> bool:
         """Whether it describes a soft body."""
         return self._root.find("deformable") is not None

@@ -47,7 +47,9 @@ class JointedBody(Body):
         if fixed_base or self.base_joints:
             arguments["useFixedBase"] = True
         self.has_fixed_base = bool(arguments.get("useFixedBase", False)) and not self.base_joints
-        super().__init__(pb, config.name, load_urdf(pb, config.name, arguments, self.prepare_urdf))
+        inertia_from_urdf = config.inertia_from_urdf and not config.is_visual_robot  # which has no mass
+        body_id = load_urdf(pb, config.name, arguments, self.prepare_urdf, inertia_from_urdf)
+        super().__init__(pb, config.name, body_id)
         self.config = config
         joints = Joint.all_of(pb, self.body_id)
         self.model = JointModel(joints, self.base_joints)
