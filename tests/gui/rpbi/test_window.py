@@ -10,6 +10,7 @@ import numpy as np
 import pybullet
 import pytest
 import rosgraph
+from diagnostic_msgs.msg import DiagnosticArray
 from pybullet_window import HEIGHT, SLOW_S, WIDTH, floating_ball, middle, mostly, window
 from ros_system import wait_until
 from sensor_msgs.msg import Image, JointState
@@ -84,6 +85,16 @@ def test_node_with_a_window_publishes_joint_states_and_images_and_ends_on_interr
     assert node.wait(SLOW_S) == 0
     assert "Traceback" not in ros.output(node)
     wait_until(lambda: window(screen) is None, "the window has gone", SLOW_S)
+
+
+def test_a_world_that_its_window_slows_down_says_so_once(ros, start):
+    node = start(
+        timeStep=0.001, setAdditionalSearchPath="pybullet_data_path", robots=[ros.write_yaml("arm.yaml", iiwa())]
+    )
+    told = "with its window, PyBullet takes"
+    wait_until(lambda: told in ros.output(node), "it says what is slow", SLOW_S)
+    ros.listen("/diagnostics", DiagnosticArray).wait_for(3, SLOW_S)
+    assert ros.output(node).count(told) == 1
 
 
 @pytest.mark.parametrize("running", [True, False], ids=["running", "stopped"])
