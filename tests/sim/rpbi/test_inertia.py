@@ -107,6 +107,11 @@ def test_what_is_not_finite_is_refused(moments_of):
         moments_of(inertial("nan", 0.02, 0.025))
 
 
+def test_a_urdf_that_only_pybullet_can_read_has_its_own_too(moments_of):
+    prefixed = inertial(0.01, 0.02, 0.025) + "<sensor:camera/>"
+    assert moments_of(prefixed) == pytest.approx((0.01, 0.02, 0.025))
+
+
 def test_flags_of_the_user_stay(build, tmp_path):
     (tmp_path / "bell.urdf").write_text(swinging(inertial(0.01, 0.02, 0.025)))
     flags = {"fileName": str(tmp_path / "bell.urdf"), "flags": "URDF_IGNORE_COLLISION_SHAPES"}

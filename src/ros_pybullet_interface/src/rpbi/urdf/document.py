@@ -192,10 +192,7 @@ class UrdfDocument:
         Args:
             joints: The joints of the chain, from its fixed end to the root.
         """
-        robot = copy.deepcopy(self._root)
-        for element in robot.iterfind(".//*[@filename]"):  # meshes and textures
-            name = element.get("filename", "")
-            element.set("filename", str(beside_or_above(name, self._source) or name))
+        robot = self._absolute()
         root = next(link for link in robot.findall("link") if link.get("name") == joints[-1].child)
         if root.find("inertial") is None:
             root.append(_inertial("0"))  # PyBullet gives 1 kg to any link without, unless it is the fixed one
@@ -204,6 +201,31 @@ class UrdfDocument:
         robot[:0] = [*links, root]  # in order, in case of URDF_MAINTAIN_LINK_ORDER
         robot.extend(map(_joint_element, joints))
         return _text(robot)
+
+    def for_window(self) -> str | None:
+        """Returns all of it with the first visual of each link at its end, with absolute names of meshes.
+
+        PyBullet's window draws a whole link in the colour of its last visual; the first one is the link's main one, as
+        a rule.
+
+        Returns:
+            Nothing if no link has several.
+        """
+        robot = self._absolute()
+        several = [link for link in robot.findall("link") if len(link.findall("visual")) > 1]
+        for link in several:
+            first = link.findall("visual")[0]
+            link.remove(first)
+            link.append(first)
+        return _text(robot) if several else None
+
+    def _absolute(self) -> Element:
+        """Returns a copy that may stand in another folder, since names of meshes and textures are absolute."""
+        robot = copy.deepcopy(self._root)
+        for element in robot.iterfind(".//*[@filename]"):
+            name = element.get("filename", "")
+            element.set("filename", str(beside_or_above(name, self._source) or name))
+        return robot
 
 
 def chain_urdf(joints: Sequence[UrdfJoint]) -> str:

@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from rpbi.config.asset_files import ROBOT_DESCRIPTION
 from rpbi.engine.client import Client
 
 from .document import UrdfDocument
-from .files import beside_or_above, resolve_meshes
+from .files import beside_or_above, resolve_meshes, write_description
 
 log = logging.getLogger(__name__)
 
@@ -64,11 +64,15 @@ def load_urdf(
     file: str = arguments["fileName"]
     try:
         prepared = prepare(file)
+        document = _parsed(prepared)
+        if pb.has_window and document is not None and (text := document.for_window()) is not None:
+            prepared = write_description(text)
         if not inertia_from_urdf:
             return int(pb.loadURDF(**{**arguments, "fileName": prepared}))
         flags = (arguments.get("flags") or 0) | pybullet.URDF_USE_INERTIA_FROM_FILE
         body_id = int(pb.loadURDF(**{**arguments, "fileName": prepared, "flags": flags}))
-        _complete_inertias(pb, name, body_id, prepared, arguments.get("globalScaling") or 1.0)
+        without = document.links_without_inertial if document is not None else set()
+        _complete_inertias(pb, name, body_id, without, arguments.get("globalScaling") or 1.0)
         return body_id
     except ConfigError as error:
         messages = [f"{problem.key or file}: {problem.message}" for problem in error.problems]
@@ -77,9 +81,16 @@ def load_urdf(
     raise ConfigError([Problem(name, "loadURDF.fileName", message) for message in messages])
 
 
-def _complete_inertias(pb: Client, name: str, body_id: int, file: str, scaling: float) -> None:
-    """Gives links of which the URDF has no moments of inertia some, and those of a scaled body its own."""
-    without = UrdfDocument(file).links_without_inertial
+def _parsed(file: str) -> UrdfDocument | None:
+    """Returns a URDF, None where PyBullet alone can make something of it: it takes unknown prefixes, for instance."""
+    try:
+        return UrdfDocument(file)
+    except ConfigError:
+        return None
+
+
+def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[str], scaling: float) -> None:
+    """Gives links without moments of inertia in the URDF some, and those of a scaled body its own."""
     links = {index: pb.getJointInfo(body_id, index)[12] for index in range(pb.getNumJoints(body_id))}
     unusable, too_large = [], []
     for index, link in {-1: pb.getBodyInfo(body_id)[0], **links}.items():
