@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import math
 import os
 import signal
 import subprocess
@@ -368,6 +370,7 @@ def _policies(process_id):
 
 @pytest.mark.parametrize("awaited", ["a scene", "who looks"])
 def test_renderer_that_starves_at_idle_priority_gets_a_share_of_the_processor(tmp_path, monkeypatch, caplog, awaited):
+    monkeypatch.setattr("rpbi.render.client.STARVED_AFTER_S", math.inf)  # the machine may be busy
     rendering = Rendering(tmp_path, make_world(tmp_path), use_egl=False, gives_way=True)
     try:
         rendering.demand("depth")
@@ -380,7 +383,7 @@ def test_renderer_that_starves_at_idle_priority_gets_a_share_of_the_processor(tm
         else:
             rendering.client.add(CAMERA._replace(name="other"))
         rendering.until(lambda: _policies(process_id) == {(os.SCHED_OTHER, 19)}, "it has a share")
-        assert [record.getMessage() for record in caplog.records] == [
+        assert [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING] == [
             "camera: the renderer has had no processor time for 0.1 s, others take all of it; "
             "from now on it runs at nice 19 instead of idle priority"
         ]
