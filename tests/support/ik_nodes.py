@@ -42,8 +42,8 @@ def start_solver(ros: Any, solver: str = "kdl", start_on_init: bool = True, **pa
 
 
 def start_setup(ros: Any, solver: str = "kdl", start_on_init: bool = True, **parameters: Any) -> Any:
-    """Starts `ik_setup_node.py`."""
-    given = {"start_on_init": start_on_init, **parameters}
+    """Starts `ik_setup_node.py`, which does not wait for a start unless parameters say so."""
+    given = {"start_on_init": start_on_init, "wait_for_start": False, **parameters}
     return start_node(ros, "ik_setup_node.py", solver, f"ik/setup/{solver}/toggle", **given)
 
 

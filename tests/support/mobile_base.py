@@ -45,7 +45,7 @@ def mobile_base(folder: Path, name: str = "mobile", **more: Any) -> dict[str, An
     """Writes the robot's description into a folder and returns its configuration, with a planar base."""
     path = folder / "mobile_base.urdf"
     path.write_text(_URDF)
-    load_urdf = {"fileName": str(path), "flags": "URDF_USE_INERTIA_FROM_FILE", **more.pop("loadURDF", {})}
+    load_urdf = {"fileName": str(path), **more.pop("loadURDF", {})}
     return {
         "name": name,
         "loadURDF": load_urdf,

@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+DAMPING = 0.3
+"""Of all joints that move [N m s/rad or N s/m]."""
 GRAVITY = np.array([0.0, 0.0, -9.81])
 
 
@@ -114,7 +116,7 @@ def urdf() -> str:
             f'</inertial></link><joint name="{link.name}_joint" type="{link.joint_type}">'
             f'<parent link="{ARM[link.parent].name if link.parent >= 0 else "base"}"/><child link="{link.name}"/>'
             f'<origin xyz="{_text(link.xyz)}" rpy="{_text(link.rpy)}"/><axis xyz="{_text(link.axis)}"/>'
-            '<limit lower="-3" upper="3" effort="1000" velocity="20"/><dynamics damping="0.3"/></joint>'
+            f'<limit lower="-3" upper="3" effort="1000" velocity="20"/><dynamics damping="{DAMPING}"/></joint>'
         )
     return "".join(parts) + "</robot>"
 

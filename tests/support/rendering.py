@@ -59,10 +59,16 @@ class Rendering:
         world: The world.
         cameras: Its cameras.
         use_egl: Whether to try EGL.
+        gives_way: Whether others go first; what it draws is asked here as a rule, not who goes first.
     """
 
     def __init__(
-        self, folder: Path, world: World, cameras: tuple[Camera, ...] = (CAMERA,), use_egl: bool = True
+        self,
+        folder: Path,
+        world: World,
+        cameras: tuple[Camera, ...] = (CAMERA,),
+        use_egl: bool = True,
+        gives_way: bool = False,
     ) -> None:
         self.folder = folder
         self.world = world
@@ -72,7 +78,7 @@ class Rendering:
             world.log,
             lambda: {name: body.body_id for name, body in world.bodies.items()},
             "frame_sink:FolderSink",
-            ["--keep-priority", f"--folder={folder}"],  # what it draws is asked here, not who goes first
+            [*([] if gives_way else ["--keep-priority"]), f"--folder={folder}"],
             use_egl,
         )
 

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 import os
+import shutil
 import signal
+from pathlib import Path
 
 import numpy as np
 import pybullet
+import pybullet_data
 import pytest
 import rosgraph
+from diagnostic_msgs.msg import DiagnosticArray
 from pybullet_window import HEIGHT, SLOW_S, WIDTH, floating_ball, middle, mostly, window
 from ros_system import wait_until
 from sensor_msgs.msg import Image, JointState
@@ -84,6 +88,37 @@ def test_node_with_a_window_publishes_joint_states_and_images_and_ends_on_interr
     assert node.wait(SLOW_S) == 0
     assert "Traceback" not in ros.output(node)
     wait_until(lambda: window(screen) is None, "the window has gone", SLOW_S)
+
+
+TWO_COLOURS = """<robot name="two"><link name="body">
+<visual><geometry><mesh filename="block.obj"/></geometry>
+<material name="red"><color rgba="1 0 0 1"/></material></visual>
+<visual><origin xyz="0 0 0.3"/><geometry><box size="0.2 0.2 0.2"/></geometry>
+<material name="blue"><color rgba="0 0 1 1"/></material></visual></link></robot>"""
+
+
+def test_a_link_has_the_colour_of_its_first_visual(ros, screen, start, tmp_path):
+    shutil.copy(Path(pybullet_data.getDataPath()) / "cube.obj", tmp_path / "block.obj")
+    (tmp_path / "two.urdf").write_text(TWO_COLOURS)
+    load = {"fileName": str(tmp_path / "two.urdf"), "useFixedBase": True}
+    camera = {"cameraDistance": 4.0, "cameraTargetPosition": [0.0, 0.0, 0.0]}
+    start(resetDebugVisualizerCamera=camera, urdfs=[ros.write_yaml("two.yaml", {"name": "two", "loadURDF": load})])
+
+    def is_red():
+        picture = screen.grab(window(screen))
+        return mostly(picture, 0).sum() > 1000 and not mostly(picture, 2).any()
+
+    wait_until(is_red, "it is red, with its mesh", SLOW_S)
+
+
+def test_a_world_that_its_window_slows_down_says_so_once(ros, start):
+    node = start(
+        timeStep=0.001, setAdditionalSearchPath="pybullet_data_path", robots=[ros.write_yaml("arm.yaml", iiwa())]
+    )
+    told = "with its window, PyBullet takes"
+    wait_until(lambda: told in ros.output(node), "it says what is slow", SLOW_S)
+    ros.listen("/diagnostics", DiagnosticArray).wait_for(3, SLOW_S)
+    assert ros.output(node).count(told) == 1
 
 
 @pytest.mark.parametrize("running", [True, False], ids=["running", "stopped"])

@@ -98,6 +98,18 @@ def test_nothing_is_published_before_there_is_a_target_or_when_its_tf_stops(ros,
     wait_until(lambda: target() or len(problems.messages) > count, "problems come again when TF does")
 
 
+def test_nothing_is_published_before_the_first_start(ros):
+    rosout = Rosout(ros)
+    start_setup(ros, goals={"hand": [0.1, 0.2, 0.3]}, wait_for_start=True)
+    problems = ros.listen("ik", IKProblem)
+    rosout.wait_for(["no problem is published: no start has come yet on /ik/setup/kdl/qinit"])
+    assert problems.messages == []
+    with publishing("ik/setup/kdl/qinit", JointState) as start:
+        start.publish(JointState(name=JOINTS, position=HOME))
+        problems.wait_for(1)
+    assert problems.messages[0].start.position == pytest.approx(HOME)
+
+
 def test_target_that_is_absurdly_far_away_is_refused_and_the_next_one_taken(ros, target):
     rosout = Rosout(ros)
     start_setup(ros, **FRAMES)

@@ -166,8 +166,7 @@ def test_the_root_frame_is_broadcast_once(build, tmp_path, planar_base, more, fr
 
 @pytest.mark.parametrize("flag", ["URDF_MERGE_FIXED_LINKS", "URDF_MAINTAIN_LINK_ORDER"])
 def test_the_joints_of_a_planar_base_are_not_the_robots(build, tmp_path, flag):
-    flags = {"flags": f"URDF_USE_INERTIA_FROM_FILE|{flag}"}
-    world = build(mobile_base(tmp_path, loadURDF=flags, broadcast_link_states=True))
+    world = build(mobile_base(tmp_path, loadURDF={"flags": flag}, broadcast_link_states=True))
     robot = world.bodies["mobile"]
     assert [joint.name for joint in robot.joints] == ["shoulder"]
     assert robot.root_link == "base_link"

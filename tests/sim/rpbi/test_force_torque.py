@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from newton_euler import ARM, MOVING, urdf, wrenches
+from newton_euler import ARM, DAMPING, MOVING, urdf, wrenches
 from worlds import write_world
 
 from custom_ros_tools.errors import ConfigError, PhysicsError
 from rpbi.config.pybullet_models import ChangeDynamics
-from rpbi.samples import WrenchSample
+from rpbi.samples import JointStateSample, WrenchSample
 from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
 
@@ -22,10 +22,9 @@ DT_S = 0.001
 
 def make_world(folder, mode="POSITION_CONTROL", sensors=None, main=None, description=None, fixed=True, **robot):
     (folder / "arm.urdf").write_text(description or urdf())
-    file, flags = str(folder / "arm.urdf"), "URDF_USE_INERTIA_FROM_FILE"
     config = {
         "name": "arm",
-        "loadURDF": {"fileName": file, "useFixedBase": fixed, "flags": flags},
+        "loadURDF": {"fileName": str(folder / "arm.urdf"), "useFixedBase": fixed},
         "setJointMotorControlArray": {"controlMode": mode},
         "joint_state_publisher_hz": 1000,
         "enabled_joint_force_torque_sensors": JOINTS if sensors is None else sensors,
@@ -134,6 +133,28 @@ def test_effort_of_the_motor_is_in_the_reading_once(world_of, sign):
     for index, effort in zip(MOVING, efforts, strict=True):
         wrench = found[JOINTS[index]]
         assert along_axis(index, (wrench[:3], wrench[3:])) == pytest.approx(effort, rel=0.01)
+
+
+@pytest.mark.parametrize("mode", ["POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL"])
+def test_along_a_moving_axis_the_urdfs_damping_is_taken_off_the_effort(world_of, mode):
+    world = world_of(mode=mode)
+    arm = world.bodies["arm"]
+    for link in arm.link_indices:
+        world.pb.changeDynamics(arm.body_id, link, linearDamping=0.0, angularDamping=0.0)
+    velocities = dict(zip(MOVING, (1.5, 0.4, -1.2), strict=True))
+    put(world, dict.fromkeys(MOVING, 0.0), velocities)
+    positions = [0.005 * rate for rate in velocities.values()]
+    world.put("arm/target", JointTarget(MOVING_JOINTS, positions, list(velocities.values()), [2.0, -3.0, 0.5]))
+    step(world, 5)
+    _, before = joint_state(world)
+    samples = world.step()
+    states = next(sample for sample in samples if isinstance(sample, JointStateSample))
+    efforts = dict(zip(states.joint_names, states.effort, strict=True))
+    wrenches_of = {sample.name: sample for sample in samples if isinstance(sample, WrenchSample)}
+    for index in MOVING:
+        wrench = wrenches_of[f"arm/{JOINTS[index]}"]
+        expected = efforts[JOINTS[index]] - DAMPING * before[index]
+        assert along_axis(index, (wrench.force, wrench.torque)) == pytest.approx(expected, rel=0.01, abs=0.01)
 
 
 def test_joint_at_its_limit_reads_what_the_stop_holds(world_of):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import math
 import os
 import signal
 import subprocess
@@ -358,6 +360,37 @@ def test_renderer_that_stands_still_neither_blocks_the_simulator_nor_fills_its_m
         os.kill(quick.client.process_id, signal.SIGCONT)
     assert time.thread_time() > begin_s
     quick.look(EYE)
+
+
+def _policies(process_id):
+    """Returns how each thread is scheduled, and its nice value."""
+    threads = [int(name) for name in os.listdir(f"/proc/{process_id}/task")]
+    return {(os.sched_getscheduler(each), os.getpriority(os.PRIO_PROCESS, each)) for each in threads}
+
+
+@pytest.mark.parametrize("awaited", ["a scene", "who looks"])
+def test_renderer_that_starves_at_idle_priority_gets_a_share_of_the_processor(tmp_path, monkeypatch, caplog, awaited):
+    monkeypatch.setattr("rpbi.render.client.STARVED_AFTER_S", math.inf)  # the machine may be busy
+    rendering = Rendering(tmp_path, make_world(tmp_path), use_egl=False, gives_way=True)
+    try:
+        rendering.demand("depth")
+        process_id = rendering.client.process_id
+        rendering.until(lambda: {policy for policy, _ in _policies(process_id)} == {os.SCHED_IDLE}, "it is idle")
+        os.kill(process_id, signal.SIGSTOP)  # as if others had the processor
+        monkeypatch.setattr("rpbi.render.client.STARVED_AFTER_S", 0.1)
+        if awaited == "a scene":
+            rendering.client.send(rendering.sample(EYE))
+        else:
+            rendering.client.add(CAMERA._replace(name="other"))
+        rendering.until(lambda: _policies(process_id) == {(os.SCHED_OTHER, 19)}, "it has a share")
+        assert [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING] == [
+            "camera: the renderer has had no processor time for 0.1 s, others take all of it; "
+            "from now on it runs at nice 19 instead of idle priority"
+        ]
+        os.kill(process_id, signal.SIGCONT)
+        rendering.look(EYE)
+    finally:
+        rendering.close()
 
 
 def test_viewer_that_comes_while_the_world_stands_still_gets_the_last_scene_once(quick):

@@ -77,6 +77,38 @@ def test_forces_of_the_floor_carry_its_weight_roughly(build, tmp_path):
     assert mean[2] == pytest.approx(MASS_KG * 9.81, rel=0.1)
 
 
+@pytest.fixture
+def resting(build, tmp_path):
+    """A soft cube that has been at rest for longer than PyBullet leaves one awake, below a body that TF moves."""
+    shape = {"shapeType": "GEOM_BOX", "halfExtents": [0.3, 0.3, 0.05]}
+    press = {
+        "name": "press",
+        "createVisualShape": shape,
+        "createCollisionShape": shape,
+        "object_tf": {"tf_id": "press"},
+    }
+    world = build(
+        block(tmp_path, load={"basePosition": [0, 0, 0.11], "NeoHookeanDamping": 0.5}, contacts={"hz": 250}),
+        collision=(GROUND, press),
+    )
+    world.bodies["press"].set_base_pose(Pose((0.0, 0.0, 1.0)))
+    run(world, 900)
+    return world
+
+
+def test_at_rest_the_floor_still_carries_it(resting):
+    samples = [sample for sample in run(resting, 50) if isinstance(sample, ContactsSample)]
+    assert np.mean([sample.force[2] for sample in samples]) == pytest.approx(MASS_KG * 9.81, rel=0.1)
+
+
+def test_at_rest_it_gives_way_to_what_tf_moves(resting):
+    height_m = nodes(resting)[:, 2].max()
+    for tick in range(250):
+        resting.bodies["press"].set_base_pose(Pose((0.0, 0.0, height_m + 0.05 - 0.0002 * tick)))
+        resting.step()
+    assert nodes(resting)[:, 2].max() == pytest.approx(height_m - 0.05, abs=0.01)
+
+
 def test_its_surface_is_told_as_triangles_at_its_rate_and_in_its_colour(build, tmp_path):
     orange = [0.9, 0.5, 0.1, 1.0]
     world = build(block(tmp_path, surface_hz=25, changeVisualShape={"rgbaColor": orange}))

@@ -47,7 +47,6 @@ def build(tmp_path):
             "name": "door",
             "loadURDF": {
                 "fileName": str(file),
-                "flags": "URDF_USE_INERTIA_FROM_FILE",
                 "useFixedBase": fixed,
                 **(load or {}),
             },

@@ -73,6 +73,20 @@ def test_a_robot_moves_through_it(build):
     assert joint(world) == 0.0
 
 
+def test_all_joints_are_put_in_one_call_since_each_takes_milliseconds_beside_a_window(build, monkeypatch):
+    world = build(ghost())
+    robot = world.bodies["ghost"]
+    calls = []
+    for name in ("resetJointState", "resetJointStateMultiDof", "resetJointStatesMultiDof"):
+        original = getattr(world.pb, name)
+        monkeypatch.setattr(world.pb, name, lambda *given, do=original: calls.append(do) or do(*given))
+    values = {joint.name: 0.1 * (i + 1) for i, joint in enumerate(robot.model.driven)}
+    world.put("ghost/target", JointTarget(list(values), list(values.values())))
+    run(world, 1)
+    assert list(robot.joint_positions().values()) == list(values.values())
+    assert len(calls) == 1
+
+
 def test_it_is_where_targets_say_also_beyond_limits_which_is_told_by_joint(build, caplog):
     world = build(ghost())
     world.put("ghost/target", JointTarget([JOINT], [0.7]))

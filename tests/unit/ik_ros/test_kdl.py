@@ -42,6 +42,15 @@ def test_a_robot_that_is_there_stays(lwr):
     assert "'end_effector_ball' is within" in solution.message
 
 
+def test_answers_are_exact_where_joints_can_move_on(lwr):
+    random.seed(4)
+    for _ in range(300):
+        inside = [random.uniform(0.9 * low, 0.9 * high) for low, high in zip(lwr.lower, lwr.upper)]
+        solution = lwr.solve(IKProblem(target=lwr.chain.pose(inside)))
+        assert solution.success
+        assert solution.position_error_m < 2e-5 and solution.orientation_error_rad < 2e-4
+
+
 def test_a_path_is_followed_without_jumps_along_a_limit_too(lwr):
     """The last joint runs into its limit, beyond which KDL alone would go on: the others make up for it."""
     posture = [0.3, 0.5, 0.2, -1.2, 0.4, 0.8, 2.95]

@@ -55,6 +55,11 @@ def pose_of(solver: TasksSolver, link: str, positions: Any) -> Pose:
     return Pose((x, y, z), (qx, qy, qz, qw))
 
 
+def close(found: Pose, expected: Pose) -> bool:
+    off = found.inverse() @ expected
+    return max(map(abs, (*off.position, *off.quat_xyzw[:3]))) < 1e-6
+
+
 def distance(pose: Pose, position: Any) -> float:
     return float(np.linalg.norm(np.array(pose.position) - position))
 
@@ -273,7 +278,7 @@ def test_targets_need_a_task_that_they_are_for(urdf):
         ("costs: [{name: a, type: closeness}, {name: a, type: closeness}]", r"costs\[1\].name: there is another"),
         ("{}", "costs: expected a task"),
         ("{costs: [{name: a, type: closeness}], joints: [left_9]}", "joints: unknown joint 'left_9'"),
-        ("{costs: [{name: a, type: closeness}], base_frame: left_hand}", "base_frame: unknown link that no joint"),
+        ("{costs: [{name: a, type: closeness}], base_frame: left_hnd}", "base_frame: unknown link 'left_hnd'.*did"),
         ("{costs: [{name: a, type: closeness}], start: {left_9: 0.0}}", "start: unknown joint 'left_9'"),
         ("{costs: [{name: a, type: closeness}], main_task: a}", "main_task: unknown task about a link 'a'"),
         ("{shapes: [{name: s, link: arm, sphere: 1}], costs: [{name: a, type: closeness}]}", r"shapes\[0\].link: unk"),
@@ -288,6 +293,39 @@ def test_targets_need_a_task_that_they_are_for(urdf):
 def test_formulations_that_do_not_fit_are_refused_with_the_key(urdf, text, words):
     with pytest.raises(ConfigError, match=words):
         make(urdf, text)
+
+
+@pytest.mark.parametrize("base", ["mount", "trunk", "left_arm", "left_hand"])
+def test_poses_may_be_expressed_in_any_link(urdf, base):
+    task = "costs: [{name: reach, type: frame_pose, frame: right_hand}]"
+    from_root, from_base = make(urdf, task), make(urdf, f"{task}\nbase_frame: {base}")
+    assert from_base.base_frame == base
+    assert set(from_base.tasks.robot.links) == set(from_root.tasks.robot.links)
+    generator = np.random.default_rng(0)
+    for _ in range(20):
+        positions = dict(zip(from_root.joint_names, generator.uniform(-1.0, 1.0, 5)))
+        q = [positions[name] for name in from_base.joint_names]
+        to_base = pose_of(from_root, base, positions.values()).inverse()
+        for link in from_root.tasks.robot.links:
+            expected = to_base @ pose_of(from_root, link, positions.values())
+            assert close(pose_of(from_base, link, q), expected)
+        robots = [solver.tasks.robot for solver in (from_root, from_base)]
+        com, com_from_base = (robot.com(robot.configuration(positions))[0] for robot in robots)
+        assert com_from_base == pytest.approx((to_base @ Pose(tuple(com))).position, abs=1e-6)
+
+
+def test_a_hand_gets_where_it_shall_be_in_the_other_hand(urdf):
+    task = "{costs: [{name: reach, type: frame_pose, frame: right_hand}], base_frame: left_hand}"
+    solver, from_root = make(urdf, task), make(urdf, "costs: [{name: stay, type: closeness}]")
+    target = pose_of(solver, "right_hand", [0.3, -0.4, 0.5, 0.2, 0.6])
+    solution = solver.solve(IKProblem(target=target))
+    assert solution.success, solution.message
+    found = dict(zip(solution.joint_names, solution.positions))
+    left, right = (
+        pose_of(from_root, f"{side}_hand", [found[name] for name in from_root.joint_names])
+        for side in ("left", "right")
+    )
+    assert distance(left.inverse() @ right, target.position) < 1e-3
 
 
 def test_descriptions_that_are_none_are_refused(tmp_path):

@@ -13,6 +13,7 @@ import casadi
 import numpy as np
 import pybullet_data
 import pytest
+from scipy.spatial.transform import Rotation
 from tree_robot import TREE
 
 from custom_ros_tools.errors import ConfigError, UnknownNameError
@@ -80,8 +81,9 @@ def test_waypoints_are_passed_in_time_from_rest_to_rest(solver, kinematics):
     trajectory = checked(solution)
     for time_s, target in zip((1.5, 3.0), targets):
         reached = kinematics.forward(at(trajectory, time_s), TIP)
-        assert math.dist(reached.position, target.position) < 1e-3
-        assert abs(np.dot(reached.quat_xyzw, target.quat_xyzw)) > math.cos(0.005)
+        assert math.dist(reached.position, target.position) < 2e-5
+        turn = Rotation.from_quat(reached.quat_xyzw).inv() * Rotation.from_quat(target.quat_xyzw)
+        assert turn.magnitude() < 2e-4
     assert trajectory.times_s[0] == 0.0 and trajectory.times_s[-1] == pytest.approx(3.0)
     assert trajectory.positions[0] == pytest.approx(BENT)
     assert trajectory.positions[-1] == pytest.approx(solution.positions)

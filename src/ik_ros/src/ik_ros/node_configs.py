@@ -20,6 +20,7 @@ from custom_ros_tools.schema import (
     PositiveMetres,
     Quat,
     Seconds,
+    Switch,
     Text,
 )
 
@@ -73,6 +74,7 @@ class SetupParameters(StartParameters, TargetParameters):
     init_bry: NonNegative = Field(0.0, description="The same about y [rad].")
     init_brz: NonNegative = Field(0.0, description="The same about z [rad].")
     goals: dict[Text, ListOf[float]] = Field({}, description="First goals of tasks that change, by task.")
+    wait_for_start: Switch = Field(True, description="Whether the first problem waits for a start.")
     max_num_prev_solutions: Count = Field(1, description="How many previous solutions a problem has.")
     seed: Count = Field(0, description="Of whatever is random in the solver.")
 

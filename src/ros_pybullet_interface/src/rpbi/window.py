@@ -1,6 +1,7 @@
 """PyBullet's own window: its keys and mouse, where it looks from, and what it shows."""
 
 import shutil
+import time
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -14,6 +15,7 @@ from rpbi.engine.client import Client
 
 RECORD = "--mp4="
 """Beginning of the option of `connect` that records the window."""
+TRIED_CALLS = 10
 
 
 class KeyEvent(NamedTuple):
@@ -88,6 +90,13 @@ class Window:
     def look(self, camera: ResetDebugVisualizerCamera) -> None:
         """Looks from somewhere else."""
         self._pb.resetDebugVisualizerCamera(**camera.kwargs())
+
+    def seconds_per_call(self) -> float:
+        """Returns how long PyBullet takes to answer now, which it does between two frames of the window [s]."""
+        begin_s = time.monotonic()
+        for _ in range(TRIED_CALLS):
+            self._pb.getPhysicsEngineParameters()
+        return (time.monotonic() - begin_s) / TRIED_CALLS
 
     def image(self, width_px: int, height_px: int) -> npt.NDArray[np.uint8]:
         """Returns what the window looks at, as high as it, drawn anew in another size.

@@ -62,7 +62,7 @@ class World:
         if mode != pybullet.DIRECT:
             check_recording(connect.get("options", ""))
         self.pb = Client(mode, **connect)
-        self.window = None if mode == pybullet.DIRECT else Window(self.pb)
+        self.window = Window(self.pb) if self.pb.has_window else None
         self._contents = WorldContents(self.pb, self.clock, self)
         self.bodies = self._contents.bodies
         self.contacts = self._contents.contacts

@@ -61,7 +61,7 @@ class Formulation(ConfigModel):
     Attributes:
         urdf_filename: The robot; `{package}/path` and `package://` are resolved.
         floating_base: Whether the root of the robot is free, as that of a robot on legs is.
-        base_frame: What poses are expressed in: a link that no joint moves, by default the root; with a floating base
+        base_frame: What poses are expressed in: a link, by default the root; with a floating base
             any name.
         base_position: Where a floating root is when the search starts [m]; only if there is no constraint of type
             `frame_pose`, since the first one of those decides.

@@ -40,7 +40,7 @@ class Robot:
         urdf_path: The robot's description; the meshes it names need not be there.
         floating: Whether the root floats.
         joints: The n joints to find positions for; without any, all that move.
-        base: The link that poses are expressed in, which no joint moves; None: the root, or what it floats in.
+        base: The link that poses are expressed in; None: the root, or what it floats in.
 
     Attributes:
         model: Pinocchio's model.
@@ -65,9 +65,11 @@ class Robot:
     ) -> None:
         document = UrdfDocument(urdf_path)
         types = document.joint_types
+        if base is not None:
+            _known("link", base, document.links)
         try:
             root = [pin.JointModelFreeFlyer()] if floating else []
-            self.model = pin.buildModelFromXML(document.with_limited_joints(), *root)
+            self.model = pin.buildModelFromXML(document.with_limited_joints(base), *root)
         except ValueError as error:
             raise ConfigError([Problem(urdf_path, "", f"Pinocchio cannot load it: {error}")]) from None
         self.data = self.model.createData()
@@ -78,7 +80,8 @@ class Robot:
             if types[name] not in MOVING:
                 raise ConfigError([Problem(urdf_path, name, f"expected a joint of one axis, got a {types[name]} one")])
         self._still = frozenset(types) - frozenset(self.all_joints)
-        self.links = tuple(frame.name for frame in self.model.frames if frame.type == pin.BODY)
+        frames = (frame.name for frame in self.model.frames if frame.type == pin.BODY)
+        self.links = tuple(name for name in frames if name in document.links)
         self.joint_names = tuple(joints) or self.all_joints
         ids = [self.joint_id(name) for name in self.joint_names]
         self._in_q = np.array([self.model.joints[i].idx_q for i in ids], dtype=int)
@@ -93,8 +96,6 @@ class Robot:
         speed = self.model.velocityLimit[in_v]
         self.max_velocity = np.where(speed > 0.0, speed, np.inf)
         self._shapes: dict[str, RobotShape] = {}
-        if base is not None:
-            self._express_in(base)
 
     def joint_id(self, name: str) -> int:
         """Returns Pinocchio's number of a joint.
@@ -211,22 +212,6 @@ class Robot:
         """Returns the Jacobian of the positions of some of the n joints: a 1 in each row."""
         first = len(self.free) - len(self.joint_names)
         return np.eye(len(self.free))[[first + i for i in indices]]
-
-    def _express_in(self, base: str) -> None:
-        """Moves the origin from the root into another link that stands still."""
-        here = self.model.frames[self.link_id(base)]
-        if here.parent:
-            still = [frame.name for frame in self.model.frames if frame.type == pin.BODY and not frame.parent]
-            raise UnknownNameError("link that no joint moves", base, still)
-        to_base = here.placement.inverse()
-        for i in range(1, self.model.njoints):
-            if self.model.parents[i] == 0:
-                self.model.jointPlacements[i] = to_base * self.model.jointPlacements[i]
-        for frame in self.model.frames:
-            if not frame.parent:
-                frame.placement = to_base * frame.placement
-        self.model.inertias[0] = to_base.act(self.model.inertias[0])
-        self.data = self.model.createData()
 
     def _of_free(self, jacobian: np.ndarray) -> np.ndarray:
         return jacobian if self._all_free else jacobian[:, self.free]

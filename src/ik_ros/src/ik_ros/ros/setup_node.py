@@ -1,6 +1,7 @@
 """`ik_setup_node.py SOLVER`: TF, joint states, tolerances and goals in, problems of inverse kinematics out."""
 
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from functools import partial
@@ -31,6 +32,8 @@ from .tf import FreshTf
 QUEUE_SIZE = 10
 START_TOPICS = ("qinit", "start_state", "currentPosition")
 """Names that the release's solvers have for the same."""
+START_PATIENCE_S = 2.0
+"""After so long without a start, it is said that problems wait for one [s]."""
 PREVIOUS_TOPICS = ("previous_solutions", "previous_solution")
 TOLERANCES = ("bx", "by", "bz", "brx", "bry", "brz")
 NOT_IN_MESSAGES = {"robot_name", "parent_frame_id", "child_frame_id"}
@@ -38,7 +41,7 @@ NOT_IN_MESSAGES = {"robot_name", "parent_frame_id", "child_frame_id"}
 
 
 def publish_problems(
-    topics: str, message_type: type, hz: float, start_on_init: bool, problem: Callable[[], rospy.Message]
+    topics: str, message_type: type, hz: float, start_on_init: bool, problem: Callable[[], rospy.Message | None]
 ) -> None:
     """Publishes problems on the topic `ik`, from now on and while it is switched on.
 
@@ -47,7 +50,8 @@ def publish_problems(
         message_type: Type of the problems.
         hz: The rate, in wall time [Hz].
         start_on_init: Whether it is on from the start.
-        problem: Returns the next one; if there is none, it raises an `InterfaceError` or `ValueError` that says why.
+        problem: Returns the next one; if there is none, nothing, or it raises an `InterfaceError` or `ValueError` that
+            says why.
     """
     is_on, warn = threading.Event(), ThrottledWarning()
     publisher = rospy.Publisher("ik", message_type, queue_size=QUEUE_SIZE, tcp_nodelay=True)
@@ -56,7 +60,8 @@ def publish_problems(
         if not is_on.is_set():
             return
         try:
-            publisher.publish(problem())
+            if (message := problem()) is not None:
+                publisher.publish(message)
         except (InterfaceError, ValueError) as error:
             warn("no problem is published", str(error))
 
@@ -85,7 +90,8 @@ class SetupNode:
         self._tf: FreshTf | None = None
         if config.parent_frame_id is not None and config.child_frame_id is not None:
             self._tf = FreshTf(config.parent_frame_id, config.child_frame_id, config.tf_timeout_s)
-        self._start: JointPositions = {}
+        self._start: JointPositions | None = None if config.wait_for_start else {}
+        self._began_s = time.monotonic()
         self._previous: deque[JointPositions] = deque(maxlen=config.max_num_prev_solutions)
         self._goals = dict(config.goals)
         self._tolerances = {key: getattr(config, f"init_{key}") for key in TOLERANCES}
@@ -138,7 +144,12 @@ class SetupNode:
         IKProblem(goals={task: message.data})
         self._goals[task] = tuple(message.data)
 
-    def _message(self) -> IKProblemMessage:
+    def _message(self) -> IKProblemMessage | None:
+        if self._start is None:
+            if time.monotonic() - self._began_s > START_PATIENCE_S:
+                topic = rospy.resolve_name(f"{self._topics}/{START_TOPICS[0]}")
+                raise InterfaceError(f"no start has come yet on {topic}; with ~wait_for_start: false none is needed")
+            return None
         problem = self._problem(None if self._tf is None else self._tf.pose())
         return problem_message(problem, Header(stamp=rospy.Time.now(), frame_id=self._config.parent_frame_id or ""))
 
@@ -147,7 +158,7 @@ class SetupNode:
             return IKProblem(
                 target=target,
                 **_fields(self._tolerances),
-                start=self._start,
+                start=self._start or {},
                 previous=tuple(self._previous),
                 goals=self._goals,
                 seed=self._config.seed,

@@ -64,7 +64,7 @@ class KdlSolver(ChainSolver):
             if size < least:
                 best, least = q, size
             if least <= 1.0:
-                return [best]
+                break
         return [levenberg_marquardt(self.chain, goal, self.limits, best)]
 
     def candidates(self, problem: IKProblem, goal: Goal, start: list[float], restarts: int) -> Iterator[list[float]]:

@@ -71,6 +71,8 @@ class SoftObject(Body):
         super().__init__(pb, config.name, _load(pb, config))
         self.config = config
         self.inertial_pose_in_base = self._base_pose_in_inertial = Pose()  # PyBullet has nothing sensible to tell
+        # A soft body that sleeps feels nothing, and bodies that poses move go through it.
+        pb.changeDynamics(self.body_id, -1, activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING)
         self._anchors: list[tuple[str | None, int]] = []
         """Name of the body that each anchor ties to, None for the world, and PyBullet's id of the anchor."""
         if config.changeVisualShape is not None:

@@ -4,7 +4,7 @@ import pybullet
 from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem
-from custom_ros_tools.schema import HzOrOff
+from custom_ros_tools.schema import HzOrOff, Switch
 from rpbi.config.pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity
 from rpbi.config.sensors import ContactsConfig
 from rpbi.engine.client import Client
@@ -23,6 +23,9 @@ class UrdfObjectConfig(BodyConfig):
     """An object that comes from a URDF and has no motors."""
 
     loadURDF: LoadURDF = Field(description="Its description and where its base is.")
+    inertia_from_urdf: Switch = Field(
+        True, description="Whether moments of inertia are the URDF's, else PyBullet's guess from the collision shapes."
+    )
     object_tf: ObjectTf | None = Field(None, description="TF frame that a fixed base follows.")
     resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity of a floating base.")
     broadcast_hz: HzOrOff = Field(0.0, description="Rate of its links' poses on TF; 0 is off.")
@@ -54,7 +57,9 @@ class UrdfObject(Body):
 
     def __init__(self, pb: Client, config: UrdfObjectConfig) -> None:
         _refuse_soft(config)
-        super().__init__(pb, config.name, load_urdf(pb, config.name, config.loadURDF.kwargs()))
+        arguments = config.loadURDF.kwargs()
+        body_id = load_urdf(pb, config.name, arguments, inertia_from_urdf=config.inertia_from_urdf)
+        super().__init__(pb, config.name, body_id)
         self.config = config
         for index in self.joint_indices:
             self._release(index)

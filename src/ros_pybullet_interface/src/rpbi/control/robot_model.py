@@ -8,8 +8,8 @@ import numpy.typing as npt
 from rpbi.config.pybullet_models import LoadURDF
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose, Vector
-from rpbi.urdf.files import resolve_meshes
 from rpbi.urdf.joints import JointModel
+from rpbi.urdf.loading import load_urdf
 
 Array = npt.NDArray[np.float64]
 
@@ -27,13 +27,15 @@ class RobotModel:
     Args:
         world: The client that it lives in, whose gravity counts.
         load: How it was loaded.
+        inertia_from_urdf: Whether its moments of inertia are the URDF's.
     """
 
-    def __init__(self, world: Client, model: JointModel, load: LoadURDF) -> None:
+    def __init__(self, world: Client, model: JointModel, load: LoadURDF, inertia_from_urdf: bool) -> None:
         self.joints = model.driven
         """The n joints."""
         self._world = world
         self._load_arguments = load.kwargs()
+        self._inertia_from_urdf = inertia_from_urdf
         self._zeros = [0.0] * len(model.driven)
         self._base_joints = len(model.joints) - len(model.own)
         self._client: Client | None = None  # made when it is needed first: the renderer's copy of the robot never does
@@ -114,7 +116,9 @@ class RobotModel:
 
     def _load(self) -> Client:
         pb = self._client = Client()
-        file = resolve_meshes(self._load_arguments["fileName"])
-        kept = {key: self._load_arguments[key] for key in ("flags", "globalScaling") if key in self._load_arguments}
-        self._body_id = pb.loadURDF(file, useFixedBase=True, **kept)
+        kept = {
+            key: value for key, value in self._load_arguments.items() if key in ("fileName", "flags", "globalScaling")
+        }
+        arguments = {**kept, "useFixedBase": True}
+        self._body_id = load_urdf(pb, "the model", arguments, inertia_from_urdf=self._inertia_from_urdf)
         return pb

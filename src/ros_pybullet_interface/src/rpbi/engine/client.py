@@ -26,6 +26,7 @@ class Client:
             self.client_id: int = pybullet.connect(mode, **options)
         except pybullet.error as error:
             raise PhysicsError(f"PyBullet did not connect: {error}") from error
+        self.has_window = mode != pybullet.DIRECT
         self.is_deformable = False
         """Whether soft bodies can be in its world, as told when that was set up."""
         if self.client_id < 0:

@@ -16,12 +16,15 @@ from rpbi.samples import SceneSample
 from .channel import Channel
 from .frame import NO_DEMAND, Camera, Demand
 from .messages import CameraAdded, CameraRemoved, Demanded, Ready, Report, Scene, SetUp, Shown, Taken, WorldChanged
+from .priority import raise_from_idle
 
 log = logging.getLogger(__name__)
 
 LONGEST_PAUSE_S = 30.0
 STABLE_AFTER_S = 10.0
 STOP_TIMEOUT_S = 5.0
+STARVED_AFTER_S = 3.0
+"""After so long without a word that is awaited, the renderer is taken for starved at idle priority [s]."""
 
 
 class RenderClient:
@@ -59,6 +62,8 @@ class RenderClient:
         self._process: subprocess.Popen[bytes] | None = None
         self._channel: Channel | None = None
         self._use_egl = use_egl
+        self._may_starve = False
+        self._heard_s = 0.0
         self._started_s = 0.0
         self._start_at_s = 0.0
         self._failures = 0
@@ -87,8 +92,13 @@ class RenderClient:
                 self._start()
             return
         self._channel.flush()
-        for message in self._channel.receive():
+        messages = self._channel.receive()
+        for message in messages:
             self._do[type(message)](message)
+        if messages or not self._is_awaited():
+            self._heard_s = time.monotonic()
+        elif self._may_starve and time.monotonic() - self._heard_s > STARVED_AFTER_S:
+            self._end_starvation()
         if self._channel.closed:
             self._channel.close()
             self._channel = None
@@ -185,10 +195,23 @@ class RenderClient:
                 pass_fds=[theirs.fileno()],
                 env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
             )
-        self._started_s = time.monotonic()
+        self._started_s = self._heard_s = time.monotonic()
+        self._may_starve = "--keep-priority" not in self._command
         self._channel = Channel(ours)
         self._channel.send(SetUp(tuple(self._cameras.values()), self._use_egl))
         self._send_log()
+
+    def _is_awaited(self) -> bool:
+        """Tells whether the process is up and owes an answer: that it draws a scene, or who looks at a camera."""
+        return bool(self._under_way) or (bool(self.renderer) and self._demands.keys() != self._cameras.keys())
+
+    def _end_starvation(self) -> None:
+        """Gives the process a share of the processor: at idle priority, busy others leave it next to nothing."""
+        assert self._process is not None
+        self._may_starve = False
+        raise_from_idle(self._process.pid)
+        waited = f"the renderer has had no processor time for {STARVED_AFTER_S:g} s, others take all of it"
+        log.warning("camera: %s; from now on it runs at nice 19 instead of idle priority", waited)
 
     def _bury(self) -> None:
         """Reports the end of the process and decides when to start the next, and which kind."""

@@ -21,6 +21,14 @@ def take_part(process_id: int) -> None:
             os.sched_setscheduler(thread_id, os.SCHED_OTHER, os.sched_param(0))
 
 
+def raise_from_idle(process_id: int) -> None:
+    """Gives an idle process that gets nothing at all the least share that is one: normal scheduling at nice 19."""
+    for thread_id in _threads(process_id):
+        with contextlib.suppress(OSError):  # it may be gone, or this not allowed
+            os.setpriority(os.PRIO_PROCESS, thread_id, 19)
+            os.sched_setscheduler(thread_id, os.SCHED_OTHER, os.sched_param(0))
+
+
 def _threads(process_id: int) -> list[int]:
     """Returns the threads of a process, none if it is gone."""
     with contextlib.suppress(OSError):

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from custom_ros_tools.errors import ConfigError, Problem
-from rpbi.geometry import Vector
+from rpbi.geometry import Vector, scaled
 
 from .files import COMMENT, NOT_XML, beside_or_above, mesh_file
 
@@ -113,6 +113,11 @@ class UrdfDocument:
         return {joint.name: joint for joint in map(_read_joint, self._joints)}
 
     @property
+    def links_without_inertial(self) -> set[str]:
+        """Names of the links of which it tells neither mass nor inertia."""
+        return {link.get("name", "") for link in self._root.findall("link") if link.find("inertial") is None}
+
+    @property
     def is_soft(self) -> bool:
         """Whether it describes a soft body."""
         return self._root.find("deformable") is not None
@@ -145,12 +150,20 @@ class UrdfDocument:
         bare = [_element("link", _inertial("1"), name=name) for name in kept]
         return _text(_element("robot", *bare, *joints, **self._root.attrib))
 
-    def with_limited_joints(self) -> str:
+    def with_limited_joints(self, base: str | None = None) -> str:
         """Returns all of it, with limits from 0 to 0, which mean none, for joints that turn without end.
 
         So each of them has one number in Pinocchio, which else has two for it, sine and cosine.
+
+        Args:
+            base: The link that all hangs on instead of the root.
+
+        Raises:
+            ValueError: If a joint between it and the root makes no sense; it names the joint.
         """
         root = copy.deepcopy(self._root)
+        if base is not None:
+            _hang_on(root, base)
         for joint in root.findall("joint"):
             if joint.get("type") == "continuous":
                 joint.set("type", "revolute")
@@ -179,10 +192,7 @@ class UrdfDocument:
         Args:
             joints: The joints of the chain, from its fixed end to the root.
         """
-        robot = copy.deepcopy(self._root)
-        for element in robot.iterfind(".//*[@filename]"):  # meshes and textures
-            name = element.get("filename", "")
-            element.set("filename", str(beside_or_above(name, self._source) or name))
+        robot = self._absolute()
         root = next(link for link in robot.findall("link") if link.get("name") == joints[-1].child)
         if root.find("inertial") is None:
             root.append(_inertial("0"))  # PyBullet gives 1 kg to any link without, unless it is the fixed one
@@ -192,11 +202,66 @@ class UrdfDocument:
         robot.extend(map(_joint_element, joints))
         return _text(robot)
 
+    def for_window(self) -> str | None:
+        """Returns all of it with the first visual of each link at its end, with absolute names of meshes.
+
+        PyBullet's window draws a whole link in the colour of its last visual; the first one is the link's main one, as
+        a rule.
+
+        Returns:
+            Nothing if no link has several.
+        """
+        robot = self._absolute()
+        several = [link for link in robot.findall("link") if len(link.findall("visual")) > 1]
+        for link in several:
+            first = link.findall("visual")[0]
+            link.remove(first)
+            link.append(first)
+        return _text(robot) if several else None
+
+    def _absolute(self) -> Element:
+        """Returns a copy that may stand in another folder, since names of meshes and textures are absolute."""
+        robot = copy.deepcopy(self._root)
+        for element in robot.iterfind(".//*[@filename]"):
+            name = element.get("filename", "")
+            element.set("filename", str(beside_or_above(name, self._source) or name))
+        return robot
+
 
 def chain_urdf(joints: Sequence[UrdfJoint]) -> str:
     """Returns a URDF of a chain of joints with bare links, from its base to its tip."""
     links = [_element("link", name=name) for name in (joints[0].parent, *(joint.child for joint in joints))]
     return _text(_element("robot", *links, *map(_joint_element, joints), name="chain"))
+
+
+def _hang_on(robot: Element, base: str) -> None:
+    """Turns the joints between a link and the root around, with further links; their positions mean what they did."""
+    above = {_end(joint, "child"): joint for joint in robot.findall("joint")}
+    link = base
+    while (joint := above.pop(link, None)) is not None:
+        name, parent = joint.get("name", ""), _end(joint, "parent")
+        x, y, z = _vector(joint, "origin", "xyz", "0 0 0")
+        roll, pitch, yaw = _vector(joint, "origin", "rpy", "0 0 0")
+        backwards = scaled(-1.0, _vector(joint, "axis", "xyz", "1 0 0"))
+        for part in ("origin", "axis", "parent", "child"):
+            for element in joint.findall(part):
+                joint.remove(element)
+        # A joint moves where its origin puts it, so the origin comes back afterwards, one turn after the other.
+        steps = (
+            ("rpy", (-roll, 0.0, 0.0)),
+            ("rpy", (0.0, -pitch, 0.0)),
+            ("rpy", (0.0, 0.0, -yaw)),
+            ("xyz", (-x, -y, -z)),
+        )
+        ends = [*(f"{name}/{number}" for number in range(len(steps))), parent]
+        joint.extend([_element("parent", link=link), _element("child", link=ends[0])])
+        joint.append(_element("axis", xyz=_words(backwards)))
+        for (kind, vector), start, end in zip(steps, ends, ends[1:]):
+            between = [_element("parent", link=start), _element("child", link=end)]
+            origin = _element("origin", **{kind: _words(vector)})
+            robot.append(_element("link", name=start))
+            robot.append(_element("joint", *between, origin, name=f"{start}/fixed", type="fixed"))
+        link = parent
 
 
 def _parse(text: str) -> Element:

@@ -1,6 +1,8 @@
 """Loading a URDF into PyBullet, and what is wrong with one that cannot be loaded."""
 
-from collections.abc import Callable, Mapping
+import logging
+import math
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +13,13 @@ from rpbi.config.asset_files import ROBOT_DESCRIPTION
 from rpbi.engine.client import Client
 
 from .document import UrdfDocument
-from .files import beside_or_above, resolve_meshes
+from .files import beside_or_above, resolve_meshes, write_description
+
+log = logging.getLogger(__name__)
 
 MESH_FORMATS = (".obj", ".stl", ".dae", ".cdf")
+PLACEHOLDER_FACTOR = 10.0
+"""Moments of inertia this many times what a link's size allows are taken for placeholders."""
 
 
 def urdf_problems(path: str) -> list[str]:
@@ -38,7 +44,11 @@ def urdf_problems(path: str) -> list[str]:
 
 
 def load_urdf(
-    pb: Client, name: str, arguments: Mapping[str, Any], prepare: Callable[[str], str] = resolve_meshes
+    pb: Client,
+    name: str,
+    arguments: Mapping[str, Any],
+    prepare: Callable[[str], str] = resolve_meshes,
+    inertia_from_urdf: bool = False,
 ) -> int:
     """Loads a URDF file and returns PyBullet's id of the body.
 
@@ -46,15 +56,68 @@ def load_urdf(
         name: Name of the body, for messages.
         arguments: Those of `loadURDF`.
         prepare: Returns a file that PyBullet can load in place of `fileName`.
+        inertia_from_urdf: Whether moments of inertia are the URDF's, else PyBullet guesses them unless `flags` say.
 
     Raises:
         ConfigError: If it cannot be loaded; it names what is wrong with the file.
     """
     file: str = arguments["fileName"]
     try:
-        return int(pb.loadURDF(**{**arguments, "fileName": prepare(file)}))
+        prepared = prepare(file)
+        document = _parsed(prepared)
+        if pb.has_window and document is not None and (text := document.for_window()) is not None:
+            prepared = write_description(text)
+        if not inertia_from_urdf:
+            return int(pb.loadURDF(**{**arguments, "fileName": prepared}))
+        flags = (arguments.get("flags") or 0) | pybullet.URDF_USE_INERTIA_FROM_FILE
+        body_id = int(pb.loadURDF(**{**arguments, "fileName": prepared, "flags": flags}))
+        without = document.links_without_inertial if document is not None else set()
+        _complete_inertias(pb, name, body_id, without, arguments.get("globalScaling") or 1.0)
+        return body_id
     except ConfigError as error:
         messages = [f"{problem.key or file}: {problem.message}" for problem in error.problems]
     except (pybullet.error, OSError, UnicodeDecodeError) as error:
         messages = urdf_problems(file) or [f"PyBullet could not load it: {error}"]
     raise ConfigError([Problem(name, "loadURDF.fileName", message) for message in messages])
+
+
+def _parsed(file: str) -> UrdfDocument | None:
+    """Returns a URDF, None where PyBullet alone can make something of it: it takes unknown prefixes, for instance."""
+    try:
+        return UrdfDocument(file)
+    except ConfigError:
+        return None
+
+
+def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[str], scaling: float) -> None:
+    """Gives links without moments of inertia in the URDF some, and those of a scaled body its own."""
+    links = {index: pb.getJointInfo(body_id, index)[12] for index in range(pb.getNumJoints(body_id))}
+    unusable, too_large = [], []
+    for index, link in {-1: pb.getBodyInfo(body_id)[0], **links}.items():
+        link = link.decode()
+        mass, _, moments = pb.getDynamicsInfo(body_id, index)[:3]
+        if not mass:
+            continue
+        if link in without or 0.0 in moments:  # PyBullet makes 0 of what no body can have
+            pb.changeDynamics(body_id, index, mass=mass)  # with its guess, from the collision shape
+            unusable += [] if link in without else [link]
+            continue
+        if scaling != 1.0:
+            moments = [moment * scaling**2 for moment in moments]
+            pb.changeDynamics(body_id, index, localInertiaDiagonal=moments)
+        if max(moments) > PLACEHOLDER_FACTOR * mass * _largest_radius(pb, body_id, index) ** 2:
+            too_large.append(link)
+    if unusable:
+        log.warning("%s: no body has the moments of inertia of %s: guessed from the shape", name, ", ".join(unusable))
+    if too_large:
+        message = "%s: moments of inertia of %s are far too large for their size; inertia_from_urdf: false guesses them"
+        log.warning(message, name, ", ".join(too_large))
+
+
+def _largest_radius(pb: Client, body_id: int, link: int) -> float:
+    """Returns an upper bound of how far the collision shape reaches from the centre of mass [m], inf without one."""
+    if not pb.getCollisionShapeData(body_id, link):
+        return math.inf
+    lower, upper = pb.getAABB(body_id, link)
+    centre = pb.getBasePositionAndOrientation(body_id)[0] if link < 0 else pb.getLinkState(body_id, link)[0]
+    return math.hypot(*(max(high - at, at - low) for low, high, at in zip(lower, upper, centre)))

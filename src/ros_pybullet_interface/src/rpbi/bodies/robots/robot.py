@@ -135,7 +135,8 @@ class Robot(JointedBody):
     def robot_model(self) -> RobotModel:
         """Its dynamics and kinematics."""
         if self._robot_model is None:
-            self._robot_model = RobotModel(self.pb, self.model, self.config.loadURDF)
+            config = self.config
+            self._robot_model = RobotModel(self.pb, self.model, config.loadURDF, config.inertia_from_urdf)
         return self._robot_model
 
     def switch_controllers(self, switch: ControllerSwitch) -> None:

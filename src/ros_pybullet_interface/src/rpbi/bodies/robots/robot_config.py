@@ -27,6 +27,9 @@ class RobotConfig(BodyConfig):
     """A robot, simulated or only shown."""
 
     loadURDF: LoadURDF = Field(description="Its description and where its base is.")
+    inertia_from_urdf: Switch = Field(
+        True, description="Whether moments of inertia are the URDF's, else PyBullet's guess from the collision shapes."
+    )
     is_visual_robot: Switch = Field(
         False, description="Whether it is only shown: it follows joint targets and TF, and nothing can touch it."
     )

@@ -45,7 +45,7 @@ class VisualRobot(JointedBody):
         return self.model.resolve(target.names, target.values_of("position", "a visual robot shows positions"))
 
     def _show(self, positions: dict[int, float]) -> None:
-        for index, position in positions.items():
-            self.pb.resetJointState(self.body_id, index, position)
-            if self.config.do_log_joint_limit_violations:
+        self._put_joints(positions)
+        if self.config.do_log_joint_limit_violations:
+            for index, position in positions.items():
                 self._limit_reports.take(self.joints[index], position, "it is shown there")

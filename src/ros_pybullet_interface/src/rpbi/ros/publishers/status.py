@@ -43,6 +43,8 @@ MAX_CLOCK_HZ = 1000.0
 FREE_RUNNING_CLOCK_HZ = 250.0
 FALLING_BEHIND = 0.98
 """Share of the asked real-time factor below which the diagnostics warn."""
+SLOW_CALL_S = 0.0005
+"""From so long a call of PyBullet on, its window is what slows a world down [s]; without one it takes 10 µs."""
 
 
 def _warn_of_rivals() -> None:
@@ -98,6 +100,8 @@ class StatusPublisher:
 
     def __init__(self, world: World, pacer: Pacer, facts: Callable[[], Mapping[str, str]]) -> None:
         self._clock, self._pacer, self._facts = world.clock, pacer, facts
+        self._window = world.window
+        """Until it has been named as slow."""
         self._wanted_factor = world.config.real_time_factor
         self._rate = WallRate(world.config.status_hz)
         self._diagnostics_rate = WallRate(1.0, delay_s=1.0)
@@ -130,6 +134,7 @@ class StatusPublisher:
         if running and factor < FALLING_BEHIND * self._wanted_factor:
             status.level = DiagnosticStatus.WARN
             status.message = f"too slow: real-time factor {factor:.3f} instead of {self._wanted_factor:g}"
+            self._blame_window(status.message)
         values = {
             "real_time_factor": f"{factor if running else 0.0:.4f}",
             "overruns_total": str(self._pacer.overruns),
@@ -143,6 +148,13 @@ class StatusPublisher:
         message = DiagnosticArray(status=[status])
         message.header.stamp = to_ros_time(self._clock.stamp_ns)
         self._diagnostics.publish(message)
+
+    def _blame_window(self, message: str) -> None:
+        """Says once if it is the window that makes the world slow."""
+        if self._window is not None and (call_s := self._window.seconds_per_call()) > SLOW_CALL_S:
+            self._window = None
+            advice = "without a graphics card use RViz and connection_mode DIRECT"
+            log.warning("%s: with its window, PyBullet takes %.1f ms a call; %s", message, 1e3 * call_s, advice)
 
 
 class StatePublisher:

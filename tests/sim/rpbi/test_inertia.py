@@ -1,0 +1,121 @@
+"""Moments of inertia are the URDF's, of any size, and where it has none PyBullet guesses them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from worlds import iiwa, write_world
+
+from custom_ros_tools.errors import ConfigError
+from rpbi.samples import JointStateSample
+from rpbi.urdf.joints import JointTarget
+from rpbi.world import World
+
+DT_S = 0.001
+BOX = '<collision><geometry><box size="0.1 0.2 0.3"/></geometry></collision>'
+BOX_MOMENTS = ((0.2**2 + 0.3**2) / 12, (0.1**2 + 0.3**2) / 12, (0.1**2 + 0.2**2) / 12)  # of 1 kg [kg m^2]
+
+
+@pytest.fixture
+def build(tmp_path):
+    worlds = []
+
+    def build_world(**parts) -> World:
+        worlds.append(World.from_file(write_world(tmp_path, timeStep=DT_S, **parts)))
+        return worlds[-1]
+
+    yield build_world
+    for world in worlds:
+        world.close()
+
+
+def swinging(inertia):
+    """Returns a URDF of a lump that swings on a hinge."""
+    return f"""<robot name="bell"><link name="frame"/><link name="lump">{inertia}{BOX}</link>
+    <joint name="hinge" type="revolute"><parent link="frame"/><child link="lump"/><axis xyz="1 0 0"/>
+    <limit lower="-3" upper="3" effort="100" velocity="100"/></joint></robot>"""
+
+
+def inertial(ixx, iyy, izz, mass=1.0):
+    tensor = f'<inertia ixx="{ixx}" iyy="{iyy}" izz="{izz}" ixy="0" ixz="0" iyz="0"/>'
+    return f'<inertial><mass value="{mass}"/>{tensor}</inertial>'
+
+
+@pytest.fixture
+def moments_of(build, tmp_path):
+    """Returns the lump's principal moments of inertia, less what it weighs."""
+
+    def load(inertia, scaling=1.0, **more):
+        file = tmp_path / f"bell{len(list(tmp_path.iterdir()))}.urdf"  # PyBullet caches files by name
+        file.write_text(swinging(inertia))
+        load_urdf = {"fileName": str(file), "useFixedBase": True, "globalScaling": scaling}
+        world = build(urdfs=({"name": "bell", "loadURDF": load_urdf, **more},))
+        return world.pb.getDynamicsInfo(world.bodies["bell"].body_id, 0)[2]
+
+    return load
+
+
+def test_efforts_of_a_moving_arm_are_those_of_its_urdf(build):
+    pinocchio = pytest.importorskip("pinocchio", reason="needs ./rpbi setup ik")
+    arm = iiwa(setJointMotorControlArray={"controlMode": "TORQUE_CONTROL"}, joint_state_publisher_hz=1 / DT_S)
+    world = build(robots=(arm,))
+    body = world.bodies["iiwa"]
+    for link in body.link_indices:
+        world.pb.changeDynamics(body.body_id, link, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0)
+    model = pinocchio.buildModelFromUrdf(body.config.loadURDF.fileName)
+    random = np.random.default_rng(1)
+    names = [joint.name for joint in body.model.driven]
+    for _ in range(20):
+        q, dq, tau = (random.uniform(-1.0, 1.0, 7) * size for size in (1.5, 2.0, 30.0))
+        body.set_joint_state(JointTarget(names, q.tolist(), dq.tolist()))
+        world.put("iiwa/target", JointTarget(names, effort=tau.tolist()))
+        sample = next(sample for sample in world.step() if isinstance(sample, JointStateSample))
+        ddq = (np.array(sample.velocity) - dq) / DT_S
+        expected = pinocchio.rnea(model, model.createData(), q, dq, ddq)
+        assert np.linalg.norm(tau - expected) < 0.01 * np.linalg.norm(expected)
+
+
+def test_where_the_urdf_tells_none_pybullet_guesses(moments_of):
+    assert moments_of("") == pytest.approx(BOX_MOMENTS)
+
+
+@pytest.mark.parametrize("impossible", [inertial(0, 0, 0), inertial(0.1, 0.2, 0.9), inertial(-0.1, 0.2, 0.25)])
+def test_what_no_body_can_have_is_guessed_and_told(moments_of, caplog, impossible):
+    assert moments_of(impossible) == pytest.approx(BOX_MOMENTS)
+    assert "bell: no body has the moments of inertia of lump: guessed from the shape" in caplog.messages
+
+
+def test_they_grow_with_the_lengths(moments_of, caplog):
+    assert moments_of(inertial(0.01, 0.02, 0.025), scaling=2.0) == pytest.approx((0.04, 0.08, 0.1))
+    assert not caplog.messages
+
+
+def test_placeholders_are_told_with_the_key_that_guesses(moments_of, caplog):
+    assert moments_of(inertial(1, 1, 1)) == pytest.approx((1.0, 1.0, 1.0))
+    assert caplog.messages == [
+        "bell: moments of inertia of lump are far too large for their size; inertia_from_urdf: false guesses them"
+    ]
+
+
+def test_a_key_has_pybullet_guess_all(moments_of, caplog):
+    assert moments_of(inertial(1, 1, 1), inertia_from_urdf=False) == pytest.approx(BOX_MOMENTS)
+    assert not caplog.messages
+
+
+def test_what_is_not_finite_is_refused(moments_of):
+    with pytest.raises(ConfigError, match="link 'lump': its mass, inertia or centre of mass is not finite"):
+        moments_of(inertial("nan", 0.02, 0.025))
+
+
+def test_a_urdf_that_only_pybullet_can_read_has_its_own_too(moments_of):
+    prefixed = inertial(0.01, 0.02, 0.025) + "<sensor:camera/>"
+    assert moments_of(prefixed) == pytest.approx((0.01, 0.02, 0.025))
+
+
+def test_flags_of_the_user_stay(build, tmp_path):
+    (tmp_path / "bell.urdf").write_text(swinging(inertial(0.01, 0.02, 0.025)))
+    flags = {"fileName": str(tmp_path / "bell.urdf"), "flags": "URDF_IGNORE_COLLISION_SHAPES"}
+    world = build(urdfs=({"name": "bell", "loadURDF": flags},))
+    body_id = world.bodies["bell"].body_id
+    assert world.pb.getDynamicsInfo(body_id, 0)[2] == pytest.approx((0.01, 0.02, 0.025))
+    assert not world.pb.getCollisionShapeData(body_id, 0)
