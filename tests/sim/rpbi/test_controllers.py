@@ -107,12 +107,12 @@ def velocities(world: World, name: str = "lwr") -> np.ndarray:
 
 
 def push(world: World, link: str, force: tuple[float, float, float], ticks: int) -> None:
-    """Pushes at the centre of mass of a link; PyBullet takes the place as if that were in the link's origin."""
+    """Pushes at the centre of mass of a link."""
     robot = world.bodies["lwr"]
     index = next(joint.index for joint in robot.joints if joint.link == link)
     for _ in range(ticks):
-        origin = robot.pb.getLinkState(robot.body_id, index, computeForwardKinematics=True)[4]
-        robot.pb.applyExternalForce(robot.body_id, index, force, origin, robot.pb.WORLD_FRAME)
+        centre = robot.pb.getLinkState(robot.body_id, index, computeForwardKinematics=True)[0]
+        robot.pb.applyExternalForce(robot.body_id, index, force, centre, robot.pb.WORLD_FRAME)
         world.step()
 
 
@@ -133,18 +133,23 @@ def test_the_model_is_that_of_pinocchio_and_of_finite_differences(build):
         assert model.mass_matrix(q.tolist()) == pytest.approx(mass, abs=1e-9)
         assert model.bias(where, q.tolist(), velocity.tolist()) == pytest.approx(bias, abs=1e-5)
         point = (0.1, -0.05, 0.2)
-        link = robot.model[JOINTS[6]].index
+        for link in (
+            robot.model[JOINTS[3]].index,
+            robot.model[JOINTS[6]].index,
+        ):  # the former's inertial frame is turned
 
-        def place(q, link=link, point=point):
-            pose = model.pose(where, q, link) @ Pose(point, (0.0, 0.0, 0.0, 1.0))
-            return np.array(pose.position)
+            def place(q, link=link, point=point):
+                pose = model.pose(where, q, link) @ Pose(point, (0.0, 0.0, 0.0, 1.0))
+                return np.array(pose.position)
 
-        jacobian = model.jacobian(where, q.tolist(), link, point)
-        for joint in range(7):
-            step = np.zeros(7)
-            step[joint] = 1e-4
-            slope = (place(q + step) - place(q - step)) / 2e-4
-            assert jacobian[:3, joint] == pytest.approx(slope, abs=1e-5)
+            jacobian = model.jacobian(where, q.tolist(), link, point)
+            for joint in range(7):
+                step = np.zeros(7)
+                step[joint] = 1e-3
+                slope = (place(q + step) - place(q - step)) / 2e-3
+                assert jacobian[:3, joint] == pytest.approx(slope, abs=1e-4), (
+                    "PyBullet tells places in single precision"
+                )
 
 
 @pytest.mark.parametrize("ratio", [0.1, 0.7, 1.0])

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from rpbi.config.pybullet_models import LoadURDF
 from rpbi.engine.client import Client
-from rpbi.geometry import Pose, Vector
+from rpbi.geometry import Pose, Quaternion, Vector, rotated_back
 from rpbi.urdf.joints import JointModel
 from rpbi.urdf.loading import load_urdf
 
@@ -41,7 +41,8 @@ class RobotModel:
         self._client: Client | None = None  # made when it is needed first: the renderer's copy of the robot never does
         self._body_id = -1
         self._gravity: Vector | None = None
-        self._centres: dict[int, Pose] = {}
+        self._axes: dict[int, Quaternion] = {}
+        """Orientation of a link's inertial frame in the link, in whose axes, from the link's origin, PyBullet has points."""
 
     def mass_matrix(self, q: Sequence[float]) -> Array:
         """Returns the mass matrix at joint positions [rad or m], shape (n, n) [kg m^2, kg m, kg]."""
@@ -83,11 +84,10 @@ class RobotModel:
         """
         pb = self._client or self._load()
         link -= self._base_joints
-        if link not in self._centres:
-            state = pb.getLinkState(self._body_id, link)
-            self._centres[link] = Pose(state[2], state[3]).inverse()
-        from_centre = (self._centres[link] @ Pose(point, (0.0, 0.0, 0.0, 1.0))).position
-        linear, angular = pb.calculateJacobian(self._body_id, link, from_centre, q, self._zeros, self._zeros)
+        if link not in self._axes:
+            self._axes[link] = pb.getLinkState(self._body_id, link)[3]
+        point = rotated_back(self._axes[link], point)
+        linear, angular = pb.calculateJacobian(self._body_id, link, point, q, self._zeros, self._zeros)
         turn = np.array(pb.getMatrixFromQuaternion(base.quat_xyzw)).reshape(3, 3)
         return np.vstack((turn @ np.array(linear), turn @ np.array(angular)))
 

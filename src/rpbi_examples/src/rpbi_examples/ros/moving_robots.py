@@ -5,7 +5,7 @@ import sys
 import threading
 
 import rospy
-from geometry_msgs.msg import Point, PoseStamped, Quaternion, Twist
+from geometry_msgs.msg import Point, PoseStamped, Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, Int64
@@ -132,15 +132,18 @@ def _wipe() -> None:
     while "table" not in touched:
         touched = [point.other_body for point in rospy.wait_for_message("rpbi/kuka_lwr/contacts", Contacts).points]
     rospy.sleep(SETTLING_S)
-    position, quat = TfInterface().wait_for_tf("rpbi/world", "rpbi/kuka_lwr/end_effector_ball")
+    start_pose = TfInterface().wait_for_tf_msg("rpbi/world", "rpbi/kuka_lwr/end_effector_ball")
+    if start_pose is None:
+        return  # ROS shuts down
+    middle = start_pose.transform.translation
     publisher = rospy.Publisher("rpbi/kuka_lwr/wipe/target", PoseStamped, queue_size=1)
     target = PoseStamped(header=Header(frame_id="rpbi/world"))
-    target.pose.orientation = Quaternion(*quat)
+    target.pose.orientation = start_pose.transform.rotation
     rate = rospy.Rate(HZ)
     start = rospy.Time.now()
     while not rospy.is_shutdown():
         target.header.stamp = rospy.Time.now()
         way = wiped((target.header.stamp - start).to_sec())
-        target.pose.position = Point(position[0], position[1] + way, position[2])
+        target.pose.position = Point(middle.x, middle.y + way, middle.z)
         publisher.publish(target)
         rate.sleep()
