@@ -21,8 +21,9 @@ class GravityModel:
 
     def __init__(self, world: Client, model: JointModel, load: LoadURDF) -> None:
         self._load_arguments = load.kwargs()
-        self._driven = [joint.index for joint in model.driven]
-        self._zeros = [0.0] * len(self._driven)
+        self._moving = [joint.index for joint in model.moving]
+        self._couplings = model.couplings
+        self._zeros = [0.0] * len(self._moving)
         engine = world.getPhysicsEngineParameters()
         self._gravity = tuple(engine[f"gravityAcceleration{axis}"] for axis in "XYZ")
         self._gravity_in_base: Vector | None = None
@@ -34,9 +35,9 @@ class GravityModel:
 
         Args:
             base: Pose of the root link in the world.
-            positions: Positions [rad or m] of the driven joints by index, in the order of the model.
+            positions: Positions [rad or m] of the moving joints by index, in the order of the model.
         """
-        if not self._driven:
+        if not self._moving:
             return {}
         if self._pb is None:
             self._pb = self._load()
@@ -46,7 +47,10 @@ class GravityModel:
             self._pb.setGravity(*gravity)
             self._gravity_in_base = gravity
         torques = self._pb.calculateInverseDynamics(self._body_id, list(positions.values()), self._zeros, self._zeros)
-        return dict(zip(self._driven, torques))
+        efforts = dict(zip(self._moving, torques))
+        for index, coupling in self._couplings.items():
+            efforts[coupling.leader] += coupling.multiplier * efforts[index]
+        return efforts
 
     def close(self) -> None:
         """Gives its client back."""
