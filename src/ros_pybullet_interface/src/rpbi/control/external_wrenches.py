@@ -21,7 +21,7 @@ class ExternalWrench(NamedTuple):
     Attributes:
         force: Force [N].
         torque: Torque [N m].
-        link: Name of the link; empty for the root link.
+        link: Name of the link, perhaps with `NAME/` of the body before it; empty or NAME for the root link.
         point: Where the force acts, in the link's URDF frame [m].
         in_link_axes: Whether force and torque have the link's axes and turn with it, else those of the world.
         duration_s: For how long [s] of the world's time; None until another one replaces it.
@@ -71,11 +71,13 @@ class ExternalWrenches:
             UnknownNameError: If the body has no such link.
             ValueError: If the link is static, or a number is not finite or too large.
         """
-        link = wrench.link or self._body.root_link
+        name = self._body.name
+        link = wrench.link.removeprefix(f"{name}/") if wrench.link != name else ""
+        link = link or self._body.root_link
         if link not in self._indices:
-            raise UnknownNameError(f"link of {self._body.name}", link, list(self._indices))
+            raise UnknownNameError(f"link of {name}", link, list(self._indices))
         if link not in self._movable:
-            raise ValueError(f"'{self._body.name}/{link}' is static, no force moves it")
+            raise ValueError(f"'{name}/{link}' is static, no force moves it")
         for name, values in (("force", wrench.force), ("torque", wrench.torque), ("point", wrench.point)):
             if not all(map(math.isfinite, values)):
                 raise ValueError(f"{name} must be finite, got {tuple(values)}")
