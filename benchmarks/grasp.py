@@ -102,7 +102,13 @@ def run(quick: bool) -> list[Result]:
     return [
         Result("grasp", f"drift of a held box in {hold_s:g} s", drift, "mm/s", None, Target(DRIFT_MM_S)),
         Result("grasp", f"drift in the worst second of {hold_s:g}", worst, "mm/s", None, Target(DRIFT_MM_S)),
-        Result("grasp", f"placed within {PLACED_MM:g} mm, of {seeds}", sum(each <= PLACED_MM for each in off), "",
-               None, Target(seeds, at_least=True)),
+        Result(
+            "grasp",
+            f"placed within {PLACED_MM:g} mm, of {seeds}",
+            sum(each <= PLACED_MM for each in off),
+            "",
+            None,
+            Target(seeds, at_least=True),
+        ),
         Result("grasp", f"farthest from its goal, of {seeds}", max(off), "mm", None, Target(PLACED_MM)),
     ]

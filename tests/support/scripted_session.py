@@ -148,7 +148,6 @@ class Script:
             request = TrajectoryRequest(tuple(JOINTS), points, stamp_ns)
             world.act("iiwa", "follow", RecordedTrajectory.of(request, None, world.clock))
 
-
     def _attach(self, world: World) -> None:
         """Attaches a body to another, perhaps with a limit; or detaches it, unless it has gone or broken."""
         draw = self._random

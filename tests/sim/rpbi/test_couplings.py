@@ -73,7 +73,7 @@ def test_multiplier_and_offset_of_the_yaml_hold_in_every_mode(build, mode, targe
         world.step()
         left, right = positions(world)
         assert right == pytest.approx(0.5 * left + 0.01, abs=1e-5)
-    assert left > 0.032
+    assert left > 0.0315
 
 
 def test_the_leader_decides_and_the_log_says_so_once(build, caplog):
@@ -118,31 +118,54 @@ def test_gravity_of_the_follower_is_the_leaders_burden(build):
     assert positions(world) == pytest.approx([0.03, 0.03], abs=1e-5)
 
 
-def drift_mm_s(world: World) -> float:
-    """Grips the box and returns how fast it moves then."""
-    world.put("gripper/target", JointTarget(["left", "right"], [0.0, 0.0]))
-    run(world, 1000)
+def shift_mm(world: World, ticks: int) -> float:
+    """Returns how far the box moves [mm] that the fingers hold."""
     start = world.bodies["box"].base_pose().position
-    run(world, 4000)
-    return math.dist(start, world.bodies["box"].base_pose().position) / 4.0 * 1e3
+    run(world, ticks)
+    return math.dist(start, world.bodies["box"].base_pose().position) * 1e3
 
 
-HELD = box(
-    half_extents_m=(0.02, 0.02, 0.02),
-    baseMass=0.2,
-    basePosition=[0.0, 0.005, 1.0],
-    changeDynamics={"lateralFriction": 1.0},
-)
+def held(anchor: int, y: float = 0.0) -> tuple[dict, ...]:
+    """Returns a box between the fingers, as far as asked from the middle [m]."""
+    contact = {"lateralFriction": 1.0, "frictionAnchor": anchor}
+    return (box(half_extents_m=(0.02, 0.02, 0.02), baseMass=1.0, basePosition=[0.0, y, 1.0], changeDynamics=contact),)
 
 
-def test_what_coupled_fingers_hold_does_not_drift(build):
-    assert drift_mm_s(build(dynamic=(HELD,), main={"setGravity": {"gravZ": -9.81, "gravY": -0.5}})) < 0.05
+GRIP = JointTarget(["left", "right"], [0.0, 0.0])
 
 
-def test_what_fingers_of_their_own_hold_drifts(build):
-    both = {"left": 0.03, "right": 0.03}
-    world = build((HELD,), "", {"setGravity": {"gravZ": -9.81, "gravY": -0.5}}, initial_joint_position=both)
-    assert drift_mm_s(world) > 0.3
+def test_what_coupled_fingers_hold_by_friction_with_anchors_does_not_drift(build):
+    world = build(held(anchor=1))
+    world.put("gripper/target", GRIP)
+    run(world, 500)
+    assert shift_mm(world, 2000) < 0.01
+
+
+def test_without_anchors_friction_creeps(build):
+    world = build(held(anchor=0))
+    world.put("gripper/target", GRIP)
+    run(world, 500)
+    assert shift_mm(world, 2000) > 0.03
+
+
+def test_coupled_fingers_centre_a_box_and_others_push_it_aside(build):
+    world = build(held(anchor=1, y=0.005))
+    world.put("gripper/target", GRIP)
+    run(world, 1000)
+    assert world.bodies["box"].base_pose().position[1] == pytest.approx(0.0, abs=2e-4)
+    apart = build(held(anchor=1, y=0.005), "", initial_joint_position={"left": 0.03, "right": 0.03})
+    apart.put("gripper/target", GRIP)
+    run(apart, 1000)
+    assert abs(apart.bodies["box"].base_pose().position[1]) > 0.01
+
+
+def test_each_finger_presses_with_its_own_effort(build):
+    world = build(held(anchor=1))
+    world.put("gripper/target", GRIP)
+    run(world, 500)
+    touches = world.pb.getContactPoints(world.bodies["box"].body_id)
+    for finger in (LEFT, RIGHT):
+        assert sum(touch[9] for touch in touches if touch[4] == finger) == pytest.approx(20.0, rel=0.02)
 
 
 @pytest.mark.parametrize(

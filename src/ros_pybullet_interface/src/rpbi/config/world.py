@@ -23,7 +23,6 @@ from custom_ros_tools.schema import (
     Text,
     optional,
 )
-
 from rpbi.constraints.attachment_config import AttachmentConfig
 
 from .asset_files import find_folder

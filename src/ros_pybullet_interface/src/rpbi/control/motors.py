@@ -210,7 +210,7 @@ class Motors:
         if self.mode == pybullet.VELOCITY_CONTROL:
             limit = joint.max_velocity
         elif self.mode == pybullet.TORQUE_CONTROL and self._enforce_effort_limits:
-            limit = joint.max_effort
+            limit = self._model.effort_limit(joint)
         else:
             return value
         return min(max(value, -limit), limit)
@@ -229,8 +229,9 @@ class Motors:
     def _arguments(self, joint: Joint, gains: Mapping[int, Mapping[str, float]]) -> dict[str, Any]:
         """Returns what PyBullet's position motor of a joint is told beside its set point."""
         arguments: dict[str, Any] = dict(gains.get(joint.index, {}))
-        if self._enforce_effort_limits and math.isfinite(joint.max_effort):
-            arguments["force"] = joint.max_effort
+        effort = self._model.effort_limit(joint)
+        if self._enforce_effort_limits and math.isfinite(effort):
+            arguments["force"] = effort
         if math.isfinite(joint.max_velocity):
             arguments["maxVelocity"] = joint.max_velocity
         return arguments

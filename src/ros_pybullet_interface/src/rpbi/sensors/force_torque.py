@@ -24,8 +24,8 @@ class ForceTorqueSensor(Sensor):
 
     PyBullet's own reading is of no use here: it lacks the motors' efforts (bullet3 issues 2966, 3204, 4451, 4604), and
     with them added it is still wrong, see docs/force_torque.md. So the wrench is what changed the momentum of all links
-    below the joint during the last tick, less their weight and less what touches, holds or pushes them (Newton-Euler, as
-    an impulse balance). That holds for all types of joints, control modes and limits.
+    below the joint during the last tick, less their weight and less what touches, holds or pushes them (Newton-Euler,
+    as an impulse balance). That holds for all types of joints, control modes and limits.
 
     It is read at `default_hz` unless its part of the robot's YAML, the configuration, has a rate.
     """
@@ -111,7 +111,7 @@ class ForceTorqueSensor(Sensor):
         """Returns force and moment of the last tick, as mean of that tick.
 
         With momentum p, angular momentum L about the joint's origin, which moves at v, first moment of mass s, weight
-        m g, and contacts, attachments and external wrenches (f, t): F = dp/dt - m g - f and M = dL/dt + v x p - s x g - t.
+        m g, and what touches, holds or pushes it (f, t): F = dp/dt - m g - f and M = dL/dt + v x p - s x g - t.
 
         Raises:
             PhysicsError: If it is not finite.

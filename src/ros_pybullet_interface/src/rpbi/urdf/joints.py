@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import NamedTuple
 
 import pybullet
@@ -169,16 +170,14 @@ class JointModel:
         ValueError: If a joint cannot follow another; it names the joint.
     """
 
-    def __init__(self, joints: Sequence[Joint], base_joints: int = 0, mimics: Mapping[str, Mimic] | None = None) -> None:
+    def __init__(
+        self, joints: Sequence[Joint], base_joints: int = 0, mimics: Mapping[str, Mimic] = MappingProxyType({})
+    ) -> None:
         self.joints = tuple(joints)
         self.own = self.joints[base_joints:]
         self.moving = tuple(joint for joint in self.own if joint.is_driven)
         self._by_name = {joint.name: joint for joint in self.own}
-        mimics = {
-            name: mimic
-            for name, mimic in (mimics or {}).items()
-            if name in self._by_name and self[name].is_driven
-        }
+        mimics = {name: mimic for name, mimic in mimics.items() if name in self._by_name and self[name].is_driven}
         self.couplings = {self[name].index: self._coupling(name, mimics) for name in mimics}
         self.driven = tuple(joint for joint in self.moving if joint.index not in self.couplings)
 
@@ -207,6 +206,14 @@ class JointModel:
             movable = ", ".join(joint.name for joint in self.moving)
             raise ValueError(f"joint '{name}' follows '{leader}', which is none that moves; there are {movable}")
         return Coupling(self[leader].index, multiplier, offset)
+
+    def effort_limit(self, joint: Joint) -> float:
+        """Returns the largest effort of a joint's motor [N m or N], which works for the joints that follow it, too."""
+        return joint.max_effort + sum(
+            abs(multiplier) * self.joints[index].max_effort
+            for index, (leader, multiplier, _) in self.couplings.items()
+            if leader == joint.index
+        )
 
     def with_followers(self, positions: Mapping[int, float], offsets: bool = True) -> dict[int, float]:
         """Returns positions by joint index, with those of the joints that follow them; velocities without `offsets`."""

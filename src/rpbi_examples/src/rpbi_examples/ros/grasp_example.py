@@ -49,7 +49,7 @@ def _run() -> None:
 
 def _box(tf: TfInterface) -> PlanarPose:
     """Returns where the box is, by TF."""
-    position, quat = tf.wait_for_tf("rpbi/world", "rpbi/box")
+    position, quat = TfInterface.msg_to_pos_quat(tf.wait_for_tf_msg("rpbi/world", "rpbi/box"))
     return PlanarPose(position[0], position[1], 2.0 * math.atan2(quat[2], quat[3]))
 
 

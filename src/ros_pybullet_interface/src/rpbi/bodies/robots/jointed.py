@@ -124,7 +124,9 @@ class JointedBody(Body):
             if abs(velocity) > joint.max_velocity:
                 limit = f"{joint.max_velocity:g} {joint.unit}/s"
                 raise ValueError(f"velocity of joint '{joint.name}' must be within +-{limit}, got {velocity:g}")
-        velocities = self.model.with_followers({index: velocities.get(index, 0.0) for index in positions}, offsets=False)
+        velocities = self.model.with_followers(
+            {index: velocities.get(index, 0.0) for index in positions}, offsets=False
+        )
         for index, position in self.model.with_followers(positions).items():
             self.pb.resetJointState(self.body_id, index, position, velocities[index])
 

@@ -24,7 +24,9 @@ class CoupledJoint(ConfigModel):
 
     joint: Text = Field(description="The joint that it follows.")
     multiplier: float = Field(1.0, description="Its velocity over that of the other.")
-    offset: float = Field(0.0, description="Its position where the other is at 0.", json_schema_extra={"unit": "rad or m"})
+    offset: float = Field(
+        0.0, description="Its position where the other is at 0.", json_schema_extra={"unit": "rad or m"}
+    )
 
     @field_validator("multiplier")
     @classmethod
