@@ -6,9 +6,8 @@ from itertools import cycle
 import rospy
 from sensor_msgs.msg import JointState
 
-from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from custom_ros_tools.ros.services import get_srv_handler
+from custom_ros_tools.ros.services import call_service
 from custom_ros_tools.ros.tf_interface import TfInterface
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
 from ros_pybullet_interface.srv import ResetEffState
@@ -28,7 +27,6 @@ def main() -> None:
 
 def _run() -> None:
     tf = TfInterface()
-    move = get_srv_handler("rpbi/panda/move_to_eff_state", ResetEffState, persistent=False)
     fingers = rospy.Publisher("rpbi/panda/joint_states/target", JointState, queue_size=10, latch=True)
     for goal in cycle(GOALS):
         before = None
@@ -37,9 +35,7 @@ def _run() -> None:
                 fingers.publish(JointState(name=[FINGER], position=[step.finger]))
                 rospy.sleep(FINGERS_S)
             else:
-                answer = move(_problem(step), MOVE_S)
-                if not answer.success:
-                    raise InterfaceError(f"the hand did not get to {step.position}: {answer.message}")
+                call_service("rpbi/panda/move_to_eff_state", ResetEffState, _problem(step), MOVE_S)
             before = step
         x, y, _ = _box(tf)
         off_mm = math.hypot(x - goal.x, y - goal.y) * 1e3
