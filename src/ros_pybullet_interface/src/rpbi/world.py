@@ -358,7 +358,7 @@ class World:
 
     def _push(self) -> None:
         for name, body in list(self._pushed.items()):
-            body.external_wrenches.apply()
+            body.external_wrenches.apply(body.link_pose)
             if not body.external_wrenches.loads:
                 del self._pushed[name]
 

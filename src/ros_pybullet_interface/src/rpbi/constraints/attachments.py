@@ -195,7 +195,7 @@ class Attachments:
             )
             self._pb.changeConstraint(constraint, maxForce=_UNLIMITED_N)
         except pybullet.error as error:
-            raise PhysicsError(f"{config.name}: {error} (bodies with useMaximalCoordinates cannot be attached)") from error
+            raise PhysicsError(f"{config.name}: {error} (do both lack useMaximalCoordinates?)") from error
         return constraint
 
     def _change(self, attachment: _Attachment, what: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import pybullet
@@ -39,7 +40,7 @@ class ExternalWrenches:
     """What acts on one body from outside; a link has one wrench, and a newer one replaces it.
 
     Args:
-        body: The body.
+        body: The body; it is not kept.
 
     Attributes:
         can_act: Whether one of its links can move.
@@ -47,7 +48,7 @@ class ExternalWrenches:
     """
 
     def __init__(self, body: Any) -> None:
-        self._body, self._pb = body, body.pb
+        self._pb, self._body_id, self._name, self._root_link = body.pb, body.body_id, body.name, body.root_link
         self._dt_s: float = self._pb.getPhysicsEngineParameters()["fixedTimeStep"]
         self._acting: dict[int, tuple[ExternalWrench, float]] = {}
         """By PyBullet's index of the link: the wrench, and for how many more ticks."""
@@ -71,9 +72,9 @@ class ExternalWrenches:
             UnknownNameError: If the body has no such link.
             ValueError: If the link is static, or a number is not finite or too large.
         """
-        name = self._body.name
+        name = self._name
         link = wrench.link.removeprefix(f"{name}/") if wrench.link != name else ""
-        link = link or self._body.root_link
+        link = link or self._root_link
         if link not in self._indices:
             raise UnknownNameError(f"link of {name}", link, list(self._indices))
         if link not in self._movable:
@@ -99,19 +100,23 @@ class ExternalWrenches:
             return
         ticks = math.inf if wrench.duration_s is None else max(1, round(wrench.duration_s / self._dt_s))
         self._acting[index] = wrench, ticks
-        self._pb.changeDynamics(self._body.body_id, -1, activationState=pybullet.ACTIVATION_STATE_WAKE_UP)
+        self._pb.changeDynamics(self._body_id, -1, activationState=pybullet.ACTIVATION_STATE_WAKE_UP)
 
-    def apply(self) -> None:
-        """Acts for a tick: PyBullet forgets forces after each step."""
-        self.loads = [self._load(index, wrench) for index, (wrench, _) in self._acting.items()]
+    def apply(self, link_pose: Callable[[int], Pose]) -> None:
+        """Acts for a tick: PyBullet forgets forces after each step.
+
+        Args:
+            link_pose: Returns the pose of a link's URDF frame in the world by PyBullet's index.
+        """
+        self.loads = [_load(index, wrench, link_pose(index)) for index, (wrench, _) in self._acting.items()]
         for link, force, torque, point in self.loads:
-            self._pb.applyExternalForce(self._body.body_id, link, force, point, pybullet.WORLD_FRAME)
-            self._pb.applyExternalTorque(self._body.body_id, link, torque, pybullet.WORLD_FRAME)
+            self._pb.applyExternalForce(self._body_id, link, force, point, pybullet.WORLD_FRAME)
+            self._pb.applyExternalTorque(self._body_id, link, torque, pybullet.WORLD_FRAME)
         self._acting = {index: (wrench, left - 1) for index, (wrench, left) in self._acting.items() if left > 1}
 
-    def _load(self, index: int, wrench: ExternalWrench) -> Load:
-        pose: Pose = self._body.link_pose(index)
-        force, torque = wrench.force, wrench.torque
-        if wrench.in_link_axes:
-            force, torque = rotated(pose.quat_xyzw, force), rotated(pose.quat_xyzw, torque)
-        return Load(index, force, torque, plus(pose.position, rotated(pose.quat_xyzw, wrench.point)))
+
+def _load(index: int, wrench: ExternalWrench, pose: Pose) -> Load:
+    force, torque = wrench.force, wrench.torque
+    if wrench.in_link_axes:
+        force, torque = rotated(pose.quat_xyzw, force), rotated(pose.quat_xyzw, torque)
+    return Load(index, force, torque, plus(pose.position, rotated(pose.quat_xyzw, wrench.point)))
