@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import gc
 import math
+import os
 
 import pytest
+import rospy
 from geometry_msgs.msg import Point, Pose, Vector3, Wrench, WrenchStamped
-from node_world import Rosout, main_config, publishing, remove
+from node_world import Rosout, count, main_config, publishing, remove
 from ros_system import wait_until
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from worlds import FLOOR, box, iiwa
 
+from custom_ros_tools.ros.rospy_internals import close_poller_with
 from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import Attachment, Attachments, WorldCommands
 from ros_pybullet_interface.srv import ApplyWrench, Attach, StepN
@@ -159,3 +163,17 @@ def test_a_wrench_by_topic_that_makes_no_sense_is_named_in_the_log(node):
     with publishing("/rpbi/box/external_wrench", WrenchStamped) as publisher:
         publisher.publish(message)
         rosout.wait_for(["/rpbi/box/external_wrench: message refused: force must be finite"])
+
+
+def test_pollers_of_topics_go_with_them(ros):
+    """Each of them is an open file."""
+    gc.disable()
+    try:
+        before = count(os.getpid(), "fd")
+        for turn in range(20):
+            subscriber = rospy.Subscriber(f"/poller_{turn}", WrenchStamped, lambda _: None)
+            close_poller_with(subscriber)
+            subscriber.unregister()
+        assert count(os.getpid(), "fd") < before + 5
+    finally:
+        gc.enable()

@@ -11,6 +11,7 @@ from sensor_msgs.msg import JointState
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.plugins import full_name
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
+from custom_ros_tools.ros.rospy_internals import close_poller_with
 from rpbi.control.external_wrenches import TIMEOUT_S, ExternalWrench
 from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Twist
@@ -129,4 +130,6 @@ class Inputs:
             except Exception as error:
                 self._warn(topic, f"message refused: {refusal(slot, taken, error)}")
 
-        return rospy.Subscriber(topic, row.message_type, take, queue_size=100, tcp_nodelay=True)
+        subscriber = rospy.Subscriber(topic, row.message_type, take, queue_size=100, tcp_nodelay=True)
+        close_poller_with(subscriber)
+        return subscriber
