@@ -9,6 +9,7 @@ import json
 import random
 import sys
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,8 @@ from worlds import FLOOR, ball, box, iiwa, write_world
 
 from rpbi.config.loading import load_object
 from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.constraints.attachment_config import AttachmentConfig
+from rpbi.control.external_wrenches import ExternalWrench
 from rpbi.control.trajectories.request import TrajectoryPoint as Point
 from rpbi.control.trajectories.request import TrajectoryRequest
 from rpbi.engine.actions import RecordedTrajectory, TimedGoal
@@ -100,7 +103,7 @@ class Script:
     def _something(self, world: World) -> None:
         draw = self._random
         robot: Any = world.bodies["iiwa"]
-        kind = draw.randrange(9)
+        kind = draw.randrange(11)
         if kind == 0:
             self._count += 1
             name = f"visitor{self._count}"
@@ -119,9 +122,21 @@ class Script:
             world.act("iiwa", "switch_mode", draw.choice(MODES))
         elif kind == 5:
             place = (draw.uniform(0.3, 0.6), draw.uniform(-0.3, 0.3), draw.uniform(0.2, 1.0))
-            world.act(f"body{draw.choice((0, 2, 3, 4))}", "teleport", Pose(place))
+            with suppress(ValueError):  # it may be attached
+                world.act(f"body{draw.choice((0, 2, 3, 4))}", "teleport", Pose(place))
         elif kind == 6:
-            world.act("iiwa", "set_joint_state", JointTarget(JOINTS[:2], [draw.uniform(-0.5, 0.5), 0.5]))
+            with suppress(ValueError):
+                world.act("iiwa", "set_joint_state", JointTarget(JOINTS[:2], [draw.uniform(-0.5, 0.5), 0.5]))
+        elif kind == 9:
+            force = (draw.uniform(-20, 20), draw.uniform(-20, 20), draw.uniform(0, 20))
+            link, name = draw.choice((("lbr_iiwa_link_7", "iiwa"), ("", "body0"), ("", "body2")))
+            wrench = ExternalWrench(force, (0.1, 0.0, 0.2), link, (0.0, 0.05, 0.0), draw.random() < 0.5, draw.random())
+            if draw.random() < 0.5:
+                world.act(name, "push", wrench)
+            else:
+                world.put(f"{name}/external_wrench", wrench._replace(duration_s=None))
+        elif kind == 10:
+            self._attach(world)
         elif robot.motors.mode == pybullet.TORQUE_CONTROL:
             world.pause("the simulation was stopped")
         elif kind == 7:
@@ -132,6 +147,19 @@ class Script:
             stamp_ns = world.clock.stamp_ns + draw.choice((0, 100_000_000))
             request = TrajectoryRequest(tuple(JOINTS), points, stamp_ns)
             world.act("iiwa", "follow", RecordedTrajectory.of(request, None, world.clock))
+
+    def _attach(self, world: World) -> None:
+        """Attaches a body to another, perhaps with a limit; or detaches it, unless it has gone or broken."""
+        draw = self._random
+        name = f"body{draw.choice((0, 2, 3, 4))}"
+        if name in [each.name for each in world.attachments.configs]:
+            world.detach(name)
+            return
+        parent = draw.choice(("iiwa/lbr_iiwa_link_7", "mobile", "follower", "floor"))
+        keys = {"name": name, "parent": parent, "child": name, "kind": draw.choice(("fixed", "ball"))}
+        if draw.random() < 0.5:
+            keys["max_force"] = draw.uniform(20.0, 200.0)
+        world.attach(AttachmentConfig.parse(keys, "script"))
 
 
 def run(world: World, seed: int, ticks: int, every: int = 500) -> list[Checkpoint]:

@@ -7,10 +7,12 @@ import math
 
 import pybullet
 import pytest
+from gripper import gripper
 from worlds import FLOOR, ball, write_world
 
 from custom_ros_tools.errors import ConfigError
 from rpbi.bodies.urdf_object import UrdfObject
+from rpbi.control.external_wrenches import ExternalWrench
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose
 from rpbi.render.mirror import Mirror
@@ -145,7 +147,7 @@ def test_a_ball_pushes_the_door_open(build):
 
 def test_a_fixed_base_follows_a_tf_frame_with_its_urdf_frame(build):
     world = build(object_tf={"tf_id": "hand"})
-    assert list(world.inputs) == ["door/pose"]
+    assert set(world.inputs) == {"door/pose", "door/external_wrench"}
     world.put("door/pose", Pose((1.0, 2.0, 3.0)))
     run(world, 1)
     assert world.bodies["door"].base_pose().position == pytest.approx((1.0, 2.0, 3.0))
@@ -160,7 +162,7 @@ def test_a_floating_base_starts_with_its_velocity_and_follows_nothing(build, cap
     with caplog.at_level(logging.WARNING):
         world = build(fixed=False, object_tf={"tf_id": "hand"}, resetBaseVelocity={"linearVelocity": [1.0, 0.0, 0.0]})
     assert caplog.messages == ["door: object_tf: has no effect: physics moves a base that is not fixed"]
-    assert not world.inputs
+    assert "door/pose" not in world.inputs
     run(world, 100)
     position = world.bodies["door"].base_pose().position
     # The leaf hangs on the frame by a hinge, so the frame alone does not keep all of its speed.
@@ -191,3 +193,15 @@ def test_unknown_key_is_refused(tmp_path):
     door = {"name": "door", "loadURDF": {"fileName": "plane.urdf"}, "broadcast_Hz": 3}
     with pytest.raises(ConfigError, match="did you mean 'broadcast_hz'"):
         World.from_file(write_world(tmp_path, urdfs=(door,)))
+
+
+def test_joints_follow_others_as_the_urdf_says(tmp_path):
+    write = gripper(tmp_path, '<mimic joint="left" multiplier="0.5" offset="0.01"/>')
+    thing = {"name": "gripper", "loadURDF": write["loadURDF"]}
+    world = World.from_file(write_world(tmp_path, urdfs=(thing,), setGravity={}))
+    world.act("gripper", "push", ExternalWrench((0.0, 0.05, 0.0), link="left_finger"))
+    run(world, 300)
+    left, right = (state[0] for state in world.pb.getJointStates(world.bodies["gripper"].body_id, (0, 1)))
+    assert left > 0.01
+    assert right == pytest.approx(0.5 * left + 0.01, abs=1e-5)
+    world.close()

@@ -32,6 +32,22 @@ class Pose(NamedTuple):
         return Pose(*pybullet.invertTransform(*self))
 
 
+class Load(NamedTuple):
+    """A force and a torque on a link, in the axes of the world.
+
+    Attributes:
+        link: PyBullet's index of the link, -1 for the base.
+        force: Force [N].
+        torque: Torque [N m].
+        point: Where the force acts, in the world [m].
+    """
+
+    link: int
+    force: Vector
+    torque: Vector
+    point: Vector
+
+
 def normalized(quat_xyzw: Sequence[float]) -> Quaternion:
     """Returns the unit quaternion of the same rotation."""
     norm = math.hypot(*quat_xyzw)

@@ -13,7 +13,8 @@ from rpbi.bodies.dynamics import LinkDynamics, read_dynamics
 from rpbi.config.loading import LoadedWorld, load_world
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.config.sensors import RgbdSensorConfig
-from rpbi.engine.actions import ACTIONS
+from rpbi.constraints.attachment_config import AttachmentConfig
+from rpbi.engine.actions import ACTIONS, MOVES_AT_ONCE
 from rpbi.engine.client import Client
 from rpbi.engine.clock import Clock
 from rpbi.engine.command_log import CommandLog, WorldCommand
@@ -66,6 +67,9 @@ class World:
         self._contents = WorldContents(self.pb, self.clock, self)
         self.bodies = self._contents.bodies
         self.contacts = self._contents.contacts
+        self.attachments = self._contents.attachments
+        self._pushed: dict[str, Body] = {}
+        """Bodies that external wrenches act on, or acted on in the last tick."""
         self.log = self._contents.log
         self._sensors = self._contents.sensors
         self._stepping = self._contents.stepping
@@ -125,6 +129,7 @@ class World:
         """
         is_body = name in self.bodies
         self._contents.remove(name)
+        self._pushed.pop(name, None)
         if is_body:
             self._note(name, "remove", None)
         self.take_inputs()  # what still waits for it must not meet a later body of the same name
@@ -157,6 +162,26 @@ class World:
         self._contents.change_dynamics(name, link, change)
         self._note(object_name, "dynamics", change)
 
+    def attach(self, config: AttachmentConfig) -> None:
+        """Attaches a body to another; when it raises, nothing has changed.
+
+        Raises:
+            UnknownNameError: If there is no such body or link.
+            ValueError: If its name is taken, or the two cannot be attached.
+            PhysicsError: If PyBullet refuses.
+        """
+        self.attachments.add(config)
+        self._note(config.name, "attach", config)
+
+    def detach(self, name: str) -> None:
+        """Ends an attachment.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        self.attachments.remove(name)
+        self._note(name, "detach", None)
+
     def act(self, name: str, what: str, value: Any, do: Callable[[Any], Any] | None = None) -> Any:
         """Does something to a body, and notes it as a command; when it raises, nothing is noted.
 
@@ -174,7 +199,10 @@ class World:
             ValueError: If the value is refused.
         """
         body = self._contents.body(name)
+        if what in MOVES_AT_ONCE:
+            self.attachments.refuse_moving(name)
         result = ACTIONS[what](body, self.clock, value) if do is None else do(body)
+        self._note_pushed(body)
         self._note(name, what, value)
         return result
 
@@ -230,6 +258,7 @@ class World:
         with blaming(body or self, f"taking '{slot}' at tick {self.clock.tick}"):
             self.inputs[slot].apply(value)
         if body is not None:
+            self._note_pushed(body)
             self._note(slot, "input", value)
 
     def step(self) -> list[Any]:
@@ -249,11 +278,15 @@ class World:
             except Exception as error:
                 blame(body, f"before_step of '{body.name}' at tick {self.clock.tick}", error)
                 raise
+        if self._pushed:
+            self._push()
         self._sensors.act("before_step")
         self.pb.stepSimulation()
         self.contacts.outdate()
         self.clock.advance()
         self._sensors.act("after_step")
+        if self.attachments.limited:
+            self.attachments.break_overloaded(self.clock.tick)
         return self._sensors.read_due()
 
     def read_rest(self) -> list[Any]:
@@ -288,6 +321,7 @@ class World:
         """
         self.halt("the world was reset")
         self._contents.clear()
+        self._pushed.clear()
         self.clock.restart()
         self.resets += 1
         try:
@@ -317,6 +351,16 @@ class World:
         for arguments in self.config.configureDebugVisualizer.calls():
             self.pb.configureDebugVisualizer(**arguments)
         self.pb.resetDebugVisualizerCamera(**self.config.resetDebugVisualizerCamera.kwargs())
+
+    def _note_pushed(self, body: Body) -> None:
+        if "external_wrenches" in vars(body) and body.external_wrenches.acts:
+            self._pushed[body.name] = body
+
+    def _push(self) -> None:
+        for name, body in list(self._pushed.items()):
+            body.external_wrenches.apply(body.link_pose)
+            if not body.external_wrenches.loads:
+                del self._pushed[name]
 
     def _note(self, name: str, what: str, value: Any) -> None:
         self.commands.note(WorldCommand(self.clock.tick, name, what, value))

@@ -1,4 +1,4 @@
-"""How things in the examples move: a figure eight, circles, an orbit, a route and joints that swing."""
+"""How things in the examples move: a figure eight, circles, an orbit, a route, joints that swing, and a grasp."""
 
 import math
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from custom_ros_tools.node_configs import StartParameters
 from custom_ros_tools.schema import Hz, NonNegative, Seconds
 from custom_ros_tools.transforms import Array, quat_of
 from rpbi.control.trajectories.trajectory import minimum_jerk
-from rpbi.geometry import Vector
+from rpbi.geometry import Quaternion, Vector
 
 CIRCLE_RADIUS = 0.12
 """Radius of the circles [m]."""
@@ -46,6 +46,10 @@ SWING_AMPLITUDE = 1.0
 """How far it swings to either side [rad or m]; less where its limits ask for it."""
 SWING_MARGIN = 0.95
 """Share of the way to a limit that is used."""
+FINGERS_OPEN, FINGERS_CLOSED = 0.04, 0.0
+"""Position of a finger [m]; on the way to closed there is the box."""
+GRASP_HEIGHT, CARRY_HEIGHT = 0.025, 0.2
+"""Height of the point between the fingertips [m] where a box is taken and put, and where it is carried."""
 
 
 class FigureEight(StartParameters):
@@ -129,6 +133,44 @@ class Route:
 def _left(pose: PlanarPose, goal: PlanarPose) -> tuple[tuple[float, float], float]:
     """Returns the way [m] and the shorter turn [rad] from a pose to another."""
     return (goal.x - pose.x, goal.y - pose.y), math.remainder(goal.yaw - pose.yaw, 2.0 * math.pi)
+
+
+class GraspStep(NamedTuple):
+    """Where the point between the fingertips is to be, on the floor and above it, and each finger [m]."""
+
+    place: PlanarPose
+    height: float
+    finger: float
+
+    @property
+    def position(self) -> Vector:
+        """The point in the world [m]."""
+        return self.place.x, self.place.y, self.height
+
+    @property
+    def quat_xyzw(self) -> Quaternion:
+        """Orientation of the hand: it points down, its fingers close along the y axis of the place."""
+        return math.cos(self.place.yaw / 2.0), math.sin(self.place.yaw / 2.0), 0.0, 0.0
+
+
+def pick_and_place(box: PlanarPose, goal: PlanarPose) -> tuple[GraspStep, ...]:
+    """Returns the steps that bring a box to a place, each of which moves either the hand or the fingers.
+
+    Args:
+        box: Where its centre is; which of its four sides faces where does not matter.
+        goal: Where it is to be.
+    """
+    box = box._replace(yaw=math.remainder(box.yaw, math.pi / 2.0))
+    return (
+        GraspStep(box, CARRY_HEIGHT, FINGERS_OPEN),
+        GraspStep(box, GRASP_HEIGHT, FINGERS_OPEN),
+        GraspStep(box, GRASP_HEIGHT, FINGERS_CLOSED),
+        GraspStep(box, CARRY_HEIGHT, FINGERS_CLOSED),
+        GraspStep(goal, CARRY_HEIGHT, FINGERS_CLOSED),
+        GraspStep(goal, GRASP_HEIGHT, FINGERS_CLOSED),
+        GraspStep(goal, GRASP_HEIGHT, FINGERS_OPEN),
+        GraspStep(goal, CARRY_HEIGHT, FINGERS_OPEN),
+    )
 
 
 class Swing:

@@ -10,8 +10,10 @@ from __future__ import annotations
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
+from functools import partial
 from importlib import import_module
 from typing import Any, TypeVar
+from weakref import WeakMethod
 
 import rospy
 
@@ -138,6 +140,23 @@ def registry() -> Registry | None:
         "a ROS master that comes back will not know this node: start it again then",
         Registry,
     )
+
+
+def close_poller_with(topic: rospy.topics.Topic) -> None:
+    """Has what polls a topic's connections, a file, closed with the topic.
+
+    It holds methods of its own, so that rospy leaves it to Python's garbage collector, which nothing hurries.
+    """
+    poller = getattr(topic.impl, "connection_poll", None)
+    for name, method in list(vars(poller).items()) if poller is not None else ():
+        if getattr(method, "__self__", None) is poller:
+            setattr(poller, name, partial(_call, WeakMethod(method)))
+
+
+def _call(method: WeakMethod, *arguments: Any) -> Any:
+    bound = method()
+    assert bound is not None  # the poller that is asked is there
+    return bound(*arguments)
 
 
 def answer_cached(parameter: str, value: Any) -> None:

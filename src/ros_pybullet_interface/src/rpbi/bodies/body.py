@@ -13,6 +13,7 @@ import pybullet
 from custom_ros_tools.errors import PhysicsError
 from custom_ros_tools.schema import ConfigModel
 from rpbi.config.pybullet_models import ObjectTf, ResetBaseVelocity
+from rpbi.control.external_wrenches import ExternalWrench, ExternalWrenches
 from rpbi.control.pose_follower import PoseFollower
 from rpbi.engine.client import Client
 from rpbi.engine.inputs import Input, PoseInput
@@ -40,6 +41,8 @@ class Body:
     Config: ClassVar[type[ConfigModel]]
     is_soft: ClassVar[bool] = False
     """Whether it has neither links nor a fixed shape."""
+    has_physics: ClassVar[bool] = True
+    """Whether it can be felt, else it is only seen."""
     section: ClassVar[str] = "objects"
     """The list of the main YAML file that names objects of this type; that of types from other packages, as a rule."""
     example: ClassVar[Mapping[str, Any]] = {}
@@ -67,6 +70,22 @@ class Body:
         """What moves its base, which is fixed, along the poses of `object_tf`; None if it is put there."""
         self.dynamics_changes = 0
         """How often its dynamics were changed, for those who keep what they know of them."""
+
+    @cached_property
+    def external_wrenches(self) -> ExternalWrenches:
+        """Forces and torques on its links from outside."""
+        return ExternalWrenches(self)
+
+    def push(self, wrench: ExternalWrench) -> None:
+        """Has a wrench act on a link from the coming tick on.
+
+        Raises:
+            UnknownNameError: If it has no such link.
+            ValueError: If the wrench is refused.
+        """
+        if self.is_soft or not self.has_physics:
+            raise ValueError(f"'{self.name}' is {'soft' if self.is_soft else 'only shown'}: no wrench acts on it")
+        self.external_wrenches.set(self.external_wrenches.check(wrench))
 
     def link_name(self, index: int) -> str:
         """Returns the name of a link by PyBullet's index, -1 for the base."""
@@ -159,15 +178,31 @@ class Body:
         return ()
 
     def inputs(self) -> Mapping[str, Input]:
-        """Returns what the body takes while the world runs, by name: the `pose` of the TF frame that it follows."""
-        if self.object_tf is None:
-            return {}
-        apply = self.set_base_pose if self.pose_follower is None else self.pose_follower.take
-        return {"pose": PoseInput.following(self.object_tf, apply)}
+        """Returns what the body takes while the world runs, by name.
+
+        It is the `pose` of the TF frame that it follows, and the `external_wrench` on what of it can move.
+        """
+        inputs: dict[str, Input] = {}
+        if self.object_tf is not None:
+            apply = self.set_base_pose if self.pose_follower is None else self.pose_follower.take
+            inputs["pose"] = PoseInput.following(self.object_tf, apply)
+        if self.has_physics and not self.is_soft and self.external_wrenches.can_act:
+            inputs["external_wrench"] = Input(self.external_wrenches.check, self.external_wrenches.set)
+        return inputs
+
+    def inertial_pose(self, index: int) -> Pose:
+        """Returns where a link's centre of mass and principal axes are in its URDF frame, -1 for the base."""
+        return self.inertial_pose_in_base if index < 0 else Pose(*self.pb.getLinkState(self.body_id, index)[2:4])
+
+    def link_pose(self, index: int) -> Pose:
+        """Returns the pose of a link's URDF frame in the world, by PyBullet's index, -1 for the base."""
+        if index >= 0:
+            return Pose(*self.pb.getLinkState(self.body_id, index, computeForwardKinematics=1)[4:6])
+        return Pose(*self.pb.getBasePositionAndOrientation(self.body_id)) @ self._base_pose_in_inertial
 
     def base_pose(self) -> Pose:
         """Returns the pose of the base link's URDF frame in the world."""
-        return Pose(*self.pb.getBasePositionAndOrientation(self.body_id)) @ self._base_pose_in_inertial
+        return self.link_pose(-1)
 
     def set_base_pose(self, pose: Pose) -> None:
         """Puts the base link's URDF frame at a pose in the world and leaves the velocity as it is."""

@@ -7,12 +7,14 @@ from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import HzOrOff, Switch
 from rpbi.config.pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity
 from rpbi.config.sensors import ContactsConfig
+from rpbi.constraints.couplings import couple
 from rpbi.engine.client import Client
 from rpbi.sensors.base_state import BaseStateSensor
 from rpbi.sensors.contact_arrows import contact_sensors
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
-from rpbi.urdf.document import UrdfDocument
+from rpbi.urdf.document import UrdfDocument, mimics_of
+from rpbi.urdf.joints import Joint, JointModel
 from rpbi.urdf.loading import load_urdf
 
 from .body import Body
@@ -61,6 +63,7 @@ class UrdfObject(Body):
         body_id = load_urdf(pb, config.name, arguments, inertia_from_urdf=config.inertia_from_urdf)
         super().__init__(pb, config.name, body_id)
         self.config = config
+        self._couple()
         for index in self.joint_indices:
             self._release(index)
         # PyBullet fixes a base without mass.
@@ -76,6 +79,20 @@ class UrdfObject(Body):
         if config.base_state_hz:
             sensors.append(BaseStateSensor(self, config.base_state_hz))
         return (*sensors, *contact_sensors(self, config.contacts))
+
+    def _couple(self) -> None:
+        """Has joints follow others as the URDF says.
+
+        Raises:
+            ConfigError: If one cannot.
+        """
+        try:
+            model = JointModel(Joint.all_of(self.pb, self.body_id), mimics=mimics_of(self.config.loadURDF.fileName))
+        except ValueError as error:
+            raise ConfigError([Problem(self.name, "loadURDF.fileName", str(error))]) from None
+        for index, coupling in model.couplings.items():
+            self.pb.resetJointState(self.body_id, index, coupling.offset)
+        couple(self.pb, self.body_id, model.couplings)
 
     def _release(self, index: int) -> None:
         """Leaves of the motor that PyBullet gives each joint what the URDF's friction is.

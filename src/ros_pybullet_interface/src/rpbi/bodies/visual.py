@@ -24,6 +24,7 @@ class VisualObject(ShapeObject):
 
     Config = VisualObjectConfig
     section = "visual_objects"
+    has_physics = False
     example = {"createVisualShape": {"shapeType": "GEOM_SPHERE", "radius": 0.1}, "object_tf": {"tf_id": "FRAME"}}
 
     def __init__(self, pb: Client, config: VisualObjectConfig) -> None:

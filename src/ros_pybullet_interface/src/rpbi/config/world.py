@@ -23,6 +23,7 @@ from custom_ros_tools.schema import (
     Text,
     optional,
 )
+from rpbi.constraints.attachment_config import AttachmentConfig
 
 from .asset_files import find_folder
 from .object_entry import FileOrOverrides
@@ -112,6 +113,7 @@ class WorldConfig(ConfigModel):
     visualizer_image_width: Pixels = Field(640, description="Columns of that image.")
     visualizer_image_height: Pixels = Field(480, description="Its rows.")
     markers_hz: HzOrOff = Field(10.0, description="How often `rpbi/markers` is looked after, in wall time; 0 is off.")
+    attachments: ListOf[AttachmentConfig] = Field((), description="What holds what from the start on.")
     objects: ListOf[FileOrOverrides] = Field(
         (), description="Files of objects of your own types, see docs/extending.md."
     )

@@ -267,7 +267,7 @@ class Motors:
         return self._limited_effort(index, value)
 
     def _limited_effort(self, index: int, value: float) -> float:
-        limit = self._model.joints[index].max_effort if self._enforce_effort_limits else math.inf
+        limit = self._model.effort_limit(self._model.joints[index]) if self._enforce_effort_limits else math.inf
         return min(max(value, -limit), limit)
 
     def _drive(self, index: int, value: float) -> None:
@@ -287,8 +287,9 @@ class Motors:
     def _arguments(self, joint: Joint, gains: Mapping[int, Mapping[str, float]]) -> dict[str, Any]:
         """Returns what PyBullet's position motor of a joint is told beside its set point."""
         arguments: dict[str, Any] = dict(gains.get(joint.index, {}))
-        if self._enforce_effort_limits and math.isfinite(joint.max_effort):
-            arguments["force"] = joint.max_effort
+        effort = self._model.effort_limit(joint)
+        if self._enforce_effort_limits and math.isfinite(effort):
+            arguments["force"] = effort
         if math.isfinite(joint.max_velocity):
             arguments["maxVelocity"] = joint.max_velocity
         return arguments

@@ -32,11 +32,13 @@ class RobotModel:
 
     def __init__(self, world: Client, model: JointModel, load: LoadURDF, inertia_from_urdf: bool) -> None:
         self.joints = model.driven
-        """The n joints."""
+        """The n joints; those that are coupled to them move with them."""
+        self._moving = model.moving
         self._world = world
         self._load_arguments = load.kwargs()
         self._inertia_from_urdf = inertia_from_urdf
-        self._zeros = [0.0] * len(model.driven)
+        self._zeros = [0.0] * len(model.moving)
+        self._by_driven, self._offsets = _couplings(model)
         self._base_joints = len(model.joints) - len(model.own)
         self._client: Client | None = None  # made when it is needed first: the renderer's copy of the robot never does
         self._body_id = -1
@@ -47,7 +49,8 @@ class RobotModel:
     def mass_matrix(self, q: Sequence[float]) -> Array:
         """Returns the mass matrix at joint positions [rad or m], shape (n, n) [kg m^2, kg m, kg]."""
         pb = self._client or self._load()
-        return np.array(pb.calculateMassMatrix(self._body_id, q))
+        mass = np.array(pb.calculateMassMatrix(self._body_id, self._positions(q)))
+        return mass if self._by_driven is None else self._by_driven.T @ mass @ self._by_driven
 
     def bias(self, base: Pose, q: Sequence[float], velocity: Sequence[float]) -> Array:
         """Returns the efforts that keep joint velocities constant: gravity, Coriolis and centrifugal forces.
@@ -64,11 +67,15 @@ class RobotModel:
             return np.zeros(0)
         pb = self._client or self._load()
         self._turn_gravity(pb, base)
-        return np.array(pb.calculateInverseDynamics(self._body_id, q, velocity, self._zeros))
+        if self._by_driven is None:
+            return np.array(pb.calculateInverseDynamics(self._body_id, q, velocity, self._zeros))
+        velocities = (self._by_driven @ velocity).tolist()
+        efforts = pb.calculateInverseDynamics(self._body_id, self._positions(q), velocities, self._zeros)
+        return self._by_driven.T @ efforts
 
     def gravity(self, base: Pose, q: Sequence[float]) -> Array:
         """Returns the n efforts [N m or N] that hold the robot still against gravity; see `bias`."""
-        return self.bias(base, q, self._zeros)
+        return self.bias(base, q, [0.0] * len(self.joints))
 
     def jacobian(self, base: Pose, q: Sequence[float], link: int, point: Vector = (0.0, 0.0, 0.0)) -> Array:
         """Returns the Jacobian of a point of a link.
@@ -87,14 +94,16 @@ class RobotModel:
         if link not in self._axes:
             self._axes[link] = pb.getLinkState(self._body_id, link)[3]
         point = rotated_back(self._axes[link], point)
-        linear, angular = pb.calculateJacobian(self._body_id, link, point, q, self._zeros, self._zeros)
+        positions = self._positions(q)
+        linear, angular = pb.calculateJacobian(self._body_id, link, point, positions, self._zeros, self._zeros)
         turn = np.array(pb.getMatrixFromQuaternion(base.quat_xyzw)).reshape(3, 3)
-        return np.vstack((turn @ np.array(linear), turn @ np.array(angular)))
+        jacobian = np.vstack((turn @ np.array(linear), turn @ np.array(angular)))
+        return jacobian if self._by_driven is None else jacobian @ self._by_driven
 
     def pose(self, base: Pose, q: Sequence[float], link: int) -> Pose:
         """Returns the pose in the world of the URDF frame of a link, given by PyBullet's index, at joint positions."""
         pb = self._client or self._load()
-        for joint, position in zip(self.joints, q):
+        for joint, position in zip(self._moving, self._positions(q)):
             pb.resetJointState(self._body_id, joint.index - self._base_joints, position)
         state = pb.getLinkState(self._body_id, link - self._base_joints, computeForwardKinematics=True)
         return base @ Pose(state[4], state[5])
@@ -104,6 +113,13 @@ class RobotModel:
         if self._client is not None:
             self._client.disconnect()
             self._client = None
+
+    def _positions(self, q: Sequence[float]) -> Sequence[float]:
+        """Returns the positions of all joints of one axis."""
+        if self._by_driven is None:
+            return q
+        positions: list[float] = (self._by_driven @ q + self._offsets).tolist()
+        return positions
 
     def _turn_gravity(self, pb: Client, base: Pose) -> None:
         engine = self._world.getPhysicsEngineParameters()
@@ -122,3 +138,23 @@ class RobotModel:
         arguments = {**kept, "useFixedBase": True}
         self._body_id = load_urdf(pb, "the model", arguments, inertia_from_urdf=self._inertia_from_urdf)
         return pb
+
+
+def _couplings(model: JointModel) -> tuple[Array | None, Array]:
+    """Returns how the m joints of one axis move by the n driven ones, shape (m, n), None if no joint follows another.
+
+    Returns:
+        That, and m offsets [rad or m].
+    """
+    if not model.couplings:
+        return None, np.zeros(0)
+    columns = {joint.index: column for column, joint in enumerate(model.driven)}
+    by_driven, offsets = np.zeros((len(model.moving), len(model.driven))), np.zeros(len(model.moving))
+    for row, joint in enumerate(model.moving):
+        if joint.index in columns:
+            by_driven[row, columns[joint.index]] = 1.0
+        else:
+            coupling = model.couplings[joint.index]
+            by_driven[row, columns[coupling.leader]] = coupling.multiplier
+            offsets[row] = coupling.offset
+    return by_driven, offsets

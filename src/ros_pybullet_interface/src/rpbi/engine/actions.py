@@ -71,6 +71,9 @@ ACTIONS: dict[str, Callable[[Any, Clock, Any], Any]] = {
     "stop_motion": _stop_motion,
     "move": _move,
     "follow": _follow,
+    "push": lambda body, _, wrench: body.push(wrench),
     "cancel": lambda body, clock, reason: body.follower.cancel(reason, clock),
 }
 """Each does something to a body, with the world's clock and a value."""
+MOVES_AT_ONCE = ("teleport", "set_joint_state")
+"""Those that put a body elsewhere, which attachments would pull back."""

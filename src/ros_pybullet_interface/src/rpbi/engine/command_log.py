@@ -12,8 +12,9 @@ class WorldCommand(NamedTuple):
 
     Attributes:
         tick: The world's tick at which it did: after that tick's physics, before the next.
-        name: The body that it concerns, `NAME/LINK` for dynamics, `NAME/INPUT` for inputs, empty for the whole world.
-        what: `input`, `add`, `remove`, `dynamics`, `halt`, `pause`, or a key of ACTIONS.
+        name: The body that it concerns, `NAME/LINK` for dynamics, `NAME/INPUT` for inputs, an attachment's name for
+            those, empty for the whole world.
+        what: `input`, `add`, `remove`, `dynamics`, `attach`, `detach`, `halt`, `pause`, or a key of ACTIONS.
         value: What it was.
     """
 

@@ -5,11 +5,12 @@ import struct
 from collections.abc import Mapping
 from typing import Any
 
-from custom_ros_tools.errors import ConfigError, PhysicsError, PluginError, Problem, UnknownNameError
+from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, PluginError, Problem, UnknownNameError
 from rpbi.bodies import Body, BodyConfig
 from rpbi.config.loading import LoadedWorld
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.config.sensors import FIRST_TOPIC_NAME, RgbdSensorConfig
+from rpbi.constraints.attachments import Attachments
 from rpbi.control.pose_follower import PoseFollower
 from rpbi.plugins import blaming
 from rpbi.sensors import sensor_class
@@ -67,6 +68,7 @@ class WorldContents:
         inputs: By slot, `NAME/INPUT`; a new dictionary whenever one comes or goes.
         sensors: When each is due.
         contacts: Who touches whom.
+        attachments: Who holds whom.
         log: All that was done to the world.
     """
 
@@ -80,6 +82,7 @@ class WorldContents:
         self.inputs: dict[str, Input] = {}
         self.sensors = SensorSchedule(clock)
         self.contacts = ContactReader(pb, self.bodies)
+        self.attachments = Attachments(pb, self.bodies)
         self.log: list[LogEntry] = []
         self._filled_entries = 0
         """How many entries of the log are of filling it."""
@@ -135,6 +138,7 @@ class WorldContents:
         if name in self.cameras:
             self.cameras = {other: camera for other, camera in self.cameras.items() if other != name}
         else:
+            self.attachments.release_body(name)
             self._append(LogEntry(name, "remove"))
             self.stepping[:] = [each for each in self.stepping if each.name != name]
         self.sensors.remove(name)
@@ -146,6 +150,7 @@ class WorldContents:
 
     def clear(self) -> None:
         """Takes all out but the cameras and the inputs, which wait for what `fill` brings."""
+        self.attachments.clear()
         for body in self.bodies.values():
             body.remove()
         self.bodies.clear()
@@ -170,6 +175,7 @@ class WorldContents:
                 problems += error.problems
             except (PhysicsError, PluginError) as error:
                 problems.append(Problem(item.file, "", str(error)))
+        problems += self._fill_in_attachments(loaded)
         problems += self._fill_in_cameras(loaded)
         self._filled_entries = len(self.log)
         # Those that were there before stay till their like has come, for who puts into them meanwhile
@@ -180,6 +186,15 @@ class WorldContents:
     def changed_names(self) -> set[str]:
         """Returns the names of all bodies that came or went since it was filled."""
         return {entry.name for entry in self.log[self._filled_entries :] if entry.what in ("add", "remove")}
+
+    def _fill_in_attachments(self, loaded: LoadedWorld) -> list[Problem]:
+        problems: list[Problem] = []
+        for index, config in enumerate(loaded.config.attachments):
+            try:
+                self.attachments.add(config)
+            except (InterfaceError, ValueError) as error:
+                problems.append(Problem(loaded.file, f"attachments[{index}]", str(error)))
+        return problems
 
     def _fill_in_cameras(self, loaded: LoadedWorld) -> list[Problem]:
         before, self.cameras = self.cameras, {}

@@ -39,6 +39,8 @@ GUIDES = {
     "enabled_joint_force_torque_sensors": "force_torque.md",
     "joint_trajectory_controller": "trajectories.md",
     "contacts": "contacts.md",
+    "attachments": "hands.md",
+    "coupled_joints": "hands.md",
     "changeDynamics": "dynamics.md",
     "sensors": "extending.md",
 }

@@ -164,6 +164,8 @@ _CHANGES: dict[str, Callable[[World, str, Any], Any]] = {
     "add": lambda world, _, arguments: world.add(*arguments),
     "remove": lambda world, name, _: world.remove(name),
     "dynamics": World.change_dynamics,
+    "attach": lambda world, _, config: world.attach(config),
+    "detach": lambda world, name, _: world.detach(name),
     "halt": lambda world, _, reason: world.halt(reason),
     "pause": lambda world, _, reason: world.pause(reason),
 }

@@ -5,17 +5,21 @@ from typing import Any
 
 import geometry_msgs.msg
 import rospy
+from geometry_msgs.msg import WrenchStamped
 from sensor_msgs.msg import JointState
 
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.plugins import full_name
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
+from custom_ros_tools.ros.rospy_internals import close_poller_with
+from rpbi.control.external_wrenches import TIMEOUT_S, ExternalWrench
 from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Twist
 from rpbi.urdf.joints import JointTarget, WrongQuantityError
 from rpbi.world import World
 
 from .endpoints import Topic, find_topic
+from .headers import prefixed
 from .tf_follower import TfFollower, refusal
 
 
@@ -27,6 +31,20 @@ def _joint_target(message: JointState) -> JointTarget:
 def _twist(message: geometry_msgs.msg.Twist) -> Twist:
     linear, angular = message.linear, message.angular
     return Twist((linear.x, linear.y, linear.z), (angular.x, angular.y, angular.z))
+
+
+def _external_wrench(message: WrenchStamped) -> ExternalWrench:
+    """Returns a wrench at the origin of the link that the frame names, in its axes; in the world's at the root link."""
+    frame = message.header.frame_id.removeprefix(prefixed("rpbi/"))
+    in_link_axes = frame not in ("", "world")
+    force, torque = message.wrench.force, message.wrench.torque
+    return ExternalWrench(
+        (force.x, force.y, force.z),
+        (torque.x, torque.y, torque.z),
+        link=frame if in_link_axes else "",
+        in_link_axes=in_link_axes,
+        duration_s=TIMEOUT_S,
+    )
 
 
 TOPIC_INPUTS: dict[str, Topic] = {
@@ -41,6 +59,12 @@ TOPIC_INPUTS: dict[str, Topic] = {
         geometry_msgs.msg.Twist,
         _twist,
         "Velocity of a planar base in its own frame [m/s, rad/s], for `cmd_vel_timeout_s`.",
+    ),
+    "external_wrench": Topic(
+        "rpbi/{name}/external_wrench",
+        WrenchStamped,
+        _external_wrench,
+        "Force [N] and torque [N m] on the link of the frame, in its axes, for 0.5 s; without a frame in the world's.",
     ),
 }
 """The topic of each kind of input that comes by topic."""
@@ -106,4 +130,6 @@ class Inputs:
             except Exception as error:
                 self._warn(topic, f"message refused: {refusal(slot, taken, error)}")
 
-        return rospy.Subscriber(topic, row.message_type, take, queue_size=100, tcp_nodelay=True)
+        subscriber = rospy.Subscriber(topic, row.message_type, take, queue_size=100, tcp_nodelay=True)
+        close_poller_with(subscriber)
+        return subscriber

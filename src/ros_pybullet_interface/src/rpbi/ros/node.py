@@ -14,6 +14,7 @@ from custom_ros_tools.ros.lifecycle.parameters import kept_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from rpbi.config.asset_files import ROBOT_DESCRIPTION
 from rpbi.config.loading import load_world_dict
+from rpbi.ros.publishers.attachments import AttachmentPublisher
 from rpbi.ros.publishers.sample_publishers import SamplePublishers
 from rpbi.ros.publishers.world_markers import WorldMarkers
 from rpbi.ros.services.node_services import NODE_SERVICES, NodeContext
@@ -86,7 +87,7 @@ class SimulatorNode:
         for name in self._world.bodies:
             publishers.find_topics(name)
         self._cameras = publishers.cameras
-        helpers: list[Callable[[], None]] = []
+        helpers: list[Callable[[], None]] = [AttachmentPublisher(self._world).poll]
         if config.markers_hz:
             helpers.append(WorldMarkers(self._world, config.markers_hz).poll)
         window = WindowTopics(self._world)

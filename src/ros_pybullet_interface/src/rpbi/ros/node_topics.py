@@ -2,11 +2,12 @@
 
 from typing import NamedTuple
 
+from rpbi.ros.publishers.attachments import ATTACHMENTS
 from rpbi.ros.publishers.commands import COMMANDS, DESCRIPTION
 from rpbi.ros.publishers.status import CLOCK, DIAGNOSTICS, STATE, STATUS
 from rpbi.ros.publishers.world_markers import MARKERS
 
-NODE_TOPICS = (STATUS, STATE, COMMANDS, DESCRIPTION, MARKERS, DIAGNOSTICS, CLOCK)
+NODE_TOPICS = (STATUS, STATE, ATTACHMENTS, COMMANDS, DESCRIPTION, MARKERS, DIAGNOSTICS, CLOCK)
 """What it publishes."""
 
 

@@ -2,6 +2,7 @@
 
 import math
 import zlib
+from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -9,13 +10,13 @@ import numpy.typing as npt
 from custom_ros_tools.errors import PhysicsError
 from rpbi.bodies.body import Body
 from rpbi.config.sensors import ForceTorqueConfig
-from rpbi.geometry import Vector, cross, minus, plus, rotated_back, scaled
+from rpbi.geometry import Load, Vector, cross, minus, plus, rotated_back, scaled
 from rpbi.samples import WrenchSample
 from rpbi.urdf.joints import Joint
 from rpbi.urdf.subtree import LinkStates, Subtree
 
 from .filters import LowPass, SeededNoise, Zeroing
-from .sensor import Sensor
+from .sensor import SensedWorld, Sensor
 
 
 class ForceTorqueSensor(Sensor):
@@ -23,8 +24,8 @@ class ForceTorqueSensor(Sensor):
 
     PyBullet's own reading is of no use here: it lacks the motors' efforts (bullet3 issues 2966, 3204, 4451, 4604), and
     with them added it is still wrong, see docs/force_torque.md. So the wrench is what changed the momentum of all links
-    below the joint during the last tick, less their weight and less the contact forces on them (Newton-Euler, as an
-    impulse balance). That holds for all types of joints, control modes and limits.
+    below the joint during the last tick, less their weight and less what touches, holds or pushes them (Newton-Euler,
+    as an impulse balance). That holds for all types of joints, control modes and limits.
 
     It is read at `default_hz` unless its part of the robot's YAML, the configuration, has a rate.
     """
@@ -56,6 +57,10 @@ class ForceTorqueSensor(Sensor):
         self._before: LinkStates | None = None
         self._sample: WrenchSample | None = None
 
+    def enter(self, world: SensedWorld) -> None:
+        """Gets to know what holds the robot's links."""
+        self._attachments = world.attachments
+
     def before_step(self, tick: int) -> None:
         """Notes how the links move."""
         if self._dynamics_changes != self._robot.dynamics_changes:
@@ -74,6 +79,12 @@ class ForceTorqueSensor(Sensor):
         if self._sample is None and self._before is not None:
             self._sample = self._measure(self._before, tick)
         return self._sample
+
+    def _loads(self) -> Iterator[Load]:
+        """Yields what attachments and external wrenches did to the links below the joint in the last step."""
+        for load in (*self._attachments.loads_on(self._robot.name), *self._robot.external_wrenches.loads):
+            if load.link in self._subtree.links:
+                yield load
 
     def zero(self, count: int) -> Zeroing:
         """Takes what so many samples to come show on average for zero, unless it is being zeroed already."""
@@ -100,7 +111,7 @@ class ForceTorqueSensor(Sensor):
         """Returns force and moment of the last tick, as mean of that tick.
 
         With momentum p, angular momentum L about the joint's origin, which moves at v, first moment of mass s, weight
-        m g and contacts (f, t): F = dp/dt - m g - f and M = dL/dt + v x p - s x g - t.
+        m g, and what touches, holds or pushes it (f, t): F = dp/dt - m g - f and M = dL/dt + v x p - s x g - t.
 
         Raises:
             PhysicsError: If it is not finite.
@@ -114,6 +125,9 @@ class ForceTorqueSensor(Sensor):
         moment = minus(moment, cross(_mean(old.mass_moment, new.mass_moment), self._gravity))
         force = minus(force, scaled(self._contact_factor, contact_force))
         moment = minus(moment, scaled(self._contact_factor, contact_moment))
+        for load in self._loads():
+            force = minus(force, load.force)
+            moment = minus(moment, plus(load.torque, cross(minus(load.point, new.origin), load.force)))
         if not math.isfinite(sum(force) + sum(moment)):
             raise PhysicsError(f"{self.name}: wrench is not finite any more at tick {tick}: {force}, {moment}")
         quat = new.quat_xyzw

@@ -26,6 +26,10 @@ class SensedWorld(Protocol):
     def contacts(self) -> Any:
         """Who touches whom, a `ContactReader`."""
 
+    @property
+    def attachments(self) -> Any:
+        """Who holds whom, `Attachments`."""
+
 
 class Sensor(ABC):
     """Reads something from the world at a rate; it owns neither timer nor thread.

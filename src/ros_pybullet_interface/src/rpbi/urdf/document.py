@@ -4,6 +4,7 @@ import copy
 import math
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -111,6 +112,16 @@ class UrdfDocument:
             ValueError: If a value makes no sense; it names the joint.
         """
         return {joint.name: joint for joint in map(_read_joint, self._joints)}
+
+    @cached_property
+    def mimics(self) -> dict[str, Mimic]:
+        """What joints follow others, by name.
+
+        Raises:
+            ValueError: If a value makes no sense; it names the joint.
+        """
+        found = {joint.get("name", ""): _mimic(joint) for joint in self._joints}
+        return {name: mimic for name, mimic in found.items() if mimic is not None}
 
     @property
     def links_without_inertial(self) -> set[str]:
@@ -226,6 +237,18 @@ class UrdfDocument:
             name = element.get("filename", "")
             element.set("filename", str(beside_or_above(name, self._source) or name))
         return robot
+
+
+def mimics_of(path: str) -> dict[str, Mimic]:
+    """Returns what joints of a URDF file follow others, by name; none if it cannot be read as PyBullet may do.
+
+    Raises:
+        ValueError: If a value makes no sense; it names the joint.
+    """
+    with suppress(ConfigError, OSError):
+        if "<mimic" in Path(path).read_text(encoding="utf-8", errors="replace"):  # saves most files the parsing
+            return UrdfDocument(path).mimics
+    return {}
 
 
 def chain_urdf(joints: Sequence[UrdfJoint]) -> str:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import NamedTuple
 
 import pybullet
 
 from custom_ros_tools.errors import UnknownNameError
 from rpbi.engine.client import Client
+
+from .document import Mimic
 
 _TYPES = ("JOINT_REVOLUTE", "JOINT_PRISMATIC", "JOINT_SPHERICAL", "JOINT_PLANAR", "JOINT_FIXED")
 _TYPE_NAMES = {getattr(pybullet, name): name for name in _TYPES}
@@ -138,19 +141,48 @@ class JointTarget(NamedTuple):
         return values
 
 
+class Coupling(NamedTuple):
+    """That a joint follows another: its position is `multiplier` times that of the leader, plus `offset`.
+
+    Attributes:
+        leader: Index of the joint that it follows, which follows no other.
+        multiplier: Its velocity over that of the leader.
+        offset: Its position where that of the leader is 0 [rad or m].
+    """
+
+    leader: int
+    multiplier: float
+    offset: float
+
+
 class JointModel:
     """The joints of one robot, by index and by name.
 
     Args:
         joints: All joints in PyBullet's index order.
         base_joints: How many of them, the first ones, move its base and are none of the robot's own.
+        mimics: What joints follow others, by name.
+
+    Attributes:
+        own: All of its own joints.
+        moving: Those that have one axis.
+        couplings: By index, what joints follow others.
+        driven: Those of one axis that follow no other: motors drive them.
+
+    Raises:
+        ValueError: If a joint cannot follow another; it names the joint.
     """
 
-    def __init__(self, joints: Sequence[Joint], base_joints: int = 0) -> None:
+    def __init__(
+        self, joints: Sequence[Joint], base_joints: int = 0, mimics: Mapping[str, Mimic] = MappingProxyType({})
+    ) -> None:
         self.joints = tuple(joints)
         self.own = self.joints[base_joints:]
-        self.driven = tuple(joint for joint in self.own if joint.is_driven)
+        self.moving = tuple(joint for joint in self.own if joint.is_driven)
         self._by_name = {joint.name: joint for joint in self.own}
+        mimics = {name: mimic for name, mimic in mimics.items() if name in self._by_name and self[name].is_driven}
+        self.couplings = {self[name].index: self._coupling(name, mimics) for name in mimics}
+        self.driven = tuple(joint for joint in self.moving if joint.index not in self.couplings)
 
     def __getitem__(self, name: str) -> Joint:
         """Returns a joint by name.
@@ -163,8 +195,42 @@ class JointModel:
         except KeyError:
             raise UnknownNameError("joint", name, list(self._by_name)) from None
 
+    def _coupling(self, name: str, mimics: Mapping[str, Mimic]) -> Coupling:
+        """Returns what a joint follows in the end: the leader may follow another itself."""
+        leader, multiplier, offset = mimics[name]
+        passed = [name]
+        while leader in mimics and leader not in passed:
+            passed.append(leader)
+            leader, more, shift = mimics[leader]
+            multiplier, offset = multiplier * more, multiplier * shift + offset
+        if leader in passed:
+            raise ValueError(f"joint '{name}' follows '{mimics[name].joint}', which follows itself in the end")
+        if leader not in self._by_name or not self[leader].is_driven:
+            movable = ", ".join(joint.name for joint in self.moving)
+            raise ValueError(f"joint '{name}' follows '{leader}', which is none that moves; there are {movable}")
+        return Coupling(self[leader].index, multiplier, offset)
+
+    def effort_limit(self, joint: Joint) -> float:
+        """Returns the largest effort of a joint's motor [N m or N], which works for the joints that follow it, too."""
+        return joint.max_effort + sum(
+            abs(multiplier) * self.joints[index].max_effort
+            for index, (leader, multiplier, _) in self.couplings.items()
+            if leader == joint.index
+        )
+
+    def with_followers(self, positions: Mapping[int, float], offsets: bool = True) -> dict[int, float]:
+        """Returns positions by joint index, with those of the joints that follow them; velocities without `offsets`."""
+        followers = {
+            index: multiplier * positions[leader] + (offset if offsets else 0.0)
+            for index, (leader, multiplier, offset) in self.couplings.items()
+            if leader in positions
+        }
+        return {**positions, **followers}
+
     def resolve(self, names: Sequence[str], values: Sequence[float]) -> dict[int, float]:
-        """Checks values of joints and returns them by joint index; fixed joints are known but not driven.
+        """Checks values of joints and returns them by joint index.
+
+        Fixed joints, and those that follow others, are known but not driven.
 
         Raises:
             UnknownNameError: If the robot lacks one of the joints.
@@ -181,7 +247,7 @@ class JointModel:
                 raise ValueError(f"values must be finite, got {value} for joint '{name}'")
             if abs(value) > LARGEST:
                 raise ValueError(f"values must be within +-{LARGEST:g}, got {value:g} for joint '{name}'")
-            if joint.is_driven:
+            if joint.is_driven and joint.index not in self.couplings:
                 resolved[joint.index] = float(value)
         return resolved
 
@@ -193,10 +259,14 @@ class JointModel:
             ValueError: If lengths differ, a joint is named twice or cannot be driven, or a value is not finite.
         """
         resolved = self.resolve(names, values)
-        others = [f"'{name}' ({self[name].type_name})" for name in names if not self[name].is_driven]
-        if others and not resolved:
-            raise ValueError(f"expected joints that can be driven, got {', '.join(others)}")
+        if names and not resolved:
+            others = ", ".join(f"'{name}' ({self._why_undriven(self[name])})" for name in names)
+            raise ValueError(f"expected joints that can be driven, got {others}")
         return resolved
+
+    def _why_undriven(self, joint: Joint) -> str:
+        coupling = self.couplings.get(joint.index)
+        return joint.type_name if coupling is None else f"follows '{self.joints[coupling.leader].name}'"
 
     def check_limits(self, positions: Mapping[int, float]) -> None:
         """Checks positions [rad or m] by joint index.

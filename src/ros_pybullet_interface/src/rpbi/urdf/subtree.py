@@ -34,6 +34,9 @@ class Subtree:
 
     Args:
         first_link: PyBullet's index of the link, and of the joint that it hangs on.
+
+    Attributes:
+        links: PyBullet's indices of its links.
     """
 
     def __init__(self, pb: Client, body_id: int, first_link: int) -> None:
@@ -42,19 +45,19 @@ class Subtree:
         for index in range(first_link + 1, pb.getNumJoints(body_id)):  # parents come before their children
             if pb.getJointInfo(body_id, index)[16] in links:
                 links.append(index)
-        self._links = tuple(links)
+        self.links = tuple(links)
         self.take_dynamics()
 
     def take_dynamics(self) -> None:
         """Takes the links' masses and inertias as they are now."""
-        infos = [self._pb.getDynamicsInfo(self._body_id, link) for link in self._links]
+        infos = [self._pb.getDynamicsInfo(self._body_id, link) for link in self.links]
         self._inertias = tuple((float(info[0]), info[2]) for info in infos)
         self.mass_kg = sum(mass for mass, _ in self._inertias)
 
     def states(self) -> LinkStates:
         """Reads where the links are and how they move, to be made sense of later."""
         states: LinkStates = self._pb.getLinkStates(
-            self._body_id, self._links, computeLinkVelocity=1, computeForwardKinematics=1
+            self._body_id, self.links, computeLinkVelocity=1, computeForwardKinematics=1
         )
         return states
 
@@ -80,7 +83,7 @@ class Subtree:
         contacts with soft bodies, it keeps to itself.
         """
         force = moment = (0.0, 0.0, 0.0)
-        body_id, links = self._body_id, self._links
+        body_id, links = self._body_id, self.links
         touching = self._pb.getContactPoints(body_id)
         if not any(touch[3] in links or (touch[2] == body_id and touch[4] in links) for touch in touching):
             return force, moment

@@ -1,5 +1,6 @@
 """What robots that move and robots that are only shown have in common."""
 
+import logging
 import math
 from collections.abc import Mapping
 from functools import cached_property
@@ -13,12 +14,17 @@ from rpbi.sensors.base_state import BaseStateSensor
 from rpbi.sensors.force_torque import ForceTorqueSensor
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
+from rpbi.urdf.document import mimics_of
 from rpbi.urdf.files import resolve_meshes
 from rpbi.urdf.joints import Joint, JointModel, JointTarget
 from rpbi.urdf.loading import load_urdf
 
 from .robot_config import RobotConfig
 
+log = logging.getLogger(__name__)
+
+START_TOLERANCE = 1e-3
+"""How far apart start positions of coupled joints may be [rad or m] that are measured ones."""
 DEFAULT_BASE_STATE_HZ = 50.0
 """Rate of the state of a base that physics moves [Hz]."""
 
@@ -52,14 +58,17 @@ class JointedBody(Body):
         super().__init__(pb, config.name, body_id)
         self.config = config
         joints = Joint.all_of(pb, self.body_id)
-        self.model = JointModel(joints, self.base_joints)
+        self.model = self._joint_model(joints)
         self.joints = self.model.own
         self.link_indices = tuple(joint.index for joint in self.joints)
         if self.base_joints:
             self.root_link = joints[self.base_joints - 1].link
         if problems := self._problems():
             raise ConfigError(problems)
-        self._put_joints(self.start_positions())
+        starts = self.model.with_followers(self.start_positions())
+        for index in self.model.couplings:
+            self._compare_start(self.model.joints[index], starts[index])
+        self._put_joints(starts)
         if config.color_alpha is not None:
             self._set_alpha(config.color_alpha)
 
@@ -85,13 +94,16 @@ class JointedBody(Body):
 
     def start_positions(self) -> dict[int, float]:
         """Returns the start position [rad or m] of each driven joint by index."""
-        in_degrees = self.config.initial_revolute_joint_positions_are_deg
-        starts = ((joint, self.config.initial_joint_position.get(joint.name, 0.0)) for joint in self.model.driven)
-        return {joint.index: math.radians(q) if in_degrees and joint.is_revolute else q for joint, q in starts}
+        return {joint.index: self._start_of(joint) for joint in self.model.driven}
+
+    def _start_of(self, joint: Joint) -> float:
+        start = self.config.initial_joint_position.get(joint.name, 0.0)
+        in_degrees = self.config.initial_revolute_joint_positions_are_deg and joint.is_revolute
+        return math.radians(start) if in_degrees else start
 
     def joint_positions(self) -> dict[int, float]:
-        """Returns the measured position [rad or m] of each driven joint by index."""
-        indices = [joint.index for joint in self.model.driven]
+        """Returns the measured position [rad or m] of each joint of one axis by index."""
+        indices = [joint.index for joint in self.model.moving]
         states = self.pb.getJointStates(self.body_id, indices) if indices else ()
         return {index: state[0] for index, state in zip(indices, states)}
 
@@ -114,7 +126,8 @@ class JointedBody(Body):
             if abs(velocity) > joint.max_velocity:
                 limit = f"{joint.max_velocity:g} {joint.unit}/s"
                 raise ValueError(f"velocity of joint '{joint.name}' must be within +-{limit}, got {velocity:g}")
-        self._put_joints(positions, velocities)
+        velocities = {index: velocities.get(index, 0.0) for index in positions}
+        self._put_joints(self.model.with_followers(positions), self.model.with_followers(velocities, offsets=False))
 
     def remove(self) -> None:
         """Takes it out of the world, and its kinematics with it."""
@@ -131,6 +144,29 @@ class JointedBody(Body):
         values, speeds = [[each] for each in positions.values()], [[rates.get(index, 0.0)] for index in positions]
         self.pb.resetJointStatesMultiDof(self.body_id, [*positions], values, speeds)
 
+    def _joint_model(self, joints: list[Joint]) -> JointModel:
+        """Returns the joints, coupled as the URDF and the configuration say.
+
+        Raises:
+            ConfigError: If a joint cannot follow another.
+        """
+        coupled = self.config.coupled_joints
+        names = {joint.name for joint in joints[self.base_joints :]}
+        problems = [
+            Problem(self.name, f"coupled_joints.{name}", str(UnknownNameError("joint", name, sorted(names))))
+            for name in coupled
+            if name not in names
+        ]
+        if problems:
+            raise ConfigError(problems)
+        try:
+            mimics = mimics_of(self.config.loadURDF.fileName)
+            mimics.update({name: each.mimic for name, each in coupled.items()})
+            return JointModel(joints, self.base_joints, mimics)
+        except ValueError as error:
+            key = "coupled_joints" if coupled else "loadURDF.fileName"
+            raise ConfigError([Problem(self.name, key, str(error))]) from None
+
     def _problems(self) -> list[Problem]:
         """Returns what in the configuration does not fit the robot."""
         configured = self.config.initial_joint_position
@@ -142,6 +178,16 @@ class JointedBody(Body):
             for joint, position in starts
             if joint.name in configured and not joint.allows(position)
         ]
+
+    def _compare_start(self, follower: Joint, position: float) -> None:
+        """Warns if a joint that follows another is configured to start elsewhere than that one has it."""
+        wanted = self._start_of(follower)
+        if follower.name in self.config.initial_joint_position and abs(wanted - position) > START_TOLERANCE:
+            leader = self.model.joints[self.model.couplings[follower.index].leader].name
+            log.warning(
+                "%s: initial_joint_position.%s: has no effect: it follows '%s' and starts at %.6g %s",
+                *(self.name, follower.name, leader, position, follower.unit),
+            )
 
     def _unknown_joints(self, names: Mapping[str, str]) -> list[Problem]:
         """Returns a problem for each name, by the key that has it, that is no joint's."""

@@ -1,7 +1,8 @@
 """Robots: jointed bodies whose motors hold and follow targets."""
 
+import logging
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -10,6 +11,7 @@ import pybullet
 
 from custom_ros_tools.errors import Problem
 from rpbi.config.pybullet_args import IMPEDANCE_CONTROL
+from rpbi.constraints.couplings import couple
 from rpbi.control.controllers.controller import Arm, RobotState
 from rpbi.control.controllers.impedance import ExternalEfforts, joint_impedance
 from rpbi.control.controllers.manager import ControllerManager, ControllerSwitch, NewGains, controller_problems
@@ -31,6 +33,8 @@ from rpbi.urdf.joints import JointTarget
 
 from .jointed import JointedBody
 from .robot_config import RobotConfig
+
+log = logging.getLogger(__name__)
 
 
 class Robot(JointedBody):
@@ -67,6 +71,8 @@ class Robot(JointedBody):
             config.enforce_effort_limits,
             config.target_timeout_s,
         )
+        couple(pb, self.body_id, self.model.couplings)
+        self._told_followers = not self.model.couplings
         self.drive = JointDrive(
             self.name,
             pb,
@@ -209,6 +215,8 @@ class Robot(JointedBody):
 
     def _check_target(self, target: JointTarget) -> tuple[Command]:
         command = self.motors.check(target)
+        if not self._told_followers:
+            self._tell_followers(target.names)
         motion = self.drive.motion
         driven = [] if motion is None else [self.model.joints[i].name for i in command.values if i in motion.joints]
         if driven:
@@ -271,6 +279,14 @@ class Robot(JointedBody):
     def _check_controller_input(self, name: str, key: str, value: Any) -> Any:
         return self.controllers.of(name).check(key, value)
 
+    def _tell_followers(self, names: Sequence[str]) -> None:
+        """Says once that joints that follow others take no targets of their own."""
+        for index, coupling in self.model.couplings.items():
+            joint, leader = self.model.joints[index].name, self.model.joints[coupling.leader].name
+            if joint in names:
+                log.info("%s: targets of '%s' have no effect: it follows '%s'", self.name, joint, leader)
+                self._told_followers = True
+
     def _gains(self) -> dict[int, dict[str, float]]:
         """Returns PyBullet's gains by joint index; what does not fit was found before."""
         gains: dict[int, dict[str, float]] = {}
@@ -279,7 +295,7 @@ class Robot(JointedBody):
             if isinstance(given, Mapping):
                 by_index = {self.model[name].index: gain for name, gain in given.items()}
             else:
-                by_index = {joint.index: given[i % len(given)] for i, joint in enumerate(self.model.driven)}
+                by_index = {joint.index: given[i % len(given)] for i, joint in enumerate(self.model.moving)}
             for index, gain in by_index.items():
                 gains.setdefault(index, {})[argument] = gain
         return gains
@@ -291,14 +307,15 @@ class Robot(JointedBody):
 
     def _problems(self) -> list[Problem]:
         driven = [joint.name for joint in self.model.driven]
+        moving = [joint.name for joint in self.model.moving]
         problems = super()._problems()
         problems += trajectory_problems(self.name, self.config.joint_trajectory_controller, driven)
         for key, gains in self._configured_gains().items():
             path = f"setJointMotorControlArray.{key}"
             if isinstance(gains, Mapping):
                 problems += self._unknown_joints({f"{path}.{name}": name for name in gains})
-            elif len(gains) not in (1, len(driven)):
-                message = f"expected 1 number or {len(driven)}, one for each of {', '.join(driven)}; got {len(gains)}"
+            elif len(gains) not in (1, len(moving)):
+                message = f"expected 1 number or {len(moving)}, one for each of {', '.join(moving)}; got {len(gains)}"
                 problems.append(Problem(self.name, path, message))
         problems += controller_problems(self.name, self._arm(), self.config.controllers)
         for key in ("stiffness", "damping_ratio"):

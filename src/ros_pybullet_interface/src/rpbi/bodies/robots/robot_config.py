@@ -6,7 +6,18 @@ from typing import Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from custom_ros_tools.schema import Hz, HzOrOff, KeyedError, ListOf, Name, NonNegative, Seconds, Switch
+from custom_ros_tools.schema import (
+    ConfigModel,
+    Hz,
+    HzOrOff,
+    KeyedError,
+    ListOf,
+    Name,
+    NonNegative,
+    Seconds,
+    Switch,
+    Text,
+)
 from rpbi.bodies.body_config import BodyConfig
 from rpbi.config.pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity, SetJointMotorControlArray
 from rpbi.config.sensors import ContactsConfig, ForceTorqueEntry
@@ -14,6 +25,7 @@ from rpbi.control.controllers.entry import ControllerEntry
 from rpbi.control.controllers.impedance import JointSprings
 from rpbi.control.planar_base import PlanarBaseConfig
 from rpbi.control.trajectories.config import JointTrajectoryControllerConfig
+from rpbi.urdf.document import Mimic
 
 _NOT_VISUAL = {
     "controllers": "a visual robot has no motors to drive",
@@ -21,6 +33,28 @@ _NOT_VISUAL = {
     "contacts": "a visual robot touches nothing",
     "planar_base": "a visual robot has no physics; its base follows object_tf",
 }
+
+
+class CoupledJoint(ConfigModel):
+    """How a joint follows another, as `<mimic>` says it in a URDF."""
+
+    joint: Text = Field(description="The joint that it follows.")
+    multiplier: float = Field(1.0, description="Its velocity over that of the other.")
+    offset: float = Field(
+        0.0, description="Its position where the other is at 0.", json_schema_extra={"unit": "rad or m"}
+    )
+
+    @field_validator("multiplier")
+    @classmethod
+    def _is_not_zero(cls, value: float) -> float:
+        if value == 0.0:
+            raise ValueError("must not be 0: nothing would move it")
+        return value
+
+    @property
+    def mimic(self) -> Mimic:
+        """The same as a URDF has it."""
+        return Mimic(self.joint, self.multiplier, self.offset)
 
 
 class RobotConfig(BodyConfig):
@@ -47,6 +81,9 @@ class RobotConfig(BodyConfig):
     )
     move_to_initial_joint_state_on_startup: Switch = Field(
         False, description="Accepted without effect: a robot starts there and its motors hold it."
+    )
+    coupled_joints: dict[str, CoupledJoint] = Field(
+        {}, description="Joints that follow others, by name, beside those of which the URDF says so."
     )
     target_timeout_s: Seconds = Field(
         0.5, description="Age at which velocity and torque targets expire, in the world's time; positions never do."

@@ -15,6 +15,7 @@ from .robot_config import RobotConfig
 class VisualRobot(JointedBody):
     """A robot without physics: it is put where it shall be, pushes nothing and is pushed by nothing."""
 
+    has_physics = False
     example = {
         "is_visual_robot": True,
         "loadURDF": {"fileName": "kuka_iiwa/model.urdf", "useFixedBase": True},
@@ -45,6 +46,7 @@ class VisualRobot(JointedBody):
         return self.model.resolve(target.names, target.values_of("position", "a visual robot shows positions"))
 
     def _show(self, positions: dict[int, float]) -> None:
+        positions = self.model.with_followers(positions)
         self._put_joints(positions)
         if self.config.do_log_joint_limit_violations:
             for index, position in positions.items():

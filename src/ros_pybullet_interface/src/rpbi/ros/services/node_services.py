@@ -17,6 +17,8 @@ from ros_pybullet_interface.msg import ObjectDynamics, PybulletObject
 from ros_pybullet_interface.srv import (
     AddPybulletObject,
     AddPybulletObjectRequest,
+    ApplyWrench,
+    Attach,
     ChangeDynamicsRequest,
     ChangeObjectDynamics,
     ChangeObjectDynamicsRequest,
@@ -47,6 +49,8 @@ from rpbi.ros.headers import to_ros_time
 from rpbi.ros.object_lifecycle import ObjectLifecycle
 from rpbi.ros.requests import Requests
 from rpbi.ros.simulation import Simulation
+
+from .hands import apply_wrench, attach, detach
 
 log = logging.getLogger(__name__)
 
@@ -240,5 +244,8 @@ NODE_SERVICES = (
     Service("rpbi/get_pybullet_object_dynamics", GetObjectDynamics, _get_dynamics),
     Service("rpbi/change_pybullet_object_dynamics", ChangeObjectDynamics, _change_object_dynamics),
     Service("rpbi/change_dynamics", ChangeDynamicsService, _change_dynamics),
+    Service("rpbi/attach", Attach, attach),
+    Service("rpbi/detach", SetString, detach),
+    Service("rpbi/apply_wrench", ApplyWrench, apply_wrench),
     Service("rpbi/get_state_hash", GetStateHash, _state_hash),
 )

@@ -1,0 +1,1 @@
+"""What holds bodies and joints together beside contact: attachments, and joints that follow others."""
