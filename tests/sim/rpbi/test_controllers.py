@@ -147,7 +147,7 @@ def test_the_model_is_that_of_pinocchio_and_of_finite_differences(build):
                 step = np.zeros(7)
                 step[joint] = 1e-3
                 slope = (place(q + step) - place(q - step)) / 2e-3
-                assert jacobian[:3, joint] == pytest.approx(slope, abs=1e-4), (
+                assert jacobian[:3, joint] == pytest.approx(slope, abs=3e-4), (
                     "PyBullet tells places in single precision"
                 )
 

@@ -44,7 +44,7 @@ class RobotModel:
         self._body_id = -1
         self._gravity: Vector | None = None
         self._axes: dict[int, Quaternion] = {}
-        """Orientation of a link's inertial frame in the link: PyBullet has points in its axes, from the link's origin."""
+        """How a link's inertial frame is turned in it: PyBullet has points in its axes, from the link's origin."""
 
     def mass_matrix(self, q: Sequence[float]) -> Array:
         """Returns the mass matrix at joint positions [rad or m], shape (n, n) [kg m^2, kg m, kg]."""
