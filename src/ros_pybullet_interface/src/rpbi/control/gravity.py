@@ -16,6 +16,7 @@ class GravityModel:
     turned instead.
 
     Args:
+        world: The client of its world, for that one's gravity.
         load: How it was loaded. What is attached to it, or was changed in it since, is not known here.
     """
 
@@ -23,8 +24,7 @@ class GravityModel:
         self._load_arguments = load.kwargs()
         self._driven = [joint.index for joint in model.driven]
         self._zeros = [0.0] * len(self._driven)
-        engine = world.getPhysicsEngineParameters()
-        self._gravity = tuple(engine[f"gravityAcceleration{axis}"] for axis in "XYZ")
+        self._world = world
         self._gravity_in_base: Vector | None = None
         self._pb: Client | None = None  # made when it is needed first: the renderer's copy of the robot never does
         self._body_id = -1
@@ -41,7 +41,7 @@ class GravityModel:
         if self._pb is None:
             self._pb = self._load()
         to_base = self._pb.invertTransform((0.0, 0.0, 0.0), base.quat_xyzw)[1]
-        gravity = self._pb.rotateVector(to_base, self._gravity)
+        gravity = self._pb.rotateVector(to_base, self._world.gravity)
         if gravity != self._gravity_in_base:
             self._pb.setGravity(*gravity)
             self._gravity_in_base = gravity

@@ -66,6 +66,7 @@ ACTIONS: dict[str, Callable[[Any, Clock, Any], Any]] = {
     "teleport": lambda body, _, pose: body.teleport(pose),
     "set_joint_state": lambda body, _, target: body.set_joint_state(target),
     "switch_mode": lambda body, _, mode: body.switch_mode(mode),
+    "set_gains": lambda body, _, gains: body.motors.set_gains(gains),
     "stop_motion": _stop_motion,
     "move": _move,
     "follow": _follow,

@@ -13,7 +13,7 @@ class WorldCommand(NamedTuple):
     Attributes:
         tick: The world's tick at which it did: after that tick's physics, before the next.
         name: The body that it concerns, `NAME/LINK` for dynamics, `NAME/INPUT` for inputs, empty for the whole world.
-        what: `input`, `add`, `remove`, `dynamics`, `halt`, `pause`, or a key of ACTIONS.
+        what: `input`, `add`, `remove`, `dynamics`, `physics`, `sensor_rate`, `halt`, `pause`, or a key of ACTIONS.
         value: What it was.
     """
 

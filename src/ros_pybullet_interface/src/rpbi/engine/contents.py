@@ -9,6 +9,7 @@ from custom_ros_tools.errors import ConfigError, PhysicsError, PluginError, Prob
 from rpbi.bodies import Body, BodyConfig
 from rpbi.config.loading import LoadedWorld
 from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.config.pybullet_world_models import PhysicsChange
 from rpbi.config.sensors import FIRST_TOPIC_NAME, RgbdSensorConfig
 from rpbi.plugins import blaming
 from rpbi.sensors import sensor_class
@@ -143,6 +144,10 @@ class WorldContents:
         """Changes how a link behaves, the root if its name is empty; see `World.change_dynamics`."""
         self._append(LogEntry(name, "dynamics", (link, change)))
 
+    def change_physics(self, change: PhysicsChange) -> None:
+        """Changes gravity or how contacts and joints are solved; see `World.change_physics`."""
+        self._append(LogEntry("", "physics", change))
+
     def clear(self) -> None:
         """Takes all out but the cameras and the inputs, which wait for what `fill` brings."""
         for body in self.bodies.values():
@@ -185,6 +190,7 @@ class WorldContents:
         configs = [item.config for item in loaded.cameras]
         for camera in before.values():
             if any(camera.config is config for config in configs):
+                camera.hz = camera.config.hz
                 self._take_camera(camera)
         problems: list[Problem] = []
         for config, file in loaded.cameras:

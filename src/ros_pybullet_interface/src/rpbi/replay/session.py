@@ -164,6 +164,8 @@ _CHANGES: dict[str, Callable[[World, str, Any], Any]] = {
     "add": lambda world, _, arguments: world.add(*arguments),
     "remove": lambda world, name, _: world.remove(name),
     "dynamics": World.change_dynamics,
+    "physics": lambda world, _, change: world.change_physics(change),
+    "sensor_rate": lambda world, name, rate: world.set_sensor_rate(name, *rate),
     "halt": lambda world, _, reason: world.halt(reason),
     "pause": lambda world, _, reason: world.pause(reason),
 }

@@ -1,6 +1,7 @@
 """The simulation loop: requests, ticks, samples out, in step with the wall clock."""
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -165,6 +166,22 @@ class Simulation:
         self._pacer.restart()
         self._publishers.restart()
         self._state.restart()
+
+    @property
+    def real_time_factor(self) -> float:
+        """How fast the world is to run: simulated seconds per second; 0 is as fast as it goes."""
+        return self._pacer.real_time_factor
+
+    def set_real_time_factor(self, factor: float) -> None:
+        """Changes how fast the world is to run, from now on.
+
+        Raises:
+            ValueError: If it is negative or not finite.
+        """
+        if not 0.0 <= factor < math.inf:
+            raise ValueError(f"real_time_factor: must be finite and >= 0, got {factor:g}")
+        self._pacer.set_factor(factor)
+        self._publishers.set_factor(factor)
 
     def run(self, is_over: Callable[[], bool]) -> None:
         """Loops until it is over, on the thread that calls it."""

@@ -100,6 +100,11 @@ class TickPublisher:
         self._idle_tick = 0
         """The tick at which the world would be, had it not stood still."""
 
+    def set_factor(self, real_time_factor: float) -> None:
+        """Publishes the time as often as a pace allows."""
+        if self._clock is not None:
+            self._clock.set_factor(real_time_factor)
+
     def publish_tick(self, samples: list[Any]) -> None:
         """Publishes a tick and the samples that were due."""
         if self._clock is not None:

@@ -154,6 +154,14 @@ _ELSEWHERE = (LinkPoseSample, SceneSample)
 """Samples that go to TF and to the renderer."""
 
 
+def address(sensor: Sensor) -> str:
+    """Returns what a sensor is called in requests: its topic below `rpbi/`; `NAME/tf`, or a camera's name."""
+    topic = sample_topic(sensor)
+    if topic is not None:
+        return topic.name.format(name=sensor.name).removeprefix("rpbi/")
+    return f"{sensor.name}/tf" if sensor.sample_type is LinkPoseSample else sensor.name
+
+
 def sample_topic(sensor: Sensor) -> Topic | None:
     """Returns the topic of a sensor, None if its samples go elsewhere.
 

@@ -57,12 +57,15 @@ class ClockPublisher:
     """Simulated time on /clock, of which the simulator is the only source."""
 
     def __init__(self, world: World) -> None:
-        self._clock, config = world.clock, world.config
-        factor = config.real_time_factor
-        limit_hz = min(factor / config.timeStep, MAX_CLOCK_HZ) if factor else FREE_RUNNING_CLOCK_HZ
-        self._period_s = 1.0 / min(config.clock_hz or limit_hz, limit_hz)
+        self._clock, self._most_hz = world.clock, world.config.clock_hz
         _warn_of_rivals()
         self._publisher = FastTopic(CLOCK.name, ClockMessage)
+        self.set_factor(world.config.real_time_factor)
+
+    def set_factor(self, real_time_factor: float) -> None:
+        """Publishes as often as a pace allows."""
+        limit_hz = min(real_time_factor / self._clock.dt_s, MAX_CLOCK_HZ) if real_time_factor else FREE_RUNNING_CLOCK_HZ
+        self._period_s = 1.0 / min(self._most_hz or limit_hz, limit_hz)
         self._due_s = 0.0
 
     def publish_tick(self) -> None:
@@ -98,7 +101,6 @@ class StatusPublisher:
 
     def __init__(self, world: World, pacer: Pacer, facts: Callable[[], Mapping[str, str]]) -> None:
         self._clock, self._pacer, self._facts = world.clock, pacer, facts
-        self._wanted_factor = world.config.real_time_factor
         self._rate = WallRate(world.config.status_hz)
         self._diagnostics_rate = WallRate(1.0, delay_s=1.0)
         self._status = rospy.Publisher(STATUS.name, Int64, queue_size=10)
@@ -127,9 +129,10 @@ class StatusPublisher:
         self._overruns = self._pacer.overruns
         status = DiagnosticStatus(name=f"{rospy.get_name()}: simulation", hardware_id="rpbi", level=DiagnosticStatus.OK)
         status.message = "running" if running else "stepping" if stepping else "stopped"
-        if running and factor < FALLING_BEHIND * self._wanted_factor:
+        asked = self._pacer.real_time_factor
+        if running and factor < FALLING_BEHIND * asked:
             status.level = DiagnosticStatus.WARN
-            status.message = f"too slow: real-time factor {factor:.3f} instead of {self._wanted_factor:g}"
+            status.message = f"too slow: real-time factor {factor:.3f} instead of {asked:g}"
         values = {
             "real_time_factor": f"{factor if running else 0.0:.4f}",
             "overruns_total": str(self._pacer.overruns),
@@ -206,7 +209,7 @@ class StatePublisher:
             stepping=self.is_stepping,
             tick=clock.tick,
             simulated_time=clock.time_s,
-            real_time_factor_asked=self._world.config.real_time_factor,
+            real_time_factor_asked=self._pacer.real_time_factor,
             real_time_factor=self._factor,
             overruns=self._pacer.overruns,
             lost_time=self._pacer.lost_s,
