@@ -273,11 +273,14 @@ class World:
             except Exception as error:
                 blame(body, f"before_step of '{body.name}' at tick {self.clock.tick}", error)
                 raise
-        self._sensors.act("before_step")
+        watching = self._sensors.watching
+        if watching:
+            self._sensors.act("before_step")
         self.pb.stepSimulation()
         self.contacts.outdate()
         self.clock.advance()
-        self._sensors.act("after_step")
+        if watching:
+            self._sensors.act("after_step")
         return self._sensors.read_due()
 
     def read_rest(self) -> list[Any]:

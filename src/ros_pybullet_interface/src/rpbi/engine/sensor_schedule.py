@@ -51,7 +51,7 @@ class SensorSchedule:
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._scheduled: dict[str, list[_Scheduled]] = {}
-        self._watching: list[Sensor] = []
+        self.watching: list[Sensor] = []
         """Sensors that act at every tick."""
         self._queue: list[tuple[int, int, _Scheduled]] = []
         """A heap of when each sensor is due, in which order it came, and the sensor."""
@@ -107,7 +107,7 @@ class SensorSchedule:
 
     def act(self, method: str) -> None:
         """Calls `before_step` or `after_step` of the sensors that act at every tick."""
-        for sensor in self._watching:
+        for sensor in self.watching:
             try:
                 getattr(sensor, method)(self._clock.tick)
             except Exception as error:
@@ -118,6 +118,8 @@ class SensorSchedule:
         """Returns samples of the sensors that are due at this tick."""
         tick = self._clock.tick
         queue = self._queue
+        if not queue or queue[0][0] > tick:
+            return []
         samples: list[Any] = []
         while queue and queue[0][0] <= tick:
             _, order, each = queue[0]
@@ -140,7 +142,7 @@ class SensorSchedule:
     def _take_stock(self) -> None:
         self._queue = [(each.next_tick, each.order, each) for each in self._all() if each.sensor.hz]
         heapq.heapify(self._queue)
-        self._watching = [each.sensor for each in self._all() if _acts_at_ticks(type(each.sensor))]
+        self.watching = [each.sensor for each in self._all() if _acts_at_ticks(type(each.sensor))]
 
     def _all(self) -> Iterator[_Scheduled]:
         for scheduled in self._scheduled.values():

@@ -19,6 +19,8 @@ log = logging.getLogger(__name__)
 
 IDLE_PERIOD_S = 0.001
 """Shortest time between two looks at requests while stopped [s]."""
+PASS_S = 0.001
+"""How long ticks that are due follow each other in one pass of the loop [s]."""
 BURST_S = 0.01
 """How long ticks follow each other before the loop looks at requests [s]."""
 
@@ -205,14 +207,22 @@ class Simulation:
             self._advance_burst(self._burst)
         elif not self.running:
             self._idle()
-        elif self._pacer.is_due():
-            self._take_tick()
+        else:
+            self._take_due_ticks()
 
     def _publish(self) -> None:
         self._status.spin(self.running, self._burst is not None)
         self._state.spin(self.running or self._burst is not None)
         self._commands.spin()
         flush_buffered_sockets()
+
+    def _take_due_ticks(self) -> None:
+        end_s = time.monotonic() + PASS_S
+        while self._pacer.is_due():
+            self._take_tick()
+            if time.monotonic() > end_s:
+                break
+        self._publishers.publish_time()
 
     def _take_tick(self, is_last: bool = False) -> None:
         """Goes one tick on; of the last one before standing still everything is published, whatever is due."""
@@ -226,6 +236,7 @@ class Simulation:
         while burst.left > 1 and time.monotonic() < end_s:
             self._take_tick()
             burst.left -= 1
+        self._publishers.publish_time()
         if burst.left == 1:
             self._take_tick(is_last=True)
             burst.left = 0

@@ -60,6 +60,7 @@ class ClockPublisher:
         self._clock, self._most_hz = world.clock, world.config.clock_hz
         _warn_of_rivals()
         self._publisher = FastTopic(CLOCK.name, ClockMessage)
+        self._sent_ns = 0
         self.set_factor(world.config.real_time_factor)
 
     def set_factor(self, real_time_factor: float) -> None:
@@ -69,9 +70,9 @@ class ClockPublisher:
         self._due_s = 0.0
 
     def publish_tick(self) -> None:
-        """Publishes a new tick, unless the rate is used up."""
+        """Publishes the present tick, if it is a new one and the rate is not used up."""
         now_s = time.monotonic()
-        if now_s >= self._due_s:
+        if now_s >= self._due_s and self._clock.stamp_ns != self._sent_ns:
             # Counting on from the last deadline keeps the mean rate; a pause must not be made up for.
             self._due_s = max(self._due_s + self._period_s, now_s - self._period_s)
             self._send()
@@ -87,7 +88,8 @@ class ClockPublisher:
             self.publish_now()
 
     def _send(self) -> None:
-        self._publisher.publish(ClockMessage(to_ros_time(self._clock.stamp_ns)))
+        self._sent_ns = self._clock.stamp_ns
+        self._publisher.publish(ClockMessage(to_ros_time(self._sent_ns)))
 
 
 class StatusPublisher:
