@@ -19,10 +19,8 @@ log = logging.getLogger(__name__)
 
 IDLE_PERIOD_S = 0.001
 """Shortest time between two looks at requests while stopped [s]."""
-PASS_S = 0.001
-"""How long ticks that are due follow each other in one pass of the loop [s]."""
-BURST_S = 0.01
-"""How long ticks follow each other before the loop looks at requests [s]."""
+BURST_S = 0.005
+"""How long ticks that are due follow each other before the loop sends what they had, and looks at requests [s]."""
 
 
 class StepBurst:
@@ -188,7 +186,7 @@ class Simulation:
     def run(self, is_over: Callable[[], bool]) -> None:
         """Loops until it is over, on the thread that calls it."""
         self._thread = threading.get_ident()
-        parts = (self._move, *self._helpers, self._publish)
+        parts = (self._move, flush_buffered_sockets, *self._helpers, self._publish)
         while not is_over():
             self.passes += 1
             self.world.mailbox.run_requests()
@@ -217,7 +215,7 @@ class Simulation:
         flush_buffered_sockets()
 
     def _take_due_ticks(self) -> None:
-        end_s = time.monotonic() + PASS_S
+        end_s = time.monotonic() + BURST_S
         while self._pacer.is_due():
             self._take_tick()
             if time.monotonic() > end_s:
@@ -230,6 +228,8 @@ class Simulation:
         publish = self._publishers.publish_all if is_last else self._publishers.publish_tick
         publish(self.world.step())
         self._state.take_tick()
+        if is_last:
+            flush_buffered_sockets()  # before whoever asked for the tick gets an answer
 
     def _advance_burst(self, burst: StepBurst) -> None:
         end_s = time.monotonic() + BURST_S

@@ -1,7 +1,7 @@
-"""Messages that are sent often, and packed in one go: the same bytes as their types write, in a fraction of the time."""
+"""Messages that are sent often, packed in one go: the same bytes as their types write, in a fraction of the time."""
 
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
 from io import BytesIO
 
