@@ -18,9 +18,12 @@ from mobile_base import mobile_base
 from worlds import FLOOR, ball, box, iiwa, write_world
 
 from rpbi.config.loading import load_object
+from rpbi.config.pybullet_args import IMPEDANCE_CONTROL
 from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.config.pybullet_world_models import SetGravity, SetPhysicsEngineParameter
 from rpbi.constraints.attachment_config import AttachmentConfig
 from rpbi.control.external_wrenches import ExternalWrench
+from rpbi.control.motors import MotorGains
 from rpbi.control.trajectories.request import TrajectoryPoint as Point
 from rpbi.control.trajectories.request import TrajectoryRequest
 from rpbi.engine.actions import RecordedTrajectory, TimedGoal
@@ -32,7 +35,7 @@ from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
 
 JOINTS = [f"lbr_iiwa_joint_{number}" for number in range(1, 8)]
-MODES = (pybullet.POSITION_CONTROL, pybullet.VELOCITY_CONTROL, pybullet.TORQUE_CONTROL)
+MODES = (pybullet.POSITION_CONTROL, pybullet.VELOCITY_CONTROL, pybullet.TORQUE_CONTROL, IMPEDANCE_CONTROL)
 
 
 def build(folder: Path | None = None) -> World:
@@ -92,6 +95,21 @@ class Script:
             self._target(world)
         if draw.random() < 0.01:
             self._something(world)
+        if draw.random() < 0.006:
+            self._physics(world)
+
+    def _physics(self, world: World) -> None:
+        draw = self._random
+        kind = draw.randrange(4)
+        if kind == 0:
+            world.change_physics(SetGravity(gravX=draw.uniform(-1, 1), gravZ=draw.uniform(-10, -5)))
+        elif kind == 1:
+            world.change_physics(SetPhysicsEngineParameter(numSolverIterations=draw.randint(20, 80), contactERP=0.3))
+        elif kind == 2:
+            gains = [draw.uniform(0.02, 0.2) for _ in JOINTS]
+            world.act("iiwa", "set_gains", MotorGains(JOINTS, gains, [10.0 * gain for gain in gains]))
+        else:
+            world.set_sensor_rate("iiwa", 1, draw.choice((0.0, 50.0, 1000.0)))
 
     def _target(self, world: World) -> None:
         draw = self._random

@@ -37,7 +37,7 @@ def session(folder):
 def test_a_session_with_contacts_is_the_same_in_a_new_process(seed, folder):
     recorded = script.record(seed, TICKS, folder)
     kinds = {command.what for _, command in recorded["commands"]}
-    assert {"input", "add", "switch_mode", "attach", "push"} <= kinds
+    assert {"input", "add", "switch_mode", "attach", "push", "physics", "set_gains", "sensor_rate"} <= kinds
     printed = subprocess.run(
         [sys.executable, script.__file__], input=json.dumps(recorded), capture_output=True, text=True, check=True
     ).stdout

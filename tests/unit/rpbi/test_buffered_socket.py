@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from custom_ros_tools.ros.buffered_socket import BufferedSocket
+from custom_ros_tools.ros.buffered_socket import MOST_TOGETHER, BufferedSocket, flush_buffered_sockets
 
 
 @pytest.fixture
@@ -32,10 +32,38 @@ def _message(number):
     return b"%06d" % number * 500
 
 
-def test_what_is_taken_at_once_goes_at_once(pair):
+def test_messages_go_together_with_the_next_flush(pair):
     buffered = BufferedSocket(pair[0], limit=10)
-    buffered.sendall(b"hello")
-    assert _received(pair[1]) == b"hello"
+    buffered.sendall(b"hello ")
+    buffered.sendall(b"world")
+    assert _received(pair[1]) == b""
+    flush_buffered_sockets()
+    assert _received(pair[1]) == b"hello world"
+
+
+def test_many_messages_do_not_wait_for_a_flush(pair):
+    buffered = BufferedSocket(pair[0], limit=1000)
+    for _ in range(MOST_TOGETHER):
+        buffered.sendall(b"x")
+    assert _received(pair[1]) == b"x" * MOST_TOGETHER
+
+
+def test_sockets_are_flushed_in_the_order_in_which_messages_came(pair):
+    class Noting(BufferedSocket):
+        def flush(self):
+            flushed.append(self)
+            super().flush()
+
+    flushed = []
+    others = socket.socketpair()
+    first, second = Noting(pair[0], limit=10), Noting(others[0], limit=10)
+    for each in (second, first, second):
+        each.sendall(b"x")
+    flush_buffered_sockets()
+    flush_buffered_sockets()
+    assert flushed == [second, first]
+    for each in others:
+        each.close()
 
 
 def test_a_reader_that_sleeps_holds_nobody_up_and_gets_everything_in_order(pair):
@@ -64,11 +92,14 @@ def test_beyond_the_limit_the_oldest_are_dropped_but_never_a_part_of_one(pair):
     assert len(numbers) < 100
 
 
-def test_a_reader_that_has_gone_is_an_error(pair):
+def test_a_reader_that_has_gone_is_an_error_at_the_next_message(pair):
     buffered = BufferedSocket(pair[0], limit=5)
     pair[1].close()
+    buffered.sendall(b"x")
+    flush_buffered_sockets()
     with pytest.raises(BrokenPipeError):
         buffered.sendall(b"x")
+    flush_buffered_sockets()
 
 
 def test_it_is_otherwise_the_socket(pair):

@@ -109,7 +109,7 @@ def test_robot_description_is_a_word_until_a_file_stands_for_it(folder: Path) ->
 
 
 def test_all_faults_of_all_files_are_told_at_once(folder: Path) -> None:
-    write(folder / "arm.yaml", {**ARM, "loadURDF": {"fileName": "none.urdf"}, "joint_state_publisher_hz": 0})
+    write(folder / "arm.yaml", {**ARM, "loadURDF": {"fileName": "none.urdf"}, "joint_state_publisher_hz": -1})
     shape = {**BALL["createVisualShape"], "radius": float("nan"), "raduis": 1}
     write(folder / "ball.yaml", {**BALL, "createVisualShape": shape})
     write(folder / "twin.yaml", {"name": "arm", "createVisualShape": {"shapeType": "GEOM_BX"}})
@@ -137,7 +137,7 @@ def test_all_faults_of_all_files_are_told_at_once(folder: Path) -> None:
         f"world.yaml: visual_objects[3]: no such file: missing.yaml (looked in {folder}, {data})",
         "arm.yaml: name: 'arm' is taken by twin.yaml; names are unique in a world",
         f"arm.yaml: loadURDF.fileName: no such file: none.urdf (looked in {folder}, {data})",
-        "arm.yaml: joint_state_publisher_hz: must be > 0 [Hz], got 0",
+        "arm.yaml: joint_state_publisher_hz: must be >= 0 [Hz], got -1",
         "world.yaml: rgbd_sensor.name: 'ball' is taken by ball.yaml; names are unique in a world",
     ]
 

@@ -41,6 +41,16 @@ def test_ticks_follow_the_real_time_factor(wall, factor, expected):
     assert pace.measure() == pytest.approx(factor, rel=0.01)
 
 
+def test_another_factor_counts_at_once_and_owes_nothing_of_before(wall):
+    pace = Pacer(0.001)
+    _run(pace, wall, 100.5)
+    wall.now_s += 0.2
+    pace.set_factor(0.1)
+    assert _run(pace, wall, 101.7) == pytest.approx(100, abs=1)
+    assert (pace.real_time_factor, pace.overruns) == (0.1, 0)
+    assert pace.measure() == pytest.approx(0.1, rel=0.02)
+
+
 def test_short_lateness_is_caught_up_with(wall):
     pace = Pacer(0.001)
     ticks = _run(pace, wall, 100.5)

@@ -12,6 +12,7 @@ from custom_ros_tools.errors import UnknownNameError
 from rpbi.bodies.dynamics import LinkDynamics, read_dynamics
 from rpbi.config.loading import LoadedWorld, load_world
 from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.config.pybullet_world_models import PhysicsChange
 from rpbi.config.sensors import RgbdSensorConfig
 from rpbi.constraints.attachment_config import AttachmentConfig
 from rpbi.engine.actions import ACTIONS, MOVES_AT_ONCE
@@ -182,6 +183,29 @@ class World:
         self.attachments.remove(name)
         self._note(name, "detach", None)
 
+    def change_physics(self, change: PhysicsChange) -> None:
+        """Changes gravity, or how contacts and joints are solved; a reset takes it back."""
+        self._contents.change_physics(change)
+        self._note("", "physics", change)
+
+    def set_sensor_rate(self, name: str, number: int, hz: float) -> None:
+        """Changes how often a sensor is read; a reset takes it back.
+
+        Args:
+            name: The body that has it, or the camera.
+            number: Which one it is of `sensors_of(name)`.
+            hz: Its rate [Hz] of the world's time from this tick on; 0 is off.
+
+        Raises:
+            UnknownNameError: If there is no body or camera of that name.
+            ValueError: If there is no such sensor, or the rate is negative or not finite.
+        """
+        if name not in self._sensors:
+            raise UnknownNameError("object", name, [*self.bodies, *self.cameras])
+        self._sensors.set_rate(name, number, hz)
+        if name in self.bodies:
+            self._note(name, "sensor_rate", (number, hz))
+
     def act(self, name: str, what: str, value: Any, do: Callable[[Any], Any] | None = None) -> Any:
         """Does something to a body, and notes it as a command; when it raises, nothing is noted.
 
@@ -280,11 +304,14 @@ class World:
                 raise
         if self._pushed:
             self._push()
-        self._sensors.act("before_step")
+        watching = self._sensors.watching
+        if watching:
+            self._sensors.act("before_step")
         self.pb.stepSimulation()
         self.contacts.outdate()
         self.clock.advance()
-        self._sensors.act("after_step")
+        if watching:
+            self._sensors.act("after_step")
         if self.attachments.limited:
             self.attachments.break_overloaded(self.clock.tick)
         return self._sensors.read_due()
@@ -313,7 +340,8 @@ class World:
         """Makes the world what it was when it was built, to the last bit; stamps go on.
 
         Objects that came later go, those that were removed come back. Motions end with a reason; inputs that wait are
-        dropped. Cameras stay, with the pose that they have. Bodies and their sensors are new objects.
+        dropped. Cameras stay, with the pose that they have. Bodies and their sensors are new objects; gravity, the
+        engine's parameters and rates are those of the configuration.
 
         Raises:
             ConfigError: If something cannot be loaded any more, for instance because its file has gone; then the

@@ -5,65 +5,70 @@ import threading
 from collections import deque
 from typing import Any
 
+MOST_TOGETHER = 32
+"""How many messages are sent by one call of the system, and kept at most until the next flush."""
+
 
 class BufferedSocket:
-    """A connected socket whose `sendall` never waits: what the other side does not take yet is kept in order.
+    """A connected socket whose `sendall` never waits: messages are kept until the next flush, and are sent in order.
 
-    Any thread may use it. Beyond `limit` messages that are kept, the oldest are dropped.
+    Any thread may use it. What the other side does not take yet stays; beyond `limit` messages the oldest are dropped.
     """
 
     def __init__(self, connection: socket.socket, limit: int) -> None:
         connection.setblocking(False)  # rospy's sockets have a timeout, for which Python would wait whatever the flags
         self._socket = connection
         self._lock = threading.Lock()
-        self._begun = b""  # rest of a message of which a part was sent
+        self._begun = b""  # rest of messages of which a part was sent
         self._kept: deque[bytes] = deque(maxlen=limit)
+        self._most_together = min(limit, MOST_TOGETHER)
+        self._error: OSError | None = None
+        """Why the other side cannot be reached any more."""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._socket, name)
 
     def sendall(self, data: bytes) -> None:
-        """Sends a message, now or with a later call.
+        """Has a message sent by the next flush, or now if many are kept already.
 
         Raises:
-            OSError: If the other side has gone.
+            OSError: If the other side has gone, as was seen before.
         """
         with self._lock:
+            if self._error is not None:
+                raise self._error
             self._kept.append(data)
-            self._send_kept()
+            _unsent[self] = None
+            if len(self._kept) >= self._most_together:
+                self._send_kept()
 
     def flush(self) -> None:
-        """Sends what is kept as far as the other side takes it; forgets it if the other side has gone."""
+        """Sends what is kept as far as the other side takes it; if that has gone, the next message is an error."""
         with self._lock:
-            try:
-                self._send_kept()
-            except OSError:  # rospy looks for broken connections by itself, and closes them
-                self._begun = b""
-                self._kept.clear()
-                _unsent.discard(self)
+            self._send_kept()
 
     def _send_kept(self) -> None:
-        self._begun = self._send(self._begun)
-        while self._kept and not self._begun:
-            self._begun = self._send(self._kept.popleft())
-        if self._begun:
-            _unsent.add(self)
-        elif _unsent:
-            _unsent.discard(self)
+        while True:
+            if not self._begun:
+                if not self._kept:
+                    _unsent.pop(self, None)
+                    return
+                count = min(len(self._kept), MOST_TOGETHER)
+                self._begun = b"".join([self._kept.popleft() for _ in range(count)])
+            try:
+                self._begun = self._begun[self._socket.send(self._begun) :]
+            except BlockingIOError:
+                return
+            except OSError as error:
+                self._error, self._begun = error, b""
+                self._kept.clear()
 
-    def _send(self, data: bytes) -> bytes:
-        """Sends what can be sent at once and returns the rest."""
-        try:
-            return data[self._socket.send(data) :] if data else data
-        except BlockingIOError:
-            return data
 
-
-_unsent: set[BufferedSocket] = set()
-"""Those that keep something."""
+_unsent: dict[BufferedSocket, None] = {}
+"""Those that keep something, in the order in which they began to."""
 
 
 def flush_buffered_sockets() -> None:
-    """Sends what slow subscribers have not taken yet, as far as they take it; for every pass of a loop."""
+    """Sends what is kept, as far as it is taken; for every pass of a loop."""
     for each in tuple(_unsent):
         each.flush()

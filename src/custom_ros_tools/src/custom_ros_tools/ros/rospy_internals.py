@@ -17,7 +17,7 @@ from weakref import WeakMethod
 
 import rospy
 
-from .buffered_socket import BufferedSocket
+from .buffered_socket import BufferedSocket, flush_buffered_sockets
 
 T = TypeVar("T")
 
@@ -34,7 +34,7 @@ def _expecting(expected: str, loss: str, use: Callable[[], T]) -> T | None:
 
 
 class DirectSending:
-    """Has a publisher send in the thread that publishes, through sockets that keep what is not taken yet.
+    """Has a publisher send in the thread that publishes, through sockets that keep all until `flush_buffered_sockets`.
 
     With a queue size, rospy hands every message to a thread for each subscriber. At 1 kHz with a few subscribers the
     threads' quarrel about Python's lock costs more than the simulation; without a queue size, one subscriber that does
@@ -94,6 +94,7 @@ class DirectSending:
                 raise TypeError("the list of connections is the same as before the first one")
             sending.wrap_connections()
             trial.impl.publish(publisher.data_class())
+            flush_buffered_sockets()
             theirs.setblocking(False)
             if not isinstance(connection.socket, BufferedSocket) or not theirs.recv(1):
                 raise TypeError("nothing was sent by the socket of the connection")

@@ -109,6 +109,10 @@ class SetPhysicsEngineParameter(PybulletModel):
     numNonContactInnerIterations: Iterations | None = optional("Iterations on joints in each of the solver's.")
 
 
+PhysicsChange = SetGravity | SetPhysicsEngineParameter
+"""What can be changed of a world's physics while it runs."""
+
+
 def _as_list(given: Any) -> Any:
     """Splits `A|B`; anything that is no list is a list of one."""
     if isinstance(given, str):

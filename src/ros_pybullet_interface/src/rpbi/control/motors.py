@@ -6,7 +6,7 @@ import contextlib
 import logging
 import math
 import time
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import pybullet
@@ -83,6 +83,20 @@ def joined(older: tuple[Command, ...], newer: tuple[Command, ...]) -> tuple[Comm
     return (*older[:-1], older[-1].merged(*newer))
 
 
+class MotorGains(NamedTuple):
+    """Gains of some joints.
+
+    Attributes:
+        names: The joints.
+        position: PyBullet's position gain of each; empty to leave them as they are.
+        velocity: PyBullet's velocity gain of each; empty to leave them as they are.
+    """
+
+    names: Sequence[str]
+    position: Sequence[float]
+    velocity: Sequence[float]
+
+
 class Motors:
     """Drives the joints of one robot within the efforts and velocities of its URDF.
 
@@ -140,6 +154,27 @@ class Motors:
         is_held = mode in POSITION_MODES
         self.targets = {index: state[0] if is_held else 0.0 for index, state in zip(self._indices, states)}
         for index in self._indices:
+            self._drive(index, self.targets[index])
+
+    def set_gains(self, gains: MotorGains) -> None:
+        """Changes gains from the coming tick on; when it raises, nothing has changed.
+
+        Raises:
+            UnknownNameError: If the robot lacks one of the joints.
+            ValueError: If there is nothing to change, lengths differ or a gain is negative or not finite.
+        """
+        changed: dict[int, dict[str, float]] = {}
+        for key, values in (("positionGain", gains.position), ("velocityGain", gains.velocity)):
+            for index, gain in (self._model.resolve_driven(gains.names, values) if values else {}).items():
+                if gain < 0.0:
+                    raise ValueError(f"{key} of '{self._model.joints[index].name}' must be >= 0, got {gain:g}")
+                changed.setdefault(index, {})[key] = gain
+        if not changed:
+            raise ValueError("expected joints, and a position or velocity gain of each; got none")
+        for index, arguments in changed.items():
+            self._position_arguments[index].update(arguments)
+            if "velocityGain" in arguments:
+                self._velocity_arguments[index]["velocityGain"] = arguments["velocityGain"]
             self._drive(index, self.targets[index])
 
     def check(self, target: JointTarget) -> Command:

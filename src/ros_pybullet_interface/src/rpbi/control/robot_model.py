@@ -122,10 +122,7 @@ class RobotModel:
         return positions
 
     def _turn_gravity(self, pb: Client, base: Pose) -> None:
-        engine = self._world.getPhysicsEngineParameters()
-        gravity = tuple(engine[f"gravityAcceleration{axis}"] for axis in "XYZ")
-        to_base = pb.invertTransform((0.0, 0.0, 0.0), base.quat_xyzw)[1]
-        in_base = pb.rotateVector(to_base, gravity)
+        in_base = rotated_back(base.quat_xyzw, self._world.gravity)
         if in_base != self._gravity:
             pb.setGravity(*in_base)
             self._gravity = in_base

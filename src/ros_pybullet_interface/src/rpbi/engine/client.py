@@ -6,6 +6,7 @@ from typing import Any
 import pybullet
 
 from custom_ros_tools.errors import PhysicsError
+from rpbi.geometry import Vector
 
 
 class Client:
@@ -29,6 +30,10 @@ class Client:
         self.has_window = mode != pybullet.DIRECT
         self.is_deformable = False
         """Whether soft bodies can be in its world, as told when that was set up."""
+        self.gravity: Vector = (0.0, 0.0, 0.0)
+        """Gravity of its world [m/s^2], as told when that was set."""
+        self.sub_steps = 0
+        """Parts that each step of its world is divided into, as told when that was set; 0 is one."""
         if self.client_id < 0:
             raise PhysicsError("PyBullet did not connect (GUI mode needs a screen: is DISPLAY set?)")
 

@@ -14,7 +14,8 @@ class WorldCommand(NamedTuple):
         tick: The world's tick at which it did: after that tick's physics, before the next.
         name: The body that it concerns, `NAME/LINK` for dynamics, `NAME/INPUT` for inputs, an attachment's name for
             those, empty for the whole world.
-        what: `input`, `add`, `remove`, `dynamics`, `attach`, `detach`, `halt`, `pause`, or a key of ACTIONS.
+        what: `input`, `add`, `remove`, `dynamics`, `physics`, `sensor_rate`, `attach`, `detach`, `halt`, `pause`, or a
+            key of ACTIONS.
         value: What it was.
     """
 

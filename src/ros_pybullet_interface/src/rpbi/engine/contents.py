@@ -9,6 +9,7 @@ from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, P
 from rpbi.bodies import Body, BodyConfig
 from rpbi.config.loading import LoadedWorld
 from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.config.pybullet_world_models import PhysicsChange
 from rpbi.config.sensors import FIRST_TOPIC_NAME, RgbdSensorConfig
 from rpbi.constraints.attachments import Attachments
 from rpbi.control.pose_follower import PoseFollower
@@ -148,6 +149,10 @@ class WorldContents:
         """Changes how a link behaves, the root if its name is empty; see `World.change_dynamics`."""
         self._append(LogEntry(name, "dynamics", (link, change)))
 
+    def change_physics(self, change: PhysicsChange) -> None:
+        """Changes gravity or how contacts and joints are solved; see `World.change_physics`."""
+        self._append(LogEntry("", "physics", change))
+
     def clear(self) -> None:
         """Takes all out but the cameras and the inputs, which wait for what `fill` brings."""
         self.attachments.clear()
@@ -201,6 +206,7 @@ class WorldContents:
         configs = [item.config for item in loaded.cameras]
         for camera in before.values():
             if any(camera.config is config for config in configs):
+                camera.hz = camera.config.hz
                 self._take_camera(camera)
         problems: list[Problem] = []
         for config, file in loaded.cameras:

@@ -10,6 +10,7 @@ import pybullet
 from custom_ros_tools.errors import PhysicsError, UnknownNameError
 from rpbi.bodies import Body, body_class
 from rpbi.bodies.dynamics import change_dynamics
+from rpbi.config.pybullet_world_models import PhysicsChange, SetGravity
 from rpbi.config.world import WorldConfig
 from rpbi.plugins import blame, blaming
 
@@ -51,10 +52,16 @@ def _are_finite(numbers: Iterable[float]) -> bool:
     return all(map(math.isfinite, numbers))
 
 
-_SAME_EVERY_TIME = {
+_SAME_EVERY_TIME: dict[str, Any] = {
     "deterministicOverlappingPairs": 1,  # else the order of contacts depends on what the broad phase has seen before
     "contactBreakingThreshold": 0.02,  # [m] PyBullet's default; one global of the process that outlives its client
+    "numSubSteps": 0,  # the default, too; it outlives a reset
+    "enableFileCaching": 1,  # the same
 }
+
+
+MULTI_BODY = 2
+"""PyBullet's number of bodies in reduced coordinates."""
 
 
 class LogEntry(NamedTuple):
@@ -62,9 +69,9 @@ class LogEntry(NamedTuple):
 
     Attributes:
         name: The body it was done to, empty for the world itself.
-        what: `world` (set it up), `add`, `dynamics` (change them) or `remove`.
-        arguments: The WorldConfig of `world`; type and configuration of a body for `add`; link (empty for the root) and
-            ChangeDynamics for `dynamics`; None for `remove`.
+        what: `world` (set it up), `physics` (change them), `add`, `dynamics` (change them) or `remove`.
+        arguments: The WorldConfig of `world`; the PhysicsChange of `physics`; type and configuration of a body for
+            `add`; link (empty for the root) and ChangeDynamics for `dynamics`; None for `remove`.
     """
 
     name: str
@@ -91,6 +98,8 @@ def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:
         raise UnknownNameError("object", entry.name, list(bodies))
     if entry.what == "world":
         _set_up(pb, entry.arguments)
+    elif entry.what == "physics":
+        change_physics(pb, bodies.values(), entry.arguments)
     elif entry.what == "remove":
         body = bodies.pop(entry.name)
         for other in bodies.values():
@@ -137,10 +146,28 @@ def _set_up(pb: Client, config: WorldConfig) -> None:
     pb.is_deformable = bool((config.resetSimulation.flags or 0) & pybullet.RESET_USE_DEFORMABLE_WORLD)
     for path in config.setAdditionalSearchPath:
         pb.setAdditionalSearchPath(path)
-    gravity = config.setGravity
-    pb.setGravity(gravity.gravX, gravity.gravY, gravity.gravZ)
     pb.setTimeStep(round(config.timeStep * 1e9) / 1e9)
-    pb.setPhysicsEngineParameter(**{**_SAME_EVERY_TIME, **config.setPhysicsEngineParameter.kwargs()})
+    pb.setPhysicsEngineParameter(**_SAME_EVERY_TIME)
+    change_physics(pb, (), config.setGravity)
+    change_physics(pb, (), config.setPhysicsEngineParameter)
+
+
+def change_physics(pb: Client, bodies: Iterable[Body], change: PhysicsChange) -> None:
+    """Changes gravity, or the engine's parameters that are given.
+
+    What sleeps would not notice gravity, so it wakes up; but in maximal coordinates PyBullet would have it sleep
+    thereafter even if it may not.
+    """
+    arguments = change.kwargs()
+    if isinstance(change, SetGravity):
+        for body in bodies:
+            if pb.getDynamicsInfo(body.body_id, -1)[10] == MULTI_BODY:
+                pb.changeDynamics(body.body_id, -1, activationState=pybullet.ACTIVATION_STATE_WAKE_UP)
+        pb.setGravity(**arguments)
+        pb.gravity = (change.gravX, change.gravY, change.gravZ)
+    elif arguments:
+        pb.setPhysicsEngineParameter(**arguments)
+    pb.sub_steps = pb.getPhysicsEngineParameters()["numSubSteps"]
 
 
 def _body_ids(pb: Client) -> set[int]:

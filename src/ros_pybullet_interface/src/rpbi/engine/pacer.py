@@ -18,15 +18,23 @@ class Pacer:
     Args:
         dt_s: Length of a tick [s] of simulated time.
         real_time_factor: Simulated seconds per wall second; 0 is as fast as it goes.
+
+    Attributes:
+        real_time_factor: The same, as it was set last.
     """
 
     def __init__(self, dt_s: float, real_time_factor: float = 1.0) -> None:
         self._dt_s = dt_s
-        self._period_s = dt_s / real_time_factor if real_time_factor else 0.0
         self.overruns = 0
         """Ticks that began more than one period late."""
         self.lost_s = 0.0
         """Wall time that was given up because it could not be caught up with [s]."""
+        self.set_factor(real_time_factor)
+
+    def set_factor(self, real_time_factor: float) -> None:
+        """Changes the pace, and begins afresh."""
+        self.real_time_factor = real_time_factor
+        self._period_s = self._dt_s / real_time_factor if real_time_factor else 0.0
         self.restart()
 
     def restart(self) -> None:

@@ -2,6 +2,7 @@
 
 import heapq
 import logging
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -20,10 +21,15 @@ class _Scheduled:
         self.sensor = sensor
         self._is_foreign = is_foreign(sensor)
         self.order = order
-        self.schedule = Schedule(sensor.hz, dt_ns)
-        self.next_tick = self.schedule.next_due(tick)
         self.read_tick = -1
         """Tick of the last sample, -1 before the first."""
+        self.schedule_from(tick, dt_ns)
+
+    def schedule_from(self, tick: int, dt_ns: int) -> None:
+        """Has it due by the sensor's rate after a tick; one that is off stays with the old times."""
+        if self.sensor.hz:
+            self.schedule = Schedule(self.sensor.hz, dt_ns)
+            self.next_tick = self.schedule.next_due(tick)
 
     def read(self, tick: int) -> Any:
         try:
@@ -45,7 +51,7 @@ class SensorSchedule:
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._scheduled: dict[str, list[_Scheduled]] = {}
-        self._watching: list[Sensor] = []
+        self.watching: list[Sensor] = []
         """Sensors that act at every tick."""
         self._queue: list[tuple[int, int, _Scheduled]] = []
         """A heap of when each sensor is due, in which order it came, and the sensor."""
@@ -67,8 +73,20 @@ class SensorSchedule:
         self._scheduled[name] = [_Scheduled(one, dt_ns, tick, order) for order, one in enumerate(sensors, self._count)]
         self._count += len(sensors)
         for each in self._scheduled[name]:
-            if each.schedule.clamped:
-                self._warn(each.sensor)
+            self._warn_if_clamped(each)
+        self._take_stock()
+
+    def set_rate(self, name: str, number: int, hz: float) -> None:
+        """Changes how often a sensor is read from this tick on, see `World.set_sensor_rate`."""
+        scheduled = self._scheduled[name]
+        if not 0 <= number < len(scheduled):
+            raise ValueError(f"'{name}' has {len(scheduled)} sensors, got number {number}")
+        if not 0.0 <= hz < math.inf:
+            raise ValueError(f"hz: must be finite and >= 0 [Hz], got {hz:g}")
+        each = scheduled[number]
+        each.sensor.hz = hz
+        each.schedule_from(self._clock.tick, self._clock.dt_ns)
+        self._warn_if_clamped(each)
         self._take_stock()
 
     def remove(self, name: str) -> None:
@@ -81,14 +99,15 @@ class SensorSchedule:
         self._scheduled.clear()
         self._take_stock()
 
-    def _warn(self, sensor: Sensor) -> None:
-        if (sensor.name, sensor.hz) not in self._warned:
+    def _warn_if_clamped(self, scheduled: _Scheduled) -> None:
+        sensor = scheduled.sensor
+        if sensor.hz and scheduled.schedule.clamped and (sensor.name, sensor.hz) not in self._warned:
             self._warned.add((sensor.name, sensor.hz))
             log.warning("%s: %s Hz is more than a sample a tick; it gets one a tick", sensor.name, sensor.hz)
 
     def act(self, method: str) -> None:
         """Calls `before_step` or `after_step` of the sensors that act at every tick."""
-        for sensor in self._watching:
+        for sensor in self.watching:
             try:
                 getattr(sensor, method)(self._clock.tick)
             except Exception as error:
@@ -99,6 +118,8 @@ class SensorSchedule:
         """Returns samples of the sensors that are due at this tick."""
         tick = self._clock.tick
         queue = self._queue
+        if not queue or queue[0][0] > tick:
+            return []
         samples: list[Any] = []
         while queue and queue[0][0] <= tick:
             _, order, each = queue[0]
@@ -111,23 +132,25 @@ class SensorSchedule:
     def read_rest(self) -> list[Any]:
         """Returns samples of the sensors that were not read at this tick yet."""
         tick = self._clock.tick
-        return _present(each.read(tick) for each in self._all() if each.read_tick != tick and each.sensor.wanted)
+        return _present(each.read(tick) for each in self._rated() if each.read_tick != tick)
 
     def read_idle(self, tick: int, since: int) -> list[Any]:
         """Returns the samples that would have come due between two ticks, had the world not stood still."""
         now = self._clock.tick
-        return _present(
-            each.read(now) for each in self._all() if each.sensor.wanted and each.schedule.is_due(tick, since)
-        )
+        return _present(each.read(now) for each in self._rated() if each.schedule.is_due(tick, since))
 
     def _take_stock(self) -> None:
-        self._queue = [(each.next_tick, each.order, each) for each in self._all()]
+        self._queue = [(each.next_tick, each.order, each) for each in self._all() if each.sensor.hz]
         heapq.heapify(self._queue)
-        self._watching = [each.sensor for each in self._all() if _acts_at_ticks(type(each.sensor))]
+        self.watching = [each.sensor for each in self._all() if _acts_at_ticks(type(each.sensor))]
 
     def _all(self) -> Iterator[_Scheduled]:
         for scheduled in self._scheduled.values():
             yield from scheduled
+
+    def _rated(self) -> Iterator[_Scheduled]:
+        """Yields the sensors that are to be read now and then."""
+        return (each for each in self._all() if each.sensor.hz and each.sensor.wanted)
 
 
 def _acts_at_ticks(sensor_type: type[Sensor]) -> bool:

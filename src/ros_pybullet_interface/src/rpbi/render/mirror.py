@@ -35,6 +35,8 @@ class Mirror:
 
     def apply(self, entry: LogEntry) -> None:
         """Does what was done to the world; what cannot be done is left out of the images."""
+        if entry.what == "physics":
+            return  # nothing moves by itself here
         if entry.what == "world":
             self._bodies.clear()
             self._shown.clear()

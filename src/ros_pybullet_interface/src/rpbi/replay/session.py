@@ -166,6 +166,8 @@ _CHANGES: dict[str, Callable[[World, str, Any], Any]] = {
     "dynamics": World.change_dynamics,
     "attach": lambda world, _, config: world.attach(config),
     "detach": lambda world, name, _: world.detach(name),
+    "physics": lambda world, _, change: world.change_physics(change),
+    "sensor_rate": lambda world, name, rate: world.set_sensor_rate(name, *rate),
     "halt": lambda world, _, reason: world.halt(reason),
     "pause": lambda world, _, reason: world.pause(reason),
 }

@@ -1,6 +1,7 @@
 """The simulation loop: requests, ticks, samples out, in step with the wall clock."""
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -18,8 +19,8 @@ log = logging.getLogger(__name__)
 
 IDLE_PERIOD_S = 0.001
 """Shortest time between two looks at requests while stopped [s]."""
-BURST_S = 0.01
-"""How long ticks follow each other before the loop looks at requests [s]."""
+BURST_S = 0.005
+"""How long ticks that are due follow each other before the loop sends what they had, and looks at requests [s]."""
 
 
 class StepBurst:
@@ -166,10 +167,26 @@ class Simulation:
         self._publishers.restart()
         self._state.restart()
 
+    @property
+    def real_time_factor(self) -> float:
+        """How fast the world is to run: simulated seconds per second; 0 is as fast as it goes."""
+        return self._pacer.real_time_factor
+
+    def set_real_time_factor(self, factor: float) -> None:
+        """Changes how fast the world is to run, from now on.
+
+        Raises:
+            ValueError: If it is negative or not finite.
+        """
+        if not 0.0 <= factor < math.inf:
+            raise ValueError(f"real_time_factor: must be finite and >= 0, got {factor:g}")
+        self._pacer.set_factor(factor)
+        self._publishers.set_factor(factor)
+
     def run(self, is_over: Callable[[], bool]) -> None:
         """Loops until it is over, on the thread that calls it."""
         self._thread = threading.get_ident()
-        parts = (self._move, *self._helpers, self._publish)
+        parts = (self._move, flush_buffered_sockets, *self._helpers, self._publish)
         while not is_over():
             self.passes += 1
             self.world.mailbox.run_requests()
@@ -188,8 +205,8 @@ class Simulation:
             self._advance_burst(self._burst)
         elif not self.running:
             self._idle()
-        elif self._pacer.is_due():
-            self._take_tick()
+        else:
+            self._take_due_ticks()
 
     def _publish(self) -> None:
         self._status.spin(self.running, self._burst is not None)
@@ -197,18 +214,29 @@ class Simulation:
         self._commands.spin()
         flush_buffered_sockets()
 
+    def _take_due_ticks(self) -> None:
+        end_s = time.monotonic() + BURST_S
+        while self._pacer.is_due():
+            self._take_tick()
+            if time.monotonic() > end_s:
+                break
+        self._publishers.publish_time()
+
     def _take_tick(self, is_last: bool = False) -> None:
         """Goes one tick on; of the last one before standing still everything is published, whatever is due."""
         self._before_tick()
         publish = self._publishers.publish_all if is_last else self._publishers.publish_tick
         publish(self.world.step())
         self._state.take_tick()
+        if is_last:
+            flush_buffered_sockets()  # before whoever asked for the tick gets an answer
 
     def _advance_burst(self, burst: StepBurst) -> None:
         end_s = time.monotonic() + BURST_S
         while burst.left > 1 and time.monotonic() < end_s:
             self._take_tick()
             burst.left -= 1
+        self._publishers.publish_time()
         if burst.left == 1:
             self._take_tick(is_last=True)
             burst.left = 0

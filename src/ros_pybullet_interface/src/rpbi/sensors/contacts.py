@@ -36,7 +36,7 @@ class ContactReader:
     def _ask(self) -> dict[int, list[Any]]:
         self._by_id = {body.body_id: body for body in self._bodies.values()}
         # PyBullet divides the impulse of the last sub-step by the whole time step.
-        self._factor = max(1.0, self._pb.getPhysicsEngineParameters()["numSubSteps"])
+        self._factor = max(1, self._pb.sub_steps)
         touches: dict[int, list[Any]] = {}
         # Asked for one body, PyBullet turns normals towards it but not friction; asked for all, it turns nothing.
         for touch in self._pb.getContactPoints():

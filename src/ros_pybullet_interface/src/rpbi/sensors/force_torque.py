@@ -40,10 +40,9 @@ class ForceTorqueSensor(Sensor):
         self._robot = robot
         self._subtree = Subtree(robot.pb, robot.body_id, joint.index)
         self._dynamics_changes = robot.dynamics_changes
-        engine = robot.pb.getPhysicsEngineParameters()
-        self._gravity = tuple(engine[f"gravityAcceleration{axis}"] for axis in "XYZ")
-        self._dt_s: float = engine["fixedTimeStep"]
-        self._contact_factor = max(1, engine["numSubSteps"])
+        self._dt_s: float = robot.pb.getPhysicsEngineParameters()["fixedTimeStep"]
+        self._gravity = robot.pb.gravity
+        self._contact_factor = 1
         """PyBullet divides the impulse of the last sub-step by the whole time step."""
         self._sign = 1.0 if config.acting == "parent_on_child" else -1.0
         self._noise = SeededNoise(
@@ -62,7 +61,8 @@ class ForceTorqueSensor(Sensor):
         self._attachments = world.attachments
 
     def before_step(self, tick: int) -> None:
-        """Notes how the links move."""
+        """Notes how the links move, and in what world."""
+        self._gravity, self._contact_factor = self._robot.pb.gravity, max(1, self._robot.pb.sub_steps)
         if self._dynamics_changes != self._robot.dynamics_changes:
             self._dynamics_changes = self._robot.dynamics_changes
             self._subtree.take_dynamics()

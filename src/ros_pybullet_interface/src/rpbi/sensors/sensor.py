@@ -36,7 +36,7 @@ class Sensor(ABC):
 
     Attributes:
         name: The body or sensor that its topics are named after.
-        hz: How often it is read [Hz] of the world's time.
+        hz: How often it is read [Hz] of the world's time, 0 is never; the world changes it.
         wanted: Whether anybody looks at its samples; it is not read while nobody does.
     """
 

@@ -102,7 +102,8 @@ class Robot(JointedBody):
 
     def sensors(self) -> tuple[Sensor, ...]:
         """Joint states, force-torque sensors, the follower's state and contacts, beside link poses."""
-        joint_states = JointStateSensor(self, self.config.joint_state_publisher_hz)
+        hz = self.config.joint_state_publisher_hz
+        joint_states = (JointStateSensor(self, hz),) if hz else ()
         trajectory = () if self.follower is None else (TrajectoryStateSensor(self.drive, self.follower),)
         contacts = contact_sensors(self, self.config.contacts)
         controllers = (
@@ -110,7 +111,7 @@ class Robot(JointedBody):
             for name, each in self.config.controllers.items()
             if each.state_hz
         )
-        return (joint_states, *controllers, *self.force_torque_sensors, *trajectory, *contacts, *super().sensors())
+        return (*joint_states, *controllers, *self.force_torque_sensors, *trajectory, *contacts, *super().sensors())
 
     def inputs(self) -> Mapping[str, Input]:
         """Takes `target`, a JointTarget of what the control mode asks for, beside the pose of its base."""

@@ -103,7 +103,7 @@ class RobotConfig(BodyConfig):
     gravity_compensation: Switch = Field(
         False, description="Whether torque targets come on top of the torques that hold the robot against gravity."
     )
-    joint_state_publisher_hz: Hz = Field(50.0, description="Rate of the joint states.")
+    joint_state_publisher_hz: HzOrOff = Field(50.0, description="Rate of the joint states; 0 is off.")
     broadcast_link_states: Switch = Field(False, description="Whether the poses of all links are on TF.")
     broadcast_link_states_hz: Hz = Field(50.0, description="Rate of the links' poses on TF.")
     broadcast_root_tf_hz: HzOrOff = Field(
@@ -149,6 +149,10 @@ class RobotConfig(BodyConfig):
         for key, message in _NOT_VISUAL.items() if self.is_visual_robot else ():
             if getattr(self, key) not in (None, {}):
                 raise KeyedError(key, message)
+        for index, sensor in enumerate(self.enabled_joint_force_torque_sensors):
+            if not (sensor.hz or self.joint_state_publisher_hz):
+                key = f"enabled_joint_force_torque_sensors[{index}].hz"
+                raise KeyedError(key, "missing; it would be that of the joint states, which are off")
         if self.planar_base is not None:
             if self.resetBaseVelocity is not None:
                 raise KeyedError("resetBaseVelocity", "a planar base starts at rest; remove this or planar_base")

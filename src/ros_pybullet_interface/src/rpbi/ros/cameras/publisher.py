@@ -12,6 +12,7 @@ import rospy
 from rosnode import cleanup_master_blacklist
 
 from custom_ros_tools.errors import PhysicsError
+from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
 from rpbi.render.camera import Intrinsics
 from rpbi.render.client import RenderClient
 from rpbi.render.depth import DepthNoise
@@ -129,6 +130,7 @@ class ScenePublisher:
         """Waits for something of a synchronous camera, or until the node shuts down."""
         end_s = time.monotonic() + LONGEST_WAIT_S
         while not (condition() or rospy.core.is_shutdown_requested()):
+            flush_buffered_sockets()  # what it waits for may come of what others hear of earlier ticks
             self.poll()
             self._world.take_inputs()
             if needs_renderer and not self._renderer.is_up:

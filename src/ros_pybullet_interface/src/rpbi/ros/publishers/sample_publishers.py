@@ -100,12 +100,21 @@ class TickPublisher:
         self._idle_tick = 0
         """The tick at which the world would be, had it not stood still."""
 
+    def set_factor(self, real_time_factor: float) -> None:
+        """Publishes the time as often as a pace allows."""
+        if self._clock is not None:
+            self._clock.set_factor(real_time_factor)
+
     def publish_tick(self, samples: list[Any]) -> None:
-        """Publishes a tick and the samples that were due."""
+        """Publishes a tick and the samples that were due; the time of a tick without any can wait."""
+        if samples:
+            self.publish_time()
+            self._publishers.publish(samples, self._world.clock.stamp_ns)
+
+    def publish_time(self) -> None:
+        """Publishes the time, if it is another one and its rate is not used up."""
         if self._clock is not None:
             self._clock.publish_tick()
-        if samples:
-            self._publishers.publish(samples, self._world.clock.stamp_ns)
 
     def publish_all(self, samples: list[Any]) -> None:
         """Publishes the last tick before standing still: all of it, whatever is due."""

@@ -28,6 +28,8 @@ from rpbi.samples import (
 )
 from rpbi.sensors.sensor import Sensor
 
+from .packed_messages import PackedJointState
+
 _ARROW = Vector3(0.015, 0.03, 0.04)
 """Diameters of shaft and head and length of the head [m]."""
 _COLOUR = ColorRGBA(0.85, 0.1, 0.1, 1.0)
@@ -35,11 +37,8 @@ _COLOUR = ColorRGBA(0.85, 0.1, 0.1, 1.0)
 
 def joint_state_message(sample: JointStateSample, stamp_ns: int) -> JointState:
     """Returns positions, velocities and efforts of all joints."""
-    message = JointState(
-        name=sample.joint_names, position=sample.position, velocity=sample.velocity, effort=sample.effort
-    )
-    message.header.stamp = to_ros_time(stamp_ns)
-    return message
+    header = Header(0, to_ros_time(stamp_ns), "")
+    return PackedJointState(header, sample.joint_names, sample.position, sample.velocity, sample.effort)
 
 
 def wrench_message(sample: WrenchSample, stamp_ns: int) -> WrenchStamped:
@@ -161,6 +160,14 @@ TOPICS: dict[type, Topic] = {
 
 _ELSEWHERE = (LinkPoseSample, SceneSample)
 """Samples that go to TF and to the renderer."""
+
+
+def address(sensor: Sensor) -> str:
+    """Returns what a sensor is called in requests: its topic below `rpbi/`; `NAME/tf`, or a camera's name."""
+    topic = sample_topic(sensor)
+    if topic is not None:
+        return topic.name.format(name=sensor.name).removeprefix("rpbi/")
+    return f"{sensor.name}/tf" if sensor.sample_type is LinkPoseSample else sensor.name
 
 
 def sample_topic(sensor: Sensor) -> Topic | None:

@@ -59,18 +59,22 @@ class ClockPublisher:
     """Simulated time on /clock, of which the simulator is the only source."""
 
     def __init__(self, world: World) -> None:
-        self._clock, config = world.clock, world.config
-        factor = config.real_time_factor
-        limit_hz = min(factor / config.timeStep, MAX_CLOCK_HZ) if factor else FREE_RUNNING_CLOCK_HZ
-        self._period_s = 1.0 / min(config.clock_hz or limit_hz, limit_hz)
+        self._clock, self._most_hz = world.clock, world.config.clock_hz
         _warn_of_rivals()
         self._publisher = FastTopic(CLOCK.name, ClockMessage)
+        self._sent_ns = 0
+        self.set_factor(world.config.real_time_factor)
+
+    def set_factor(self, real_time_factor: float) -> None:
+        """Publishes as often as a pace allows."""
+        limit_hz = min(real_time_factor / self._clock.dt_s, MAX_CLOCK_HZ) if real_time_factor else FREE_RUNNING_CLOCK_HZ
+        self._period_s = 1.0 / min(self._most_hz or limit_hz, limit_hz)
         self._due_s = 0.0
 
     def publish_tick(self) -> None:
-        """Publishes a new tick, unless the rate is used up."""
+        """Publishes the present tick, if it is a new one and the rate is not used up."""
         now_s = time.monotonic()
-        if now_s >= self._due_s:
+        if now_s >= self._due_s and self._clock.stamp_ns != self._sent_ns:
             # Counting on from the last deadline keeps the mean rate; a pause must not be made up for.
             self._due_s = max(self._due_s + self._period_s, now_s - self._period_s)
             self._send()
@@ -86,7 +90,8 @@ class ClockPublisher:
             self.publish_now()
 
     def _send(self) -> None:
-        self._publisher.publish(ClockMessage(to_ros_time(self._clock.stamp_ns)))
+        self._sent_ns = self._clock.stamp_ns
+        self._publisher.publish(ClockMessage(to_ros_time(self._sent_ns)))
 
 
 class StatusPublisher:
@@ -102,7 +107,6 @@ class StatusPublisher:
         self._clock, self._pacer, self._facts = world.clock, pacer, facts
         self._window = world.window
         """Until it has been named as slow."""
-        self._wanted_factor = world.config.real_time_factor
         self._rate = WallRate(world.config.status_hz)
         self._diagnostics_rate = WallRate(1.0, delay_s=1.0)
         self._status = rospy.Publisher(STATUS.name, Int64, queue_size=10)
@@ -131,9 +135,10 @@ class StatusPublisher:
         self._overruns = self._pacer.overruns
         status = DiagnosticStatus(name=f"{rospy.get_name()}: simulation", hardware_id="rpbi", level=DiagnosticStatus.OK)
         status.message = "running" if running else "stepping" if stepping else "stopped"
-        if running and factor < FALLING_BEHIND * self._wanted_factor:
+        asked = self._pacer.real_time_factor
+        if running and factor < FALLING_BEHIND * asked:
             status.level = DiagnosticStatus.WARN
-            status.message = f"too slow: real-time factor {factor:.3f} instead of {self._wanted_factor:g}"
+            status.message = f"too slow: real-time factor {factor:.3f} instead of {asked:g}"
             self._blame_window(status.message)
         values = {
             "real_time_factor": f"{factor if running else 0.0:.4f}",
@@ -218,7 +223,7 @@ class StatePublisher:
             stepping=self.is_stepping,
             tick=clock.tick,
             simulated_time=clock.time_s,
-            real_time_factor_asked=self._world.config.real_time_factor,
+            real_time_factor_asked=self._pacer.real_time_factor,
             real_time_factor=self._factor,
             overruns=self._pacer.overruns,
             lost_time=self._pacer.lost_s,

@@ -12,6 +12,7 @@ from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import prefixed, to_ros_time, world_frame
 from rpbi.samples import LinkPoseSample
 
+from .packed_messages import PackedTransforms
 from .topics import FastTopic
 
 TF = Topic("/tf", TFMessage, meaning="Where it is, see [frames](#frames).")
@@ -96,7 +97,7 @@ class TransformPublisher:
         """Sends what was collected."""
         if self._collected:
             if self._topic.has_subscribers:
-                self._topic.publish(TFMessage(self._collected))
+                self._topic.publish(PackedTransforms(self._collected))
             self._collected = []
 
     def serve_late(self) -> None:

@@ -56,9 +56,9 @@ class StateTopic(rospy.SubscribeListener):
 
 
 class FastTopic(StateTopic):
-    """A topic of small messages that go out in the caller's own thread, which never waits.
+    """A topic of small messages that go out in the caller's own thread, which never waits, by `flush_buffered_sockets`.
 
-    What a slow subscriber does not take is kept for it, and sent by `flush_buffered_sockets`.
+    What a slow subscriber does not take is kept for it.
     """
 
     def __init__(self, topic: str, message_type: type) -> None:
@@ -71,7 +71,7 @@ class FastTopic(StateTopic):
             self._sending.wrap_connections()
 
     def publish(self, message: Any) -> None:
-        """Sends a message to all subscribers, or keeps it for those that are slow."""
+        """Has a message sent to all subscribers by the next flush."""
         self.wrap_connections()
         super().publish(message)
 

@@ -5,10 +5,15 @@ from typing import Any
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.srv import SetStringRequest
-from ros_pybullet_interface.srv import ResetEffStateRequest, ResetJointStateRequest, SetJointStateRequest
+from ros_pybullet_interface.srv import (
+    ResetEffStateRequest,
+    ResetJointStateRequest,
+    SetJointStateRequest,
+    SetMotorGainsRequest,
+)
 from rpbi.config.pybullet_args import CONTROL_MODES
 from rpbi.control.motion import Motion, MotionResult
-from rpbi.control.motors import MODE_NAMES
+from rpbi.control.motors import MODE_NAMES, MotorGains
 from rpbi.engine.actions import TimedGoal
 from rpbi.ros.endpoints import Answer
 from rpbi.ros.services.body_context import BodyContext
@@ -68,6 +73,17 @@ def stop_motion(context: BodyContext, _: Any) -> Answer:
     """
     was_moving = context.act("stop_motion", "it was stopped")
     return Answer(was_moving, "stopped" if was_moving else "no motion is running")
+
+
+def set_motor_gains(context: BodyContext, request: SetMotorGainsRequest) -> Answer:
+    """Changes position and velocity gains of the joints that are named.
+
+    Raises:
+        UnknownNameError: If the robot lacks one of the joints.
+        ValueError: If there is nothing to change, lengths differ or a gain is negative or not finite.
+    """
+    context.act("set_gains", MotorGains(request.name, request.position_gains, request.velocity_gains))
+    return Answer(True, f"changed gains of {', '.join(request.name)}")
 
 
 def set_joint_state(context: BodyContext, request: SetJointStateRequest) -> Answer:

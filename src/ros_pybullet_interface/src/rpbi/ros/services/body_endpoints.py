@@ -17,6 +17,7 @@ from ros_pybullet_interface.srv import (
     ResetJointState,
     RobotInfo,
     SetJointState,
+    SetMotorGains,
     SwitchControllers,
 )
 from rpbi.bodies import Body
@@ -35,6 +36,7 @@ from rpbi.ros.robots.motion import (
     move_to_joint_state,
     set_control_mode,
     set_joint_state,
+    set_motor_gains,
     stop_motion,
 )
 from rpbi.ros.robots.trajectory_action import open_trajectory_action
@@ -77,14 +79,21 @@ def zero_force_torque(context: BodyContext, _: Any) -> tuple[()]:
     """Takes the mean of the next 100 samples of that force-torque sensor for zero.
 
     Raises:
-        InterfaceError: If the simulation is stopped, before or meanwhile, or the robot goes; the old zero stays then.
+        InterfaceError: If the simulation is stopped or the sensor is off, before or meanwhile, or the robot goes; the
+            old zero stays then.
     """
     body = context.body
     sensor = next(each for each in body.force_torque_sensors if each.name == context.owner)
 
+    def refuse_if_off() -> None:
+        if not sensor.hz:
+            sensor.cancel_zeroing()
+            raise InterfaceError("the sensor is off, so there are no samples to average; the old zero stays")
+
     def start() -> Zeroing:
         if not context.simulation.running:
             raise InterfaceError("the simulation is stopped: start it, else there are no samples to average")
+        refuse_if_off()
         zeroing: Zeroing = sensor.zero(SAMPLES)
         return zeroing
 
@@ -92,6 +101,7 @@ def zero_force_torque(context: BodyContext, _: Any) -> tuple[()]:
         if not context.simulation.running and not zeroing.mean.done():
             sensor.cancel_zeroing()
             raise InterfaceError(f"the simulation was stopped before {SAMPLES} samples had come; the old zero stays")
+        refuse_if_off()
 
     zeroing = context.ask_body(start, body)
     while not wait([zeroing.mean], timeout=LOOK_AGAIN_AFTER_S).done:
@@ -106,6 +116,7 @@ BODY_SERVICES = (
     Service("rpbi/{name}/set_joint_state", SetJointState, set_joint_state, of(JointedBody)),
     Service("rpbi/{name}/ft_sensor", Empty, zero_force_torque, force_torque_sensors),
     Service("rpbi/{name}/set_control_mode", SetString, set_control_mode, of(Robot)),
+    Service("rpbi/{name}/set_motor_gains", SetMotorGains, set_motor_gains, of(Robot)),
     Service("rpbi/{name}/switch_controllers", SwitchControllers, switch_controllers, robots_with_controllers),
     Service("rpbi/{name}/set_gains", SetString, set_gains, controllers),
     Service("rpbi/{name}/stop_motion", Trigger, stop_motion, of(Robot)),

@@ -1,4 +1,4 @@
-"""The services of the node: of time, of objects and cameras, and of how objects behave in contact and motion.
+"""The services of the node: of time, of objects, cameras and sensors, and of how all behaves in contact and motion.
 
 A handler never touches PyBullet, it asks the simulation thread.
 """
@@ -11,7 +11,7 @@ import genpy
 from std_srvs.srv import Trigger
 
 from custom_ros_tools.config import load_config, load_configs
-from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.errors import InterfaceError, UnknownNameError
 from custom_ros_tools.srv import SetString, SetStringRequest
 from ros_pybullet_interface.msg import ObjectDynamics, PybulletObject
 from ros_pybullet_interface.srv import (
@@ -26,10 +26,16 @@ from ros_pybullet_interface.srv import (
     GetObjectDynamicsRequest,
     GetStateHash,
     ListObjects,
+    SetGravityRequest,
+    SetRealTimeFactor,
+    SetRealTimeFactorRequest,
+    SetSensorRate,
+    SetSensorRateRequest,
     StepN,
     StepNRequest,
 )
 from ros_pybullet_interface.srv import ChangeDynamics as ChangeDynamicsService
+from ros_pybullet_interface.srv import SetGravity as SetGravityService
 from rpbi.bodies import kind_of
 from rpbi.bodies.collision import CollisionObject
 from rpbi.bodies.dynamic import DynamicObject
@@ -42,11 +48,13 @@ from rpbi.config.asset_files import find_file
 from rpbi.config.loading import load_object, type_of
 from rpbi.config.object_entry import FILE, parse_object_entry
 from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.config.pybullet_world_models import SetGravity, SetPhysicsEngineParameter
 from rpbi.config.sensors import RgbdSensorConfig
 from rpbi.engine.clock import NS_PER_S
 from rpbi.ros.endpoints import Answer, Service
 from rpbi.ros.headers import to_ros_time
 from rpbi.ros.object_lifecycle import ObjectLifecycle
+from rpbi.ros.publishers.sample_topics import address
 from rpbi.ros.requests import Requests
 from rpbi.ros.simulation import Simulation
 
@@ -231,6 +239,56 @@ def _change_dynamics(node: NodeContext, request: ChangeDynamicsRequest) -> Answe
     return Answer(True, f"changed {keys}")
 
 
+def _set_real_time_factor(node: NodeContext, request: SetRealTimeFactorRequest) -> Answer:
+    """Changes how fast the world runs; a reset leaves that as it is."""
+    before = node.simulation.real_time_factor
+    node.ask(lambda: node.simulation.set_real_time_factor(request.real_time_factor))
+    stamps = "" if node.simulation.world.clock.simulated else "; stamps are wall time and tell nothing of it"
+    return Answer(True, f"{request.real_time_factor:g}, was {before:g}{stamps}")
+
+
+def _set_gravity(node: NodeContext, request: SetGravityRequest) -> Answer:
+    """Changes gravity, until the next reset."""
+    asked = request.gravity
+    change = SetGravity.parse({"gravX": asked.x, "gravY": asked.y, "gravZ": asked.z}, "gravity")
+    node.ask(lambda: node.simulation.world.change_physics(change))
+    return Answer(True, f"gravity is {asked.x:g}, {asked.y:g}, {asked.z:g} [m/s^2]")
+
+
+def _set_engine_parameter(node: NodeContext, request: SetStringRequest) -> Answer:
+    """Changes the keys of `setPhysicsEngineParameter` that the YAML text in it has, until the next reset."""
+    data = load_configs(request.data, "data")
+    if "fixedTimeStep" in data:
+        raise InterfaceError("data: fixedTimeStep: cannot change while the world runs; write timeStep in the main file")
+    change = SetPhysicsEngineParameter.parse(data, "data")
+    keys = ", ".join(change.kwargs())
+    if not keys:
+        raise InterfaceError("data: expected keys of setPhysicsEngineParameter, such as numSolverIterations; got none")
+    node.ask(lambda: node.simulation.world.change_physics(change))
+    return Answer(True, f"changed {keys}")
+
+
+def _set_sensor_rate(node: NodeContext, request: SetSensorRateRequest) -> Answer:
+    """Changes how often a sensor is read, until the next reset; 0 is off."""
+    world, wanted = node.simulation.world, request.sensor.removeprefix("/").removeprefix("rpbi/")
+
+    def change() -> float:
+        known = {
+            address(sensor): (name, number)
+            for name in (*world.bodies, *world.cameras)
+            for number, sensor in enumerate(world.sensors_of(name))
+        }
+        if wanted not in known:
+            raise UnknownNameError("sensor", wanted, list(known))
+        name, number = known[wanted]
+        before = world.sensors_of(name)[number].hz
+        world.set_sensor_rate(name, number, request.hz)
+        return before
+
+    before = node.ask(change)
+    return Answer(True, f"'{wanted}': {request.hz:g} Hz, was {before:g}")
+
+
 NODE_SERVICES = (
     Service("rpbi/start", Trigger, _start),
     Service("rpbi/stop", Trigger, _stop),
@@ -247,5 +305,9 @@ NODE_SERVICES = (
     Service("rpbi/attach", Attach, attach),
     Service("rpbi/detach", SetString, detach),
     Service("rpbi/apply_wrench", ApplyWrench, apply_wrench),
+    Service("rpbi/set_gravity", SetGravityService, _set_gravity),
+    Service("rpbi/set_physics_engine_parameter", SetString, _set_engine_parameter),
+    Service("rpbi/set_real_time_factor", SetRealTimeFactor, _set_real_time_factor),
+    Service("rpbi/set_sensor_rate", SetSensorRate, _set_sensor_rate),
     Service("rpbi/get_state_hash", GetStateHash, _state_hash),
 )

@@ -1,0 +1,76 @@
+"""Messages that are sent often, packed in one go: the same bytes as their types write, in a fraction of the time."""
+
+import struct
+from collections.abc import Callable
+from functools import lru_cache
+from io import BytesIO
+
+from sensor_msgs.msg import JointState
+from tf2_msgs.msg import TFMessage
+
+
+class PackedJointState(JointState):
+    """Joint states of a robot, always with the same names."""
+
+    def serialize(self, buff: BytesIO) -> None:
+        """Writes it to a buffer."""
+        header, names = self.header, self.name
+        try:
+            pack, packed_names = _joint_state_format(header.frame_id, tuple(names))
+            count = len(names)
+            stamp = header.stamp
+            buff.write(
+                pack(
+                    header.seq,
+                    stamp.secs,
+                    stamp.nsecs,
+                    packed_names,
+                    count,
+                    *self.position,
+                    count,
+                    *self.velocity,
+                    count,
+                    *self.effort,
+                )
+            )
+        except struct.error:  # something else than a number for each joint, which the type itself knows how to tell
+            super().serialize(buff)
+
+
+class PackedTransforms(TFMessage):
+    """Transforms, always between the same frames."""
+
+    def serialize(self, buff: BytesIO) -> None:
+        """Writes it to a buffer."""
+        packed = [_COUNT.pack(len(self.transforms))]
+        for each in self.transforms:
+            header, place, turn = each.header, each.transform.translation, each.transform.rotation
+            pack, frames = _transform_format(header.frame_id, each.child_frame_id)
+            seq, stamp = header.seq, header.stamp
+            packed.append(
+                pack(seq, stamp.secs, stamp.nsecs, frames, place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w)
+            )
+        buff.write(b"".join(packed))
+
+
+_COUNT = struct.Struct("<I")
+_Format = tuple[Callable[..., bytes], bytes]
+"""What packs a message, and the texts in it."""
+
+
+@lru_cache(maxsize=1000)
+def _joint_state_format(frame: str, names: tuple[str, ...]) -> _Format:
+    texts = _text(frame) + _COUNT.pack(len(names)) + b"".join(map(_text, names))
+    numbers = f"I{len(names)}d"
+    return struct.Struct(f"<3I{len(texts)}s{3 * numbers}").pack, texts
+
+
+@lru_cache(maxsize=10_000)
+def _transform_format(parent: str, child: str) -> _Format:
+    texts = _text(parent) + _text(child)
+    return struct.Struct(f"<3I{len(texts)}s7d").pack, texts
+
+
+def _text(text: str) -> bytes:
+    data = text.encode()
+    return _COUNT.pack(len(data)) + data
