@@ -95,7 +95,7 @@ class Script:
             self._target(world)
         if draw.random() < 0.01:
             self._something(world)
-        if draw.random() < 0.006:
+        if draw.random() < 0.012:
             self._physics(world)
 
     def _physics(self, world: World) -> None:

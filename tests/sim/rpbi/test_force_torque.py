@@ -98,9 +98,9 @@ def test_standing_in_20_poses_all_joints_read_what_newton_and_euler_say(world_of
             assert_within_one_percent(found[joint], np.concatenate([force, moment]), joint)
 
 
-@pytest.mark.parametrize("mode", ["POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL"])
+@pytest.mark.parametrize("mode", ["POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL", "IMPEDANCE_CONTROL"])
 def test_moving_in_20_states_all_joints_read_what_newton_and_euler_say(world_of, mode):
-    world = world_of(mode=mode)
+    world = world_of(mode=mode, target_interpolation="hold")
     random = np.random.default_rng(2)
     still = dict.fromkeys(MOVING, 0.0)
     for _ in range(20):
@@ -135,7 +135,7 @@ def test_effort_of_the_motor_is_in_the_reading_once(world_of, sign):
         assert along_axis(index, (wrench[:3], wrench[3:])) == pytest.approx(effort, rel=0.01)
 
 
-@pytest.mark.parametrize("mode", ["POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL"])
+@pytest.mark.parametrize("mode", ["POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL", "IMPEDANCE_CONTROL"])
 def test_along_a_moving_axis_the_urdfs_damping_is_taken_off_the_effort(world_of, mode):
     world = world_of(mode=mode)
     arm = world.bodies["arm"]

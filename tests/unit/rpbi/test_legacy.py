@@ -66,7 +66,7 @@ def test_two_old_spellings_of_one_key_are_refused() -> None:
 
 def test_fault_in_an_old_spelling_is_told_as_the_user_spelt_it() -> None:
     with pytest.raises(ConfigError) as caught:
-        robot(publish_joint_state_frequency=0)
+        robot(publish_joint_state_frequency=-1)
     assert str(caught.value) == "iiwa.yaml: publish_joint_state_frequency: must be >= 0 [Hz], got -1"
 
 

@@ -251,7 +251,8 @@ def test_visualizer_flags_become_one_call_each() -> None:
         (
             SetJointMotorControlArray,
             {},
-            "controlMode: missing, expected a control mode (POSITION_CONTROL, VELOCITY_CONTROL, TORQUE_CONTROL)",
+            "controlMode: missing, expected a control mode "
+            "(POSITION_CONTROL, VELOCITY_CONTROL, TORQUE_CONTROL, IMPEDANCE_CONTROL)",
         ),
     ],
 )

@@ -118,7 +118,9 @@ class RobotConfig(BodyConfig):
     enabled_joint_force_torque_sensors: ListOf[ForceTorqueEntry] = Field(
         (), description="Joints with a force-torque sensor: names, or mappings with all of its keys."
     )
-    controllers: dict[Name, ControllerEntry] = Field({}, description="Controllers that live in the tick, by name.")
+    controllers: dict[Name, ControllerEntry] = Field(
+        {}, description="Controllers that live in the tick, by name.", json_schema_extra={"additionalProperties": False}
+    )
     impedance: JointSprings = Field(JointSprings(), description="Springs and dampers of IMPEDANCE_CONTROL.")
     joint_trajectory_controller: JointTrajectoryControllerConfig | None = Field(
         None, description="Follower of trajectories, for planners; {} has the usual settings."
