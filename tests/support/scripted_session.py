@@ -17,11 +17,13 @@ import pybullet
 from mobile_base import mobile_base
 from worlds import FLOOR, ball, box, iiwa, write_world
 
+from custom_ros_tools.errors import InterfaceError
 from rpbi.config.loading import load_object
 from rpbi.config.pybullet_args import IMPEDANCE_CONTROL
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.config.pybullet_world_models import SetGravity, SetPhysicsEngineParameter
 from rpbi.constraints.attachment_config import AttachmentConfig
+from rpbi.control.controllers.manager import ControllerSwitch, NewGains
 from rpbi.control.external_wrenches import ExternalWrench
 from rpbi.control.motors import MotorGains
 from rpbi.control.trajectories.request import TrajectoryPoint as Point
@@ -51,6 +53,10 @@ def build(folder: Path | None = None) -> World:
             ],
             joint_trajectory_controller={},
             gravity_compensation=True,
+            controllers={
+                "springs": {"type": "joint_impedance", "active": False},
+                "press": {"type": "force", "link": "lbr_iiwa_link_7", "active": False},
+            },
             setJointMotorControlArray={"controlMode": "POSITION_CONTROL", "positionGains": [0.05]},
         )
         things = tuple(
@@ -115,13 +121,15 @@ class Script:
         draw = self._random
         joints = draw.sample(JOINTS, draw.randint(1, 7))
         values = [draw.uniform(-1.0, 1.0) for _ in joints]
-        if world.bodies["iiwa"].drive.motion is None:
+        with suppress(ValueError):  # a motion or a controller may drive them
             world.put("iiwa/target", JointTarget(joints, values, values, [20.0 * value for value in values]))
+        with suppress(ValueError):
+            world.put("iiwa/springs/target", JointTarget(tuple(joints), tuple(values), (), (), world.clock.stamp_ns))
 
     def _something(self, world: World) -> None:
         draw = self._random
         robot: Any = world.bodies["iiwa"]
-        kind = draw.randrange(11)
+        kind = draw.randrange(13)
         if kind == 0:
             self._count += 1
             name = f"visitor{self._count}"
@@ -155,16 +163,26 @@ class Script:
                 world.put(f"{name}/external_wrench", wrench._replace(duration_s=None))
         elif kind == 10:
             self._attach(world)
+        elif kind == 11:
+            names = ["springs", "press"]
+            draw.shuffle(names)
+            world.act("iiwa", "switch_controllers", ControllerSwitch(names[: draw.randint(0, 1)], names[1:]))
+        elif kind == 12:
+            config = robot.controllers.config("springs")
+            keys = {**config.model_dump(exclude_unset=True), "stiffness": draw.uniform(10.0, 1000.0)}
+            world.act("iiwa", "set_controller_gains", NewGains("springs", type(config).parse(keys, "script")))
         elif robot.motors.mode == pybullet.TORQUE_CONTROL:
             world.pause("the simulation was stopped")
         elif kind == 7:
             goal = {robot.model[name].index: draw.uniform(-0.5, 0.5) for name in JOINTS[:3]}
-            world.act("iiwa", "move", TimedGoal(goal, draw.uniform(0.1, 1.0)))
+            with suppress(ValueError):
+                world.act("iiwa", "move", TimedGoal(goal, draw.uniform(0.1, 1.0)))
         else:
             points = tuple(Point(time_s, tuple(draw.uniform(-0.5, 0.5) for _ in JOINTS)) for time_s in (0.5, 1.0))
             stamp_ns = world.clock.stamp_ns + draw.choice((0, 100_000_000))
             request = TrajectoryRequest(tuple(JOINTS), points, stamp_ns)
-            world.act("iiwa", "follow", RecordedTrajectory.of(request, None, world.clock))
+            with suppress(InterfaceError):  # a controller may drive its joints
+                world.act("iiwa", "follow", RecordedTrajectory.of(request, None, world.clock))
 
     def _attach(self, world: World) -> None:
         """Attaches a body to another, perhaps with a limit; or detaches it, unless it has gone or broken."""

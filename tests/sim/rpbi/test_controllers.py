@@ -17,6 +17,7 @@ from rpbi.control.controllers import Controller
 from rpbi.control.controllers.cartesian_impedance import PoseTarget
 from rpbi.control.controllers.controller import SetPoints
 from rpbi.control.controllers.manager import ControllerSwitch, NewGains
+from rpbi.engine.actions import TimedGoal
 from rpbi.geometry import Pose
 from rpbi.replay.recorded_values import to_text
 from rpbi.replay.session import RecordedCommand, apply_command
@@ -314,6 +315,8 @@ def test_one_joint_has_one_controller(build):
     assert [controllers.sample("lwr", name).active for name in ("first", "second")] == [False, True]
     with pytest.raises(ValueError, match="a controller drives lwr_arm_0_joint until it is stopped"):
         world.put("lwr/target", JointTarget(JOINTS[:1], [0.1]))
+    with pytest.raises(ValueError, match="a controller drives lwr_arm_0_joint until it is stopped"):
+        world.act("lwr", "move", TimedGoal({world.bodies["lwr"].model[JOINTS[0]].index: 0.1}, 1.0))
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 """Drives the joints of one robot: its motors, and the targets or the motion that they follow."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import pybullet
 
@@ -41,6 +41,8 @@ class JointDrive:
         self.motion: Motion | None = None
         self._pb, self._body_id = pb, body_id
         self._has_begun = False
+        self.controlled: Callable[[], frozenset[int]] = frozenset
+        """Returns the joints that a controller drives."""
         self._interpolates = interpolation != "hold"
         self._streams = TargetStreams(motors, self.dt_s, interpolation == "smooth", buffer_s)
 
@@ -69,10 +71,13 @@ class JointDrive:
         """Starts a motion; one that runs is ended with a reason.
 
         Raises:
-            ValueError: If the robot is under torque control.
+            ValueError: If the robot is under torque control, or a controller drives one of its joints.
         """
         if self.motors.mode == pybullet.TORQUE_CONTROL:
             raise ValueError("the robot is under TORQUE_CONTROL, where nothing holds it to a position")
+        if taken := self.controlled() & motion.joints:
+            names = ", ".join(self.model.joints[index].name for index in sorted(taken))
+            raise ValueError(f"a controller drives {names} until it is stopped")
         self.halt("a newer motion replaced it")
         self._streams.drop(motion.joints)
         self.motion, self._has_begun = motion, False

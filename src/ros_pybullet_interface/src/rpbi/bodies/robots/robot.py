@@ -89,6 +89,7 @@ class Robot(JointedBody):
         follower = config.joint_trajectory_controller
         self.follower = None if follower is None else TrajectoryFollower(self.drive, follower)
         self.controllers = ControllerManager(self._arm(), config.controllers, self.motors)
+        self.drive.controlled = lambda: self.controllers.driven
         joints = self.model.driven
         self._stiffness = config.impedance.by_joint("stiffness", joints)
         self._external = ExternalEfforts(len(joints), self.drive.dt_s)

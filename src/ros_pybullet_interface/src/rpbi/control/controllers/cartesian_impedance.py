@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, WithJsonSchema
 
 from custom_ros_tools.schema import NonNegative, Text, Unit
 from rpbi.control.target_stream import Arrivals, TargetStream
@@ -43,6 +43,10 @@ class PoseTarget(NamedTuple):
 
 class CartesianImpedanceConfig(ControllerConfig):
     """Keys of `cartesian_impedance`."""
+
+    type: Annotated[Text, WithJsonSchema({"enum": ["cartesian_impedance"]})] = Field(
+        description="`cartesian_impedance`, or a class that takes its keys."
+    )
 
     link: Text = Field(description="The link that is held.")
     point: Annotated[tuple[float, float, float], Field(strict=False), Unit("m")] = Field(

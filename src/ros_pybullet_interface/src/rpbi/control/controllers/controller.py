@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, HzOrOff, ListOf, Switch, Text
 from rpbi.control.robot_model import RobotModel
@@ -20,8 +20,6 @@ Array = npt.NDArray[np.float64]
 
 class ControllerConfig(ConfigModel):
     """An entry of a robot's `controllers`; a controller with more keys has a subclass of this as its `Config`."""
-
-    model_config = ConfigDict(json_schema_extra={"additionalProperties": True})  # those of subclasses
 
     type: Text = Field(description="What it is: a key of CONTROLLERS, or `module:Class`.")
     active: Switch = Field(True, description="Whether it drives its joints from the start on.")

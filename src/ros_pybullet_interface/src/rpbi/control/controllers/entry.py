@@ -3,15 +3,18 @@
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import PlainValidator, ValidationInfo
+from pydantic import ConfigDict, Field, PlainValidator, ValidationInfo, WithJsonSchema
 
 from custom_ros_tools.errors import ConfigError
-from custom_ros_tools.schema import InnerProblemsError, KeyedError
+from custom_ros_tools.schema import InnerProblemsError, KeyedError, Text
 from custom_ros_tools.schema.type_names import shown
 from rpbi.plugins import config_of
 
 from . import CONTROLLERS, controller_class
+from .cartesian_impedance import CartesianImpedanceConfig
 from .controller import ControllerConfig
+from .force import ForceConfig
+from .joint_impedance import JointImpedanceConfig
 
 
 def controller_config(entry: Any, info: ValidationInfo) -> ControllerConfig:
@@ -33,5 +36,14 @@ def controller_config(entry: Any, info: ValidationInfo) -> ControllerConfig:
         raise InnerProblemsError(error.problems) from None
 
 
-ControllerEntry = Annotated[Any, PlainValidator(controller_config, json_schema_input_type=ControllerConfig)]
+class OwnControllerConfig(ControllerConfig):
+    """An entry with a class of another package, which may have more keys."""
+
+    model_config = ConfigDict(json_schema_extra={"additionalProperties": True})
+
+    type: Annotated[Text, WithJsonSchema({"type": "string", "pattern": ":"})] = Field(description="`module:Class`.")
+
+
+_Entry = JointImpedanceConfig | CartesianImpedanceConfig | ForceConfig | OwnControllerConfig
+ControllerEntry = Annotated[Any, PlainValidator(controller_config, json_schema_input_type=_Entry)]
 """A controller: `{type: KEY or module:Class, KEY: VALUE, ...}`."""

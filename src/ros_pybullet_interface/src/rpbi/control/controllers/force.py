@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import Field, WithJsonSchema, field_validator
 
-from custom_ros_tools.schema import NonNegative, Positive, Unit, Vec3
+from custom_ros_tools.schema import NonNegative, Positive, Text, Unit, Vec3
 
 from .cartesian_impedance import CartesianImpedanceConfig, CartesianImpedanceController
 from .controller import Arm, Array
@@ -16,6 +16,10 @@ from .impedance import damping_of
 
 class ForceConfig(CartesianImpedanceConfig):
     """Keys of `force`, beside those of `cartesian_impedance`."""
+
+    type: Annotated[Text, WithJsonSchema({"enum": ["force"]})] = Field(
+        description="`force`, or a class that takes its keys."
+    )
 
     axis: Vec3 = Field((0.0, 0.0, -1.0), description="Where it pushes, in the world.")
     force: Annotated[NonNegative, Unit("N")] = Field(10.0, le=1000.0, description="With what force.")

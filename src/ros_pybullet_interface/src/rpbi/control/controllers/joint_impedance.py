@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field, WithJsonSchema
 
+from custom_ros_tools.schema import Text
 from rpbi.control.target_stream import Arrivals, TargetStream
 from rpbi.urdf.joints import JointTarget
 
@@ -19,6 +21,10 @@ BUFFER_S = 0.01
 
 class JointImpedanceConfig(JointSprings, ControllerConfig):
     """Keys of `joint_impedance`."""
+
+    type: Annotated[Text, WithJsonSchema({"enum": ["joint_impedance"]})] = Field(
+        description="`joint_impedance`, or a class that takes its keys."
+    )
 
 
 class JointImpedanceController(Controller):
