@@ -69,6 +69,14 @@ class Slow(Controller):
         return np.array([float(sum(range(150_000)) * 0) for _ in self.arm.chosen])
 
 
+class TellsNonsense(Controller):
+    def compute(self, state, targets, tick):
+        return self.arm.model.bias(state.base, state.position, state.velocity)
+
+    def report(self):
+        return {"error": math.inf}
+
+
 class Follows(Controller):
     """Moves its joints by set points."""
 
@@ -268,9 +276,10 @@ def test_a_force_stays_while_it_wipes(build):
         (wrong("Raises"), r"test_controllers:Raises.*out of ideas"),
         (wrong("NotFinite"), "not finite"),
         (wrong("TooFew"), r"expected one number for each of its 7 joints, got shape \(2,\)"),
+        (wrong("TellsNonsense"), "what it tells is not finite: error"),
         (wrong("Slow"), r"it needs .* ms for a tick of 1 ms"),
     ],
-    ids=["raises", "not finite", "too few", "slow"],
+    ids=["raises", "not finite", "too few", "tells nonsense", "slow"],
 )
 def test_a_controller_that_fails_is_stopped_and_named_and_the_world_goes_on(build, caplog, controller, told):
     aside = {"fileName": "kuka_iiwa/model.urdf", "useFixedBase": True, "basePosition": [2.0, 0.0, 0.0]}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -200,9 +201,17 @@ class ControllerManager:
                 self._advance(managed, state, tick)
 
     def sample(self, robot: str, name: str) -> ControllerSample:
-        """Returns how a controller does."""
+        """Returns how a controller does; one that cannot tell is stopped."""
         managed = self._managed[name]
-        values = managed.controller.report() if managed.active and managed.has_begun else {}
+        values: Mapping[str, float] = {}
+        if managed.active and managed.has_begun:
+            try:
+                values = {str(key): float(value) for key, value in managed.controller.report().items()}
+                if wrong := [key for key, value in values.items() if not math.isfinite(value)]:
+                    raise ValueError(f"what it tells is not finite: {', '.join(wrong)}")
+            except Exception as error:
+                self._fail(managed, _cause(managed.controller, "report", error))
+                values = {}
         return ControllerSample(f"{robot}/{name}", managed.config.type, managed.active, managed.message, values)
 
     def _advance(self, managed: _Managed, state: RobotState, tick: int) -> None:
@@ -210,7 +219,7 @@ class ControllerManager:
         try:
             wanted = managed.compute(state, tick)
         except Exception as error:
-            self._fail(managed, _cause(managed.controller, error))
+            self._fail(managed, _cause(managed.controller, "compute", error))
             return
         took_s = (time.thread_time_ns() - begin_ns) * 1e-9
         managed.slow = managed.slow + 1 if took_s > managed.arm.dt_s else 0
@@ -266,10 +275,10 @@ def chosen_joints(arm: Arm, names: Iterable[str] | None) -> np.ndarray:
     return np.array([known.index(name) for name in names], np.int64)
 
 
-def _cause(controller: Controller, error: Exception) -> str:
+def _cause(controller: Controller, doing: str, error: Exception) -> str:
     """Tells what went wrong in a controller, and where if it is of another package."""
     try:
-        blame(controller, "compute", error)
+        blame(controller, doing, error)
     except InterfaceError as blamed:
         return str(blamed)
     return f"{type(error).__name__}: {error}"
