@@ -50,6 +50,10 @@ class Robot(JointedBody):
         "broadcast_link_states": True,
         "base_state_hz": 50.0,
         "enabled_joint_force_torque_sensors": ["lbr_iiwa_joint_7"],
+        "controllers": {
+            "springs": {"type": "joint_impedance", "active": False},
+            "press": {"type": "force", "link": "lbr_iiwa_link_7", "active": False},
+        },
         "joint_trajectory_controller": {},
         "start_ik_callback": True,
         "contacts": {},
