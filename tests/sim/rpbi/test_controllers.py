@@ -24,7 +24,8 @@ from rpbi.replay.session import RecordedCommand, apply_command
 from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
 
-LWR = Path(__file__).resolve().parents[3] / "src" / "rpbi_examples" / "robots" / "kuka_lwr.urdf"
+ROOT = Path(__file__).resolve().parents[3]
+LWR = ROOT / "src" / "rpbi_examples" / "robots" / "kuka_lwr.urdf"
 BENT = {"lwr_arm_1_joint": 30.0, "lwr_arm_3_joint": -90.0, "lwr_arm_5_joint": 60.0}
 JOINTS = [f"lwr_arm_{index}_joint" for index in range(7)]
 TIP = "end_effector_ball"
@@ -393,3 +394,21 @@ def test_a_session_with_controllers_is_the_same_again(build):
             apply_command(second, waiting.pop(0))
         second.step()
     assert second.state_hash() == first.state_hash()
+
+
+def test_the_controller_of_the_page_works(build, tmp_path, monkeypatch):
+    page = (ROOT / "docs" / "controllers.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    imports = """
+import numpy as np
+from pydantic import Field
+from custom_ros_tools.schema import NonNegative
+from rpbi.control.controllers import Controller, ControllerConfig
+"""
+    (tmp_path / "shaker_of_the_page.py").write_text(imports + code)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    world = build(lwr(controllers={"shake": {"type": "shaker_of_the_page:Shaker", "amplitude": 3.0}}))
+    start = positions(world)
+    run(world, 250)
+    assert np.abs(positions(world) - start).max() > 0.01
+    assert world.bodies["lwr"].controllers.sample("lwr", "shake").active
