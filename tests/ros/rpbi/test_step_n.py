@@ -154,7 +154,8 @@ def test_a_tick_listener_waits_for_all_of_a_tick(ros, stopped):
 
 def test_the_predictive_controller_of_the_page_brings_the_joint_to_its_goal(ros, tmp_path):
     code = re.search(r"```python\n(.*?)```", DOCS.read_text(), re.DOTALL)[1]
-    config = main_config(tmp_path, robots=(iiwa(),), start_pybullet_after_initialization=False)
+    arm = iiwa(target_interpolation="hold")
+    config = main_config(tmp_path, robots=(arm,), start_pybullet_after_initialization=False)
     ros.simulator(config, namespace="/mpc/")
     script = tmp_path / "mpc.py"
     script.write_text(code)

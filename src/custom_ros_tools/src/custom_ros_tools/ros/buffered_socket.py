@@ -39,7 +39,7 @@ class BufferedSocket:
                 raise self._error
             self._kept.append(data)
             _unsent[self] = None
-            if len(self._kept) >= self._most_together:
+            if _at_once.is_set() or len(self._kept) >= self._most_together:
                 self._send_kept()
 
     def flush(self) -> None:
@@ -66,6 +66,16 @@ class BufferedSocket:
 
 _unsent: dict[BufferedSocket, None] = {}
 """Those that keep something, in the order in which they began to."""
+
+
+_at_once = threading.Event()
+"""Set once nobody flushes any more."""
+
+
+def send_at_once() -> None:
+    """Sends what is kept, and from now on every message at once: for the end of a loop that has flushed."""
+    _at_once.set()
+    flush_buffered_sockets()
 
 
 def flush_buffered_sockets() -> None:

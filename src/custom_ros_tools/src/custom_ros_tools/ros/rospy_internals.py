@@ -148,7 +148,9 @@ def close_poller_with(topic: rospy.topics.Topic) -> None:
 
     It holds methods of its own, so that rospy leaves it to Python's garbage collector, which nothing hurries.
     """
-    poller = getattr(topic.impl, "connection_poll", None)
+    poller = getattr(
+        getattr(topic, "impl", None), "connection_poll", None
+    )  # else nothing is lost but a file for a while
     for name, method in list(vars(poller).items()) if poller is not None else ():
         if getattr(method, "__self__", None) is poller:
             setattr(poller, name, partial(_call, WeakMethod(method)))

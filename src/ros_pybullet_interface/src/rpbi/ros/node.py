@@ -10,6 +10,7 @@ import pybullet
 import rospy
 
 from custom_ros_tools.errors import ConfigError, PhysicsError, Problem
+from custom_ros_tools.ros.buffered_socket import send_at_once
 from custom_ros_tools.ros.lifecycle.parameters import kept_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from rpbi.config.asset_files import ROBOT_DESCRIPTION
@@ -120,6 +121,7 @@ class SimulatorNode:
                 raise
         finally:
             has_gone = not self._world.is_connected
+            send_at_once()  # such as the results of goals that it ends in the middle of
             self._cameras.close()
             self._world.close()  # from here on, no object comes or goes
             # Topics that are just being opened or closed would lock rospy up. Who waits for them ends with the process.
