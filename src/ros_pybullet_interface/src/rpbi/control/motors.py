@@ -130,6 +130,9 @@ class Motors:
         self._pb, self._body_id, self._model = pb, body_id, model
         self._limit_reports = limit_reports
         self._enforce_effort_limits = enforce_effort_limits
+        self._effort_limits = {
+            joint.index: model.effort_limit(joint) if enforce_effort_limits else math.inf for joint in model.driven
+        }
         self._position_arguments = {joint.index: self._arguments(joint, gains) for joint in model.driven}
         self._velocity_arguments = {
             index: {key: value for key, value in arguments.items() if key in ("velocityGain", "force")}
@@ -262,7 +265,8 @@ class Motors:
 
     def push(self, efforts: Mapping[int, float]) -> None:
         """Applies efforts [N m or N] by joint index for one tick, within the joints' own."""
-        limited = {index: self._limited_effort(index, effort) for index, effort in efforts.items()}
+        limits = self._effort_limits
+        limited = {index: min(max(effort, -limits[index]), limits[index]) for index, effort in efforts.items()}
         self._pb.setJointMotorControlArray(
             self._body_id, list(limited), pybullet.TORQUE_CONTROL, forces=list(limited.values())
         )
@@ -299,11 +303,7 @@ class Motors:
             return min(max(value, joint.lower), joint.upper)
         if self.mode == pybullet.VELOCITY_CONTROL:
             return min(max(value, -joint.max_velocity), joint.max_velocity)
-        return self._limited_effort(index, value)
-
-    def _limited_effort(self, index: int, value: float) -> float:
-        limit = self._model.effort_limit(self._model.joints[index]) if self._enforce_effort_limits else math.inf
-        return min(max(value, -limit), limit)
+        return min(max(value, -self._effort_limits[index]), self._effort_limits[index])
 
     def _drive(self, index: int, value: float) -> None:
         """Sets the set point of one motor; PyBullet keeps it. Under torque control and impedance it is released."""

@@ -43,8 +43,10 @@ class RobotModel:
         self._client: Client | None = None  # made when it is needed first: the renderer's copy of the robot never does
         self._body_id = -1
         self._gravity: Vector | None = None
-        self._axes: dict[int, Quaternion] = {}
-        """How a link's inertial frame is turned in it: PyBullet has points in its axes, from the link's origin."""
+        self._points: dict[tuple[int, Vector], Vector] = {}
+        """Points of links as PyBullet has them: from the link's origin, along the axes of its inertial frame."""
+        self._turned: Quaternion | None = None
+        self._turn = np.eye(3)
 
     def mass_matrix(self, q: Sequence[float]) -> Array:
         """Returns the mass matrix at joint positions [rad or m], shape (n, n) [kg m^2, kg m, kg]."""
@@ -91,13 +93,15 @@ class RobotModel:
         """
         pb = self._client or self._load()
         link -= self._base_joints
-        if link not in self._axes:
-            self._axes[link] = pb.getLinkState(self._body_id, link)[3]
-        point = rotated_back(self._axes[link], point)
+        if (link, point) not in self._points:
+            self._points[link, point] = rotated_back(pb.getLinkState(self._body_id, link)[3], point)
+        point = self._points[link, point]
         positions = self._positions(q)
         linear, angular = pb.calculateJacobian(self._body_id, link, point, positions, self._zeros, self._zeros)
-        turn = np.array(pb.getMatrixFromQuaternion(base.quat_xyzw)).reshape(3, 3)
-        jacobian = np.vstack((turn @ np.array(linear), turn @ np.array(angular)))
+        if base.quat_xyzw != self._turned:
+            self._turned = base.quat_xyzw
+            self._turn = np.array(pb.getMatrixFromQuaternion(base.quat_xyzw)).reshape(3, 3)
+        jacobian = (self._turn @ np.array((linear, angular))).reshape(6, -1)
         return jacobian if self._by_driven is None else jacobian @ self._by_driven
 
     def pose(self, base: Pose, q: Sequence[float], link: int) -> Pose:

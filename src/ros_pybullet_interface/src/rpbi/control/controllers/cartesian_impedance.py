@@ -18,15 +18,15 @@ from .impedance import (
     DampingRatio,
     ExternalEfforts,
     cartesian_impedance,
-    columns_solved,
-    damping_of,
+    critical_damping,
+    force_for,
+    inverse,
     joint_impedance,
     turn_between,
 )
 from .joint_impedance import BUFFER_S
 
-ROUNDING = 1e-6 * np.eye(6)
-"""Keeps the mobility of a singular arm invertible."""
+_EYE = np.eye(6)
 
 
 class PoseTarget(NamedTuple):
@@ -77,6 +77,10 @@ class CartesianImpedanceController(Controller):
         if config.link not in arm.links:
             raise ValueError(f"link: there is no link '{config.link}', there are {', '.join(arm.links)}")
         self._link = arm.links[config.link]
+        self._stiffness = np.repeat((config.stiffness, config.rotational_stiffness), 3)
+        self._push = np.zeros(6)
+        self._axes: Array | None = None
+        """Axes of the springs, as columns, shape (6, 6); None for those of the world."""
 
     def check(self, key: str, value: PoseTarget) -> PoseTarget:
         """Takes finite poses."""
@@ -88,56 +92,54 @@ class CartesianImpedanceController(Controller):
         self._stream = TargetStream(Arrivals(self.arm.dt_s, BUFFER_S), _components(self._goal), smooth=True)
         self._posture = np.array(state.position)[self.arm.chosen]
         self._external = ExternalEfforts(len(self._posture), self.arm.dt_s)
-        self._ones, self._zeros = np.ones_like(self._posture), np.zeros_like(self._posture)
-        self._posture_stiffness = self.config.posture_stiffness * self._ones
+        self._posture_stiffness = np.full(len(self._posture), self.config.posture_stiffness)
         self._taken: Any = None
 
     def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array:
         """Returns the efforts of the spring, the damper and what balances gravity and motion."""
         self._take(targets.get("target"), tick)
         wanted = list(self._stream.advance(tick + 1.0).values())
-        arm, dt_s = self.arm, self.arm.dt_s
-        chosen, q = arm.chosen, state.position
-        jacobian = arm.model.jacobian(state.base, q, self._link, self.config.point)[:, chosen]
-        mass = arm.model.mass_matrix(q)[np.ix_(chosen, chosen)]
-        joint_velocity = np.array(state.velocity)[chosen]
-        by_force = columns_solved(mass, jacobian)
-        mobility = jacobian @ by_force.T
-        velocity = jacobian @ joint_velocity
+        arm, config, axes = self.arm, self.config, self._axes
+        q, velocity = np.array((state.position, state.velocity))[:, arm.chosen]
         pose = self._pose()
-        turn = turn_between(pose.quat_xyzw, wanted[3:])
-        self._error = np.concatenate((np.subtract(wanted[:3], pose.position), turn))
-        self._external.update(joint_velocity)
+        jacobian = arm.of_chosen(arm.model.jacobian(state.base, state.position, self._link, config.point))
+        error = np.concatenate((np.subtract(wanted[:3], pose.position), turn_between(pose.quat_xyzw, wanted[3:])))
+        if axes is not None:
+            jacobian, error = axes.T @ jacobian, axes.T @ error
+        mass = arm.of_chosen(arm.of_chosen(arm.model.mass_matrix(state.position)).T)
+        by_force = jacobian @ inverse(mass)
+        mobility = by_force @ jacobian.T
+        self._external.update(velocity)
         external = self._external.estimate
-        stiffness, damping, push = self._springs(mobility)
-        self._wrench = cartesian_impedance(
-            mobility, stiffness, damping, self._error, velocity, push, by_force @ external, dt_s
-        )
+        self._error, self._wrench = error, cartesian_impedance(
+            mobility,
+            self._stiffness,
+            self._damping(mobility),
+            error,
+            jacobian @ velocity,
+            self._push,
+            by_force @ external,
+            arm.dt_s,
+        )  # fmt: skip
         efforts: Array = jacobian.T @ self._wrench
-        if self.config.posture_stiffness:
-            pull = joint_impedance(
-                mass, self._posture_stiffness, self._ones, self._posture - np.array(q)[chosen], joint_velocity,
-                self._zeros, external, dt_s
-            )  # fmt: skip
-            efforts += pull - jacobian.T @ np.linalg.solve(mobility + ROUNDING, by_force @ pull)
-        self._external.note(mass, efforts, joint_velocity)
-        return efforts + arm.model.bias(state.base, q, state.velocity)[chosen]
+        if config.posture_stiffness:
+            away = self._posture - q
+            pull = joint_impedance(mass, self._posture_stiffness, 1.0, away, velocity, 0.0, external, arm.dt_s)
+            efforts += pull - jacobian.T @ force_for(mobility, by_force @ pull)  # Khatib, 1987
+        self._external.note(mass, efforts, velocity)
+        return efforts + arm.of_chosen(arm.model.bias(state.base, state.position, state.velocity))
 
     def report(self) -> Mapping[str, float]:
         """Returns how far it is from the target, and with what force and moment it pulls, in the world's axes."""
-        axes = ("x", "y", "z")
-        told = {f"error/{axis}": value for axis, value in zip(axes, self._error)}
-        told |= {f"turn/{axis}": value for axis, value in zip(axes, self._error[3:])}
-        told |= {f"force/{axis}": value for axis, value in zip(axes, self._wrench)}
-        told |= {f"moment/{axis}": value for axis, value in zip(axes, self._wrench[3:])}
-        return {key: float(value) for key, value in told.items()}
+        axes = _EYE if self._axes is None else self._axes
+        numbers = np.concatenate((axes @ self._error, axes @ self._wrench)).tolist()
+        names = (f"{what}/{axis}" for what in ("error", "turn", "force", "moment") for axis in "xyz")
+        return dict(zip(names, numbers))
 
-    def _springs(self, mobility: Array) -> tuple[Array, Array, Array]:
-        """Returns stiffness and damping, shape (6, 6), and a push [N, N m], shape (6,), in the world's axes."""
-        config = self.config
-        stiffness = np.repeat((config.stiffness, config.rotational_stiffness), 3)
-        damping = damping_of(mobility, np.eye(3), stiffness, config.damping_ratio)
-        return np.diag(stiffness), np.diag(damping), np.zeros(6)
+    def _damping(self, mobility: Array) -> Array:
+        """Returns the damping along each axis of the springs, shape (6,) [N s/m, N m s/rad]."""
+        damping: Array = self.config.damping_ratio * critical_damping(mobility, self._stiffness)
+        return damping
 
     def _pose(self) -> Pose:
         pose = self.arm.link_pose(self._link)

@@ -72,6 +72,10 @@ class Arm(NamedTuple):
     chosen: npt.NDArray[np.int64]
     dt_s: float
 
+    def of_chosen(self, rows: Array) -> Array:
+        """Returns what belongs to the controller's joints, of the last axis of something for all driven ones."""
+        return rows if len(self.chosen) == len(self.model.joints) else rows[..., self.chosen]
+
     def link_pose(self, link: int) -> Pose:
         """Returns the measured pose in the world of the URDF frame of a link, by PyBullet's index."""
         state = self.pb.getLinkState(self.body_id, link, computeForwardKinematics=True)

@@ -11,7 +11,6 @@ from custom_ros_tools.schema import NonNegative, Positive, Text, Unit, Vec3
 
 from .cartesian_impedance import CartesianImpedanceConfig, CartesianImpedanceController
 from .controller import Arm, Array
-from .impedance import damping_of
 
 
 class ForceConfig(CartesianImpedanceConfig):
@@ -49,14 +48,12 @@ class ForceController(CartesianImpedanceController):
         axis = np.array(config.axis) / np.linalg.norm(config.axis)
         side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
         side /= np.linalg.norm(side)
-        self._turn = np.column_stack((axis, side, np.cross(axis, side)))
-        self._push = np.concatenate((config.force * axis, np.zeros(3)))
+        turn = np.column_stack((axis, side, np.cross(axis, side)))
+        self._axes = np.kron(np.eye(2), turn)
+        self._stiffness[0] = 0.0
+        self._push[0] = config.force
 
-    def _springs(self, mobility: Array) -> tuple[Array, Array, Array]:
-        config, turn = self.config, self._turn
-        stiffness = np.repeat((config.stiffness, config.rotational_stiffness), 3)
-        stiffness[0] = 0.0
-        damping = damping_of(mobility, turn, stiffness, config.damping_ratio)
-        damping[0] = config.force / config.approach_speed
-        both = np.kron(np.eye(2), turn)
-        return both * stiffness @ both.T, both * damping @ both.T, self._push
+    def _damping(self, mobility: Array) -> Array:
+        damping = super()._damping(mobility)
+        damping[0] = self.config.force / self.config.approach_speed
+        return damping

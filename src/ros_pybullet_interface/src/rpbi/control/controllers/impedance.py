@@ -14,6 +14,7 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
+from scipy.linalg import lapack
 
 from custom_ros_tools.errors import hint
 from custom_ros_tools.schema import ConfigModel, Positive, Unit
@@ -25,6 +26,8 @@ DampingRatio = Annotated[float, Field(ge=0.0, le=2.0)]
 SMOOTHED_S = 0.01
 """Time constant of the estimate of external efforts [s]."""
 _EYE = np.eye(6)
+ROUNDING = 1e-6 * np.eye(6)
+"""Keeps the mobility of a singular arm invertible."""
 LARGEST_MASS_KG = 100.0
 """Of a direction in which the arm can hardly move, for damping."""
 
@@ -85,10 +88,10 @@ class ExternalEfforts:
 def joint_impedance(
     mass: Array,
     stiffness: Array,
-    damping_ratio: Array,
+    damping_ratio: Array | float,
     error: Array,
     velocity: Array,
-    wanted_velocity: Array,
+    wanted_velocity: Array | float,
     external: Array,
     dt_s: float,
 ) -> Array:
@@ -107,8 +110,8 @@ def joint_impedance(
     damping = 2.0 * damping_ratio * np.sqrt(stiffness * mass.diagonal())
     ahead = stiffness * (error - velocity * dt_s) + damping * (wanted_velocity - velocity) + external
     stiff = mass.copy()
-    stiff.flat[:: len(mass) + 1] += damping * dt_s + stiffness * dt_s**2
-    efforts: Array = mass @ np.linalg.solve(stiff, ahead) - external
+    stiff.flat[:: len(mass) + 1] += (damping + stiffness * dt_s) * dt_s
+    efforts: Array = mass @ lapack.dposv(stiff, ahead)[1] - external
     return efforts
 
 
@@ -122,59 +125,61 @@ def cartesian_impedance(
     external: Array,
     dt_s: float,
 ) -> Array:
-    """Returns force and moment of a spring and damper at a point of an arm.
+    """Returns force and moment of a spring and damper at a point of an arm, along the axes of the springs.
 
     Args:
         mobility: Acceleration of the point by force, J M^-1 J^T, shape (6, 6).
-        stiffness: Shape (6, 6) [N/m, N m/rad].
-        damping: Shape (6, 6) [N s/m, N m s/rad].
+        stiffness: 6 stiffnesses [N/m, N m/rad].
+        damping: 6 dampings [N s/m, N m s/rad].
         error: From where the point is to where it is to be: way [m] and turn [rad], shape (6,).
         velocity: Of the point [m/s] and of the link's rotation [rad/s], shape (6,).
         push: A force [N] and moment [N m] beside the spring, shape (6,).
         external: How what else acts on the arm accelerates the point [m/s^2, rad/s^2], shape (6,).
         dt_s: Length of a tick [s].
     """
-    by_acceleration = damping * dt_s + stiffness * dt_s**2
-    ahead = stiffness @ (error - velocity * dt_s) - damping @ velocity + push - by_acceleration @ external
-    wrench: Array = np.linalg.solve(_EYE + by_acceleration @ mobility, ahead)
+    by_acceleration = (damping + stiffness * dt_s) * dt_s
+    ahead = stiffness * (error - velocity * dt_s) - damping * velocity + push - by_acceleration * external
+    wrench: Array = lapack.dgesv(_EYE + by_acceleration[:, None] * mobility, ahead)[2]
     return wrench
 
 
-def columns_solved(matrix: Array, rows: Array) -> Array:
-    """Returns the solutions of one system of n equations for k right sides, given and returned as rows, shape (k, n).
-
-    One by one, since LAPACK solves several at once in threads of its own, which on a busy machine wait for each other
-    for many times as long as the sums take.
-    """
-    solved: Array = np.linalg.solve(np.broadcast_to(matrix, (len(rows), *matrix.shape)), rows[:, :, None])[:, :, 0]
-    return solved
-
-
-def damping_of(mobility: Array, turn: Array, stiffness: Array, ratio: float) -> Array:
-    """Returns the diagonal damping that has a ratio to the critical one along each axis.
+def critical_damping(mobility: Array, stiffness: Array) -> Array:
+    """Returns the 6 dampings [N s/m, N m s/rad] that are critical along each axis of springs.
 
     Args:
         mobility: Acceleration by force, shape (6, 6).
-        turn: The axes along which the stiffness is diagonal, as columns, shape (3, 3).
-        stiffness: 6 stiffnesses along these axes [N/m, N m/rad].
-        ratio: The damping ratio.
-
-    Returns:
-        6 dampings [N s/m, N m s/rad].
+        stiffness: 6 stiffnesses [N/m, N m/rad].
     """
-    along = [(turn * (part @ turn)).sum(0) for part in (mobility[:3, :3], mobility[3:, 3:])]
-    masses = 1.0 / np.maximum(np.concatenate(along), 1.0 / LARGEST_MASS_KG)
-    dampings: Array = 2.0 * ratio * np.sqrt(stiffness * masses)
+    dampings: Array = 2.0 * np.sqrt(stiffness / np.maximum(mobility.diagonal(), 1.0 / LARGEST_MASS_KG))
     return dampings
+
+
+def inverse(matrix: Array) -> Array:
+    """Returns the inverse of a symmetric positive definite matrix, such as a mass matrix.
+
+    It takes no solution of several right sides at once: LAPACK makes them in threads of its own, which on a busy
+    machine wait for each other for many times as long as the sums take.
+    """
+    root = lapack.dtrtri(lapack.dpotrf(matrix, lower=1)[0], lower=1)[0]
+    inverted: Array = root.T @ root
+    return inverted
+
+
+def force_for(mobility: Array, acceleration: Array) -> Array:
+    """Returns force and moment that give a point an acceleration [m/s^2, rad/s^2], shapes (6,).
+
+    Args:
+        mobility: Acceleration by force, shape (6, 6); of a singular arm it is not invertible but for a small part.
+    """
+    wrench: Array = lapack.dposv(mobility + ROUNDING, acceleration)[1]
+    return wrench
 
 
 def turn_between(start: Sequence[float], end: Sequence[float]) -> Array:
     """Returns the rotation vector [rad] from one quaternion (x, y, z, w) to another, in the axes that both are in."""
     x, y, z, w = start
     a, b, c, d = end
-    turn = np.array([a * w - d * x - b * z + c * y, b * w - d * y - c * x + a * z, c * w - d * z - a * y + b * x])
-    cosine = d * w + a * x + b * y + c * z
-    if cosine < 0.0:
-        turn, cosine = -turn, -cosine
-    sine = float(np.linalg.norm(turn))
-    return turn * (2.0 * math.atan2(sine, cosine) / sine) if sine > 1e-12 else 2.0 * turn
+    turn = a * w - d * x - b * z + c * y, b * w - d * y - c * x + a * z, c * w - d * z - a * y + b * x
+    cosine, sine = d * w + a * x + b * y + c * z, math.hypot(*turn)
+    scale = 2.0 * math.atan2(sine, abs(cosine)) / sine if sine > 1e-12 else 2.0
+    return np.array(turn) * math.copysign(scale, cosine)

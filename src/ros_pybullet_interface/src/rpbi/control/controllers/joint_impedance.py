@@ -73,7 +73,7 @@ class JointImpedanceController(Controller):
         before = np.array(list(self._stream.set_points.values()))
         after = np.array(list(self._stream.advance(tick + 1.0).values()))
         chosen, model, dt_s = self.arm.chosen, self.arm.model, self.arm.dt_s
-        mass = model.mass_matrix(state.position)[np.ix_(chosen, chosen)]
+        mass = self.arm.of_chosen(self.arm.of_chosen(model.mass_matrix(state.position)).T)
         self._error = before - np.array(state.position)[chosen]
         velocity = np.array(state.velocity)[chosen]
         bias = model.bias(state.base, state.position, state.velocity)[chosen]
