@@ -13,6 +13,8 @@ from rpbi.urdf.loading import load_urdf
 
 Array = npt.NDArray[np.float64]
 
+NO_TURN = (0.0, 0.0, 0.0, 1.0)
+
 
 class RobotModel:
     """A robot with n driven joints and a base that does not move, in a client of its own.
@@ -101,7 +103,9 @@ class RobotModel:
         if base.quat_xyzw != self._turned:
             self._turned = base.quat_xyzw
             self._turn = np.array(pb.getMatrixFromQuaternion(base.quat_xyzw)).reshape(3, 3)
-        jacobian = (self._turn @ np.array((linear, angular))).reshape(6, -1)
+        jacobian = np.array(linear + angular)
+        if self._turned != NO_TURN:
+            jacobian = (self._turn @ jacobian.reshape(2, 3, -1)).reshape(6, -1)
         return jacobian if self._by_driven is None else jacobian @ self._by_driven
 
     def pose(self, base: Pose, q: Sequence[float], link: int) -> Pose:
