@@ -16,6 +16,7 @@ from workplace import Workplace
 WORKPLACE = Workplace()
 
 import rosgraph  # noqa: E402
+from careful_master import path_with  # noqa: E402
 from ros_system import RosSystem, stop_group, wait_until  # noqa: E402
 from second_master import SecondMaster  # noqa: E402
 
@@ -46,8 +47,11 @@ def ros_master(no_process_is_left: None) -> Iterator[str]:
     port = WORKPLACE.port
     log_path = WORKPLACE.folder / "roscore.log"
     with open(log_path, "w") as log:
+        environment = {**os.environ, "PATH": path_with(WORKPLACE.folder / "bin")}
         command = ["roscore", "-p", str(port.number)]
-        roscore = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
+        roscore = subprocess.Popen(
+            command, stdout=log, stderr=subprocess.STDOUT, start_new_session=True, env=environment
+        )
     try:
         wait_until(rosgraph.is_master_online, "the ROS master answers", 60.0)
         wait_until(lambda: rosgraph.Master("/tests").lookupNode("/rosout"), "rosout is up", 60.0)
