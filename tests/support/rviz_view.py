@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import math
+import re
+import subprocess
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import yaml
+from ros_system import RosSystem, stop_group, wait_until
 from screen import Screen, Window
 
+SLOW_S = 300.0
+ATTEMPTS = 3
+CRASH = re.compile(r"\[rviz-\d+\] process has died \[pid \d+, exit code -(6|11),")
+"""What roslaunch says of it: it was aborted, or accessed memory that is not there."""
 FIELD_OF_VIEW = math.radians(45.0)
 """Vertical opening of RViz's view."""
 
@@ -51,3 +58,27 @@ def find_view(screen: Screen) -> Window | None:
     views = [window for window in windows if not window.title and min(window.width, window.height) > 300]
     is_open = any("- RViz" in window.title for window in windows)
     return max(views, key=lambda window: window.width * window.height) if is_open and views else None
+
+
+def launch_with_rviz(system: RosSystem, screen: Screen, *arguments: str) -> subprocess.Popen:
+    """Launches an example as a user with a screen does, and waits until RViz is open.
+
+    Debian's RViz sometimes, once in some fifty times on a busy machine, crashes while it starts (`free(): invalid next
+    size`, exit code -6). Then the example is launched again; nothing else is tried twice.
+    """
+    for _ in range(ATTEMPTS):
+        example = system.start(["roslaunch", "rpbi_examples", *arguments, "headless:=false"], **screen.environment)
+        said = wait_until(
+            lambda example=example: (
+                CRASH.search(system.output(example))
+                or (find_view(screen) and "open")
+                or (example.poll() is not None and "over")
+            ),
+            "RViz is open",
+            SLOW_S,
+            every_s=0.5,
+        )
+        if isinstance(said, str):
+            return example
+        stop_group(example)
+    raise AssertionError(f"RViz crashed {ATTEMPTS} times while it started")

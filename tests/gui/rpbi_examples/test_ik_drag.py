@@ -10,7 +10,7 @@ import pytest
 import rospy
 import tf2_ros
 from ros_system import RosSystem, wait_until
-from rviz_view import RvizView, find_view
+from rviz_view import RvizView, find_view, launch_with_rviz
 
 CONFIG_FILE = Path(__file__).resolve().parents[3] / "src/rpbi_examples/rviz/kuka_lwr_ik_example.rviz"
 TARGET, TIP = "rpbi/figure_eight", "rpbi/kuka_lwr/end_effector_ball"
@@ -27,8 +27,7 @@ def example(ros_master, screen, tmp_path_factory):
     """The example as a user with a screen launches it to drag the arm; it tracks the target."""
     system = RosSystem(tmp_path_factory.mktemp("drag"))
     try:
-        command = ["roslaunch", "rpbi_examples", "kuka_lwr_ik_example.launch", "drag:=true", "headless:=false"]
-        process = system.start(command, **screen.environment)
+        process = launch_with_rviz(system, screen, "kuka_lwr_ik_example.launch", "drag:=true")
         wait_until(lambda: "the arm tracks its target" in system.output(process), "the arm tracks", SLOW_S)
         yield system
     finally:

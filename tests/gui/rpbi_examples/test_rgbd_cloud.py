@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from ros_system import RosSystem, wait_until
+from rviz_view import launch_with_rviz
 from sensor_msgs.msg import PointCloud2
 
 SLOW_S = 300.0
@@ -13,8 +14,7 @@ SLOW_S = 300.0
 def example(ros_master, screen, tmp_path):
     system = RosSystem(tmp_path)
     try:
-        command = ["roslaunch", "rpbi_examples", "pybullet_rgbd_example.launch", "headless:=false"]
-        system.start(command, **screen.environment)
+        launch_with_rviz(system, screen, "pybullet_rgbd_example.launch")
         yield system
     finally:
         system.close()

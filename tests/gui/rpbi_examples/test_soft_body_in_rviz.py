@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from ros_system import RosSystem, wait_until
+from rviz_view import launch_with_rviz
 from scipy import ndimage
 
 TORUS = (242, 115, 92)
@@ -17,8 +18,7 @@ def picture(ros_master, tmp_path_factory, screen):
     """What is to be seen in the window's right part, where the world is, when called."""
     system = RosSystem(tmp_path_factory.mktemp("soft_body_in_rviz"))
     try:
-        command = ["roslaunch", "rpbi_examples", "soft_body.launch", "headless:=false"]
-        example = system.start(command, **screen.environment)
+        example = launch_with_rviz(system, screen, "soft_body.launch")
         yield lambda: screen.grab()[:, 420:]
         print(system.output(example))  # pytest shows it if a test failed
     finally:
