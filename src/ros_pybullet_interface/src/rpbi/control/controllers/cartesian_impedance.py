@@ -111,16 +111,11 @@ class CartesianImpedanceController(Controller):
         mobility = by_force @ jacobian.T
         self._external.update(velocity)
         external = self._external.estimate
-        self._error, self._wrench = error, cartesian_impedance(
-            mobility,
-            self._stiffness,
-            self._damping(mobility),
-            error,
-            jacobian @ velocity,
-            self._push,
-            by_force @ external,
-            arm.dt_s,
-        )  # fmt: skip
+        damping, of_point, by_others = self._damping(mobility), jacobian @ velocity, by_force @ external
+        self._error = error
+        self._wrench = cartesian_impedance(
+            mobility, self._stiffness, damping, error, of_point, self._push, by_others, arm.dt_s
+        )
         efforts: Array = jacobian.T @ self._wrench
         if config.posture_stiffness:
             away = self._posture - q
