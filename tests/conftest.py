@@ -21,6 +21,7 @@ from ros_system import RosSystem, stop_group, wait_until  # noqa: E402
 from second_master import SecondMaster  # noqa: E402
 
 pytest_plugins = ("work_plan", "run_report")
+os.environ["PATH"] = path_with(WORKPLACE.folder / "bin")
 
 
 def pytest_terminal_summary() -> None:
@@ -47,11 +48,8 @@ def ros_master(no_process_is_left: None) -> Iterator[str]:
     port = WORKPLACE.port
     log_path = WORKPLACE.folder / "roscore.log"
     with open(log_path, "w") as log:
-        environment = {**os.environ, "PATH": path_with(WORKPLACE.folder / "bin")}
         command = ["roscore", "-p", str(port.number)]
-        roscore = subprocess.Popen(
-            command, stdout=log, stderr=subprocess.STDOUT, start_new_session=True, env=environment
-        )
+        roscore = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
     try:
         wait_until(rosgraph.is_master_online, "the ROS master answers", 60.0)
         wait_until(lambda: rosgraph.Master("/tests").lookupNode("/rosout"), "rosout is up", 60.0)

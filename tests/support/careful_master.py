@@ -1,14 +1,14 @@
-"""A ROS master that shuts down nobody else's nodes.
+"""A ROS master that shuts down no node by mistake.
 
-A master tells the former owner of a node's name to end, by the address that it had. Workers run at the same time, and
-by then the port may be that of a node of another worker, which would end for no reason that anybody could find.
+A master tells the former owner of a node's name to end, by the address that it had, also if it ended long ago: rospy
+does not take leave of all that it told the master. By then the port may be that of another node, perhaps of another
+worker's, which would end for no reason that anybody could find.
 """
 
 from __future__ import annotations
 
 import os
-import re
-import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ SCRIPT = "#!/usr/bin/python3\nimport sys\n\nsys.path.insert(0, {!r})\nimport car
 
 
 def path_with(folder: Path) -> str:
-    """Returns a PATH on which `roscore` finds this master, written to a folder, in the place of its own."""
+    """Returns a PATH on which programs find this master, written to a folder, in the place of ROS's own."""
     folder.mkdir(parents=True, exist_ok=True)
     script = folder / "rosmaster"
     script.write_text(SCRIPT.format(str(Path(__file__).parent)))
@@ -29,22 +29,34 @@ def path_with(folder: Path) -> str:
 
 def main() -> None:
     """Runs the master."""
-    shut_down = registrations.shutdown_node_task
+    manager = registrations.RegistrationManager
+    register, shut_down = manager._register_node_api, registrations.shutdown_node_task
+    processes: dict[tuple[str, str], str | None] = {}
 
-    def shut_down_own(api: str, caller_id: str, reason: str) -> None:
-        if _is_ours(api):
+    def register_and_remember(self: Any, caller_id: str, caller_api: str) -> Any:
+        known = (caller_id, caller_api)
+        if known not in processes:
+            processes[known] = None
+
+            def remember() -> None:
+                processes[known] = _process_at(caller_api)
+
+            threading.Thread(target=remember, daemon=True).start()
+        return register(self, caller_id, caller_api)
+
+    def shut_down_the_same(api: str, caller_id: str, reason: str) -> None:
+        before = processes.get((caller_id, api))
+        if before is not None and before == _process_at(api):
             shut_down(api, caller_id, reason)
 
-    registrations.shutdown_node_task = shut_down_own
+    manager._register_node_api, registrations.shutdown_node_task = register_and_remember, shut_down_the_same
     rosmaster.rosmaster_main()
 
 
-def _is_ours(api: str) -> bool:
-    """Tells whether what answers at an address is a process that was started with the URI of this master."""
-    port = sys.argv[sys.argv.index("-p") + 1]
+def _process_at(api: str) -> str | None:
+    """Returns a text that only the process that answers at an address has, None if no node does."""
     try:
         answer: Any = registrations.xmlrpcapi(api).getPid("/master")
-        environment = Path(f"/proc/{answer[2]}/environ").read_bytes()
+        return f"{answer[2]} since {Path(f'/proc/{answer[2]}/stat').read_text().rsplit(')', 1)[1].split()[19]}"
     except Exception:  # whatever is there instead of a node may answer anything
-        return False
-    return re.search(rf"(^|\0)ROS_MASTER_URI=[^\0]*:{port}/?(\0|$)", environment.decode(errors="replace")) is not None
+        return None
