@@ -51,8 +51,10 @@ def attach(ros, **fields):
 
 
 def step(ros, ticks):
+    """Returns the stamp of the last tick."""
     answer = ros.call("/rpbi/step_n", StepN, ticks)
     assert answer.success, answer.message
+    return answer.stamp
 
 
 def noted(commands):
@@ -61,12 +63,17 @@ def noted(commands):
 
 
 def positions(ros):
-    """Returns a function that tells where the box was last."""
+    """Returns a function that tells where the box was last; at a stamp, once that has come."""
     listener = ros.listen("/tf", TFMessage)
 
-    def last():
+    def newest():
         found = [one for m in list(listener.messages) for one in m.transforms if one.child_frame_id == "rpbi/box"]
-        place = found[-1].transform.translation
+        return found[-1]
+
+    def last(stamp=None):
+        if stamp is not None:
+            wait_until(lambda: newest().header.stamp >= stamp, "the last tick has come")
+        place = newest().transform.translation
         return place.x, place.y, place.z
 
     return last
@@ -149,12 +156,11 @@ def test_a_wrench_by_topic_acts_in_the_axes_of_its_frame_for_half_a_second(node)
     with publishing("/rpbi/box/external_wrench", WrenchStamped) as publisher:
         publisher.publish(message)
         wait_until(lambda: step(ros, 1) or "input" in noted(commands), "the wrench has come")
-    step(ros, 1000)
+    stamp = step(ros, 1000)
     # v = 0.5 m/s after 0.5 s, then coasting: 0.125 m and as far as it coasted, at least 0.2 m
-    wait_until(lambda: place()[0] > 1.0 + 0.125 + 0.2, "the box has moved")
-    first = place()[0]
-    step(ros, 100)
-    wait_until(lambda: place()[0] == pytest.approx(first + 0.05, abs=1e-4), "it coasts at 0.5 m/s")
+    first = place(stamp)[0]
+    assert first > 1.0 + 0.125 + 0.2
+    assert place(step(ros, 100))[0] == pytest.approx(first + 0.05, abs=1e-4), "it coasts at 0.5 m/s"
 
 
 def test_a_wrench_by_topic_that_makes_no_sense_is_named_in_the_log(node):
