@@ -155,7 +155,7 @@ def test_a_wrench_by_topic_acts_in_the_axes_of_its_frame_for_half_a_second(node)
     commands = ros.listen("/rpbi/commands", WorldCommands)
     with publishing("/rpbi/box/external_wrench", WrenchStamped) as publisher:
         publisher.publish(message)
-        wait_until(lambda: step(ros, 1) or "input" in noted(commands), "the wrench has come")
+        wait_until(lambda: step(ros, 1) and "input" in noted(commands), "the wrench has come")
     stamp = step(ros, 1000)
     # v = 0.5 m/s after 0.5 s, then coasting: 0.125 m and as far as it coasted, at least 0.2 m
     first = place(stamp)[0]
