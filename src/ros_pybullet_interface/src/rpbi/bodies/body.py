@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 
 MAXIMAL_COORDINATES = 1
 """PyBullet's type of bodies that the solver of rigid bodies moves, where `getDynamicsInfo` tells it."""
-_MULTI_BODY = 2
+MULTI_BODY = 2
 """The same of what has joints in reduced coordinates, or could have."""
 UNNAMED_LINK = "link0"
 """PyBullet's name of the only link of a shape, which it leaves out in maximal coordinates."""
@@ -144,7 +144,7 @@ class Body:
         What was loaded with `useMaximalCoordinates` is put there: PyBullet takes no velocity of such a base.
         """
         self.object_tf = object_tf
-        if object_tf is not None and self.pb.getDynamicsInfo(self.body_id, -1)[10] == _MULTI_BODY:
+        if object_tf is not None and self.pb.getDynamicsInfo(self.body_id, -1)[10] == MULTI_BODY:
             centre = self.inertial_pose_in_base
             self.pose_follower = PoseFollower(self.pb, self.name, self.body_id, centre, object_tf)
 

@@ -67,7 +67,7 @@ ACTIONS: dict[str, Callable[[Any, Clock, Any], Any]] = {
     "set_joint_state": lambda body, _, target: body.set_joint_state(target),
     "switch_mode": lambda body, _, mode: body.switch_mode(mode),
     "switch_controllers": lambda body, _, switch: body.switch_controllers(switch),
-    "set_controller_gains": lambda body, _, gains: body.set_controller_gains(gains),
+    "set_controller_gains": lambda body, _, gains: body.controllers.configure(gains),
     "set_gains": lambda body, _, gains: body.motors.set_gains(gains),
     "stop_motion": _stop_motion,
     "move": _move,

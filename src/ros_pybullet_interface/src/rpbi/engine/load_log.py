@@ -9,6 +9,7 @@ import pybullet
 
 from custom_ros_tools.errors import PhysicsError, UnknownNameError
 from rpbi.bodies import Body, body_class
+from rpbi.bodies.body import MULTI_BODY
 from rpbi.bodies.dynamics import change_dynamics
 from rpbi.config.pybullet_world_models import PhysicsChange, SetGravity
 from rpbi.config.world import WorldConfig
@@ -58,10 +59,6 @@ _SAME_EVERY_TIME: dict[str, Any] = {
     "numSubSteps": 0,  # the default, too; it outlives a reset
     "enableFileCaching": 1,  # the same
 }
-
-
-MULTI_BODY = 2
-"""PyBullet's number of bodies in reduced coordinates."""
 
 
 class LogEntry(NamedTuple):

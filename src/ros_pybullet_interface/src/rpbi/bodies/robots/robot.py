@@ -13,8 +13,8 @@ from custom_ros_tools.errors import Problem
 from rpbi.config.pybullet_args import IMPEDANCE_CONTROL
 from rpbi.constraints.couplings import couple
 from rpbi.control.controllers.controller import Arm, RobotState
-from rpbi.control.controllers.impedance import ExternalEfforts, joint_impedance
-from rpbi.control.controllers.manager import ControllerManager, ControllerSwitch, NewGains, controller_problems
+from rpbi.control.controllers.impedance import JointImpedance
+from rpbi.control.controllers.manager import ControllerManager, ControllerSwitch, controller_problems
 from rpbi.control.joint_drive import JointDrive
 from rpbi.control.motors import Command, LimitReports, Motors, joined
 from rpbi.control.robot_model import RobotModel
@@ -94,10 +94,7 @@ class Robot(JointedBody):
         self.follower = None if follower is None else TrajectoryFollower(self.drive, follower)
         self.controllers = ControllerManager(self._arm(), config.controllers, self.motors)
         self.drive.controlled = lambda: self.controllers.driven
-        joints = self.model.driven
-        self._stiffness = config.impedance.by_joint("stiffness", joints)
-        self._external = ExternalEfforts(len(joints), self.drive.dt_s)
-        self._damping_ratio = config.impedance.by_joint("damping_ratio", joints)
+        self._springs = JointImpedance(config.impedance, self.model.driven, self.drive.dt_s)
         self._start_base(config.resetBaseVelocity, config.object_tf, self.has_fixed_base)
 
     @classmethod
@@ -164,15 +161,6 @@ class Robot(JointedBody):
             self.motors.let_go(taken)
         self.drive.drop_targets(taken)
 
-    def set_controller_gains(self, gains: NewGains) -> None:
-        """Changes the keys of a controller; one that is active begins again where the robot is.
-
-        Raises:
-            UnknownNameError: If there is none of that name.
-            ValueError: If they do not fit.
-        """
-        self.controllers.configure(gains)
-
     def halt(self, reason: str) -> None:
         """Ends the motion that runs, if any; its joints hold where they are."""
         self.drive.halt(reason)
@@ -188,7 +176,7 @@ class Robot(JointedBody):
             self.halt("the control mode was changed")
             self.drive.drop_targets()
             self.motors.switch(mode)
-            self._external = ExternalEfforts(len(self.model.driven), self.drive.dt_s)
+            self._springs.restart()
             self.motors.let_go(self.controllers.driven)
 
     def set_joint_state(self, target: JointTarget) -> None:
@@ -246,18 +234,7 @@ class Robot(JointedBody):
             return
         positions, velocities = np.array(wanted).T
         mass, velocity = model.mass_matrix(state.position), np.array(state.velocity)
-        self._external.update(velocity)
-        springs = joint_impedance(
-            mass,
-            self._stiffness,
-            self._damping_ratio,
-            positions - state.position,
-            velocity,
-            velocities,
-            self._external.estimate,
-            self.drive.dt_s,
-        )
-        self._external.note(mass, springs, velocity)
+        springs = self._springs.efforts(mass, positions - state.position, velocity, velocities)
         efforts = springs + model.bias(state.base, state.position, state.velocity)
         indices = (joint.index for joint in model.joints)
         driven = self.controllers.driven
@@ -267,7 +244,7 @@ class Robot(JointedBody):
         links = {joint.link: joint.index for joint in self.joints}
         none = np.zeros(0, np.int64)
         dt_s: float = self.pb.getPhysicsEngineParameters()["fixedTimeStep"]
-        return Arm(self.name, self.pb, self.body_id, self.robot_model, links, none, dt_s)
+        return Arm(self.name, self.link_pose, self.robot_model, links, none, dt_s)
 
     def _controller_inputs(self) -> dict[str, Input]:
         """Returns what controllers take: `CONTROLLER/INPUT`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -12,7 +12,6 @@ from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, HzOrOff, ListOf, Switch, Text
 from rpbi.control.robot_model import RobotModel
-from rpbi.engine.client import Client
 from rpbi.geometry import Pose
 
 Array = npt.NDArray[np.float64]
@@ -56,8 +55,7 @@ class Arm(NamedTuple):
 
     Attributes:
         name: The robot.
-        pb: The client that it lives in.
-        body_id: Its id there.
+        link_pose: Returns the measured pose in the world of the URDF frame of a link, by PyBullet's index.
         model: Its dynamics and kinematics.
         links: PyBullet's indices of its links by name.
         chosen: The places of the controller's joints among the driven ones, shape (m,).
@@ -65,8 +63,7 @@ class Arm(NamedTuple):
     """
 
     name: str
-    pb: Client
-    body_id: int
+    link_pose: Callable[[int], Pose]
     model: RobotModel
     links: Mapping[str, int]
     chosen: npt.NDArray[np.int64]
@@ -75,11 +72,6 @@ class Arm(NamedTuple):
     def of_chosen(self, rows: Array) -> Array:
         """Returns what belongs to the controller's joints, of the last axis of something for all driven ones."""
         return rows if len(self.chosen) == len(self.model.joints) else rows[..., self.chosen]
-
-    def link_pose(self, link: int) -> Pose:
-        """Returns the measured pose in the world of the URDF frame of a link, by PyBullet's index."""
-        state = self.pb.getLinkState(self.body_id, link, computeForwardKinematics=True)
-        return Pose(state[4], state[5])
 
 
 class Controller(ABC):

@@ -115,6 +115,49 @@ def joint_impedance(
     return efforts
 
 
+class JointImpedance:
+    """Springs and dampers at n joints from tick to tick.
+
+    Args:
+        springs: How stiff and how damped they are.
+        joints: The n joints.
+        dt_s: Length of a tick [s].
+
+    Raises:
+        ValueError: If the springs name a joint that is none of these.
+    """
+
+    def __init__(self, springs: JointSprings, joints: Sequence[Joint], dt_s: float) -> None:
+        self._stiffness = springs.by_joint("stiffness", joints)
+        self._damping_ratio = springs.by_joint("damping_ratio", joints)
+        self._dt_s = dt_s
+        self.restart()
+
+    def restart(self) -> None:
+        """Forgets what acted on the joints."""
+        self._external = ExternalEfforts(len(self._stiffness), self._dt_s)
+
+    def efforts(
+        self, mass: Array, error: Array, velocity: Array, wanted_velocity: Array, push: Array | float = 0.0
+    ) -> Array:
+        """Returns n efforts [N m or N] for a tick, beyond those that balance gravity and motion.
+
+        Args:
+            mass: Mass matrix, shape (n, n).
+            error: How far each joint is from where it is to be [rad or m].
+            velocity: n measured velocities [rad/s or m/s].
+            wanted_velocity: n velocities that joints are to have.
+            push: n efforts [N m or N] to add.
+        """
+        self._external.update(velocity)
+        external = self._external.estimate
+        springs = joint_impedance(
+            mass, self._stiffness, self._damping_ratio, error, velocity, wanted_velocity, external, self._dt_s
+        )
+        self._external.note(mass, springs + push, velocity)
+        return springs + push
+
+
 def cartesian_impedance(
     mobility: Array,
     stiffness: Array,

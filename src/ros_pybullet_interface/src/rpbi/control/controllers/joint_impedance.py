@@ -13,7 +13,7 @@ from rpbi.control.target_stream import Arrivals, TargetStream
 from rpbi.urdf.joints import JointTarget
 
 from .controller import Arm, Array, Controller, ControllerConfig, RobotState
-from .impedance import ExternalEfforts, JointSprings, joint_impedance
+from .impedance import JointImpedance, JointSprings
 
 BUFFER_S = 0.01
 """Longest delay of targets to even out how late they come [s]."""
@@ -40,8 +40,7 @@ class JointImpedanceController(Controller):
         super().__init__(arm, config)
         self._joints = [arm.model.joints[place] for place in arm.chosen]
         self._places = {joint.name: place for place, joint in enumerate(self._joints)}
-        self._stiffness = config.by_joint("stiffness", self._joints)
-        self._ratio = config.by_joint("damping_ratio", self._joints)
+        self._springs = JointImpedance(config, self._joints, arm.dt_s)
 
     def check(self, key: str, value: JointTarget) -> JointTarget:
         """Takes targets for some or all of its joints."""
@@ -63,7 +62,7 @@ class JointImpedanceController(Controller):
         held = {place: state.position[chosen] for place, chosen in enumerate(self.arm.chosen)}
         self._stream = TargetStream(Arrivals(self.arm.dt_s, BUFFER_S), held, smooth=True)
         self._push = np.zeros(len(held))
-        self._external = ExternalEfforts(len(held), self.arm.dt_s)
+        self._springs.restart()
         self._taken: Any = None
         self._goal = dict(held)
 
@@ -76,19 +75,8 @@ class JointImpedanceController(Controller):
         mass = self.arm.of_chosen(self.arm.of_chosen(model.mass_matrix(state.position)).T)
         self._error = before - np.array(state.position)[chosen]
         velocity = np.array(state.velocity)[chosen]
-        bias = model.bias(state.base, state.position, state.velocity)[chosen]
-        self._external.update(velocity)
-        efforts: Array = self._push + joint_impedance(
-            mass,
-            self._stiffness,
-            self._ratio,
-            self._error,
-            velocity,
-            (after - before) / dt_s,
-            self._external.estimate,
-            dt_s,
-        )
-        self._external.note(mass, efforts, velocity)
+        efforts = self._springs.efforts(mass, self._error, velocity, (after - before) / dt_s, self._push)
+        bias: Array = self.arm.of_chosen(model.bias(state.base, state.position, state.velocity))
         return efforts + bias
 
     def report(self) -> Mapping[str, float]:
