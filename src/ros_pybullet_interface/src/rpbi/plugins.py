@@ -1,15 +1,20 @@
 """What classes of other packages must have, and errors that name them when they fail."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
-from custom_ros_tools.errors import InterfaceError, PluginError
+from pydantic import ValidationInfo
+
+from custom_ros_tools.errors import ConfigError, InterfaceError, PluginError
 from custom_ros_tools.plugins import cause_of, full_name, own_folders
+from custom_ros_tools.schema import ConfigModel, InnerProblemsError, KeyedError
+from custom_ros_tools.schema.type_names import shown
 
 _Kind = TypeVar("_Kind")
+_Model = TypeVar("_Model", bound=ConfigModel)
 
 _OWN_PACKAGE = __name__.split(".")[0]
 own_folders.append(str(Path(__file__).parent))
@@ -25,6 +30,36 @@ def config_of(found: Any, base: type[_Kind]) -> type[_Kind]:
     if isinstance(model, type) and issubclass(model, base):
         return model
     raise ValueError(f"expected a Config in '{full_name(found)}' that is a subclass of {full_name(base)}")
+
+
+def entry_config(
+    entry: Any, info: ValidationInfo, base: type[_Model], class_of: Callable[[str], Any], expected: str
+) -> _Model:
+    """Returns the configuration of an entry with a `type`, by the model of its class; for pydantic's validators.
+
+    Args:
+        entry: What YAML says, or the configuration itself.
+        base: What the configuration is at least.
+        class_of: Returns the class of a type; it raises ValueError if there is none.
+        expected: What was expected if it is no mapping with a type.
+
+    Raises:
+        ValueError: If it does not fit.
+    """
+    if isinstance(entry, base):
+        return entry
+    kind = entry.get("type") if isinstance(entry, Mapping) else None
+    if not isinstance(kind, str):
+        raise ValueError(f"expected {expected}; got {shown(entry)}")
+    try:
+        model = config_of(class_of(kind), base)
+    except ValueError as error:
+        raise KeyedError("type", str(error)) from None
+    context = info.context or {}
+    try:
+        return model.parse(entry, context.get("file", ""), context)
+    except ConfigError as error:
+        raise InnerProblemsError(error.problems) from None
 
 
 def is_foreign(thing: Any) -> bool:

@@ -1,34 +1,19 @@
 """What YAML says of every body."""
 
-from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
-from custom_ros_tools.errors import ConfigError
-from custom_ros_tools.schema import ConfigModel, Expects, InnerProblemsError, KeyedError, ListOf, Name
-from custom_ros_tools.schema.type_names import shown
+from custom_ros_tools.schema import ConfigModel, Expects, KeyedError, ListOf, Name
 from rpbi.config.sensors import SensorConfig
-from rpbi.plugins import config_of
+from rpbi.plugins import entry_config
 from rpbi.sensors import sensor_class
 
 
 def _sensor_config(entry: Any, info: ValidationInfo) -> SensorConfig:
     """Returns the configuration of a sensor, by the model of its class."""
-    if isinstance(entry, SensorConfig):
-        return entry
-    kind = entry.get("type") if isinstance(entry, Mapping) else None
-    if not isinstance(kind, str):
-        raise ValueError(f"expected a mapping with 'type: module:Class', 'name' and 'hz'; got {shown(entry)}")
-    try:
-        model = config_of(sensor_class(kind), SensorConfig)
-    except ValueError as error:
-        raise KeyedError("type", str(error)) from None
-    context = info.context or {}
-    try:
-        return model.parse(entry, context.get("file", ""), context)
-    except ConfigError as error:
-        raise InnerProblemsError(error.problems) from None
+    expected = "a mapping with 'type: module:Class', 'name' and 'hz'"
+    return entry_config(entry, info, SensorConfig, sensor_class, expected)
 
 
 SensorEntry = Annotated[
