@@ -167,9 +167,15 @@ def test_a_master_that_dies_while_it_waits_is_an_error(
         rosgraph.Master("/silent").registerPublisher("/a", "std_msgs/Float64", uri)
 
         def kill() -> None:
-            connection, _ = silent.accept()
-            second_master.kill()
-            connection.close()
+            asked = b""
+            while b"requestTopic" not in asked:  # others ask too, such as the master who has a name
+                connection, _ = silent.accept()
+                with connection:
+                    asked = connection.recv(4096)
+                    while b"</methodCall>" not in asked and (more := connection.recv(4096)):
+                        asked += more
+                    if b"requestTopic" in asked:
+                        second_master.kill()
 
         killer = threading.Thread(target=kill)
         killer.start()

@@ -35,5 +35,13 @@ def test_no_joint_ever_leaves_its_limits(swing):
         assert all(low <= position <= high for low, position, high in zip(LOWER, swing.at(time_s), UPPER))
 
 
+def test_each_swing_begins_and_ends_at_rest_and_is_no_faster_than_its_joint(swing):
+    dt_s = 1e-3
+    times = np.arange(TO_ZERO_S - 0.5, TO_ZERO_S + 4 * SWING_PERIOD_S, dt_s)
+    velocities = np.diff([swing.at(time_s) for time_s in times], axis=0) / dt_s
+    assert np.abs(velocities).max() < 1.9  # the slowest joint of the KUKA LWR: 1.92 rad/s
+    assert np.abs(np.diff(velocities, axis=0)).max() / dt_s < 6.0
+
+
 def test_a_joint_whose_limits_leave_out_zero_goes_to_the_nearest_it_may():
     assert Swing((1.0,), (0.5,), (2.0,)).at(TO_ZERO_S) == (0.5,)

@@ -42,6 +42,8 @@ TO_ZERO_S = 3.0
 """Time that all joints take together to reach zero [s]."""
 SWING_PERIOD_S = 4.0
 """Time that one joint swings [s]."""
+SWING_RAMP_S = 0.6
+"""Time in which a swing gets to its full speed, and comes to rest at its end [s]."""
 SWING_AMPLITUDE = 1.0
 """How far it swings to either side [rad or m]; less where its limits ask for it."""
 SWING_MARGIN = 0.95
@@ -199,5 +201,15 @@ class Swing:
         turn, phase_s = divmod(time_s - TO_ZERO_S, SWING_PERIOD_S)
         joint = self._order[int(turn) % len(self._order)]
         positions = list(self._zero)
-        positions[joint] += self._amplitude[joint] * math.sin(2.0 * math.pi * phase_s / SWING_PERIOD_S)
+        positions[joint] += self._amplitude[joint] * math.sin(_swing_angle(phase_s))
         return tuple(positions)
+
+
+def _swing_angle(phase_s: float) -> float:
+    """Returns the angle of the sine [rad] at a time since a swing began [s]: from 0 to a full turn, at rest at both."""
+    if phase_s > SWING_PERIOD_S / 2.0:
+        return 2.0 * math.pi - _swing_angle(SWING_PERIOD_S - phase_s)
+    speed = 2.0 * math.pi / (SWING_PERIOD_S - SWING_RAMP_S)
+    if phase_s > SWING_RAMP_S:
+        return speed * (phase_s - SWING_RAMP_S / 2.0)
+    return speed / 2.0 * (phase_s - SWING_RAMP_S / math.pi * math.sin(math.pi * phase_s / SWING_RAMP_S))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -11,22 +11,14 @@ from pydantic import Field, WithJsonSchema
 from custom_ros_tools.schema import NonNegative, Text, Unit
 from rpbi.control.target_stream import Arrivals, TargetStream
 from rpbi.engine.inputs import check_pose
-from rpbi.geometry import Pose, rotated
+from rpbi.geometry import Pose, minus, plus, rotated
 
 from .controller import Arm, Array, Controller, ControllerConfig, RobotState
-from .impedance import (
-    DampingRatio,
-    ExternalEfforts,
-    cartesian_impedance,
-    critical_damping,
-    force_for,
-    inverse,
-    joint_impedance,
-    turn_between,
-)
+from .impedance import DampingRatio, Disturbance, force_for, implicit, implicit_wrench, inverse, turn_between
 from .joint_impedance import BUFFER_S
 
-_EYE = np.eye(6)
+LEAST_MOBILITY = 0.01
+"""Of a direction in which the arm can hardly move, for damping [1/kg, 1/(kg m^2)]."""
 
 
 class PoseTarget(NamedTuple):
@@ -78,9 +70,11 @@ class CartesianImpedanceController(Controller):
             raise ValueError(f"link: there is no link '{config.link}', there are {', '.join(arm.links)}")
         self._link = arm.links[config.link]
         self._stiffness = np.repeat((config.stiffness, config.rotational_stiffness), 3)
+        self._critical = 2.0 * config.damping_ratio * np.sqrt(self._stiffness)
         self._push = np.zeros(6)
         self._axes: Array | None = None
         """Axes of the springs, as columns, shape (6, 6); None for those of the world."""
+        self._posture_stiffness = np.full(len(arm.chosen), config.posture_stiffness)
 
     def check(self, key: str, value: PoseTarget) -> PoseTarget:
         """Takes finite poses."""
@@ -91,57 +85,65 @@ class CartesianImpedanceController(Controller):
         self._goal = self._pose()
         self._stream = TargetStream(Arrivals(self.arm.dt_s, BUFFER_S), _components(self._goal), smooth=True)
         self._posture = np.array(state.position)[self.arm.chosen]
-        self._external = ExternalEfforts(len(self._posture), self.arm.dt_s)
-        self._posture_stiffness = np.full(len(self._posture), self.config.posture_stiffness)
+        self._disturbance = Disturbance(len(self._posture), self.arm.dt_s)
         self._taken: Any = None
 
     def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array:
         """Returns the efforts of the spring, the damper and what balances gravity and motion."""
         self._take(targets.get("target"), tick)
-        wanted = list(self._stream.advance(tick + 1.0).values())
-        arm, config, axes = self.arm, self.config, self._axes
-        q, velocity = np.array((state.position, state.velocity))[:, arm.chosen]
-        pose = self._pose()
+        arm, config = self.arm, self.config
+        q, velocity = arm.of_chosen(np.array((state.position, state.velocity)))
+        error = self._error = np.array(self._way(tick))
         jacobian = arm.of_chosen(arm.model.jacobian(state.base, state.position, self._link, config.point))
-        error = np.concatenate((np.subtract(wanted[:3], pose.position), turn_between(pose.quat_xyzw, wanted[3:])))
-        if axes is not None:
-            jacobian, error = axes.T @ jacobian, axes.T @ error
+        if self._axes is not None:
+            jacobian, error = self._axes.T @ jacobian, self._axes.T @ error
         mass = arm.of_chosen(arm.of_chosen(arm.model.mass_matrix(state.position)).T)
-        by_force = jacobian @ inverse(mass)
-        mobility = by_force @ jacobian.T
-        self._external.update(velocity)
-        external = self._external.estimate
-        damping, of_point, by_others = self._damping(mobility), jacobian @ velocity, by_force @ external
-        self._error = error
-        self._wrench = cartesian_impedance(
-            mobility, self._stiffness, damping, error, of_point, self._push, by_others, arm.dt_s
+        by_effort = inverse(mass)
+        mobility = jacobian @ by_effort @ jacobian.T
+        self._disturbance.update(velocity)
+        unforced = self._disturbance.estimate
+        self._wrench = implicit_wrench(
+            mobility,
+            self._stiffness,
+            self._damping(mobility),
+            self._stiffness * error + self._push,
+            jacobian @ (velocity / arm.dt_s + unforced),
+            arm.dt_s,
         )
-        efforts: Array = jacobian.T @ self._wrench
+        wrench = self._wrench
         if config.posture_stiffness:
-            away = self._posture - q
-            pull = joint_impedance(mass, self._posture_stiffness, 1.0, away, velocity, 0.0, external, arm.dt_s)
-            efforts += pull - jacobian.T @ force_for(mobility, by_force @ pull)  # Khatib, 1987
-        self._external.note(mass, efforts, velocity)
-        return efforts + arm.of_chosen(arm.model.bias(state.base, state.position, state.velocity))
+            damping = 2.0 * np.sqrt(self._posture_stiffness * mass.diagonal())
+            pull = self._posture_stiffness * (self._posture - q)
+            turns = implicit(mass, self._posture_stiffness, damping, pull, velocity, arm.dt_s)
+            wrench = wrench - force_for(mobility, jacobian @ turns)  # Khatib, 1987
+            efforts = jacobian.T @ wrench + mass @ turns
+        else:
+            efforts = jacobian.T @ wrench
+        self._disturbance.predict(velocity, by_effort @ efforts + unforced)
+        bias: Array = arm.of_chosen(arm.model.bias(state.base, state.position, state.velocity))
+        return efforts + bias
 
     def report(self) -> Mapping[str, float]:
         """Returns how far it is from the target, and with what force and moment it pulls, in the world's axes."""
-        axes = _EYE if self._axes is None else self._axes
-        numbers = np.concatenate((axes @ self._error, axes @ self._wrench)).tolist()
+        wrench = self._wrench if self._axes is None else self._axes @ self._wrench
+        numbers = (*self._error.tolist(), *wrench.tolist())
         names = (f"{what}/{axis}" for what in ("error", "turn", "force", "moment") for axis in "xyz")
         return dict(zip(names, numbers))
 
     def _damping(self, mobility: Array) -> Array:
         """Returns the damping along each axis of the springs, shape (6,) [N s/m, N m s/rad]."""
-        damping: Array = self.config.damping_ratio * critical_damping(mobility, self._stiffness)
+        damping: Array = self._critical / np.sqrt(np.maximum(mobility.diagonal(), LEAST_MOBILITY))
         return damping
 
+    def _way(self, tick: int) -> Sequence[float]:
+        """Returns way [m] and turn [rad] from where the point is to where it is to be after a tick."""
+        x, y, z, *quat = self._stream.advance(tick + 1.0).values()
+        pose = self._pose()
+        return *minus((x, y, z), pose.position), *turn_between(pose.quat_xyzw, quat)
+
     def _pose(self) -> Pose:
-        pose = self.arm.link_pose(self._link)
-        point = rotated(pose.quat_xyzw, self.config.point)
-        return Pose(
-            (pose.position[0] + point[0], pose.position[1] + point[1], pose.position[2] + point[2]), pose.quat_xyzw
-        )
+        position, quat = self.arm.link_pose(self._link)
+        return Pose(plus(position, rotated(quat, self.config.point)), quat)
 
     def _take(self, target: PoseTarget | None, tick: int) -> None:
         if target is None or target is self._taken:

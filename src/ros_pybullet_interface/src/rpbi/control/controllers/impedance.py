@@ -18,6 +18,7 @@ from scipy.linalg import lapack
 
 from custom_ros_tools.errors import hint
 from custom_ros_tools.schema import ConfigModel, Positive, Unit
+from rpbi.geometry import Vector, scaled
 from rpbi.urdf.joints import Joint
 
 Array = npt.NDArray[np.float64]
@@ -28,8 +29,6 @@ SMOOTHED_S = 0.01
 _EYE = np.eye(6)
 ROUNDING = 1e-6 * np.eye(6)
 """Keeps the mobility of a singular arm invertible."""
-LARGEST_MASS_KG = 100.0
-"""Of a direction in which the arm can hardly move, for damping."""
 
 
 class JointSprings(ConfigModel):
@@ -59,8 +58,8 @@ class JointSprings(ConfigModel):
         return np.array([given.get(name, default) for name in names])
 
 
-class ExternalEfforts:
-    """Estimates what acts on n joints beside the efforts that a controller knows of, from how they accelerate.
+class Disturbance:
+    """Estimates how what a controller does not know of accelerates n joints, from where they are beside its prediction.
 
     Args:
         count: How many joints there are.
@@ -69,50 +68,19 @@ class ExternalEfforts:
 
     def __init__(self, count: int, dt_s: float) -> None:
         self.estimate = np.zeros(count)
-        """n efforts [N m or N], smoothed by a first-order filter of 10 ms."""
+        """n accelerations [rad/s^2 or m/s^2], smoothed by a first-order filter of 10 ms."""
         self._dt_s = dt_s
-        self._share = 1.0 - math.exp(-dt_s / SMOOTHED_S)
-        self._last: tuple[Array, Array, Array] | None = None
+        self._share = (1.0 - math.exp(-dt_s / SMOOTHED_S)) / dt_s
+        self._predicted: Array | None = None
 
     def update(self, velocity: Array) -> None:
-        """Takes the velocities [rad/s or m/s] after the tick of the last `note`."""
-        if self._last is not None:
-            mass, net, before = self._last
-            self.estimate += self._share * (mass @ (velocity - before) / self._dt_s - net - self.estimate)
+        """Takes the velocities [rad/s or m/s] after the tick of the last `predict`."""
+        if self._predicted is not None:
+            self.estimate += self._share * (velocity - self._predicted)
 
-    def note(self, mass: Array, net: Array, velocity: Array) -> None:
-        """Notes the mass matrix, the efforts of a tick beyond the bias, and the velocities before it."""
-        self._last = mass, net, velocity
-
-
-def joint_impedance(
-    mass: Array,
-    stiffness: Array,
-    damping_ratio: Array | float,
-    error: Array,
-    velocity: Array,
-    wanted_velocity: Array | float,
-    external: Array,
-    dt_s: float,
-) -> Array:
-    """Returns the efforts of springs and dampers at n joints.
-
-    Args:
-        mass: Mass matrix, shape (n, n).
-        stiffness: n stiffnesses [N m/rad or N/m].
-        damping_ratio: n damping ratios of each joint with its own inertia (Lehr's); 1 is critical.
-        error: How far each joint is from where it is to be [rad or m], positive if it is to move forward.
-        velocity: n measured velocities [rad/s or m/s].
-        wanted_velocity: n velocities that joints are to have.
-        external: n efforts [N m or N] that something else applies.
-        dt_s: Length of a tick [s].
-    """
-    damping = 2.0 * damping_ratio * np.sqrt(stiffness * mass.diagonal())
-    ahead = stiffness * (error - velocity * dt_s) + damping * (wanted_velocity - velocity) + external
-    stiff = mass.copy()
-    stiff.flat[:: len(mass) + 1] += (damping + stiffness * dt_s) * dt_s
-    efforts: Array = mass @ lapack.dposv(stiff, ahead)[1] - external
-    return efforts
+    def predict(self, velocity: Array, acceleration: Array) -> None:
+        """Notes velocities before a tick, and the accelerations that are expected of it, with the estimate."""
+        self._predicted = velocity + self._dt_s * acceleration
 
 
 class JointImpedance:
@@ -129,13 +97,13 @@ class JointImpedance:
 
     def __init__(self, springs: JointSprings, joints: Sequence[Joint], dt_s: float) -> None:
         self._stiffness = springs.by_joint("stiffness", joints)
-        self._damping_ratio = springs.by_joint("damping_ratio", joints)
+        self._damping = 2.0 * springs.by_joint("damping_ratio", joints) * np.sqrt(self._stiffness)
         self._dt_s = dt_s
         self.restart()
 
     def restart(self) -> None:
         """Forgets what acted on the joints."""
-        self._external = ExternalEfforts(len(self._stiffness), self._dt_s)
+        self._disturbance = Disturbance(len(self._stiffness), self._dt_s)
 
     def efforts(
         self, mass: Array, error: Array, velocity: Array, wanted_velocity: Array, push: Array | float = 0.0
@@ -144,57 +112,57 @@ class JointImpedance:
 
         Args:
             mass: Mass matrix, shape (n, n).
-            error: How far each joint is from where it is to be [rad or m].
+            error: How far each joint is from where it is to be [rad or m], positive if it is to move forward.
             velocity: n measured velocities [rad/s or m/s].
             wanted_velocity: n velocities that joints are to have.
             push: n efforts [N m or N] to add.
         """
-        self._external.update(velocity)
-        external = self._external.estimate
-        springs = joint_impedance(
-            mass, self._stiffness, self._damping_ratio, error, velocity, wanted_velocity, external, self._dt_s
-        )
-        self._external.note(mass, springs + push, velocity)
-        return springs + push
+        self._disturbance.update(velocity)
+        external = mass @ self._disturbance.estimate
+        damping = self._damping * np.sqrt(mass.diagonal())
+        forces = self._stiffness * error + damping * wanted_velocity + (external + push)
+        acceleration = implicit(mass, self._stiffness, damping, forces, velocity, self._dt_s)
+        self._disturbance.predict(velocity, acceleration)
+        efforts: Array = mass @ acceleration - external
+        return efforts
 
 
-def cartesian_impedance(
-    mobility: Array,
-    stiffness: Array,
-    damping: Array,
-    error: Array,
-    velocity: Array,
-    push: Array,
-    external: Array,
-    dt_s: float,
+def implicit(mass: Array, stiffness: Array, damping: Array, forces: Array, velocity: Array, dt_s: float) -> Array:
+    """Returns how n joints accelerate [rad/s^2 or m/s^2] by springs and dampers, evaluated at the end of a tick.
+
+    Args:
+        mass: Mass matrix, shape (n, n).
+        stiffness: n stiffnesses [N m/rad or N/m].
+        damping: n dampings [N m s/rad or N s/m].
+        forces: n efforts [N m or N] that act if the joints do not move, those of the springs among them.
+        velocity: n velocities before the tick [rad/s or m/s].
+        dt_s: Length of the tick [s].
+    """
+    by_velocity = damping + stiffness * dt_s
+    stiff = mass.copy()
+    stiff.reshape(-1)[:: len(mass) + 1] += by_velocity * dt_s
+    acceleration: Array = lapack.dposv(stiff, forces - by_velocity * velocity)[1]
+    return acceleration
+
+
+def implicit_wrench(
+    mobility: Array, stiffness: Array, damping: Array, wrench: Array, acceleration: Array, dt_s: float
 ) -> Array:
-    """Returns force and moment of a spring and damper at a point of an arm, along the axes of the springs.
+    """Returns force and moment of springs and dampers at a point of an arm, evaluated at the end of a tick.
 
     Args:
         mobility: Acceleration of the point by force, J M^-1 J^T, shape (6, 6).
-        stiffness: 6 stiffnesses [N/m, N m/rad].
+        stiffness: 6 stiffnesses [N/m, N m/rad] along and about the axes of the springs.
         damping: 6 dampings [N s/m, N m s/rad].
-        error: From where the point is to where it is to be: way [m] and turn [rad], shape (6,).
-        velocity: Of the point [m/s] and of the link's rotation [rad/s], shape (6,).
-        push: A force [N] and moment [N m] beside the spring, shape (6,).
-        external: How what else acts on the arm accelerates the point [m/s^2, rad/s^2], shape (6,).
-        dt_s: Length of a tick [s].
+        wrench: Force [N] and moment [N m] if the point did not move, shape (6,).
+        acceleration: Of the point, that brings its velocity about within a tick, and by what else acts on the arm
+            [m/s^2, rad/s^2], shape (6,).
+        dt_s: Length of the tick [s].
     """
     by_acceleration = (damping + stiffness * dt_s) * dt_s
-    ahead = stiffness * (error - velocity * dt_s) - damping * velocity + push - by_acceleration * external
-    wrench: Array = lapack.dgesv(_EYE + by_acceleration[:, None] * mobility, ahead)[2]
-    return wrench
-
-
-def critical_damping(mobility: Array, stiffness: Array) -> Array:
-    """Returns the 6 dampings [N s/m, N m s/rad] that are critical along each axis of springs.
-
-    Args:
-        mobility: Acceleration by force, shape (6, 6).
-        stiffness: 6 stiffnesses [N/m, N m/rad].
-    """
-    dampings: Array = 2.0 * np.sqrt(stiffness / np.maximum(mobility.diagonal(), 1.0 / LARGEST_MASS_KG))
-    return dampings
+    given = wrench - by_acceleration * acceleration
+    solved: Array = lapack.dgesv(_EYE + by_acceleration[:, None] * mobility, given)[2]
+    return solved
 
 
 def inverse(matrix: Array) -> Array:
@@ -218,11 +186,11 @@ def force_for(mobility: Array, acceleration: Array) -> Array:
     return wrench
 
 
-def turn_between(start: Sequence[float], end: Sequence[float]) -> Array:
+def turn_between(start: Sequence[float], end: Sequence[float]) -> Vector:
     """Returns the rotation vector [rad] from one quaternion (x, y, z, w) to another, in the axes that both are in."""
     x, y, z, w = start
     a, b, c, d = end
     turn = a * w - d * x - b * z + c * y, b * w - d * y - c * x + a * z, c * w - d * z - a * y + b * x
     cosine, sine = d * w + a * x + b * y + c * z, math.hypot(*turn)
     scale = 2.0 * math.atan2(sine, abs(cosine)) / sine if sine > 1e-12 else 2.0
-    return np.array(turn) * math.copysign(scale, cosine)
+    return scaled(math.copysign(scale, cosine), turn)
