@@ -104,3 +104,10 @@ def test_a_reader_that_has_gone_is_an_error_at_the_next_message(pair):
 
 def test_it_is_otherwise_the_socket(pair):
     assert BufferedSocket(pair[0], limit=5).fileno() == pair[0].fileno()
+
+
+def test_a_message_does_not_wait_until_the_one_before_it_is_acknowledged():
+    with socket.create_server(("127.0.0.1", 0)) as server, socket.create_connection(server.getsockname()) as ours:
+        assert not ours.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+        BufferedSocket(ours, limit=10)
+        assert ours.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)

@@ -12,11 +12,16 @@ MOST_TOGETHER = 32
 class BufferedSocket:
     """A connected socket whose `sendall` never waits: messages are kept until the next flush, and are sent in order.
 
+    What is flushed goes out at once: rospy's subscribers ask for no TCP_NODELAY unless they are told to, whatever the
+    publisher says, and then a message waits until the one before it is acknowledged, up to 40 ms.
+
     Any thread may use it. What the other side does not take yet stays; beyond `limit` messages the oldest are dropped.
     """
 
     def __init__(self, connection: socket.socket, limit: int) -> None:
         connection.setblocking(False)  # rospy's sockets have a timeout, for which Python would wait whatever the flags
+        if connection.family in (socket.AF_INET, socket.AF_INET6):
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket = connection
         self._lock = threading.Lock()
         self._begun = b""  # rest of messages of which a part was sent
