@@ -35,6 +35,8 @@ ROSOUT = "/rosout"
 LONGEST_WAIT_S = 2.0
 """How long to wait for those who listen to /rosout; a node that has just begun is not connected to them yet."""
 SENDING_S = 0.2
+INTERRUPTED_TOO_S = 1.0
+"""How much later than the node of a service an interrupt may reach this one, where it goes to both [s]."""
 
 
 def init_node(name: str, loggers: Iterable[str] = (), anonymous: bool = False, ros_time: bool = True) -> None:
@@ -88,6 +90,10 @@ def run_node(
             uri = rosgraph.get_master_uri()
             _log_fatal_lines([f"the ROS master at {uri} has gone while the node was starting: {error}"])
             sys.exit(1)
+        except rospy.ServiceException as error:
+            if not ended.wait(INTERRUPTED_TOO_S):
+                _log_fatal_lines([f"{error}: its node has gone, or cannot be reached"])
+                sys.exit(1)
         except rospy.ROSInterruptException:
             return
 
