@@ -1,4 +1,4 @@
-"""A node that serves what is never answered if its argument is `serve`, else one that calls it."""
+"""A node that serves what is never answered if its first argument is `serve`, else calls it; the second is its name."""
 
 import signal
 import sys
@@ -27,4 +27,4 @@ def _call() -> None:
     call_service(NAME, Trigger)
 
 
-run_node(sys.argv[1], _serve if sys.argv[1] == "serve" else _call)
+run_node(sys.argv[2], _serve if sys.argv[1] == "serve" else _call)

@@ -1,15 +1,16 @@
-"""The end of a node whose call nobody answers any more."""
+"""The end of a node: what it says, and what the master still knows of it."""
 
 import os
 import signal
 
 import pytest
+import rosgraph
 from ros_system import wait_until
 
 
 @pytest.mark.parametrize("interrupted", [True, False], ids=["both are interrupted", "the other node dies"])
 def test_a_service_whose_node_goes_is_told_unless_both_are_interrupted(ros, interrupted):
-    server, client = (ros.start_program("calls_a_service.py", name) for name in ("serve", "call"))
+    server, client = (ros.start_program("calls_a_service.py", role, role) for role in ("serve", "call"))
     wait_until(lambda: "asked" in ros.output(server), "the service is called")
     if interrupted:
         os.killpg(client.pid, signal.SIGINT)
@@ -18,3 +19,14 @@ def test_a_service_whose_node_goes_is_told_unless_both_are_interrupted(ros, inte
     said = ros.output(client)
     assert "Traceback" not in said, said
     assert ("its node has gone" in said) != interrupted, said
+
+
+def test_the_master_knows_nothing_of_a_node_that_has_ended(ros):
+    node = ros.start_program("calls_a_service.py", "serve", "leaver")
+    master = rosgraph.Master("/test")
+    wait_until(lambda: "/leaver" in dict(master.getSystemState()[2]).get("/never_answers", ()), "the node is up")
+    assert master.lookupNode("/leaver")
+    os.killpg(node.pid, signal.SIGINT)
+    assert node.wait(60.0) == 0, ros.output(node)
+    with pytest.raises(rosgraph.MasterError, match="unknown node"):
+        master.lookupNode("/leaver")

@@ -32,6 +32,7 @@ LONGEST_FAREWELL_S = 10.0
 """How long leaving the ROS master may take [s]; it may hang or be gone."""
 MASTER_PERIOD_S = 0.2
 ROSOUT = "/rosout"
+LOG_PARAMETER = "/rosout_disable_topics_generation"
 LONGEST_WAIT_S = 2.0
 """How long to wait for those who listen to /rosout; a node that has just begun is not connected to them yet."""
 SENDING_S = 0.2
@@ -42,6 +43,7 @@ INTERRUPTED_TOO_S = 1.0
 def init_node(name: str, loggers: Iterable[str] = (), anonymous: bool = False, ros_time: bool = True) -> None:
     """Makes this process a node that a ROS master finds again when it comes back; for the arguments see `run_node`."""
     rospy.init_node(name, anonymous=anonymous, disable_rostime=not ros_time, disable_signals=True)
+    rospy.on_shutdown(_leave_parameters)
     _attach_logging({"custom_ros_tools", *loggers})
     MasterWatch()
 
@@ -128,6 +130,7 @@ def leave_ros_on_signals() -> None:
 
     Call it in the main thread, after `rospy.init_node(..., disable_signals=True)`.
     """
+    rospy.on_shutdown(_leave_parameters)
     reading, writing = os.pipe()
 
     def wait_and_leave() -> None:
@@ -143,6 +146,16 @@ def leave_ros_on_signals() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: os.write(writing, b"."))  # all that is safe wherever the script happens to be
     atexit.register(leave)
+
+
+def _leave_parameters() -> None:
+    """Takes leave of the parameter that rospy subscribes to with the first line it logs.
+
+    rospy itself does not. A master that still knows the node would shut down, once its name is used again, whoever has
+    come to its address since.
+    """
+    with contextlib.suppress(OSError, rosgraph.MasterException):
+        rosgraph.Master(rospy.get_name()).unsubscribeParam(rospy.get_node_uri(), LOG_PARAMETER)
 
 
 def _interrupt() -> None:
