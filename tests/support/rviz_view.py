@@ -17,6 +17,8 @@ SLOW_S = 300.0
 ATTEMPTS = 3
 CRASH = re.compile(r"\[rviz-\d+\] process has died \[pid \d+, exit code -(6|11),")
 """What roslaunch says of it: it was aborted, or accessed memory that is not there."""
+CRASH_CODES = (-6, -11)
+"""The same of RViz alone."""
 FIELD_OF_VIEW = math.radians(45.0)
 """Vertical opening of RViz's view."""
 
@@ -61,24 +63,29 @@ def find_view(screen: Screen) -> Window | None:
 
 
 def launch_with_rviz(system: RosSystem, screen: Screen, *arguments: str) -> subprocess.Popen:
-    """Launches an example as a user with a screen does, and waits until RViz is open.
+    """Launches an example as a user with a screen does, and waits until RViz is open; see `start_with_rviz`."""
+    return start_with_rviz(system, screen, "roslaunch", "rpbi_examples", *arguments, "headless:=false")
+
+
+def start_with_rviz(system: RosSystem, screen: Screen, *command: str) -> subprocess.Popen:
+    """Starts RViz, or what starts it, and waits until it is open.
 
     Debian's RViz sometimes, once in some fifty times on a busy machine, crashes while it starts (`free(): invalid next
-    size`, exit code -6). Then the example is launched again; nothing else is tried twice.
+    size`, exit code -6). Then it is started again; nothing else is tried twice.
     """
     for _ in range(ATTEMPTS):
-        example = system.start(["roslaunch", "rpbi_examples", *arguments, "headless:=false"], **screen.environment)
+        process = system.start(list(command), **screen.environment)
         said = wait_until(
-            lambda example=example: (
-                CRASH.search(system.output(example))
+            lambda process=process: (
+                CRASH.search(system.output(process))
                 or (find_view(screen) and "open")
-                or (example.poll() is not None and "over")
+                or (process.poll() is not None and ("over" if process.poll() not in CRASH_CODES else process))
             ),
             "RViz is open",
             SLOW_S,
             every_s=0.5,
         )
         if isinstance(said, str):
-            return example
-        stop_group(example)
+            return process
+        stop_group(process)
     raise AssertionError(f"RViz crashed {ATTEMPTS} times while it started")

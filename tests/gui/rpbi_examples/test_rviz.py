@@ -14,7 +14,7 @@ from PIL import Image, ImageDraw
 from rendering import back_project
 from robot_shape import link_triangles, moved, pose_matrix
 from ros_system import RosSystem, stop_group, wait_until
-from rviz_view import RvizView, find_view, launch_with_rviz
+from rviz_view import RvizView, find_view, launch_with_rviz, start_with_rviz
 from sensor_msgs.msg import CameraInfo
 from sensor_msgs.msg import Image as ImageMessage
 from tf2_msgs.msg import TFMessage
@@ -145,12 +145,15 @@ def show(example, screen, shipped):
         manager["Displays"] = [display for display in manager["Displays"] if display["Class"] in classes]
         manager["Global Options"]["Background Color"] = "; ".join(map(str, DARK_GREEN))
         path = example.write_yaml("_".join(sorted(classes)).replace("/", "-") + ".rviz", config)
-        rviz = example.start(["rviz", "-d", path], **screen.environment)
-        picture, window = settled(
-            screen,
-            lambda picture, view: not differs(picture[0], DARK_GREEN).any() and is_shown(picture, view),
-            what,
-        )
+        rviz = start_with_rviz(example, screen, "rviz", "-d", str(path))
+        try:
+            picture, window = settled(
+                screen,
+                lambda picture, view: not differs(picture[0], DARK_GREEN).any() and is_shown(picture, view),
+                what,
+            )
+        except TimeoutError as error:
+            raise AssertionError(f"{error}; RViz: {rviz.poll()}, {example.output(rviz)[-2000:]}") from error
         stop_group(rviz)
         wait_until(lambda: not screen.windows(), "RViz has closed", SLOW_S)
         return picture, View(CONFIG_FILE, window.width, window.height)
