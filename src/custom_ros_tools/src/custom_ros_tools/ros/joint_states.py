@@ -49,7 +49,10 @@ def resolve_joint_order(msg: JointState, joint_names: Sequence[str], ns: str = "
 
 
 def get_joint_state(
-    topic: str, timeout: float | None = None, joint_names: Sequence[str] | None = None, ns: str = ""
+    topic: str = "joint_states",
+    timeout: float | None = None,
+    joint_names: Sequence[str] | None = None,
+    ns: str = "",
 ) -> JointState:
     """Waits for one message of a topic and returns it.
 
@@ -75,9 +78,9 @@ class JointStatePublisher:
         queue_size: Messages kept for a slow subscriber.
     """
 
-    def __init__(self, topic: str, joint_names: Sequence[str], queue_size: int = 1) -> None:
+    def __init__(self, topic_name: str, joint_names: Sequence[str], queue_size: int = 1) -> None:
         self._names = tuple(joint_names)
-        self._publisher = rospy.Publisher(topic, JointState, queue_size=queue_size)
+        self._publisher = rospy.Publisher(topic_name, JointState, queue_size=queue_size)
 
     def publish(
         self,
@@ -112,13 +115,13 @@ class JointStateSubscriber:
 
     def __init__(
         self,
-        topic: str,
+        topic_name: str,
         joint_names: Sequence[str],
         ns: str = "",
         callback: Callable[[JointState], None] | None = None,
     ) -> None:
         self._names, self._ns, self._callback = tuple(joint_names), ns, callback
-        self._topic, self._warn = rospy.resolve_name(topic), ThrottledWarning()
+        self._topic, self._warn = rospy.resolve_name(topic_name), ThrottledWarning()
         self._newest: JointState | None = None
         self._subscriber = rospy.Subscriber(self._topic, JointState, self._take, queue_size=1, tcp_nodelay=True)
 
