@@ -22,7 +22,7 @@ LEGACY_KEYS: dict[str, dict[str, str]] = {
 }
 """By section: an old spelling and the key that it means."""
 
-_FOLLOWERS = ("robots", "visual_objects", "collision_objects", "urdfs")
+FOLLOWERS = ("robots", "visual_objects", "collision_objects", "urdfs")
 """Lists of objects that may follow a TF frame; without `tf_id` they stay where they are, as in the release."""
 _FOLLOW = "write tf_id with the name of a TF frame"
 _OBJECT_TF = {
@@ -50,7 +50,7 @@ NO_EFFECT: dict[str, dict[str, str]] = {
         "setJointMotorControlArray.targetPositions": "targets come by topic",
         "setJointMotorControlArray.targetVelocities": "targets come by topic",
     },
-    **dict.fromkeys(_FOLLOWERS[1:], _OBJECT_TF),
+    **dict.fromkeys(FOLLOWERS[1:], _OBJECT_TF),
     "dynamic_objects": {"object_tf": "physics moves it; write basePosition and baseOrientation"},
 }
 """By section: a key that older worlds carry and that does nothing here, and what to do instead."""
@@ -90,7 +90,7 @@ def modernise(section: str, data: Mapping[str, Any], file: str) -> tuple[dict[st
         if _take(current, key) is not None:
             log.warning("%s: %s: has no effect: %s", file, key, advice)
     object_tf = current.get("object_tf")
-    if section in _FOLLOWERS and isinstance(object_tf, dict) and object_tf.keys() <= {"hz"}:
+    if section in FOLLOWERS and isinstance(object_tf, dict) and object_tf.keys() <= {"hz"}:
         del current["object_tf"]
         log.warning("%s: object_tf: has no effect: %s", file, _FOLLOW)
     return current, spellings, problems
