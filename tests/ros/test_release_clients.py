@@ -114,6 +114,7 @@ assert resolve_joint_order(msg=state, joint_names=["b"], ns="").position == [2.0
 timer.shutdown()
 
 keys = KeyDownSubscriber(key_action_map={Key.KEY_1: lambda: None})
+keys.unregister(), subscriber.unregister(), publisher.unregister(), toggle.shutdown()
 print("all calls are known")
 """
 

@@ -21,5 +21,5 @@ def test_each_key_calls_its_function_and_others_call_none(ros):
         publisher.publish(Key(code=code))
     wait_until(lambda: len(pressed) >= 2, "both are called")
     assert pressed == ["b", "a"]
-    subscriber._subscriber.unregister()
+    subscriber.unregister()
     publisher.unregister()

@@ -70,7 +70,7 @@ def get_joint_state(
     return message if joint_names is None else resolve_joint_order(message, joint_names, ns)
 
 
-class JointStatePublisher:
+class JointStatePublisher(rospy.Publisher):
     """Publishes joint states of a fixed list of joints.
 
     Args:
@@ -80,7 +80,7 @@ class JointStatePublisher:
 
     def __init__(self, topic_name: str, joint_names: Sequence[str], queue_size: int = 1) -> None:
         self._names = tuple(joint_names)
-        self._publisher = rospy.Publisher(topic_name, JointState, queue_size=queue_size)
+        super().__init__(topic_name, JointState, queue_size=queue_size)
 
     def publish(
         self,
@@ -99,10 +99,10 @@ class JointStatePublisher:
             ValueError: If there are more or fewer than n, or a value is not finite.
         """
         values = JointValues.of(self._names, q, qd, eff)
-        self._publisher.publish(joint_state(values, Header(stamp=rospy.Time.now())))
+        super().publish(joint_state(values, Header(stamp=rospy.Time.now())))
 
 
-class JointStateSubscriber:
+class JointStateSubscriber(rospy.Subscriber):
     """Keeps the newest joint state of a topic, its joints in the order of a list.
 
     Messages that lack joints or are faulty are refused and named now and then; the one before stays.
@@ -123,7 +123,7 @@ class JointStateSubscriber:
         self._names, self._ns, self._callback = tuple(joint_names), ns, callback
         self._topic, self._warn = rospy.resolve_name(topic_name), ThrottledWarning()
         self._newest: JointState | None = None
-        self._subscriber = rospy.Subscriber(self._topic, JointState, self._take, queue_size=1, tcp_nodelay=True)
+        super().__init__(self._topic, JointState, self._take, queue_size=1, tcp_nodelay=True)
 
     def received(self) -> bool:
         """Tells whether there is a joint state."""

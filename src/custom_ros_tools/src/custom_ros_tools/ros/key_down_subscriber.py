@@ -7,7 +7,7 @@ import rospy
 from keyboard.msg import Key
 
 
-class KeyDownSubscriber:
+class KeyDownSubscriber(rospy.Subscriber):
     """Calls functions when keys go down, as told on `keyboard/keydown`.
 
     Args:
@@ -16,7 +16,7 @@ class KeyDownSubscriber:
 
     def __init__(self, key_action_map: Mapping[int, Callable[[], Any]]) -> None:
         self._actions = dict(key_action_map)
-        self._subscriber = rospy.Subscriber("keyboard/keydown", Key, self._take, queue_size=100)
+        super().__init__("keyboard/keydown", Key, self._take, queue_size=100)
 
     def _take(self, message: Key) -> None:
         action = self._actions.get(message.code)

@@ -54,7 +54,7 @@ def call_service(name: str, srv_type: type, *arguments: object) -> Any:
 Handler = Callable[[], tuple[bool, str]]
 
 
-class ToggleService:
+class ToggleService(rospy.Service):
     """A std_srvs/SetBool service.
 
     Args:
@@ -66,7 +66,7 @@ class ToggleService:
 
     def __init__(self, name: str, enable_handler: Handler, disable_handler: Handler, **options: Any) -> None:
         self._enable, self._disable = enable_handler, disable_handler
-        self._service = rospy.Service(name, SetBool, self._handle, **options)
+        super().__init__(name, SetBool, self._handle, **options)
 
     def _handle(self, request: SetBoolRequest) -> SetBoolResponse:
         success, message = self._enable() if request.data else self._disable()
