@@ -59,7 +59,15 @@ def test_every_file_that_is_used_at_run_time_is_installed(installed):
     ] == []
 
 
-MODULES = "custom_ros_tools.tf", "custom_srvs.srv", "ik_ros", "ros_pybullet_interface.msg", "rpbi.world", "rpbi_examples", "rpbi_utils"
+MODULES = (
+    "custom_ros_tools.tf",
+    "custom_srvs.srv",
+    "ik_ros",
+    "ros_pybullet_interface.msg",
+    "rpbi.world",
+    "rpbi_examples",
+    "rpbi_utils",
+)
 
 
 def test_python_comes_from_the_install_space_and_the_venv(installed):

@@ -177,7 +177,9 @@ def test_a_joint_that_is_to_go_beyond_its_limits_stops_there_which_is_no_success
     world = build()
     success, message = finish(world, start(world, {JOINTS[0]: 0.5, JOINTS[1]: goal}, 1.0))
     assert not success
-    assert re.match(rf"went to the limits only: joint '{JOINTS[1]}' must be within -2.094\d* to 2.094\d* rad, got", message)
+    assert re.match(
+        rf"went to the limits only: joint '{JOINTS[1]}' must be within -2.094\d* to 2.094\d* rad, got", message
+    )
     limit = world.bodies["iiwa"].model[JOINTS[1]].nearest_allowed(goal)
     assert positions(world)[JOINTS[0]] == pytest.approx(0.5, abs=0.01)
     assert positions(world)[JOINTS[1]] == pytest.approx(limit, abs=0.01)

@@ -92,7 +92,10 @@ def test_key_without_effect_is_warned_of(caplog: pytest.LogCaptureFixture, main:
     ("object_tf", "told"),
     [
         ({"offset": [0.5, 0.0, 0.0]}, ["object_tf.offset", "object_tf"]),
-        ({"offset": [0.5, 0.0, 0.0], "broadcast_tf": True}, ["object_tf.offset", "object_tf.broadcast_tf", "object_tf"]),
+        (
+            {"offset": [0.5, 0.0, 0.0], "broadcast_tf": True},
+            ["object_tf.offset", "object_tf.broadcast_tf", "object_tf"],
+        ),
         (
             {"base_tf_id": "box", "is_static": True, "listener_frequency": 50, "timeout": 5.0, "tf_frame_id": "b"},
             [f"object_tf.{key}" for key in ("base_tf_id", "is_static", "listener_frequency", "timeout", "tf_frame_id")]
