@@ -11,7 +11,12 @@ import pytest
 from node_world import main_config
 from release_types import MESSAGES, SERVICES
 from ros_system import SUPPORT
+from std_srvs.srv import SetBool
+from tf2_msgs.msg import TFMessage
 from worlds import iiwa
+
+from custom_ros_tools.config import replace_package
+from ik_ros.lookup import make_solver
 
 PACKAGES = sorted({name.split("/")[0] for name in (*MESSAGES, *SERVICES)} | {"roscpp", "sensor_msgs", "std_srvs"})
 CMAKE = f"""cmake_minimum_required(VERSION 3.16)
@@ -61,6 +66,18 @@ def test_client_in_cpp_knows_all_types_and_is_served(ros, tmp_path, client):
         "removed 'mark'",
         "stopped",
     ]
+
+
+def test_files_and_nodes_of_its_examples_are_found_under_their_names(ros):
+    """What launch files of the release say of the package `ik_ros_examples`."""
+    arm = {"base_link": "lwr_arm_0_link", "tip_link": "end_effector_ball"}
+    solver = make_solver("trac_ik", {"urdf_filename": "{ik_ros_examples}/robots/kuka_lwr.urdf", **arm})
+    assert len(solver.joint_names) == 7
+    assert "rpbi/world" in Path(replace_package("{ik_ros_examples}/rviz/kuka_lwr_example.rviz")).read_text()
+    frames = ros.listen("/tf", TFMessage)
+    ros.start(["rosrun", "ik_ros_examples", "figure_eight_node.py"])
+    assert frames.wait_for(1)[0].transforms[0].child_frame_id == "figure_eight"
+    assert not ros.call("toggle_figure_eight", SetBool, True).success, "it moves from the start"
 
 
 SCRIPT = """
