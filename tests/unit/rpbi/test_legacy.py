@@ -101,6 +101,10 @@ def test_key_without_effect_is_warned_of(caplog: pytest.LogCaptureFixture, main:
             [f"object_tf.{key}" for key in ("base_tf_id", "is_static", "listener_frequency", "timeout", "tf_frame_id")]
             + ["object_tf"],
         ),
+        (
+            {"pose_reset_hz": 100, "offset": {"transform": [0, 0.1, 0]}, "base": {"tf_id": "box", "is_static": True}},
+            ["object_tf.pose_reset_hz", "object_tf.offset", "object_tf.base", "object_tf"],
+        ),
         ({"hz": 10}, ["object_tf"]),
         ({}, ["object_tf"]),
     ],

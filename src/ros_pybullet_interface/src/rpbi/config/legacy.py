@@ -26,9 +26,11 @@ FOLLOWERS = ("robots", "visual_objects", "collision_objects", "urdfs")
 """Lists of objects that may follow a TF frame; without `tf_id` they stay where they are, as in the release."""
 _FOLLOW = "write tf_id with the name of a TF frame"
 _OBJECT_TF = {
+    "object_tf.base": _FOLLOW,
     "object_tf.base_tf_id": _FOLLOW,
     "object_tf.is_static": "publish a static TF frame",
     "object_tf.listener_frequency": "write hz",
+    "object_tf.pose_reset_hz": "write hz",
     "object_tf.offset": "publish a TF frame with the offset in it",
     "object_tf.timeout": "write timeout_s",
     "object_tf.broadcast_tf": "the frame that it follows is on TF already",
