@@ -49,8 +49,18 @@ def _imports(path: Path) -> set[str]:
     return set(imported_names(path, module))
 
 
+COMPATIBILITY = SRC / "compatibility"
+
+
 def test_every_package_is_known_here():
     assert {path.parent.name for path in SRC.glob("*/package.xml")} == set(MODULES) == set(ALLOWED)
+
+
+def test_packages_for_compatibility_have_no_code():
+    """They are names of the release's: definitions, and nodes that call what is elsewhere."""
+    python = [path for path in COMPATIBILITY.rglob("*.py") if path.parent.name != "nodes"]
+    assert python == []
+    assert not {path.parent.name for path in COMPATIBILITY.glob("*/package.xml")} & set(MODULES)
 
 
 @pytest.mark.parametrize("package", MODULES)
@@ -93,7 +103,7 @@ def test_imports_between_packages_are_those_of_package_xml(package):
 
 @pytest.mark.parametrize("package", MODULES)
 def test_nodes_only_call_main(package):
-    for path in (SRC / package / "nodes").glob("*"):
+    for path in (*(SRC / package / "nodes").glob("*"), *COMPATIBILITY.glob("*/nodes/*")):
         if path.is_file():
             code = [line for line in path.read_text().splitlines() if line.strip()]
             assert len(code) <= MAX_NODE_LINES, path

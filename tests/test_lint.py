@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-NODES = sorted(path for path in ROOT.glob("src/*/nodes/*") if path.is_file())
+NODES = sorted(
+    path for packages in ("src", "src/compatibility") for path in ROOT.glob(f"{packages}/*/nodes/*") if path.is_file()
+)
 
 
 def run(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -13,7 +13,7 @@ import pytest
 import rospkg
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = sorted(path.parent for path in (*ROOT.glob("src/*/package.xml"), *ROOT.glob("templates/*/package.xml")))
+PACKAGES = sorted(path.parent for folder in ("src", "templates") for path in ROOT.glob(f"{folder}/**/package.xml"))
 OF_ROS = re.compile(r"ros(?!pkg)[a-z_]*|tf2?(_\w+)?|gen(py|msg)|actionlib|interactive_markers|\w+_(msgs|srvs)")
 """Python modules of ROS packages, which Debian ships without package.xml in part."""
 NOT_IN_DEBIAN = {
@@ -65,6 +65,6 @@ def test_packages_agree_on_who_maintains_them_and_under_which_licence() -> None:
         tree = ElementTree.parse(package / "package.xml")
         return (tree.findtext("maintainer"), tree.findtext("license"), tree.findtext("version"))
 
-    own = {facts(package) for package in PACKAGES if package.parent.name == "src"}
+    own = {facts(package) for package in PACKAGES if package.is_relative_to(ROOT / "src")}
     assert {(name, licence) for name, licence, _ in own} == {("ROS-PyBullet Interface developers", "LGPL-3.0-or-later")}
     assert len(own) == 1

@@ -48,8 +48,8 @@ FOLDERS = ("configs", "launch", "robots", "rviz", "schema", "msg", "srv")
 
 def test_every_file_that_is_used_at_run_time_is_installed(installed):
     files = [
-        path.relative_to(ROOT / "src")
-        for package in (ROOT / "src").glob("*/package.xml")
+        path.relative_to(package.parents[1])
+        for package in (ROOT / "src").rglob("package.xml")
         for path in package.parent.rglob("*")
         if path.is_file() and path.relative_to(package.parent).parts[0] in (*FOLDERS, "package.xml")
     ]
@@ -59,7 +59,15 @@ def test_every_file_that_is_used_at_run_time_is_installed(installed):
     ] == []
 
 
-MODULES = "custom_ros_tools.srv", "ik_ros", "ros_pybullet_interface.msg", "rpbi.world", "rpbi_examples", "rpbi_utils"
+MODULES = (
+    "custom_ros_tools.tf",
+    "custom_srvs.srv",
+    "ik_ros",
+    "ros_pybullet_interface.msg",
+    "rpbi.world",
+    "rpbi_examples",
+    "rpbi_utils",
+)
 
 
 def test_python_comes_from_the_install_space_and_the_venv(installed):

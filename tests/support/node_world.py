@@ -11,12 +11,12 @@ from typing import Any
 import rosgraph
 import rospy
 import yaml
+from cob_srvs.srv import SetString
 from diagnostic_msgs.msg import DiagnosticArray
 from ros_system import wait_until
 from rosgraph_msgs.msg import Log
 from worlds import write_world
 
-from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import PybulletObject
 from ros_pybullet_interface.srv import AddPybulletObject, ListObjects
 

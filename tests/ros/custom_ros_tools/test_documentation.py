@@ -38,7 +38,7 @@ def test_all_launch_snippets_together_come_up(ros, tmp_path):
     assert "has died" not in ros.output(launch)
 
 
-@pytest.mark.parametrize("module", [title for title in EXAMPLES if not title.endswith("keyboard")])
+@pytest.mark.parametrize("module", EXAMPLES)
 def test_example_runs(ros, module):
     state = JointState(name=["lwr_arm_0_joint", "lwr_arm_1_joint"], position=[0.1, 0.2])
     states = rospy.Publisher("/rpbi/kuka_lwr/joint_states", JointState, latch=True, queue_size=1)

@@ -85,7 +85,7 @@ def test_faulty_states_are_named_and_the_last_sound_one_stays(ros, topic):
 def test_what_is_published_carries_names_stamp_and_only_what_is_given(ros):
     publisher = JointStatePublisher("/published", ["a", "b"])
     heard = ros.listen("/published", JointState)
-    wait_until(publisher._publisher.get_num_connections, "somebody listens")
+    wait_until(publisher.get_num_connections, "somebody listens")
     publisher.publish(np.array([1.0, 2.0]))
     heard.wait_for(1)
     publisher.publish(eff=[3.0, 4.0])

@@ -19,7 +19,7 @@ def test_toggle_service_calls_the_right_handler_and_answers_what_it_returns(ros)
     for to, expected in ((True, (True, "shines")), (False, (False, "was dark"))):
         answer = ros.call("/lamp", SetBool, to)
         assert (answer.success, answer.message) == expected
-    service._service.shutdown()
+    service.shutdown()
 
 
 def test_handler_waits_for_its_service_and_says_so_after_a_while(ros, monkeypatch: pytest.MonkeyPatch):

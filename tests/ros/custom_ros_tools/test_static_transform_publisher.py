@@ -8,12 +8,11 @@ from collections.abc import Iterator
 
 import pytest
 import rospy
+from custom_srvs.srv import SetTransform
 from geometry_msgs.msg import Quaternion, Transform, Vector3
 from ros_system import stop_group, wait_until
 from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
-
-from custom_ros_tools.srv import SetTransform
 
 NAMES = ("resettable_static_transform_publisher", "resetable_static_transform_publisher")
 QUARTER_TURN = Quaternion(0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))

@@ -32,11 +32,16 @@ from ik_ros.msg import IKProblem, IKSolution, TracIKProblem
 from ik_ros.srv import JointNames, SolveIK, TracIK
 
 
+def assert_position(positions, pose):
+    """Checks that the tip is where a pose is, in whatever orientation."""
+    a, b = forward(positions).position, pose.position
+    assert math.dist((a.x, a.y, a.z), (b.x, b.y, b.z)) < 1e-3
+
+
 def assert_there(positions, pose):
     """Checks that the tip is at a pose."""
+    assert_position(positions, pose)
     reached = forward(positions)
-    a, b = reached.position, pose.position
-    assert math.dist((a.x, a.y, a.z), (b.x, b.y, b.z)) < 1e-3
     a, b = reached.orientation, pose.orientation
     assert abs(a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w) > math.cos(0.005)
 
@@ -68,7 +73,14 @@ def test_problems_of_the_release_are_taken_on_the_same_topic_and_by_service(ros)
     old = TracIKProblem(qinit=start_at(HOME), goal=Transform(translation, pose.orientation), bx=1e-5, brx=1e-3)
     with publishing("ik", TracIKProblem) as ik:
         assert_there(send_until(ik, old, targets).position, pose)
-    answer = ros.call("ik/solver/trac_ik/solve_trac_ik", TracIK, old)
+    old.qinit.position = BENT
+    old.goal.rotation = Quaternion(0.0, 0.0, 0.0, 1.0)
+    old.brx = old.bry = old.brz = 10.0
+    for service in ("solve", "solve_trac_ik"):
+        answer = ros.call(f"ik/solver/trac_ik/{service}", TracIK, old)
+        assert answer.success, answer.message
+        assert_position(answer.solution.position, pose)
+    answer = ros.call("ik/solver/trac_ik/solve_ik", SolveIK, problem(BENT, start=start_at(HOME)))
     assert answer.success, answer.message
     assert_there(answer.solution.position, pose)
 

@@ -6,6 +6,7 @@ import math
 
 import pytest
 import rospy
+from custom_srvs.srv import SetTransform, SetTransformRequest
 from geometry_msgs.msg import TransformStamped, Twist
 from mobile_base import mobile_base
 from nav_msgs.msg import Odometry
@@ -17,7 +18,6 @@ from tf2_msgs.msg import TFMessage
 from tf2_ros import StaticTransformBroadcaster
 from worlds import FLOOR
 
-from custom_ros_tools.srv import SetTransform, SetTransformRequest
 from ros_pybullet_interface.srv import RobotInfo
 
 HZ = 40

@@ -7,11 +7,11 @@ import pytest
 import rospy
 import yaml
 from camera_world import CAMERA, HEIGHT_M, box_world, place, points_of
+from cob_srvs.srv import SetString
 from ros_system import wait_until
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_srvs.srv import Trigger
 
-from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.srv import ListObjects
 
 CLOUD, COLOUR, DEPTH = (f"/rpbi/camera/{suffix}" for suffix in ("pointcloud", "colour/image", "depth/image"))

@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 import rospy
 from camera_world import CAMERA, box_world, place
+from cob_srvs.srv import SetString
 from sensor_msgs.msg import Image
-
-from custom_ros_tools.srv import SetString
 
 CLOUD, DEPTH = "/rpbi/camera/pointcloud", "/rpbi/camera/depth/image"
 

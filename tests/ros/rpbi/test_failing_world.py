@@ -6,6 +6,7 @@ import threading
 
 import pytest
 from camera_world import CAMERA, box_world
+from cob_srvs.srv import SetString
 from mobile_base import mobile_base
 from node_world import Rosout, add, main_config, objects, registrations, remove
 from ros_system import support_on_path, wait_until
@@ -13,7 +14,6 @@ from sensor_msgs.msg import Image, JointState
 from std_srvs.srv import Trigger
 from worlds import box, iiwa
 
-from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import PybulletObject, SimulationState
 from ros_pybullet_interface.srv import RobotInfo
 

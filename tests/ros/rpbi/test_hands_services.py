@@ -8,6 +8,7 @@ import os
 
 import pytest
 import rospy
+from cob_srvs.srv import SetString
 from geometry_msgs.msg import Point, Pose, Vector3, Wrench, WrenchStamped
 from node_world import Rosout, count, main_config, publishing, remove
 from ros_system import wait_until
@@ -16,7 +17,6 @@ from tf2_msgs.msg import TFMessage
 from worlds import FLOOR, box, iiwa
 
 from custom_ros_tools.ros.rospy_internals import close_poller_with
-from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import Attachment, Attachments, WorldCommands
 from ros_pybullet_interface.srv import ApplyWrench, Attach, StepN
 

@@ -13,13 +13,13 @@ import pytest
 import rospy
 import yaml
 from camera_world import renderers
+from cob_srvs.srv import SetString
 from node_world import Rosout, add, main_config, registrations, remove
 from ros_system import wait_until
 from std_msgs.msg import Int64
 from std_srvs.srv import Trigger
 from worlds import FLOOR, ball, iiwa
 
-from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import PybulletObject
 from ros_pybullet_interface.srv import AddPybulletObject
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import pytest
 import rosgraph
-import rospy
 from node_world import Rosout, main_config, publishing
 
 from ros_pybullet_interface.msg import ResetDebugVisualizerCamera
 from ros_pybullet_interface.srv import GetDebugVisualizerCamera
 
 KEYS = {
+    "resetDebugVisualizerCamera": {"cameraDistance": 2.5, "cameraYaw": 30.0, "cameraPitch": -20.0}
+    | {"cameraTargetPosition": [0.0, 0.0, 0.5]},
     "enable_keyboard_publisher": True,
     "enable_mouse_publisher": True,
     "publish_visualizer_image_hz": 10,
@@ -37,9 +38,9 @@ def test_keys_of_the_window_are_warned_of_once_and_open_nothing(ros, node):
     }
 
 
-def test_camera_of_the_window_is_answered_by_that_there_is_none(ros, node):
-    with pytest.raises(rospy.ServiceException, match="there is no window"):
-        ros.call("/rpbi/get_debug_visualizer_camera", GetDebugVisualizerCamera)
+def test_camera_of_the_window_is_where_it_would_be_and_stays_there(ros, node):
+    camera = ros.call("/rpbi/get_debug_visualizer_camera", GetDebugVisualizerCamera).debug_visualizer_config
+    assert camera == ResetDebugVisualizerCamera(2.5, 30.0, -20.0, (0.0, 0.0, 0.5))
     rosout = Rosout(ros)
     with publishing("/rpbi/reset_debug_visualizer_camera", ResetDebugVisualizerCamera) as publisher:
         publisher.publish(ResetDebugVisualizerCamera(1.0, 0.0, 0.0, [0.0, 0.0, 0.0]))

@@ -13,6 +13,7 @@ import rospy
 import yaml
 from camera_world import CAMERA
 from clean_shell import in_clean_shell
+from cob_srvs.srv import SetString
 from node_world import Rosout, add, main_config, objects, publishing, remove
 from ros_system import SUPPORT, support_on_path, wait_until
 from sensor_msgs.msg import Image, Range
@@ -21,7 +22,6 @@ from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
-from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import PybulletObject, SimulationState
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import rosbag
 import rospy
+from cob_srvs.srv import SetString
 from node_world import Rosout, add, count, main_config, objects, publishing, registrations, remove, resident_mb
 from ros_system import wait_until
 from rosgraph_msgs.msg import Clock
@@ -19,7 +20,6 @@ from std_srvs.srv import Empty, Trigger
 from tf2_msgs.msg import TFMessage
 from worlds import FLOOR, ball, box, iiwa
 
-from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import PybulletObject, SimulationState
 from ros_pybullet_interface.srv import GetStateHash, ResetJointState, StepN
 from rpbi_utils import Recorder

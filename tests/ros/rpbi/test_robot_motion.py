@@ -7,6 +7,8 @@ import re
 import threading
 
 import pytest
+from cob_srvs.srv import SetString
+from custom_srvs.srv import SetTransform
 from node_world import add, main_config, publishing, remove
 from ros_system import wait_until
 from rosgraph_msgs.msg import Log
@@ -14,7 +16,6 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from worlds import box, iiwa
 
-from custom_ros_tools.srv import SetString, SetTransform
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem, PybulletObject
 from ros_pybullet_interface.srv import CalculateInverseKinematics, ResetEffState, ResetJointState, SetJointState
 
@@ -113,8 +114,14 @@ def test_a_pose_out_of_reach_moves_nothing(ros, states):
     assert now(states) == pytest.approx(before, abs=1e-3)
 
 
+def test_beyond_its_limits_it_goes_to_the_limit_and_says_so(ros, states):
+    answer = move(ros, 0.3, j1=0.2, j4=-3.0)
+    assert not answer.success
+    assert f"went to the limits only: joint '{FOURTH}' must be within -2.0944 to 2.0944 rad, got -3;" in answer.message
+    assert (now(states)[FIRST], now(states)[FOURTH]) == pytest.approx((0.2, -2.0944), abs=0.01)
+
+
 REFUSED = {
-    "outside limits": ({"j1": 0.2, "j4": 3.0}, 1.0, f"joint '{FOURTH}' must be within -2.0944 to 2.0944 rad, got 3"),
     "not finite": ({"j1": math.nan}, 1.0, f"values must be finite, got nan for joint '{FIRST}'"),
     "unknown joint": ({"j9": 0.1}, 1.0, "unknown joint 'lbr_iiwa_joint_9': known are"),
     "duration": ({"j1": 0.2}, -1.0, "duration must be 0 to 1e+06 [s], got -1"),
@@ -149,7 +156,9 @@ def test_a_stop_in_the_middle_is_answered_and_while_stopped_moves_are_refused(ro
     answer = moving()
     assert not answer.success
     assert "the simulation was stopped before the goal" in answer.message
-    assert "the simulation is stopped" in move(ros, 1.0, j1=0.5).message
+    refused = move(ros, 1.0, j1=0.5)
+    assert not refused.success
+    assert refused.message == "nothing moved: the simulation is stopped; call rpbi/start first"
     reached = now(states)[FIRST]
     assert ros.call("/rpbi/start", Trigger).success
     states.wait_for(len(states.messages) + 15)

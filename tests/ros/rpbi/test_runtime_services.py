@@ -6,6 +6,7 @@ import math
 
 import pytest
 import rospy
+from cob_srvs.srv import SetString
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Vector3, WrenchStamped
 from node_world import main_config
@@ -14,7 +15,6 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty, Trigger
 from worlds import FLOOR, ball, iiwa
 
-from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import SimulationState, WorldCommands
 from ros_pybullet_interface.srv import SetGravity, SetMotorGains, SetRealTimeFactor, SetSensorRate, StepN
 

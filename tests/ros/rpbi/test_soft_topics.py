@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from custom_srvs.srv import SetTransform
 from geometry_msgs.msg import Quaternion, Transform, Vector3
 from node_world import add, main_config, objects, remove
 from ros_system import wait_until
@@ -11,7 +12,6 @@ from soft_meshes import DEFORMABLE, GROUND, block
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker
 
-from custom_ros_tools.srv import SetTransform
 from ros_pybullet_interface.msg import Contacts, PybulletObject
 from ros_pybullet_interface.srv import GetObjectDynamics
 

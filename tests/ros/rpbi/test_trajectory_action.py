@@ -7,6 +7,7 @@ import math
 import pytest
 import rospy
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from cob_srvs.srv import SetString
 from node_world import Rosout, publishing
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
@@ -14,7 +15,6 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 from trajectory_world import CONTROLLER, JOINTS, START, Goal, moved, stands, tolerance, trajectory
 
-from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import JointTrajectoryControllerState
 
 

@@ -6,6 +6,7 @@ import time
 
 import pytest
 import rosgraph
+from custom_srvs.srv import SetTransform
 from geometry_msgs.msg import Transform
 from node_world import add, main_config, remove
 from ros_system import wait_until
@@ -13,7 +14,6 @@ from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 from worlds import FLOOR, ball, box, iiwa
 
-from custom_ros_tools.srv import SetTransform
 from ros_pybullet_interface.msg import PybulletObject
 from ros_pybullet_interface.srv import StepN
 

@@ -10,13 +10,13 @@ import pytest
 import rosgraph
 import rospy
 import tf2_ros
+from cob_srvs.srv import SetString
 from geometry_msgs.msg import WrenchStamped
 from node_world import publishing
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import Contacts, ControllerState
 from ros_pybullet_interface.srv import ResetJointState, SwitchControllers
 from rpbi_examples.motions import CIRCLE_CENTRE, CIRCLE_RADIUS

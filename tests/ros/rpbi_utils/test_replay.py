@@ -11,6 +11,8 @@ import time
 import pytest
 import rosbag
 import rospy
+from cob_srvs.srv import SetString
+from custom_srvs.srv import SetTransform
 from geometry_msgs.msg import Quaternion, Transform, Twist, Vector3
 from mobile_base import mobile_base
 from node_world import add, main_config, publishing, remove
@@ -21,7 +23,6 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from worlds import FLOOR, ball, box, iiwa
 
-from custom_ros_tools.srv import SetString, SetTransform
 from ros_pybullet_interface.msg import SimulationState, WorldCommands
 from ros_pybullet_interface.srv import ChangeDynamics, ResetJointState, SetJointState, StepN
 from rpbi_utils import Recorder

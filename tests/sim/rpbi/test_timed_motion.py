@@ -172,11 +172,17 @@ def test_what_ends_a_motion_early_is_told_with_the_state_reached(build, what, ac
     assert f"state reached: {JOINTS[0]}=" in message
 
 
-def test_a_goal_outside_limits_is_refused_before_anything_moves(build):
+@pytest.mark.parametrize("goal", [3.0, -1e8])
+def test_a_joint_that_is_to_go_beyond_its_limits_stops_there_which_is_no_success(build, goal):
     world = build()
-    with pytest.raises(ValueError, match=f"joint '{JOINTS[1]}' must be within -2.094.* got 3"):
-        start(world, {JOINTS[0]: 0.5, JOINTS[1]: 3.0}, 1.0)
-    assert world.bodies["iiwa"].drive.motion is None
+    success, message = finish(world, start(world, {JOINTS[0]: 0.5, JOINTS[1]: goal}, 1.0))
+    assert not success
+    assert re.match(
+        rf"went to the limits only: joint '{JOINTS[1]}' must be within -2.094\d* to 2.094\d* rad, got", message
+    )
+    limit = world.bodies["iiwa"].model[JOINTS[1]].nearest_allowed(goal)
+    assert positions(world)[JOINTS[0]] == pytest.approx(0.5, abs=0.01)
+    assert positions(world)[JOINTS[1]] == pytest.approx(limit, abs=0.01)
 
 
 @pytest.mark.parametrize("duration_s", [-1.0, 1e100, float("nan"), float("inf")])

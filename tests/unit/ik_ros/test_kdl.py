@@ -233,16 +233,32 @@ def test_a_mimic_that_makes_no_sense_is_named(tmp_path, mimic, message):
         planar_arm(tmp_path, more=LIMITED + mimic)
 
 
-@pytest.mark.parametrize(("solver", "options"), [("trac_ik", {"timeout": 5.0}), ("pybullet", {})])
 @pytest.mark.parametrize("field", [{"position_tolerance": (0.0, 0.01, 0.0)}, {"rotation_tolerance": (0.0, 0.0, 1.0)}])
-def test_tolerances_are_refused_by_solvers_that_cannot_make_use_of_them(tmp_path, solver, options, field):
-    arm = planar_arm(tmp_path, solver=solver, **options)
-    with pytest.raises(ValueError, match=f"{next(iter(field))}: '{solver}' takes none above .*solver 'kdl'"):
+def test_pybullet_refuses_tolerances_that_it_cannot_make_use_of(tmp_path, field):
+    arm = planar_arm(tmp_path, solver="pybullet")
+    with pytest.raises(ValueError, match=f"{next(iter(field))}: 'pybullet' takes none above .*solver 'kdl'"):
         arm.solve(IKProblem(target=Pose((0.3, 0.3, 0.0)), **field))
+
+
+@pytest.mark.parametrize(("solver", "options"), [("trac_ik", {"timeout": 5.0}), ("pybullet", {})])
+def test_what_counts_as_reached_anyway_is_no_tolerance(tmp_path, solver, options):
+    arm = planar_arm(tmp_path, solver=solver, **options)
     small = IKProblem(
         target=arm.chain.pose([0.3, 0.5, 0.2]), position_tolerance=(1e-5,) * 3, rotation_tolerance=(1e-3,) * 3
     )
-    assert arm.solve(small).success, "what counts as reached anyway is no tolerance"
+    assert arm.solve(small).success
+
+
+@pytest.mark.parametrize(
+    "field",
+    [{"rotation_tolerance": (10.0, 10.0, 10.0)}, {"position_tolerance": (0.3,) * 3}],
+    ids=["any orientation", "a box"],
+)
+def test_targets_with_tolerances_are_solved_for_by_trac_ik_as_by_kdl(tmp_path, field):
+    problem = IKProblem(target=Pose((0.3, 0.3, 0.0), (1.0, 0.0, 0.0, 0.0)), start={"elbow": 0.5}, **field)
+    solutions = [planar_arm(tmp_path, solver=solver).solve(problem) for solver in ("trac_ik", "kdl")]
+    assert solutions[0] == solutions[1]
+    assert solutions[0].success == ("rotation_tolerance" in field), "nothing turns the arm over"
 
 
 def test_pybullet_goes_to_a_position_in_any_orientation(tmp_path):

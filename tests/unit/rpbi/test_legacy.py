@@ -88,6 +88,63 @@ def test_key_without_effect_is_warned_of(caplog: pytest.LogCaptureFixture, main:
     assert message.startswith(told)
 
 
+@pytest.mark.parametrize(
+    ("object_tf", "told"),
+    [
+        ({"offset": [0.5, 0.0, 0.0]}, ["object_tf.offset", "object_tf"]),
+        (
+            {"offset": [0.5, 0.0, 0.0], "broadcast_tf": True},
+            ["object_tf.offset", "object_tf.broadcast_tf", "object_tf"],
+        ),
+        (
+            {"base_tf_id": "box", "is_static": True, "listener_frequency": 50, "timeout": 5.0, "tf_frame_id": "b"},
+            [f"object_tf.{key}" for key in ("base_tf_id", "is_static", "listener_frequency", "timeout", "tf_frame_id")]
+            + ["object_tf"],
+        ),
+        (
+            {"pose_reset_hz": 100, "offset": {"transform": [0, 0.1, 0]}, "base": {"tf_id": "box", "is_static": True}},
+            ["object_tf.pose_reset_hz", "object_tf.offset", "object_tf.base", "object_tf"],
+        ),
+        ({"hz": 10}, ["object_tf"]),
+        ({}, ["object_tf"]),
+    ],
+)
+def test_object_that_names_no_frame_stays_where_it_is_with_a_warning_of_each_key(
+    caplog: pytest.LogCaptureFixture, object_tf: dict[str, Any], told: list[str]
+) -> None:
+    shape = {"shapeType": "GEOM_SPHERE", "radius": 0.1}
+    ball = {"name": "ball", "createVisualShape": shape, "createCollisionShape": shape}
+    thing = {"name": "thing", "loadURDF": ROBOT["loadURDF"]}
+    for kind, data in (("robot", ROBOT), ("visual", ball), ("collision", ball), ("urdf", thing)):
+        caplog.clear()
+        loaded = load_object(kind, {**data, "object_tf": object_tf}, "a.yaml")
+        assert loaded.object_tf is None  # type: ignore[attr-defined]
+        assert {message.split(": ")[1] for message in caplog.messages} == set(told)
+        assert all("has no effect" in message for message in caplog.messages)
+
+
+def test_keys_beside_the_frame_have_no_effect_and_the_frame_has(caplog: pytest.LogCaptureFixture) -> None:
+    loaded = robot(object_tf={"tf_id": "base", "hz": 10, "offset": [1.0, 0.0, 0.0]})
+    assert loaded.object_tf.tf_id == "base" and loaded.object_tf.hz == 10.0  # type: ignore[attr-defined]
+    (message,) = caplog.messages
+    assert message == "iiwa.yaml: object_tf.offset: has no effect: publish a TF frame with the offset in it"
+
+
+@pytest.mark.parametrize("object_tf", [{"tfid": "base"}, {"hz": 10, "max_speed": 1.0}, {"offset": [1.0], "hzz": 2}])
+def test_misspelt_frame_is_an_error_nevertheless(object_tf: dict[str, Any]) -> None:
+    with pytest.raises(ConfigError, match="object_tf"):
+        robot(object_tf=object_tf)
+
+
+def test_dynamic_object_follows_nothing(caplog: pytest.LogCaptureFixture) -> None:
+    shape = {"shapeType": "GEOM_SPHERE", "radius": 0.1}
+    ball = {"name": "ball", "createVisualShape": shape, "createCollisionShape": shape, "changeDynamics": {}}
+    load_object("dynamic", {**ball, "baseMass": 1.0, "object_tf": {"tf_id": "base"}}, "ball.yaml")
+    assert caplog.messages == [
+        "ball.yaml: object_tf: has no effect: physics moves it; write basePosition and baseOrientation"
+    ]
+
+
 def test_ignored_motor_arguments_are_warned_of(caplog: pytest.LogCaptureFixture) -> None:
     robot(setJointMotorControlArray={"controlMode": "POSITION_CONTROL", "forces": [1.0]})
     assert caplog.messages == [

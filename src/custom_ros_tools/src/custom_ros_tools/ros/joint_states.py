@@ -49,7 +49,10 @@ def resolve_joint_order(msg: JointState, joint_names: Sequence[str], ns: str = "
 
 
 def get_joint_state(
-    topic: str, timeout: float | None = None, joint_names: Sequence[str] | None = None, ns: str = ""
+    topic: str = "joint_states",
+    timeout: float | None = None,
+    joint_names: Sequence[str] | None = None,
+    ns: str = "",
 ) -> JointState:
     """Waits for one message of a topic and returns it.
 
@@ -67,7 +70,7 @@ def get_joint_state(
     return message if joint_names is None else resolve_joint_order(message, joint_names, ns)
 
 
-class JointStatePublisher:
+class JointStatePublisher(rospy.Publisher):
     """Publishes joint states of a fixed list of joints.
 
     Args:
@@ -75,9 +78,9 @@ class JointStatePublisher:
         queue_size: Messages kept for a slow subscriber.
     """
 
-    def __init__(self, topic: str, joint_names: Sequence[str], queue_size: int = 1) -> None:
+    def __init__(self, topic_name: str, joint_names: Sequence[str], queue_size: int = 1) -> None:
         self._names = tuple(joint_names)
-        self._publisher = rospy.Publisher(topic, JointState, queue_size=queue_size)
+        super().__init__(topic_name, JointState, queue_size=queue_size)
 
     def publish(
         self,
@@ -96,10 +99,10 @@ class JointStatePublisher:
             ValueError: If there are more or fewer than n, or a value is not finite.
         """
         values = JointValues.of(self._names, q, qd, eff)
-        self._publisher.publish(joint_state(values, Header(stamp=rospy.Time.now())))
+        super().publish(joint_state(values, Header(stamp=rospy.Time.now())))
 
 
-class JointStateSubscriber:
+class JointStateSubscriber(rospy.Subscriber):
     """Keeps the newest joint state of a topic, its joints in the order of a list.
 
     Messages that lack joints or are faulty are refused and named now and then; the one before stays.
@@ -112,15 +115,15 @@ class JointStateSubscriber:
 
     def __init__(
         self,
-        topic: str,
+        topic_name: str,
         joint_names: Sequence[str],
         ns: str = "",
         callback: Callable[[JointState], None] | None = None,
     ) -> None:
         self._names, self._ns, self._callback = tuple(joint_names), ns, callback
-        self._topic, self._warn = rospy.resolve_name(topic), ThrottledWarning()
+        self._topic, self._warn = rospy.resolve_name(topic_name), ThrottledWarning()
         self._newest: JointState | None = None
-        self._subscriber = rospy.Subscriber(self._topic, JointState, self._take, queue_size=1, tcp_nodelay=True)
+        super().__init__(self._topic, JointState, self._take, queue_size=1, tcp_nodelay=True)
 
     def received(self) -> bool:
         """Tells whether there is a joint state."""

@@ -13,7 +13,7 @@ PATIENCE_S = 5.0
 
 
 def get_srv_handler(
-    name: str, srv_type: type, persistent: bool = False, headers: dict[str, str] | None = None
+    srv_name: str, srv_type: type, persistent: bool = False, headers: dict[str, str] | None = None
 ) -> rospy.ServiceProxy:
     """Waits until a service is there, for ever if need be, and returns what calls it.
 
@@ -25,13 +25,13 @@ def get_srv_handler(
         rospy.ROSInterruptException: If ROS shuts down meanwhile.
     """
     try:
-        rospy.wait_for_service(name, timeout=PATIENCE_S)
+        rospy.wait_for_service(srv_name, timeout=PATIENCE_S)
     except rospy.ROSInterruptException:
         raise
     except rospy.ROSException:
-        rospy.logwarn("still waiting for service %s", rospy.resolve_name(name))
-        rospy.wait_for_service(name)
-    return rospy.ServiceProxy(name, srv_type, persistent=persistent, headers=headers)
+        rospy.logwarn("still waiting for service %s", rospy.resolve_name(srv_name))
+        rospy.wait_for_service(srv_name)
+    return rospy.ServiceProxy(srv_name, srv_type, persistent=persistent, headers=headers)
 
 
 def get_srv_handlers(services: Mapping[str, type], persistent: bool = False) -> dict[str, rospy.ServiceProxy]:
@@ -54,13 +54,20 @@ def call_service(name: str, srv_type: type, *arguments: object) -> Any:
 Handler = Callable[[], tuple[bool, str]]
 
 
-class ToggleService:
-    """A std_srvs/SetBool service: true calls `on`, false `off`, each of which returns success and a message."""
+class ToggleService(rospy.Service):
+    """A std_srvs/SetBool service.
 
-    def __init__(self, name: str, on: Handler, off: Handler) -> None:
-        self._on, self._off = on, off
-        self._service = rospy.Service(name, SetBool, self._handle)
+    Args:
+        name: Its name.
+        enable_handler: Called on true; it returns success and a message, which are the answer.
+        disable_handler: The same on false.
+        options: Those of `rospy.Service`, such as `error_handler`.
+    """
+
+    def __init__(self, name: str, enable_handler: Handler, disable_handler: Handler, **options: Any) -> None:
+        self._enable, self._disable = enable_handler, disable_handler
+        super().__init__(name, SetBool, self._handle, **options)
 
     def _handle(self, request: SetBoolRequest) -> SetBoolResponse:
-        success, message = self._on() if request.data else self._off()
+        success, message = self._enable() if request.data else self._disable()
         return SetBoolResponse(success, message)

@@ -29,31 +29,38 @@ class TfInterface:
         self._listener = tf2_ros.TransformListener(self.tf_buffer)
 
     def set_tf(
-        self, parent: str, child: str, pos: ArrayLike, quat: ArrayLike = NO_ROTATION, eul_deg: bool = False
+        self,
+        parent_frame_id: str,
+        child_frame_id: str,
+        pos: ArrayLike,
+        orientation: ArrayLike = NO_ROTATION,
+        eul_deg: bool = False,
     ) -> None:
-        """Broadcasts a transform; for the arguments see `pack_tf_msg`."""
-        self.tf_broadcaster.sendTransform(self.pack_tf_msg(parent, child, pos, quat, eul_deg))
+        """Broadcasts a transform; `orientation` is `rot` of `pack_tf_msg`, which explains the arguments."""
+        self.tf_broadcaster.sendTransform(self.pack_tf_msg(parent_frame_id, child_frame_id, pos, orientation, eul_deg))
 
-    def set_matrix(self, parent: str, child: str, T: ArrayLike) -> None:
+    def set_matrix(self, parent_frame_id: str, child_frame_id: str, T: ArrayLike) -> None:
         """Broadcasts a transform given as homogeneous matrix, shape (4, 4).
 
         Raises:
             ValueError: If it is no rigid transform.
         """
-        self.set_tf(parent, child, *pose_of(T))
+        self.set_tf(parent_frame_id, child_frame_id, *pose_of(T))
 
-    def get_tf_msg(self, parent: str, child: str) -> TransformStamped | None:
+    def get_tf_msg(self, parent_frame_id: str, child_frame_id: str) -> TransformStamped | None:
         """Returns the newest transform, None if there is none."""
         try:
-            return self.tf_buffer.lookup_transform(parent.strip("/"), child.strip("/"), rospy.Time(0))
+            return self.tf_buffer.lookup_transform(parent_frame_id.strip("/"), child_frame_id.strip("/"), rospy.Time(0))
         except tf2_ros.TransformException:
             return None
 
-    def get_tf(self, parent: str, child: str) -> tuple[Array, Array] | tuple[None, None]:
+    def get_tf(self, parent_frame_id: str, child_frame_id: str) -> tuple[Array, Array] | tuple[None, None]:
         """Returns position and quaternion of the newest transform, (None, None) if there is none."""
-        return _pose(self.get_tf_msg(parent, child))
+        return _pose(self.get_tf_msg(parent_frame_id, child_frame_id))
 
-    def wait_for_tf_msg(self, parent: str, child: str, timeout: float | None = None) -> TransformStamped | None:
+    def wait_for_tf_msg(
+        self, parent_frame_id: str, child_frame_id: str, timeout: float | None = None
+    ) -> TransformStamped | None:
         """Waits until there is a transform and returns the newest, None if there was none in time.
 
         The timeout [s] is wall time; None is for ever.
@@ -63,54 +70,67 @@ class TfInterface:
         """
         start_s = time.monotonic()
         while not rospy.is_shutdown():
-            message = self.get_tf_msg(parent, child)
+            message = self.get_tf_msg(parent_frame_id, child_frame_id)
             if message is not None or (timeout is not None and time.monotonic() - start_s > timeout):
                 return message
             time.sleep(POLL_S)  # rospy.sleep would hang while simulated time stands still
-        raise rospy.ROSInterruptException(f"shut down while waiting for TF from '{parent}' to '{child}'")
+        raise rospy.ROSInterruptException(
+            f"shut down while waiting for TF from '{parent_frame_id}' to '{child_frame_id}'"
+        )
 
     def wait_for_tf(
-        self, parent: str, child: str, timeout: float | None = None
+        self, parent_frame_id: str, child_frame_id: str, timeout: float | None = None
     ) -> tuple[Array, Array] | tuple[None, None]:
         """Waits as `wait_for_tf_msg` does; returns position and quaternion, (None, None) if there was none in time."""
-        return _pose(self.wait_for_tf_msg(parent, child, timeout))
+        return _pose(self.wait_for_tf_msg(parent_frame_id, child_frame_id, timeout))
 
     @staticmethod
     def pack_tf_msg(
-        parent: str, child: str, pos: ArrayLike, quat: ArrayLike = NO_ROTATION, eul_deg: bool = False
+        parent_frame_id: str,
+        child_frame_id: str,
+        pos: ArrayLike,
+        rot: ArrayLike = NO_ROTATION,
+        eul_deg: bool = False,
     ) -> TransformStamped:
         """Returns a transform from parent to child with the present stamp.
 
         Args:
             pos: Position x, y, z [m].
-            quat: Quaternion x, y, z, w, or roll, pitch, yaw.
+            rot: Quaternion x, y, z, w, or roll, pitch, yaw.
             eul_deg: Whether roll, pitch, yaw are in degrees rather than radians.
 
         Raises:
             ValueError: If lengths are wrong, a number is not finite or the quaternion is zero.
         """
-        message = TransformStamped(child_frame_id=child, transform=transform_message(pos, quat, eul_deg))
-        message.header.frame_id = parent
+        message = TransformStamped(child_frame_id=child_frame_id, transform=transform_message(pos, rot, eul_deg))
+        message.header.frame_id = parent_frame_id
         message.header.stamp = rospy.Time.now()
         return message
 
     @staticmethod
-    def pack_tf(pos: ArrayLike, quat: ArrayLike = NO_ROTATION, eul_deg: bool = False) -> Transform:
+    def pack_tf(pos: ArrayLike, rot: ArrayLike = NO_ROTATION, eul_deg: bool = False) -> Transform:
         """Returns a transform without frames; for the arguments see `pack_tf_msg`."""
-        return transform_message(pos, quat, eul_deg)
-
-    tf_msg_to_pos = staticmethod(position_in)
-    tf_msg_to_quat = staticmethod(quat_in)
+        return transform_message(pos, rot, eul_deg)
 
     @staticmethod
-    def tf_msg_to_eul(tf: Transform) -> Array:
+    def tf_msg_to_pos(msg: Transform) -> Array:
+        """Returns the position x, y, z [m] of a Transform."""
+        return position_in(msg)
+
+    @staticmethod
+    def tf_msg_to_quat(msg: Transform) -> Array:
+        """Returns the unit quaternion x, y, z, w of a Transform."""
+        return quat_in(msg)
+
+    @staticmethod
+    def tf_msg_to_eul(msg: Transform) -> Array:
         """Returns roll, pitch, yaw [rad] of a Transform."""
-        return rpy_of(quat_in(tf))
+        return rpy_of(quat_in(msg))
 
     @staticmethod
-    def tf_msg_to_pos_magnitude(tf: Transform) -> float:
+    def tf_msg_to_pos_magnitude(msg: Transform) -> float:
         """Returns the distance [m] of a Transform."""
-        return float(np.linalg.norm(position_in(tf)))
+        return float(np.linalg.norm(position_in(msg)))
 
     @staticmethod
     def msg_to_pos(msg: TransformStamped) -> Array:

@@ -153,15 +153,21 @@ def refuse_mimics(config: ChainConfig, solver: str) -> None:
         raise ConfigError([Problem(config.urdf_filename, "", message)])
 
 
+_COUNTS_AS_REACHED = {"position_tolerance": POSITION_TOLERANCE_M, "rotation_tolerance": ORIENTATION_TOLERANCE_RAD}
+
+
+def large_tolerances(problem: IKProblem) -> list[str]:
+    """Returns the tolerances, by field, that are larger than what counts as reached anyway."""
+    return [name for name, most in _COUNTS_AS_REACHED.items() if max(getattr(problem, name)) > most]
+
+
 def refuse_boxes(problem: IKProblem, solver: str, may_turn: bool = False) -> None:
     """Refuses tolerances that are larger than what counts as reached anyway; `may_turn` allows those for rotations.
 
     Raises:
         ValueError: If there are some; it names the field.
     """
-    limits = [("position_tolerance", POSITION_TOLERANCE_M), ("rotation_tolerance", ORIENTATION_TOLERANCE_RAD)]
-    for name, most in limits[:1] if may_turn else limits:
-        values = getattr(problem, name)
-        if max(values) > most:
-            advice = "the solver 'kdl' makes use of them"
-            raise ValueError(f"{name}: '{solver}' takes none above {most:g}, got {values}; {advice}")
+    for name in large_tolerances(problem):
+        if not (may_turn and name == "rotation_tolerance"):
+            message = f"{name}: '{solver}' takes none above {_COUNTS_AS_REACHED[name]:g}, got {getattr(problem, name)}"
+            raise ValueError(f"{message}; the solver 'kdl' makes use of them")

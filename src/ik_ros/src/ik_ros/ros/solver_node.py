@@ -75,8 +75,10 @@ class SolverNode:
         services = topics_of("solver", name)
         ToggleService(f"{services}/toggle", solving.on, solving.off)
         rospy.Service(f"{services}/joint_names", JointNames, lambda _: JointNamesResponse(self._solver.joint_names))
-        rospy.Service(f"{services}/solve", SolveIK, self._serve)
-        rospy.Service(f"{services}/solve_trac_ik", TracIK, self._serve_trac_ik)
+        by_type = {"solve_ik": (SolveIK, self._serve), "solve_trac_ik": (TracIK, self._serve_trac_ik)}
+        by_type["solve"] = by_type["solve_trac_ik" if name == "trac_ik" else "solve_ik"]  # as in the release
+        for service, (service_type, serve) in by_type.items():
+            rospy.Service(f"{services}/{service}", service_type, serve)
 
     def _new_stream(self) -> ProblemStream:
         if self._continuity is None:

@@ -11,13 +11,18 @@ from pydantic import Field
 from custom_ros_tools.errors import ConfigError, MissingDependency, Problem
 from custom_ros_tools.schema import Count, Positive, Unit
 from ik_ros.chain.kdl import Goal
-from ik_ros.chain.solver import ChainConfig, ChainSolver, refuse_boxes, refuse_mimics
+from ik_ros.chain.solver import ChainConfig, ChainSolver, large_tolerances, refuse_mimics
 from ik_ros.problem import IKProblem
+
+from .kdl import KdlConfig, KdlSolver
 
 try:
     import pytracik
 except ImportError:
     raise MissingDependency("pytracik", "./rpbi setup") from None
+
+
+_ENDS = set(ChainConfig.model_fields)
 
 
 class TracIkConfig(ChainConfig):
@@ -40,7 +45,8 @@ class TracIkConfig(ChainConfig):
 class TracIkSolver(ChainSolver):
     """The TRAC-IK library as the package `pytracik` has it, which leaves out Cartesian tolerances.
 
-    It is not deterministic: its two threads race, and where it ends depends on the clock.
+    Targets with tolerances go to the search of `kdl` instead. It is not deterministic: its two threads race, and where
+    it ends depends on the clock.
 
     Raises:
         ConfigError: If a joint of the chain mimics another, or slides without limits; it names the joint.
@@ -57,17 +63,15 @@ class TracIkSolver(ChainSolver):
                 message = f"joint '{joint.name}' slides without limits, which 'trac_ik' cannot solve for; 'kdl' can"
                 raise ConfigError([Problem(config.urdf_filename, "", message)])
         self._restarts = config.restarts
+        self._with_tolerances = KdlSolver(KdlConfig.model_construct(**config.model_dump(include=_ENDS)))
         solve_type = getattr(pytracik.SolveType, config.solve_type)
         ends = self.description.base, self.description.tip
         self._trac_ik = pytracik.TRAC_IK(*ends, self.description.urdf, config.timeout, config.epsilon, solve_type)
 
     def find(self, problem: IKProblem, goal: Goal, start: list[float]) -> Sequence[Sequence[float]]:
-        """Returns TRAC-IK's solution, if it finds one; see `ChainSolver`.
-
-        Raises:
-            ValueError: If the problem has larger tolerances than what counts as reached anyway.
-        """
-        refuse_boxes(problem, "trac_ik")
+        """Returns TRAC-IK's solution, if it finds one; see `ChainSolver`."""
+        if large_tolerances(problem):
+            return self._with_tolerances.find(problem, goal, start)
         target = (*goal.frame.p, *goal.frame.M.GetQuaternion())
         restarts = 0 if self.is_beyond_reach(problem) else self._restarts
         for first in self.limits.starts(start, restarts, partial(random.Random, problem.seed)):

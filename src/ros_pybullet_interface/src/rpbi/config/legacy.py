@@ -22,6 +22,22 @@ LEGACY_KEYS: dict[str, dict[str, str]] = {
 }
 """By section: an old spelling and the key that it means."""
 
+FOLLOWERS = ("robots", "visual_objects", "collision_objects", "urdfs")
+"""Lists of objects that may follow a TF frame; without `tf_id` they stay where they are, as in the release."""
+_FOLLOW = "write tf_id with the name of a TF frame"
+_OBJECT_TF = {
+    "object_tf.base": _FOLLOW,
+    "object_tf.base_tf_id": _FOLLOW,
+    "object_tf.is_static": "publish a static TF frame",
+    "object_tf.listener_frequency": "write hz",
+    "object_tf.pose_reset_hz": "write hz",
+    "object_tf.offset": "publish a TF frame with the offset in it",
+    "object_tf.timeout": "write timeout_s",
+    "object_tf.broadcast_tf": "the frame that it follows is on TF already",
+    "object_tf.tf_frame_id": "the frame that it follows is on TF already",
+}
+"""What came before `tf_id`; the last release no longer reads it."""
+
 NO_EFFECT: dict[str, dict[str, str]] = {
     MAIN: {
         "gravity": "write setGravity: {gravZ: -9.81}",
@@ -30,14 +46,14 @@ NO_EFFECT: dict[str, dict[str, str]] = {
         "setPhysicsEngineParameter.fixedTimeStep": "write timeStep",
     },
     "robots": {
-        "object_tf.offset": "publish a TF frame with the offset in it",
+        **_OBJECT_TF,
         "self.broadcast_link_states_hz": "write broadcast_link_states_hz",
         "setJointMotorControlArray.forces": "efforts are limited by the URDF",
         "setJointMotorControlArray.targetPositions": "targets come by topic",
         "setJointMotorControlArray.targetVelocities": "targets come by topic",
     },
-    "visual_objects": {"object_tf.offset": "publish a TF frame with the offset in it"},
-    "collision_objects": {"object_tf.offset": "publish a TF frame with the offset in it"},
+    **dict.fromkeys(FOLLOWERS[1:], _OBJECT_TF),
+    "dynamic_objects": {"object_tf": "physics moves it; write basePosition and baseOrientation"},
 }
 """By section: a key that older worlds carry and that does nothing here, and what to do instead."""
 
@@ -75,6 +91,10 @@ def modernise(section: str, data: Mapping[str, Any], file: str) -> tuple[dict[st
     for key, advice in NO_EFFECT.get(section, {}).items():
         if _take(current, key) is not None:
             log.warning("%s: %s: has no effect: %s", file, key, advice)
+    object_tf = current.get("object_tf")
+    if section in FOLLOWERS and isinstance(object_tf, dict) and object_tf.keys() <= {"hz"}:
+        del current["object_tf"]
+        log.warning("%s: object_tf: has no effect: %s", file, _FOLLOW)
     return current, spellings, problems
 
 

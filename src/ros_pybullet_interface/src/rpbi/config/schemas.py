@@ -13,7 +13,7 @@ from custom_ros_tools.schema.json_schema import (
 )
 from rpbi.bodies import BODY_TYPES
 
-from .legacy import LEGACY_KEYS, MAIN, old_keys
+from .legacy import FOLLOWERS, LEGACY_KEYS, MAIN, old_keys
 from .loading import CAMERAS
 from .object_entry import FILE
 from .objects import OWN_TYPES, TYPE, object_sections
@@ -148,4 +148,6 @@ def _with_old_keys(schema: Schema, section: str) -> Schema:
             mapping.pop("$ref", None)
             mapping |= {**content, **mapping, "description": properties[outer]["description"]}
             mapping["properties"] = {**content["properties"], inner: old}
+            if outer == "object_tf" and section in FOLLOWERS:
+                mapping.pop("required", None)
     return with_definitions(result, result.get(DEFINITIONS, {}))

@@ -300,7 +300,7 @@ class Motors:
         joint = self._model.joints[index]
         if self.mode in POSITION_MODES:
             self._limit_reports.take(joint, value, "it goes to the limit")
-            return min(max(value, joint.lower), joint.upper)
+            return joint.nearest_allowed(value)
         if self.mode == pybullet.VELOCITY_CONTROL:
             return min(max(value, -joint.max_velocity), joint.max_velocity)
         return min(max(value, -self._effort_limits[index]), self._effort_limits[index])

@@ -24,15 +24,15 @@ PEAK = 15.0 / 8.0
 class TimedMotion(Motion):
     """Moves joints to a goal with minimum jerk; it takes longer than asked if the joints' velocities demand it.
 
-    It succeeds if the measured joints come to rest within `TOLERANCES` of the goal. Joints that are not named are left
-    alone.
+    It succeeds if the measured joints come to rest within `TOLERANCES` of the goal. Joints that are asked to go beyond
+    their limits stop there, and the motion does not succeed. Joints that are not named are left alone.
 
     Args:
         goal: Positions [rad or m] by joint index.
         duration_s: How long it shall take [s].
 
     Raises:
-        ValueError: If the goal is empty or outside the joints' limits, or the duration is negative or not finite.
+        ValueError: If the goal is empty, or the duration is negative or not finite.
     """
 
     def __init__(self, model: JointModel, goal: Mapping[int, float], duration_s: float) -> None:
@@ -40,10 +40,10 @@ class TimedMotion(Motion):
             raise ValueError("expected a position for one joint or more, got none")
         if not 0.0 <= duration_s <= LONGEST_S:
             raise ValueError(f"duration must be 0 to {LONGEST_S:g} [s], got {duration_s:g}")
-        model.check_limits(goal)
         super().__init__(frozenset(goal))
         self._model = model
-        self._goal = dict(goal)
+        self._beyond = model.limit_violations(goal)
+        self._goal = {index: model.joints[index].nearest_allowed(position) for index, position in goal.items()}
         self._asked_s = max(duration_s, SHORTEST_S)
         self._trajectory: Trajectory
 
@@ -63,7 +63,11 @@ class TimedMotion(Motion):
         if time_s > self._trajectory.end_s + 1e-9:
             missed = self._missed(measured)
             if not missed and self._rests(measured):
-                self.end(True, f"reached: {self._residuals(measured)}{self._stretched()}")
+                reached = f"{self._residuals(measured)}{self._stretched()}"
+                if self._beyond:
+                    self.end(False, f"went to the limits only: {'; '.join(self._beyond)}; {reached}")
+                else:
+                    self.end(True, f"reached: {reached}")
             elif time_s > self._trajectory.end_s + SETTLING_S:
                 why = "missed the goal" if missed else "still swings about the goal"
                 self.end(False, f"{why}: {self._residuals(measured, missed or None)}; {self._reached(measured)}")

@@ -13,13 +13,19 @@ class RosNode:
 
     The simulator does not use it: it must never wait for ROS time, and this does.
 
+    Args:
+        name: The node's name unless it is given another one.
+        options: Those of `rospy.init_node`, such as `anonymous` and `log_level`. With `disable_signals` the script sees
+            to Ctrl-C itself.
+
     Attributes:
         tf: TF.
     """
 
-    def __init__(self, name: str) -> None:
-        rospy.init_node(name, disable_signals=True)
-        leave_ros_on_signals()
+    def __init__(self, name: str, **options: Any) -> None:
+        rospy.init_node(name, **{**options, "disable_signals": True})
+        if not options.get("disable_signals"):
+            leave_ros_on_signals()
         self.tf = TfInterface()
 
     def __getattr__(self, name: str) -> Any:
@@ -30,6 +36,6 @@ class RosNode:
         """Returns the present ROS time (`rospy.Time.now`)."""
         return rospy.Time.now()
 
-    def wait_for_tf(self, parent: str, child: str, timeout: float | None = None) -> Any:
+    def wait_for_tf(self, parent_frame_id: str, child_frame_id: str, timeout: float | None = None) -> Any:
         """Waits for a transform and returns position and quaternion; see `TfInterface.wait_for_tf`."""
-        return self.tf.wait_for_tf(parent, child, timeout)
+        return self.tf.wait_for_tf(parent_frame_id, child_frame_id, timeout)

@@ -92,6 +92,10 @@ class Joint:
         """Returns whether a position [rad or m] is within the limits, rounding errors of limits in degrees aside."""
         return self.lower - LIMIT_ROUNDING <= position <= self.upper + LIMIT_ROUNDING
 
+    def nearest_allowed(self, position: float) -> float:
+        """Returns the position within the limits that is nearest to one [rad or m]."""
+        return min(max(position, self.lower), self.upper)
+
     def limit_violation(self, position: float) -> str:
         """Returns a message about a position [rad or m] that is outside the limits."""
         limits = f"{self.lower:.6g} to {self.upper:.6g} {self.unit}"
@@ -274,10 +278,13 @@ class JointModel:
         Raises:
             ValueError: If one is outside its joint's limits; it names all that are.
         """
-        beyond = [
+        if beyond := self.limit_violations(positions):
+            raise ValueError("; ".join(beyond))
+
+    def limit_violations(self, positions: Mapping[int, float]) -> list[str]:
+        """Returns a message about each position [rad or m], by joint index, that is outside its joint's limits."""
+        return [
             self.joints[index].limit_violation(position)
             for index, position in positions.items()
             if not self.joints[index].allows(position)
         ]
-        if beyond:
-            raise ValueError("; ".join(beyond))

@@ -50,7 +50,7 @@ def _run() -> None:
 def _track(robot: str, solver: str, target: np.ndarray) -> None:
     """Switches setup and solver on, when the arm is where the figure begins."""
     problem = IKProblem(has_target=True, target=_pose(target), start=_state(HOME))
-    start = call_service(f"ik/solver/{solver}/solve", SolveIK, problem).solution
+    start = call_service(f"ik/solver/{solver}/solve_ik", SolveIK, problem).solution
     call_service(f"rpbi/{robot}/move_to_joint_state", ResetJointState, start, APPROACH_S)
     figure = ("toggle_figure_eight",) if rospy.get_param("~figure_moves", True) else ()
     for toggle in (f"ik/setup/{solver}/toggle", f"ik/solver/{solver}/toggle", *figure):

@@ -69,5 +69,6 @@ def _move(parent: str, child: str, pose: Callable[[float], tuple[ArrayLike, Arra
                 message.header.stamp = last = now
                 tf.tf_broadcaster.sendTransform(message)
             rate.sleep()
-    except rospy.ROSInterruptException:
-        pass  # Ctrl-C
+    except rospy.ROSException:
+        if not rospy.is_shutdown():  # Ctrl-C, asleep or on the way to a topic that is closed already
+            raise

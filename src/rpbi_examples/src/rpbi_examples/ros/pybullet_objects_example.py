@@ -1,10 +1,10 @@
 """Throws a box into the world again and again."""
 
 import rospy
+from cob_srvs.srv import SetString
 
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.services import get_srv_handler
-from custom_ros_tools.srv import SetString
 from ros_pybullet_interface.msg import PybulletObject
 from ros_pybullet_interface.srv import AddPybulletObject
 

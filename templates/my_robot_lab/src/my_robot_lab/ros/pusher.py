@@ -1,12 +1,12 @@
 """A controller: pushes the parcel off the belt when the range finder sees it, and puts it back on request."""
 
 import rospy
+from custom_srvs.srv import SetTransform
 from geometry_msgs.msg import Quaternion, Transform, Vector3
 from sensor_msgs.msg import JointState, Range
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from custom_ros_tools.srv import SetTransform
 
 OUT, HOME = 0.5, 0.0
 """Where the plate goes [m]."""

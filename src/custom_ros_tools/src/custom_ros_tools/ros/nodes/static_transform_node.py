@@ -3,6 +3,7 @@
 import sys
 
 import rospy
+from custom_srvs.srv import SetTransform, SetTransformRequest, SetTransformResponse
 
 from custom_ros_tools.errors import collecting_problems
 from custom_ros_tools.node_configs import RateParameters
@@ -10,7 +11,6 @@ from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
 from custom_ros_tools.ros.transform_messages import TransformTopic, position_in, quat_in, transform_message
-from custom_ros_tools.srv import SetTransform, SetTransformRequest, SetTransformResponse
 from custom_ros_tools.transforms import StaticTransform
 
 NAME = "resettable_static_transform_publisher"

@@ -12,8 +12,8 @@ from rpbi.reference.config_page import config_page
 from .interface_page import interface_page
 from .reference_world import reference_world
 
-PACKAGES = ("ros_pybullet_interface", "custom_ros_tools")
-"""Those with messages and services of ours."""
+PACKAGES = ("ros_pybullet_interface", "compatibility/cob_srvs", "compatibility/custom_srvs")
+"""Folders with the messages and services that the node has."""
 FAVOURITE = "basic_example_kuka_lwr"
 """Folder of the examples that are shown first."""
 _FIRST_LINE = re.compile(r"# yaml-language-server: .*/(\w+)\.schema\.json\n")

@@ -1,9 +1,9 @@
 """Services of controllers that live in the tick."""
 
 import yaml
+from cob_srvs.srv import SetStringRequest
 
 from custom_ros_tools.errors import ConfigError
-from custom_ros_tools.srv import SetStringRequest
 from ros_pybullet_interface.srv import SwitchControllersRequest
 from rpbi.bodies import Body
 from rpbi.bodies.robots.robot import Robot

@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
+from cob_srvs.srv import SetStringRequest
+
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.srv import SetStringRequest
 from ros_pybullet_interface.srv import (
     ResetEffStateRequest,
     ResetJointStateRequest,
@@ -23,7 +24,10 @@ from .ik import arrival, solve_for_robot
 
 
 def move_to_joint_state(context: BodyContext, request: ResetJointStateRequest) -> Answer:
-    """Moves the joints that are named, in `duration` [s]; answers at the end."""
+    """Moves the joints that are named, in `duration` [s]; answers at the end.
+
+    Those that are asked to go beyond their limits stop there, and `success` is false.
+    """
     state = request.joint_state
     target = JointTarget(state.name, state.position, state.velocity, state.effort)
     positions = target.values_of("position", "the goal of a motion is a position")
@@ -111,7 +115,7 @@ def _move(context: BodyContext, goal: Mapping[int, float], duration_s: float) ->
 
     def start() -> Motion:
         if not context.simulation.running:
-            raise InterfaceError("the simulation is stopped: start it, else nothing moves")
+            raise InterfaceError("nothing moved: the simulation is stopped; call rpbi/start first")
         motion: Motion = context.world.act(context.name, "move", TimedGoal(goal, duration_s))
         return motion
 

@@ -5,11 +5,12 @@ from concurrent.futures import wait
 from contextlib import ExitStack
 from typing import Any
 
+from cob_srvs.srv import SetString
+from custom_srvs.srv import SetTransform, SetTransformRequest
 from std_srvs.srv import Empty, Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.srv import SetString, SetTransform, SetTransformRequest
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
 from ros_pybullet_interface.srv import (
     CalculateInverseKinematics,

@@ -3,9 +3,9 @@
 import math
 from typing import Any
 
+from cob_srvs.srv import SetStringRequest
 from geometry_msgs.msg import Pose
 
-from custom_ros_tools.srv import SetStringRequest
 from ros_pybullet_interface.msg import Attachment
 from ros_pybullet_interface.srv import ApplyWrenchRequest, AttachRequest
 from rpbi.constraints.attachment_config import AttachmentConfig

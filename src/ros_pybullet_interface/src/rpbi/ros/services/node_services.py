@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import genpy
+from cob_srvs.srv import SetString, SetStringRequest
 from std_srvs.srv import Trigger
 
 from custom_ros_tools.config import load_config, load_configs
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
-from custom_ros_tools.srv import SetString, SetStringRequest
 from ros_pybullet_interface.msg import ObjectDynamics, PybulletObject
 from ros_pybullet_interface.srv import (
     AddPybulletObject,

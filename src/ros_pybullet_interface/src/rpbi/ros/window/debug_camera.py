@@ -18,10 +18,15 @@ HZ = 30.0
 
 
 class DebugCamera:
-    """Publishes where the window looks from while somebody listens; without a window, what is asked is refused."""
+    """Publishes where the window looks from while somebody listens.
 
-    def __init__(self, window: Window | None) -> None:
-        self._window = window
+    Args:
+        window: The window; without it, nothing is published, and nothing can be changed.
+        configured: Where a window would look from at first.
+    """
+
+    def __init__(self, window: Window | None, configured: ResetDebugVisualizerCamera) -> None:
+        self._window, self._configured = window, configured
         self._rate = WallRate(HZ)
         self._publisher = None if window is None else rospy.Publisher(CAMERA.name, CameraMessage, queue_size=10)
 
@@ -39,12 +44,9 @@ class DebugCamera:
         subscribe(RESET, self)
 
     def get(self, _: Any) -> CameraMessage:
-        """Returns where the window looks from.
-
-        Raises:
-            InterfaceError: If there is no window.
-        """
-        return _message(self._ask(lambda: self._present_window().camera()))
+        """Returns where the window looks from; without a window, what is configured."""
+        window = self._window
+        return _message(self._configured if window is None else self._ask(window.camera))
 
     def reset(self, message: CameraMessage) -> None:
         """Has the window look from somewhere else.
@@ -58,12 +60,10 @@ class DebugCamera:
             camera = ResetDebugVisualizerCamera.parse(given, RESET.name)
         except ConfigError as error:
             raise ValueError("; ".join(f"{one.key}: {one.message}" for one in error.problems)) from None
-        self._ask(lambda: self._present_window().look(camera))
-
-    def _present_window(self) -> Window:
-        if self._window is None:
+        window = self._window
+        if window is None:
             raise InterfaceError("there is no window (connection_mode: DIRECT)")
-        return self._window
+        self._ask(lambda: window.look(camera))
 
 
 def _message(camera: ResetDebugVisualizerCamera) -> CameraMessage:

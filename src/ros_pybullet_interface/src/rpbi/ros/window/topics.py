@@ -26,7 +26,7 @@ class WindowTopics:
     """Opens the topics of the window that the configuration asks for, and says so if there is no window."""
 
     def __init__(self, world: World) -> None:
-        self._camera = DebugCamera(world.window)
+        self._camera = DebugCamera(world.window, world.config.resetDebugVisualizerCamera)
         self.polls: tuple[Callable[[], None], ...] = ()
         """To be called at every pass of the loop."""
         if world.window is None:

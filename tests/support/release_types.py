@@ -1,0 +1,37 @@
+"""Messages and services of the authors' release, with the md5 sums by which its clients know them."""
+
+MESSAGES = {
+    "dmp/DMPData": "dd2a2dd30705ac6b894c0c83b8081221",
+    "dmp/DMPPoint": "f32a98450510f8ae05fae28f45d6e99a",
+    "dmp/DMPTraj": "1d088d86ab60cf6a2671bc3c0e99932b",
+    "ik_ros/EXOTicaProblem": "ce962502687f55c1262e4bd04feec180",
+    "ik_ros/EXOTicaSyncTf": "6c13ad5f65ce41c5d5ce05e331b076a6",
+    "ik_ros/IKSolution": "9d9d20f46e8e2af539dbff8d238f2338",
+    "ik_ros/TracIKProblem": "7be0c51f9022071f61a2d5e730a6ea2b",
+    "keyboard/Key": "5d57616b5631968b8f1d31d23c83281f",
+    "ros_pybullet_interface/CalculateInverseKinematicsProblem": "66ba1e46809f0e71459d2d82a47754bf",
+    "ros_pybullet_interface/JointInfo": "a9c7515fded04226244ad03a018364a8",
+    "ros_pybullet_interface/KeyboardEvent": "70fe1577726387662ed067d7c32e2647",
+    "ros_pybullet_interface/MouseEvent": "696c74a6ae77c9e704c542ce3f600209",
+    "ros_pybullet_interface/PybulletObject": "022579c11581da84aa0c29f919119faa",
+    "ros_pybullet_interface/ResetDebugVisualizerCamera": "efde5121549f4407c5ac25e7a0eb7731",
+    "safe_robot/Status": "fe313d6462ceec2e84e1ab1b0cebf1b6",
+}
+SERVICES = {
+    "cob_srvs/SetString": "546971982e3fbbd5a41e60fb6432e357",
+    "custom_srvs/SetTransform": "18a9eea4bf7301361f824b9b6abce083",
+    "dmp/GetDMPPlan": "5cd79fd80676a4f8f062c5472a3190b1",
+    "dmp/LearnDMPFromDemo": "3ba13cfa47585560a2fd9cc202efdbff",
+    "dmp/SetActiveDMP": "10d64adb0a08cbb7afbd425801f828e5",
+    "ik_ros/EXOTica": "79dc7694dce7c5e1d9610b41ebe60a8b",
+    "ik_ros/EXOTicaInfo": "6e64c46f3a31f38949a8b24af3c010cf",
+    "ik_ros/JointNames": "587f4b1b8847cbdf153605e9cf8ebaed",
+    "ik_ros/TracIK": "8a445ecb230fa39cf7d2ac5953bef6a0",
+    "ros_pybullet_interface/AddPybulletObject": "21feca091ba47662b9b8306046dd6d18",
+    "ros_pybullet_interface/CalculateInverseKinematics": "4ae03ea1c2add4477faaf6439751820f",
+    "ros_pybullet_interface/GetDebugVisualizerCamera": "f54fde95a74416d547ed75f41181d84a",
+    "ros_pybullet_interface/ResetEffState": "b4b9e8e680c64cc1fb7c1344cfdcfe27",
+    "ros_pybullet_interface/ResetJointState": "41a26f0fbc660cf98fb7f043a66ebbaf",
+    "ros_pybullet_interface/RobotInfo": "471d7ab0ef52a9053d202aeb048099a0",
+    "teleop/GetBoxLimits": "f47aa9712a2a074d8127af0fff5e939c",
+}
