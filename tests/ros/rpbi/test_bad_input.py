@@ -17,8 +17,8 @@ from std_msgs.msg import Int64
 from tf2_msgs.msg import TFMessage
 from worlds import FLOOR, ball, iiwa
 
+from custom_ros_tools.ros.tf_listener import END_OF_TIME_S, fault_in
 from ros_pybullet_interface.msg import PybulletObject
-from rpbi.ros.tf_follower import fault_in
 
 TOPIC = "/rpbi/iiwa/joint_states/target"
 JOINT = "lbr_iiwa_joint_4"
@@ -142,10 +142,10 @@ def test_tf_that_never_comes_is_named(ros, node):
     assert remove(ros, "also_lost").success
 
 
-def _transform(child, x=0.0, quat=(0.0, 0.0, 0.0, 1.0)):
+def _transform(child, x=0.0, quat=(0.0, 0.0, 0.0, 1.0), stamp=None):
     transform = TransformStamped(child_frame_id=child)
     transform.header.frame_id = "rpbi/world"
-    transform.header.stamp = rospy.Time.from_sec(time.time())
+    transform.header.stamp = stamp or rospy.Time.from_sec(time.time())
     transform.transform.translation.x = x
     rotation = transform.transform.rotation
     rotation.x, rotation.y, rotation.z, rotation.w = quat
@@ -160,6 +160,9 @@ NO_POSES = {
     "long rotation": _transform("marker", 0.0, (0.0, 0.0, 0.0, 2.0)),
     "in itself": _transform("rpbi/world"),
     "nameless": _transform(""),
+    "after the end of time": _transform("marker", stamp=rospy.Time(END_OF_TIME_S, 0)),
+    "later still": _transform("marker", stamp=rospy.Time(2**32 - 1, 0)),
+    "just after it": _transform("marker", stamp=rospy.Time(END_OF_TIME_S - 1, 1_000_000_000)),
 }
 
 

@@ -1,0 +1,62 @@
+"""Entry point of the process in which meshes are tried: `python -m rpbi.meshes FD USE FILE ...`.
+
+It writes a line to the file descriptor for each mesh that it got through: empty, or why PyBullet does not take it. It
+may well crash, which is what it is for.
+"""
+
+import os
+import resource
+import sys
+
+import pybullet
+
+from .trial import MOST_BYTES, MOST_CPU_S, Use
+
+
+def main() -> None:
+    """Tries all meshes that the arguments name."""
+    for limit, most in ((resource.RLIMIT_AS, MOST_BYTES), (resource.RLIMIT_CPU, MOST_CPU_S), (resource.RLIMIT_CORE, 0)):
+        resource.setrlimit(limit, (most, most))
+    report, *meshes = sys.argv[1:]
+    pybullet.connect(pybullet.DIRECT)
+    pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD)
+    for use, file in zip(meshes[::2], meshes[1::2], strict=True):
+        try:
+            _USES[Use(use)](file)
+            message = ""
+        except (pybullet.error, MemoryError) as error:
+            message = str(error) or "out of memory"
+        os.write(int(report), " ".join(message.split()).encode() + b"\n")
+
+
+def _see(file: str) -> None:
+    shape = pybullet.createVisualShape(pybullet.GEOM_MESH, fileName=file)
+    _remove(pybullet.createMultiBody(baseVisualShapeIndex=shape))
+
+
+def _feel(file: str) -> None:
+    for flags in (0, pybullet.GEOM_FORCE_CONCAVE_TRIMESH):
+        shape = pybullet.createCollisionShape(pybullet.GEOM_MESH, fileName=file, flags=flags)
+        _remove(pybullet.createMultiBody(baseMass=0 if flags else 1, baseCollisionShapeIndex=shape))
+
+
+def _stand_on(file: str) -> None:
+    shape = pybullet.createCollisionShape(pybullet.GEOM_HEIGHTFIELD, fileName=file)
+    _remove(pybullet.createMultiBody(baseCollisionShapeIndex=shape))
+
+
+def _bend(file: str) -> None:
+    _remove(pybullet.loadSoftBody(file, useMassSpring=1))
+
+
+def _remove(body_id: int) -> None:
+    if body_id < 0:
+        raise pybullet.error("PyBullet made nothing of it")
+    pybullet.stepSimulation()
+    pybullet.removeBody(body_id)
+
+
+_USES = {Use.VISUAL: _see, Use.COLLISION: _feel, Use.HEIGHT_FIELD: _stand_on, Use.SOFT: _bend}
+
+if __name__ == "__main__":
+    main()
