@@ -19,6 +19,8 @@ PYBULLET_DATA_PATH = "pybullet_data_path"
 """The word that stands for the folder of PyBullet's data in search paths."""
 LONGEST_PATH = 1000
 """Characters of a path; PyBullet copies them into 1024 bytes."""
+OF_KERNEL = ("/proc/", "/sys/", "/dev/")
+"""Folders whose files may be without end, or never begin."""
 ASSETS = "example-robot-data"
 """Robots of the extra `assets`: they are named as if this were a ROS package, `{example-robot-data}/robots/...`."""
 
@@ -44,14 +46,14 @@ def find_file(name: str, file: str, search_paths: Sequence[str] = ()) -> str:
     candidates = [path] if path.is_absolute() else [Path(folder) / path for folder in folders]
     try:
         candidate = next((each for each in candidates if each.is_file()), None)
-        is_empty = candidate is not None and not candidate.stat().st_size  # as those of /proc are, some without end
+        is_of_kernel = candidate is not None and str(candidate.resolve()).startswith(OF_KERNEL)
     except OSError as error:
         raise ValueError(f"{shortened(name)}: {(error.strerror or str(error)).lower()}") from None
     if candidate is not None:
         found = str(candidate.resolve() if ".." in candidate.parts else candidate.absolute())
         _refuse_long(found)
-        if is_empty:
-            raise ValueError(f"the file is empty: {found}")
+        if is_of_kernel:
+            raise ValueError(f"expected an ordinary file, got {found}")
         return found
     if any(candidate.is_dir() for candidate in candidates):
         raise ValueError(f"expected a file, got the folder {name}")

@@ -128,7 +128,7 @@ class CreateVisualShape(_CreateShape):
         corners = len(self.vertices or ())
         for key in ("normals", "uvs"):
             given = getattr(self, key)
-            if given is not None and len(given) != corners:
+            if self.vertices is not None and given is not None and len(given) != corners:
                 raise KeyedError(key, f"expected one for each of the {corners} vertices, got {len(given)}")
         return self
 
@@ -148,7 +148,7 @@ class CreateCollisionShape(_CreateShape):
     @model_validator(mode="after")
     def _height_field_has_a_source(self) -> Self:
         self._require("GEOM_HEIGHTFIELD", "fileName", "heightfieldData")
-        if self.heightfieldData is not None:
+        if self.heightfieldData is not None and self.shapeType == SHAPE_TYPES.parse("GEOM_HEIGHTFIELD"):
             rows, columns, count = (
                 self.numHeightfieldRows or 0,
                 self.numHeightfieldColumns or 0,

@@ -17,7 +17,7 @@ from rpbi.meshes.trial import Mesh, Use, faults_in
 
 from .document import UrdfDocument
 from .files import PACKAGE, beside_or_above, mesh_file, resolve_meshes, write_description
-from .structure import structure_problems
+from .structure import structure_problems, texts_for_numbers
 
 log = logging.getLogger(__name__)
 
@@ -103,6 +103,8 @@ def load_urdf(
     try:
         prepared = prepare(file)
         document = UrdfDocument(prepared)
+        if texts := texts_for_numbers(document):
+            log.warning("%s: expected numbers, PyBullet takes these for 0: %s", name, ", ".join(texts[:3]))
         if pb.has_window and (text := document.for_window()) is not None:
             prepared = write_description(text)
         if not inertia_from_urdf:

@@ -1,6 +1,7 @@
 """What in a URDF makes no robot, though PyBullet may take it, or die of it."""
 
 import math
+import re
 from collections import Counter
 from collections.abc import Iterator
 
@@ -12,6 +13,7 @@ from .joints import LARGEST
 
 LONGEST_NAME = 250
 """Characters of a name; PyBullet copies names into fixed places on the stack."""
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*(e[-+]?\d+)?|\.\d+(e[-+]?\d+)?|nan|inf(inity)?)", re.IGNORECASE)
 _NUMBERS = {
     **dict.fromkeys((("origin", "xyz"), ("box", "size"), ("sphere", "radius")), FARTHEST_M),
     **{(tag, key): FARTHEST_M for tag in ("cylinder", "capsule") for key in ("radius", "length")},
@@ -70,25 +72,35 @@ def _tree_problems(document: UrdfDocument) -> Iterator[str]:
 
 def _text_problems(document: UrdfDocument) -> Iterator[str]:
     for owner, tag, key, text in document.attributes():
-        what = f"{owner}: {tag}.{key}"
-        if tag.startswith("xacro:"):
-            yield f"{owner}: <{shortened(tag)}> is left of xacro: expected a URDF, as the program xacro makes it"
-        elif "${" in text or "$(" in text:
-            yield f"{what}: '{shortened(text)}' is left of xacro: expected a URDF, as the program xacro makes it"
+        what = f"{owner}: {shortened(tag)}.{shortened(key)}"
+        if tag.startswith("xacro:") or "${" in text:
+            left = f"<{shortened(tag)}>" if tag.startswith("xacro:") else f"'{shortened(text)}'"
+            yield f"{what}: {left} is left of xacro: expected a URDF, as the program xacro makes it"
         elif (tag, key) in _NUMBERS and (problem := _number_problem(text, _NUMBERS[tag, key])):
             yield f"{what}: {problem}, got '{shortened(text)}'"
-        elif tag == "mass" and key == "value" and float(text) < 0.0:
-            yield f"{what}: must be >= 0 [kg], got {text}"
+        elif (tag, key) == ("mass", "value") and _number(text.strip() or "0") < 0.0:
+            yield f"{what}: must be >= 0 [kg], got '{shortened(text)}'"
+
+
+def texts_for_numbers(document: UrdfDocument) -> list[str]:
+    """Returns where a text stands in the place of a number; PyBullet takes it for 0."""
+    return [
+        f"{owner}: {tag}.{key} '{shortened(text)}'"
+        for owner, tag, key, text in document.attributes()
+        if (tag, key) in _NUMBERS and not all(map(_NUMBER.match, text.split()))
+    ]
 
 
 def _number_problem(text: str, largest: float) -> str:
-    for word in text.split():
-        try:
-            number = float(word)
-        except ValueError:
-            return "expected numbers"
+    for number in map(_number, text.split()):
         if math.isnan(number):
             return "expected finite numbers"
         if abs(number) > largest:
             return f"must be within +-{largest:g}"
     return ""
+
+
+def _number(word: str) -> float:
+    """Returns the number that a word begins with, 0 if it begins with none, as PyBullet reads it."""
+    match = _NUMBER.match(word)
+    return float(match[0]) if match else 0.0
