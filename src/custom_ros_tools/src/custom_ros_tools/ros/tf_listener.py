@@ -32,8 +32,15 @@ class TfListener:
     def __init__(self, buffer: tf2_ros.Buffer, noted: Callable[[str], None] = lambda _: None) -> None:
         self._noted = noted
         self._warn = ThrottledWarning()
-        rospy.Subscriber("/tf", TFMessage, self._take, buffer.set_transform, queue_size=QUEUE_SIZE)
-        rospy.Subscriber("/tf_static", TFMessage, self._take, buffer.set_transform_static, queue_size=QUEUE_SIZE)
+        self._subscribers = [
+            rospy.Subscriber(topic, TFMessage, self._take, store, queue_size=QUEUE_SIZE)
+            for topic, store in (("/tf", buffer.set_transform), ("/tf_static", buffer.set_transform_static))
+        ]
+
+    def unregister(self) -> None:
+        """Listens no more."""
+        for subscriber in self._subscribers:
+            subscriber.unregister()
 
     def _take(self, message: TFMessage, store: Callable[[TransformStamped, str], None]) -> None:
         sender = message._connection_header.get("callerid", "")

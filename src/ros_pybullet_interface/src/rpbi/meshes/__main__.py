@@ -4,13 +4,20 @@ It writes a line to the file descriptor for each mesh that it got through: empty
 may well crash, which is what it is for.
 """
 
+import ctypes
 import os
 import resource
 import sys
+import tempfile
+from typing import IO
+from xml.sax.saxutils import quoteattr
 
 import pybullet
 
 from .trial import MOST_BYTES, MOST_CPU_S, Use
+
+GETS_NOTHING = b"cannot extract anything useful"
+"""What PyBullet says of a mesh that it leaves out; nothing else tells it of a visual one."""
 
 
 def main() -> None:
@@ -18,6 +25,8 @@ def main() -> None:
     for limit, most in ((resource.RLIMIT_AS, MOST_BYTES), (resource.RLIMIT_CPU, MOST_CPU_S), (resource.RLIMIT_CORE, 0)):
         resource.setrlimit(limit, (most, most))
     report, *meshes = sys.argv[1:]
+    said = tempfile.TemporaryFile()
+    os.dup2(said.fileno(), 1)
     pybullet.connect(pybullet.DIRECT)
     pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD)
     for use, file in zip(meshes[::2], meshes[1::2], strict=True):
@@ -26,7 +35,18 @@ def main() -> None:
             message = ""
         except (pybullet.error, MemoryError) as error:
             message = str(error) or "out of memory"
+        if _says(said, GETS_NOTHING):
+            message = "it gets nothing out of it"
         os.write(int(report), " ".join(message.split()).encode() + b"\n")
+
+
+def _says(said: IO[bytes], words: bytes) -> bool:
+    """Returns whether PyBullet, which prints by C, has said something since the last time."""
+    ctypes.CDLL(None).fflush(None)
+    found = words in os.pread(said.fileno(), 1 << 20, 0)
+    os.ftruncate(said.fileno(), 0)
+    os.lseek(said.fileno(), 0, os.SEEK_SET)
+    return found
 
 
 def _see(file: str) -> None:
@@ -49,6 +69,32 @@ def _bend(file: str) -> None:
     _remove(pybullet.loadSoftBody(file, useMassSpring=1))
 
 
+def _see_link(file: str) -> None:
+    body_id = _load_link(f"<visual>{_geometry(file)}</visual>")
+    if not pybullet.getVisualShapeData(body_id):
+        raise pybullet.error("PyBullet leaves it out")
+    _remove(body_id)
+
+
+def _feel_link(file: str) -> None:
+    for concave in ("no", "yes"):
+        body_id = _load_link(f"<collision concave='{concave}'>{_geometry(file)}</collision>")
+        if not pybullet.getCollisionShapeData(body_id, -1):
+            raise pybullet.error("PyBullet leaves it out")
+        _remove(body_id)
+
+
+def _geometry(file: str) -> str:
+    return f"<geometry><mesh filename={quoteattr(file)}/></geometry>"
+
+
+def _load_link(parts: str) -> int:
+    with tempfile.NamedTemporaryFile("w", suffix=".urdf") as urdf:
+        urdf.write(f"<robot name='trial'><link name='link'>{parts}</link></robot>")
+        urdf.flush()
+        return int(pybullet.loadURDF(urdf.name, useFixedBase=1))
+
+
 def _remove(body_id: int) -> None:
     if body_id < 0:
         raise pybullet.error("PyBullet made nothing of it")
@@ -56,7 +102,14 @@ def _remove(body_id: int) -> None:
     pybullet.removeBody(body_id)
 
 
-_USES = {Use.VISUAL: _see, Use.COLLISION: _feel, Use.HEIGHT_FIELD: _stand_on, Use.SOFT: _bend}
+_USES = {
+    Use.VISUAL: _see,
+    Use.COLLISION: _feel,
+    Use.HEIGHT_FIELD: _stand_on,
+    Use.SOFT: _bend,
+    Use.URDF_VISUAL: _see_link,
+    Use.URDF_COLLISION: _feel_link,
+}
 
 if __name__ == "__main__":
     main()

@@ -41,6 +41,8 @@ class Use(enum.Enum):
     COLLISION = "collision"
     HEIGHT_FIELD = "height_field"
     SOFT = "soft"
+    URDF_VISUAL = "urdf_visual"
+    URDF_COLLISION = "urdf_collision"
 
 
 class Mesh(NamedTuple):

@@ -51,32 +51,41 @@ def _mesh_problems(document: UrdfDocument) -> list[str]:
     """Returns a sentence for each mesh that PyBullet would not find, would leave out or would not survive."""
     problems: dict[str, None] = {}
     meshes: dict[Mesh, str] = {}
-    for use in (Use.VISUAL, Use.COLLISION):
-        for name in document.meshes_of(use.value):
-            file = _mesh_path(name, document.path)
+    for part, use in (("visual", Use.URDF_VISUAL), ("collision", Use.URDF_COLLISION)):
+        for name in document.meshes_of(part):
             if Path(name).suffix.lower() not in MESH_FORMATS:
                 problems[f"mesh '{shortened(name)}' is none of {', '.join(MESH_FORMATS)}"] = None
-            elif file is None:
-                looked = "looked for beside it and in all folders above"
-                problems[f"no such mesh: {shortened(name)} ({looked})"] = None
-            elif fault := mesh_file_problem(str(file)):
-                problems[f"mesh '{shortened(name)}': {fault}"] = None
-            elif file.suffix.lower() != ".cdf":
-                meshes[Mesh(use, str(file))] = name
+                continue
+            try:
+                file = str(_mesh_path(name, document.path))
+                if fault := mesh_file_problem(file):
+                    problems[f"mesh '{shortened(name)}': {fault}"] = None
+                elif not file.lower().endswith(".cdf"):
+                    meshes[Mesh(use, file)] = name
+            except ConfigError as error:
+                problems |= {f"mesh '{shortened(name)}': {each.message}": None for each in error.problems}
+            except OSError as error:
+                problems[str(error.strerror or error)] = None
     for mesh, fault in faults_in(meshes).items():
         problems[f"mesh '{shortened(meshes[mesh])}': {fault}"] = None
     return list(problems)
 
 
-def _mesh_path(name: str, path: str) -> Path | None:
-    """Returns the file of a mesh, where PyBullet finds it once names of packages are resolved; None if it does not."""
+def _mesh_path(name: str, path: str) -> Path:
+    """Returns the file of a mesh, where PyBullet finds it once names of packages are resolved.
+
+    Raises:
+        ConfigError: If it is of an unknown package.
+        OSError: If there is none.
+    """
     source = Path(path)
-    try:
-        if name.startswith(PACKAGE):
-            return mesh_file(name, source)
-        return beside_or_above(name.removeprefix("model://"), source)
-    except (ConfigError, OSError):
-        return None
+    if name.startswith(PACKAGE):
+        return mesh_file(name, source)
+    found = beside_or_above(name.removeprefix("model://"), source)
+    if found is None:
+        looked = "looked for beside it and in all folders above"
+        raise FileNotFoundError(f"no such mesh: {shortened(name)} ({looked})")
+    return found
 
 
 def load_urdf(
