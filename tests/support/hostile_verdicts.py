@@ -1,4 +1,4 @@
-"""Makes hostile files in a folder, reads each, and prints kind, seed, verdict and what was said, as a line of JSON each.
+"""Makes hostile files in a folder, reads each, and prints kind, seed, verdict and what was said, a line of JSON each.
 
 Arguments: the folder, the first seed, how many of each kind, and the kinds; `controls` are files that must not be fine
 with who reads them without care.

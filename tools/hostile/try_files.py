@@ -1,6 +1,6 @@
 """Reads many broken and hostile files, each in a process of its own, and prints a table of what became of that.
 
-Run it in the workspace's shell: `./rpbi shell -c 'python3 tools/hostile/try_files.py'`; the table in docs/security.md is its.
+Run it by `./rpbi shell -c 'python3 tools/hostile/try_files.py'`; the table in docs/security.md is its.
 """
 
 from __future__ import annotations

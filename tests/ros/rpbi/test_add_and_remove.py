@@ -204,9 +204,7 @@ REFUSED = {
         DYNAMIC,
         {**box("b"), "type": "unittest.__main__:x"},
         "",
-        [
-            "config: type: 'unittest.__main__:x' is not trusted, so it is not imported: name its package in trusted_packages"
-        ],
+        ["config: type: 'unittest.__main__:x' is not trusted, so it is not imported: name its package in trusted_"],
     ),
     "a sensor that nobody named": (
         DYNAMIC,

@@ -5,14 +5,18 @@ may well crash, which is what it is for.
 """
 
 import ctypes
+import math
 import os
 import resource
+import struct
 import sys
 import tempfile
 from typing import IO
 from xml.sax.saxutils import quoteattr
 
 import pybullet
+
+from custom_ros_tools.config import read_file
 
 from .trial import MOST_BYTES, MOST_CPU_S, Use
 
@@ -31,6 +35,7 @@ def main() -> None:
     pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD)
     for use, file in zip(meshes[::2], meshes[1::2], strict=True):
         try:
+            _refuse_non_finite(file)
             _USES[Use(use)](file)
             message = ""
         except (pybullet.error, MemoryError) as error:
@@ -38,6 +43,14 @@ def main() -> None:
         if _says(said, GETS_NOTHING):
             message = "it gets nothing out of it"
         os.write(int(report), " ".join(message.split()).encode() + b"\n")
+
+
+def _refuse_non_finite(file: str) -> None:
+    """Refuses an STL file with a number that is none: with it, PyBullet crashes now and then."""
+    if file.lower().endswith(".stl"):
+        triangles = struct.iter_unpack("<12fH", read_file(file)[84:])
+        if not all(math.isfinite(sum(numbers)) for numbers in triangles):
+            raise pybullet.error("it has numbers that are not finite")
 
 
 def _says(said: IO[bytes], words: bytes) -> bool:
@@ -70,15 +83,15 @@ def _bend(file: str) -> None:
 
 
 def _see_link(file: str) -> None:
-    body_id = _load_link(f"<visual>{_geometry(file)}</visual>")
+    body_id = _load_link(f"<visual>{_geometry(file)}</visual>", True)
     if not pybullet.getVisualShapeData(body_id):
         raise pybullet.error("PyBullet leaves it out")
     _remove(body_id)
 
 
 def _feel_link(file: str) -> None:
-    for concave in ("no", "yes"):
-        body_id = _load_link(f"<collision concave='{concave}'>{_geometry(file)}</collision>")
+    for concave, is_fixed in (("no", False), ("no", True), ("yes", False), ("yes", True)):
+        body_id = _load_link(f"<collision concave='{concave}'>{_geometry(file)}</collision>", is_fixed)
         if not pybullet.getCollisionShapeData(body_id, -1):
             raise pybullet.error("PyBullet leaves it out")
         _remove(body_id)
@@ -88,11 +101,11 @@ def _geometry(file: str) -> str:
     return f"<geometry><mesh filename={quoteattr(file)}/></geometry>"
 
 
-def _load_link(parts: str) -> int:
+def _load_link(parts: str, is_fixed: bool) -> int:
     with tempfile.NamedTemporaryFile("w", suffix=".urdf") as urdf:
         urdf.write(f"<robot name='trial'><link name='link'>{parts}</link></robot>")
         urdf.flush()
-        return int(pybullet.loadURDF(urdf.name, useFixedBase=1))
+        return int(pybullet.loadURDF(urdf.name, useFixedBase=is_fixed))
 
 
 def _remove(body_id: int) -> None:
