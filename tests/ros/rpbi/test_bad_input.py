@@ -17,8 +17,8 @@ from std_msgs.msg import Int64
 from tf2_msgs.msg import TFMessage
 from worlds import FLOOR, ball, iiwa
 
+from custom_ros_tools.ros.tf_listener import END_OF_TIME_S, fault_in
 from ros_pybullet_interface.msg import PybulletObject
-from rpbi.ros.tf_follower import fault_in
 
 TOPIC = "/rpbi/iiwa/joint_states/target"
 JOINT = "lbr_iiwa_joint_4"
@@ -91,6 +91,15 @@ REFUSALS = {
     "too few": (JointState(name=[JOINT, "lbr_iiwa_joint_1"], position=[0.0]), "expected one value for each of the 2"),
     "velocity only": (JointState(name=[JOINT], velocity=[1.0]), "expected position, since the robot is under"),
     "effort only": (JointState(name=[JOINT], effort=[1.0]), "expected position, since the robot is under"),
+    "NaN velocity": (
+        JointState(name=[JOINT], position=[0.2], velocity=[math.nan]),
+        "values must be finite, got nan for joint",
+    ),
+    "infinite effort": (JointState(name=[JOINT], position=[0.2], effort=[math.inf]), "values must be finite, got inf"),
+    "velocities of others": (
+        JointState(name=[JOINT], position=[0.2], velocity=[0.0, 1.0]),
+        "expected one value for each of the 1 joints named, got 2",
+    ),
     "named twice": (JointState(name=[JOINT, JOINT], position=[0.0, 1.0]), "joints must be named once each"),
 }
 
@@ -110,10 +119,10 @@ def test_a_refusal_names_topic_and_reason(ros, node, case):
     assert remove(ros, name).success
 
 
-def test_names_without_values_and_values_beside_the_positions_do_no_harm(ros, target):
+def test_no_names_and_values_beside_the_positions_do_no_harm(ros, target):
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     target.publish(JointState())
-    target.publish(JointState(name=[JOINT], position=[0.2], velocity=[math.nan, 1.0], effort=[math.inf]))
+    target.publish(JointState(name=[JOINT], position=[0.2], velocity=[0.0], effort=[1.0]))
     wait_until(
         lambda: joint_states.messages and abs(joint_states.messages[-1].position[3] - 0.2) < 0.01, "it is obeyed"
     )
@@ -142,10 +151,10 @@ def test_tf_that_never_comes_is_named(ros, node):
     assert remove(ros, "also_lost").success
 
 
-def _transform(child, x=0.0, quat=(0.0, 0.0, 0.0, 1.0)):
+def _transform(child, x=0.0, quat=(0.0, 0.0, 0.0, 1.0), stamp=None):
     transform = TransformStamped(child_frame_id=child)
     transform.header.frame_id = "rpbi/world"
-    transform.header.stamp = rospy.Time.from_sec(time.time())
+    transform.header.stamp = stamp or rospy.Time.from_sec(time.time())
     transform.transform.translation.x = x
     rotation = transform.transform.rotation
     rotation.x, rotation.y, rotation.z, rotation.w = quat
@@ -160,6 +169,9 @@ NO_POSES = {
     "long rotation": _transform("marker", 0.0, (0.0, 0.0, 0.0, 2.0)),
     "in itself": _transform("rpbi/world"),
     "nameless": _transform(""),
+    "after the end of time": _transform("marker", stamp=rospy.Time(END_OF_TIME_S, 0)),
+    "later still": _transform("marker", stamp=rospy.Time(2**32 - 1, 0)),
+    "just after it": _transform("marker", stamp=rospy.Time(END_OF_TIME_S - 1, 1_000_000_000)),
 }
 
 

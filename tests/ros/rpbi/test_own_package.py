@@ -126,9 +126,7 @@ def test_a_wrong_object_is_refused_with_all_reasons(ros, lab):
     answer = add(ros, PybulletObject.DYNAMIC, wrong)
     assert not answer.success
     assert "config: size: expected" in answer.message
-    assert "config: sensors[0].type: no module 'nowhere': is its package built, and its workspace sourced?" in (
-        answer.message
-    )
+    assert "config: sensors[0].type: 'nowhere:X' is not trusted" in answer.message
     assert "second" not in objects(ros)
 
 

@@ -1,7 +1,9 @@
 """Configuration files: paths with ROS packages in them, and YAML that is safe to load."""
 
+import errno
 import os
 import re
+import stat
 from collections.abc import Hashable, Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -10,8 +12,12 @@ from typing import Any, cast
 import rospkg
 import yaml
 
-from .errors import ConfigError, Problem, closest
+from .errors import ConfigError, Problem, closest, shortened
 
+MOST_BYTES = 16_000_000
+"""A YAML file or text may be so long."""
+MOST_VALUES = 1_000_000
+"""And have so many values, with those that aliases (`*NAME`) repeat counted each time."""
 _PACKAGE = re.compile(r"package://(?P<uri>[^/{}]+)|\{(?P<braces>[^{}]*)\}")
 
 
@@ -50,14 +56,39 @@ def replace_package(path: str) -> str:
     return path[: match.start()] + folder + path[match.end() :]
 
 
-def load_config(path: str) -> dict[str, Any]:
+def read_file(path: str | Path, most_bytes: int | None = None) -> bytes:
+    """Returns the content of an ordinary file.
+
+    Others, such as pipes, devices and the kernel's own files in /proc, might never end, or never begin. Those of /proc
+    say that they are empty, and are.
+
+    Args:
+        most_bytes: The largest size.
+
+    Raises:
+        OSError: If it cannot be read, is no ordinary file or too large.
+    """
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    except ValueError as error:  # a null character
+        raise OSError(errno.EINVAL, str(error)) from None
+    with open(descriptor, "rb") as file:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            raise OSError(errno.EINVAL, "is a folder" if stat.S_ISDIR(status.st_mode) else "is not an ordinary file")
+        if most_bytes is not None and status.st_size > most_bytes:
+            raise OSError(errno.EFBIG, f"has {status.st_size} bytes, expected at most {most_bytes}")
+        return file.read(status.st_size)
+
+
+def load_config(path: str, most_bytes: int = MOST_BYTES) -> dict[str, Any]:
     """Returns the mapping in a YAML file; `{package}/path` and `package://package/path` are resolved.
 
     Raises:
         ConfigError: If the file cannot be read or is not a YAML mapping; it names file, line and column.
     """
     try:
-        text = Path(replace_package(path)).read_text(encoding="utf-8")
+        text = read_file(replace_package(path), most_bytes).decode()
     except ConfigError as error:
         raise ConfigError([Problem(path, "", problem.message) for problem in error.problems]) from None
     except OSError as error:
@@ -71,8 +102,10 @@ def load_configs(text: str, file: str = "text") -> dict[str, Any]:
     """Returns the mapping in a YAML text, which messages call `file`; an empty text is an empty mapping.
 
     Raises:
-        ConfigError: If it is not a YAML mapping, names a key twice, or asks for Python objects.
+        ConfigError: If it is not a YAML mapping, names a key twice, asks for Python objects, or is too large.
     """
+    if len(text) > MOST_BYTES:
+        raise ConfigError([Problem(file, "", f"has {len(text)} characters, expected at most {MOST_BYTES}")])
     try:
         data = yaml.load(text, Loader=_StrictLoader)
     except yaml.MarkedYAMLError as error:
@@ -95,7 +128,15 @@ def config_to_str(config: Mapping[str, Any]) -> str:
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """The safe loader, which moreover refuses a key that stands twice in one mapping."""
+    """The safe loader, which moreover refuses a key that stands twice in one mapping, and texts that unfold too far."""
+
+    def get_single_data(self) -> Any:
+        node = self.get_single_node()
+        if node is None:
+            return None
+        if _size(node, {}) > MOST_VALUES:
+            raise yaml.YAMLError(f"its aliases repeat more than {MOST_VALUES} values")
+        return self.construct_document(node)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         seen: dict[Any, yaml.Node] = {}
@@ -106,7 +147,31 @@ class _StrictLoader(yaml.SafeLoader):
             if key in seen:
                 first = seen[key].start_mark.line + 1
                 raise yaml.constructor.ConstructorError(
-                    None, None, f"key '{key}' is given twice (first in line {first})", key_node.start_mark
+                    None,
+                    None,
+                    f"key '{shortened(str(key))}' is given twice (first in line {first})",
+                    key_node.start_mark,
                 )
             seen[key] = key_node
         return cast(dict[Hashable, Any], super().construct_mapping(node, deep))
+
+
+def _size(node: yaml.Node, known: dict[int, int]) -> int:
+    """Returns how many values a node has, those of aliases counted each time.
+
+    Args:
+        known: Results by the id of a node; one that is not finished yet contains itself.
+
+    Raises:
+        yaml.YAMLError: If it contains itself.
+    """
+    if isinstance(node, yaml.ScalarNode):
+        return 1
+    if id(node) in known:
+        if not known[id(node)]:
+            raise yaml.YAMLError("an alias stands for something that contains it")
+        return known[id(node)]
+    known[id(node)] = 0
+    children = node.value if isinstance(node, yaml.SequenceNode) else [part for pair in node.value for part in pair]
+    known[id(node)] = 1 + sum(_size(child, known) for child in children)
+    return known[id(node)]

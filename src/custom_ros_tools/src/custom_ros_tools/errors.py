@@ -8,9 +8,21 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
+LONGEST_QUOTE = 60
+"""So much of what a file says is repeated in a message; it may be a file that nobody should see."""
+LONGEST_LINE = 2_000
+"""A line that says what is wrong is not longer."""
+
+
+def shortened(text: str) -> str:
+    """Returns a text that is to be quoted, with its end left out if it is long."""
+    return text if len(text) <= LONGEST_QUOTE else f"{text[: LONGEST_QUOTE - 3]}..."
+
 
 def closest(name: str, known: Iterable[str]) -> str | None:
     """Returns the known name that looks most like `name`, or None when none is near (case is ignored)."""
+    if len(name) > LONGEST_QUOTE:  # the search takes long for long ones
+        return None
     by_lower_case = {candidate.lower(): candidate for candidate in known}
     match = difflib.get_close_matches(name.lower(), by_lower_case, n=1)
     return by_lower_case[match[0]] if match else None
@@ -45,7 +57,8 @@ class Problem:
 
     def __str__(self) -> str:
         text = ": ".join(part for part in (self.file, self.key, self.message) if part)
-        return " ".join(text.splitlines())  # one line each, whatever the user's text holds
+        text = " ".join(text.splitlines())  # one line each, whatever the user's text holds
+        return text if len(text) <= LONGEST_LINE else f"{text[:LONGEST_LINE]}..."
 
 
 class ConfigError(InterfaceError):

@@ -3,14 +3,46 @@
 import importlib
 import pkgutil
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from .errors import UnknownNameError, hint
+from .errors import UnknownNameError, hint, shortened
 
 own_folders = [str(Path(__file__).parent)]
 """Folders of the packages that look classes up and call them; `cause_of` looks for the fault outside of these."""
+_found: set[str] = set()
+"""Names that `find_class` has found."""
+_trust: tuple[frozenset[str], str] | None = None
+"""Packages that `find_class` may import from, and how to add to them; None is from anywhere."""
+
+
+class UntrustedError(ValueError):
+    """A name comes from outside, and its package is not one that may be imported."""
+
+
+def trust_only(packages: Iterable[str], how: str) -> None:
+    """Has `find_class` refuse from now on whatever it has not found before and is not of these top-level packages.
+
+    Importing a module runs it. What is read at the start is the user's own; what comes later, by services, or out of a
+    bag, may be anybody's.
+
+    Args:
+        how: What the user does to have another package trusted, for the message.
+    """
+    global _trust
+    _trust = frozenset(packages), how
+
+
+def check_trusted(name: str) -> None:
+    """Checks a `module:Class` that comes from outside.
+
+    Raises:
+        UntrustedError: If it may not be imported.
+    """
+    package = name.partition(":")[0].partition(".")[0]
+    if _trust is not None and name not in _found and package not in _trust[0]:
+        raise UntrustedError(f"'{shortened(name)}' is not trusted, so it is not imported: {_trust[1]}")
 
 
 class ClassTable(Mapping[str, Any]):
@@ -45,7 +77,7 @@ def find(name: str) -> Any:
         raise ValueError(f"expected a name like 'my_package.my_module:MyClass', got '{name}'")
     try:
         module = importlib.import_module(module_name)
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # SystemExit: a script that runs when it is imported
         missing = error.name if isinstance(error, ModuleNotFoundError) else None
         if missing is not None and f"{module_name}.".startswith(f"{missing}."):
             raise ValueError(_is_missing(missing)) from None
@@ -60,10 +92,13 @@ def find_class(name: str, base: type) -> Any:
     """Returns a class of another package by its `module:Class`.
 
     Raises:
+        UntrustedError: If it may not be imported, see `trust_only`.
         ValueError: If there is no such class, or it is no subclass of `base`.
     """
+    check_trusted(name)
     found = find(name)
     if isinstance(found, type) and issubclass(found, base):
+        _found.add(name)
         return found
     raise ValueError(f"expected a subclass of {full_name(base)}, got '{name}'")
 
@@ -95,7 +130,7 @@ def full_name(thing: Any) -> str:
     return f"{named.__module__}:{named.__qualname__}"
 
 
-def cause_of(error: Exception) -> str:
+def cause_of(error: BaseException) -> str:
     """Returns what happened and where in the package of the class, in one line."""
     text = f"{type(error).__name__}: {error}"
     places = [frame for frame in traceback.extract_tb(error.__traceback__) if _is_elsewhere(frame.filename)]

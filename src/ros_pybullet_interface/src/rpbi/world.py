@@ -131,6 +131,7 @@ class World:
         is_body = name in self.bodies
         self._contents.remove(name)
         self._pushed.pop(name, None)
+        self.clock.tell_apart()  # another object of its name, perhaps elsewhere, may come within this tick
         if is_body:
             self._note(name, "remove", None)
         self.take_inputs()  # what still waits for it must not meet a later body of the same name

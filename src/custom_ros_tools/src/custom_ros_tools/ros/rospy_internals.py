@@ -7,7 +7,9 @@ expected, what is there and what is lost by that, and the node goes on without i
 
 from __future__ import annotations
 
+import errno
 import socket
+import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from functools import partial
@@ -20,6 +22,9 @@ import rospy
 from .buffered_socket import BufferedSocket, flush_buffered_sockets
 
 T = TypeVar("T")
+
+OUT_OF_HANDLES_S = 0.5
+"""How long a node that is out of file handles waits before it looks again [s]."""
 
 
 def _expecting(expected: str, loss: str, use: Callable[[], T]) -> T | None:
@@ -160,6 +165,41 @@ def _call(method: WeakMethod, *arguments: Any) -> Any:
     bound = method()
     assert bound is not None  # the poller that is asked is there
     return bound(*arguments)
+
+
+class _LastingServerSocket:
+    """A listening socket that waits when the process is out of file handles; rospy would never accept anybody again."""
+
+    def __init__(self, server: socket.socket) -> None:
+        self._server = server
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._server, name)
+
+    def accept(self) -> tuple[socket.socket, Any]:
+        try:
+            return self._server.accept()
+        except OSError as error:
+            if error.errno not in (errno.EMFILE, errno.ENFILE):
+                raise
+            time.sleep(OUT_OF_HANDLES_S)
+            raise TimeoutError from None  # after which rospy asks again
+
+
+def keep_accepting() -> None:
+    """Has this node accept subscribers and callers again once it was out of file handles."""
+
+    def wrap() -> None:
+        tcpros = import_module("rospy.impl.tcpros_base")
+        tcpros.start_tcpros_server()
+        server = tcpros._tcpros_server.tcp_ros_server
+        server.server_sock = _LastingServerSocket(server.server_sock)
+
+    _expecting(
+        "rospy.impl.tcpros_base to have a server",
+        "a node that was out of file handles once has to be started again",
+        wrap,
+    )
 
 
 def answer_cached(parameter: str, value: Any) -> None:

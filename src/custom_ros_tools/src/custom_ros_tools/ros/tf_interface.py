@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from custom_ros_tools.transforms import Array, matrix_of, pose_of, rpy_of
 
+from .tf_listener import TfListener
 from .transform_messages import position_in, quat_in, transform_message
 
 NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
@@ -26,7 +27,7 @@ class TfInterface:
     def __init__(self) -> None:
         self.tf_buffer = tf2_ros.Buffer()
         self.tf_broadcaster = tf2_ros.TransformBroadcaster()
-        self._listener = tf2_ros.TransformListener(self.tf_buffer)
+        self._listener = TfListener(self.tf_buffer)
 
     def set_tf(
         self,

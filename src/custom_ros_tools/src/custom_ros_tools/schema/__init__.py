@@ -89,22 +89,40 @@ def _frame_id(value: str) -> str:
     return value
 
 
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
+def _within(largest: float, unit: str = "") -> AfterValidator:
+    """Returns what refuses numbers that no world stands."""
+
+    def check(value: Any) -> Any:
+        for number in value if isinstance(value, tuple) else (value,):
+            if abs(number) > largest:
+                raise ValueError(f"must be within +-{largest:g}{unit and f' [{unit}]'}, got {number:g}")
+        return value
+
+    return AfterValidator(check)
+
+
+FARTHEST_M = 1e6
+"""Beyond this a body would not stay finite [m]."""
+HEAVIEST_KG = 1e9
+_LARGEST, _LARGEST_COUNT = 1e12, 2**31 - 1
+
+Positive = Annotated[float, Field(gt=0), _within(_LARGEST)]
+NonNegative = Annotated[float, Field(ge=0), _within(_LARGEST)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
-Count = Annotated[int, Field(ge=0)]
+Count = Annotated[int, Field(ge=0), _within(_LARGEST_COUNT)]
 Hz = Annotated[float, Field(gt=0), Unit("Hz")]
 HzOrOff = Annotated[float, Field(ge=0), Unit("Hz")]
 """A rate, where 0 switches off."""
 Seconds = Annotated[float, Field(gt=0), Unit("s")]
 Pixels = Annotated[int, Field(gt=0, le=8192), Unit("px")]
-Metres = Annotated[float, Unit("m")]
-NonNegativeMetres = Annotated[float, Field(ge=0), Unit("m")]
-PositiveMetres = Annotated[float, Field(gt=0), Unit("m")]
-Kilograms = Annotated[float, Field(ge=0), Unit("kg")]
+Metres = Annotated[float, _within(FARTHEST_M, "m"), Unit("m")]
+NonNegativeMetres = Annotated[float, Field(ge=0), _within(FARTHEST_M, "m"), Unit("m")]
+PositiveMetres = Annotated[float, Field(gt=0), _within(FARTHEST_M, "m"), Unit("m")]
+Kilograms = Annotated[float, Field(ge=0), _within(HEAVIEST_KG, "kg"), Unit("kg")]
+PositiveKilograms = Annotated[float, Field(gt=0), _within(HEAVIEST_KG, "kg"), Unit("kg")]
 Degrees = Annotated[float, Unit("deg")]
 
-Vec3 = Annotated[tuple[float, float, float], Field(strict=False)]
+Vec3 = Annotated[tuple[float, float, float], Field(strict=False), _within(FARTHEST_M)]
 Position = Annotated[Vec3, Unit("m")]
 Direction = Annotated[Vec3, AfterValidator(_direction)]
 """A direction of any length but zero."""

@@ -7,12 +7,14 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from custom_ros_tools.errors import Problem, hint
+from custom_ros_tools.errors import Problem, hint, shortened
 
 from .annotations import InnerProblemsError, KeyedError
 from .json_schema import Schema, json_schema, mapping_in, resolved, unit_in
 from .type_names import TYPE_NAMES, number_advice, shown, type_name
 
+MOST_PROBLEMS = 100
+"""So many problems of one file are told; the search for the key that was meant takes its time."""
 _LENGTH_ERRORS = ("missing", "too_long", "too_short")
 _RULES = {
     "greater_than": "must be > {gt:g}",
@@ -35,13 +37,16 @@ _RULES = {
 def problems_of(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any], file: str) -> list[Problem]:
     """Translates what pydantic raised when it validated the data of a file by a model."""
     problems = []
-    for details in error.errors(include_url=False):
+    all_details = error.errors(include_url=False)
+    for details in all_details[:MOST_PROBLEMS]:
         loc = _real_location(details, data)
         raised = details.get("ctx", {}).get("error")
         if isinstance(raised, InnerProblemsError):
             problems += [Problem(file, _joined(key_path(loc), each.key), each.message) for each in raised.problems]
         else:
             problems.append(Problem(file, *_explain(details, loc, _schema_of(model))))
+    if len(all_details) > MOST_PROBLEMS:
+        problems.append(Problem(file, "", f"and {len(all_details) - MOST_PROBLEMS} more problems"))
     return list(dict.fromkeys(problems))  # the same but for what pydantic adds to the location
 
 
@@ -105,7 +110,7 @@ def _explain(details: ErrorDetails, loc: tuple[str | int, ...], root: Schema) ->
     if kind == "missing":
         return key_path(loc), f"missing, expected {_expected(wanted)}{unit}"
     if kind in ("extra_forbidden", "invalid_key"):
-        return key_path(loc), f"unknown key '{loc[-1]}'{hint(str(loc[-1]), _siblings(root, loc))}"
+        return key_path(loc), f"unknown key '{shortened(str(loc[-1]))}'{hint(str(loc[-1]), _siblings(root, loc))}"
     if isinstance(error, Exception):
         return key_path(loc), str(error)
     rule = _RULES[kind].format_map(context) if kind in _RULES else f"expected {_expected(wanted)}"

@@ -7,6 +7,7 @@ import rospy
 import tf2_ros
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.tf_listener import TfListener
 from ik_ros.problem import IKProblem, Waypoint
 from rpbi.geometry import Pose
 
@@ -29,7 +30,7 @@ class FreshTf:
         self._stamp: rospy.Time | None = None
         self._changed_s = 0.0
         self._buffer = tf2_ros.Buffer()
-        self._listener = tf2_ros.TransformListener(self._buffer)
+        self._listener = TfListener(self._buffer)
 
     def pose(self) -> Pose:
         """Returns the newest pose.
@@ -61,7 +62,7 @@ class BaseFrame:
         self._frame_id = frame_id.strip("/")
         if self._frame_id:
             self._buffer = tf2_ros.Buffer()
-            self._listener = tf2_ros.TransformListener(self._buffer)
+            self._listener = TfListener(self._buffer)
 
     def with_poses_in_it(self, problem: IKProblem, frame_id: str) -> IKProblem:
         """Returns a problem with its poses, which are in a TF frame, in the base; an empty `frame_id` is the base.

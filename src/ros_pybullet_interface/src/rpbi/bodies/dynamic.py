@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem
-from custom_ros_tools.schema import HzOrOff, Position, Positive, Quat
+from custom_ros_tools.schema import HzOrOff, Position, PositiveKilograms, Quat
 from rpbi.config.pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ResetBaseVelocity
 from rpbi.config.sensors import ContactsConfig
 from rpbi.engine.client import Client
@@ -22,7 +22,7 @@ class DynamicObjectConfig(BodyConfig):
     createVisualShape: CreateVisualShape = Field(description="What it looks like.")
     createCollisionShape: CreateCollisionShape = Field(description="What it feels like.")
     changeDynamics: ChangeDynamics = Field(description="Friction, restitution and the like.")
-    baseMass: Positive = Field(description="Mass.", json_schema_extra={"unit": "kg"})
+    baseMass: PositiveKilograms = Field(description="Mass.")
     basePosition: Position = Field((0.0, 0.0, 0.0), description="Start position.")
     baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Start orientation, x, y, z, w.")
     useMaximalCoordinates: MaximalCoordinates = False

@@ -4,13 +4,11 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import Switch
 from rpbi.config.pybullet_models import CreateCollisionShape, CreateVisualShape
 from rpbi.engine.client import Client
 
 from .body import Body
-from .mesh_checks import mesh_problems
 
 MaximalCoordinates = Annotated[
     Switch,
@@ -29,7 +27,6 @@ class ShapeObject(Body):
         multi_body: Other arguments of `createMultiBody`; without `baseMass` it stays whatever pushes it.
 
     Raises:
-        ConfigError: If a mesh is broken.
         PhysicsError: If PyBullet refuses.
     """
 
@@ -41,14 +38,6 @@ class ShapeObject(Body):
         collision: CreateCollisionShape | None = None,
         **multi_body: Any,
     ) -> None:
-        problems = [
-            Problem(name, f"{function}.{key}", message)
-            for function, shape in (("createVisualShape", visual), ("createCollisionShape", collision))
-            if shape is not None
-            for key, message in mesh_problems(shape)
-        ]
-        if problems:
-            raise ConfigError(problems)
         multi_body["baseVisualShapeIndex"] = pb.createVisualShape(**visual.kwargs())
         if collision is not None:
             multi_body["baseCollisionShapeIndex"] = pb.createCollisionShape(**collision.kwargs())

@@ -14,6 +14,8 @@ from rpbi.config.pybullet_models import AnchorEntry, ChangeVisualShape, CreateSo
 from rpbi.config.sensors import ContactsConfig
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose, Twist
+from rpbi.meshes.checks import soft_mesh_problems
+from rpbi.meshes.trial import Mesh, Use, faults_in
 from rpbi.samples import BodyState
 from rpbi.sensors.contact_arrows import contact_sensors
 from rpbi.sensors.sensor import Sensor
@@ -24,7 +26,6 @@ from rpbi.urdf.loading import load_urdf
 from .body import Body
 from .body_config import BodyConfig
 from .dynamics import link_index
-from .mesh_checks import soft_mesh_problems
 
 
 class SoftObjectConfig(BodyConfig):
@@ -149,17 +150,8 @@ class SoftObject(Body):
 
 
 def _load(pb: Client, config: SoftObjectConfig) -> int:
-    """Loads a soft body, whose meshes are looked at before: PyBullet may crash on a broken one."""
+    """Loads a soft body."""
     if (load := config.loadSoftBody) is not None:
-        meshes = {"fileName": load.fileName, "simFileName": load.simFileName}
-        problems = [
-            Problem(config.name, f"loadSoftBody.{key}", message)
-            for key, path in meshes.items()
-            if path is not None
-            for message in soft_mesh_problems(path)
-        ]
-        if problems:
-            raise ConfigError(problems)
         if load.useNeoHookean and Path(load.simFileName or load.fileName).suffix.lower() != ".vtk":
             message = "a solid needs tetrahedra (.vtk); for a surface use useMassSpring"
             raise ConfigError([Problem(config.name, "loadSoftBody.useNeoHookean", message)])
@@ -171,6 +163,7 @@ def _load(pb: Client, config: SoftObjectConfig) -> int:
     urdf = config.loadURDF.fileName
     files = UrdfDocument(urdf).deformable_meshes()
     messages = [message for mesh in files for message in soft_mesh_problems(mesh)]
+    messages = messages or list(faults_in(Mesh(Use.SOFT, mesh) for mesh in files).values())
     if not files:
         messages = [f"{urdf}: expected a <deformable> with a mesh; rigid objects belong to the list `urdfs`"]
     if messages:

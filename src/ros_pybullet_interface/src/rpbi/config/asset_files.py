@@ -1,5 +1,6 @@
 """Files that a configuration names: where they are looked for, and field types that insist on them."""
 
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,13 +10,17 @@ import pybullet_data
 from pydantic import AfterValidator, ValidationInfo
 
 from custom_ros_tools.config import replace_package
-from custom_ros_tools.errors import ConfigError, MissingDependency
+from custom_ros_tools.errors import ConfigError, MissingDependency, shortened
 from custom_ros_tools.schema import Expects, Text
 
 ROBOT_DESCRIPTION = "robot_description"
 """The word that stands for the robot description on the parameter server in place of a file name."""
 PYBULLET_DATA_PATH = "pybullet_data_path"
 """The word that stands for the folder of PyBullet's data in search paths."""
+LONGEST_PATH = 1000
+"""Characters of a path; PyBullet copies them into 1024 bytes."""
+OF_KERNEL = ("/proc/", "/sys/", "/dev/")
+"""Folders whose files may be without end, or never begin."""
 ASSETS = "example-robot-data"
 """Robots of the extra `assets`: they are named as if this were a ROS package, `{example-robot-data}/robots/...`."""
 
@@ -33,14 +38,23 @@ def find_file(name: str, file: str, search_paths: Sequence[str] = ()) -> str:
     Raises:
         ValueError: If there is no such file, or the package is unknown.
     """
+    _refuse_long(name)
     path = _resolve_package(name)
     folders = [*search_paths, pybullet_data.getDataPath()]
     if not file.startswith("~"):
         folders.insert(0, str(Path(file).resolve().parent))
     candidates = [path] if path.is_absolute() else [Path(folder) / path for folder in folders]
-    for candidate in candidates:
-        if candidate.is_file():
-            return str(candidate.resolve() if ".." in candidate.parts else candidate.absolute())
+    try:
+        candidate = next((each for each in candidates if each.is_file()), None)
+        is_of_kernel = candidate is not None and str(candidate.resolve()).startswith(OF_KERNEL)
+    except OSError as error:
+        raise ValueError(f"{shortened(name)}: {(error.strerror or str(error)).lower()}") from None
+    if candidate is not None:
+        found = str(candidate.resolve() if ".." in candidate.parts else candidate.absolute())
+        _refuse_long(found)
+        if is_of_kernel:
+            raise ValueError(f"expected an ordinary file, got {found}")
+        return found
     if any(candidate.is_dir() for candidate in candidates):
         raise ValueError(f"expected a file, got the folder {name}")
     where = "" if path.is_absolute() else f" (looked in {', '.join(map(str, folders))})"
@@ -68,6 +82,7 @@ def find_folder(name: str, file: str) -> str:
     Raises:
         ValueError: If there is no such folder, or the package is unknown.
     """
+    _refuse_long(name)
     if name == PYBULLET_DATA_PATH:
         return str(pybullet_data.getDataPath())
     folder = _resolve_package(name)
@@ -76,6 +91,11 @@ def find_folder(name: str, file: str) -> str:
     if not folder.is_dir():
         raise ValueError(f"no such folder: {folder}")
     return str(folder.absolute())
+
+
+def _refuse_long(path: str) -> None:
+    if len(os.fsencode(path)) > LONGEST_PATH:
+        raise ValueError(f"expected a path of at most {LONGEST_PATH} bytes, got {shortened(path)}")
 
 
 def _resolve_package(name: str) -> Path:

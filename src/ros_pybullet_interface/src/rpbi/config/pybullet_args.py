@@ -77,7 +77,7 @@ class Flags(Constants):
             return _union(self._named(name.strip()) for name in given.split("|"))
         if isinstance(given, (list, tuple)):
             return _union(map(self.parse, given))
-        if isinstance(given, int) and not isinstance(given, bool) and given >= 0:
+        if isinstance(given, int) and not isinstance(given, bool) and 0 <= given < 2**31:
             return given
         raise ValueError(f"expected {type_name(self.schema())}, got {shown(given)}")
 

@@ -123,6 +123,15 @@ class CreateVisualShape(_CreateShape):
     normals: ListOf[Vec3] | None = optional("Normals at the corners of a mesh.")
     uvs: ListOf[Annotated[tuple[float, float], Field(strict=False)]] | None = optional("Texture coordinates there.")
 
+    @model_validator(mode="after")
+    def _corners_have_all_or_nothing(self) -> Self:
+        corners = len(self.vertices or ())
+        for key in ("normals", "uvs"):
+            given = getattr(self, key)
+            if self.vertices is not None and given is not None and len(given) != corners:
+                raise KeyedError(key, f"expected one for each of the {corners} vertices, got {len(given)}")
+        return self
+
 
 class CreateCollisionShape(_CreateShape):
     """What an object feels like."""
@@ -138,7 +147,17 @@ class CreateCollisionShape(_CreateShape):
 
     @model_validator(mode="after")
     def _height_field_has_a_source(self) -> Self:
-        return self._require("GEOM_HEIGHTFIELD", "fileName", "heightfieldData")
+        self._require("GEOM_HEIGHTFIELD", "fileName", "heightfieldData")
+        if self.heightfieldData is not None and self.shapeType == SHAPE_TYPES.parse("GEOM_HEIGHTFIELD"):
+            rows, columns, count = (
+                self.numHeightfieldRows or 0,
+                self.numHeightfieldColumns or 0,
+                len(self.heightfieldData),
+            )
+            if rows < 2 or columns < 2 or rows * columns != count:
+                expected = "expected one height for each of at least 2 numHeightfieldRows and 2 numHeightfieldColumns"
+                raise KeyedError("heightfieldData", f"{expected}, got {count} for {rows} by {columns}")
+        return self
 
 
 class ChangeDynamics(PybulletModel):

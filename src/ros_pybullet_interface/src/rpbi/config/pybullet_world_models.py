@@ -28,8 +28,8 @@ from custom_ros_tools.schema import (
 from .pybullet_args import CONNECTION_MODES, JOINT_FEEDBACK_MODES, RESET_FLAGS, SOLVER_TYPES, VISUALIZER_FLAGS
 from .pybullet_models import PybulletModel
 
-Acceleration = Annotated[float, Unit("m/s^2")]
-Iterations = Annotated[int, Field(ge=1)]
+Acceleration = Annotated[float, Field(ge=-1e6, le=1e6), Unit("m/s^2")]
+Iterations = Annotated[int, Field(ge=1, le=100_000)]
 
 
 class Connect(PybulletModel):
@@ -80,10 +80,10 @@ class SetPhysicsEngineParameter(PybulletModel):
     numSolverIterations: Iterations | None = optional("Most iterations of the solver.")
     useSplitImpulse: Switch | None = optional("Whether penetration is solved apart from velocity.")
     splitImpulsePenetrationThreshold: Metres | None = optional("Penetration from which it is solved apart.")
-    numSubSteps: Count | None = optional("Parts that each step is divided into.")
+    numSubSteps: Annotated[Count, Field(le=1_000)] | None = optional("Parts that each step is divided into.")
     collisionFilterMode: Count | None = optional("0: both masks must match, 1: one of them.")
     contactBreakingThreshold: NonNegativeMetres | None = optional("Distance at which contacts end.")
-    maxNumCmdPer1ms: int | None = optional("Most commands in a millisecond.")
+    maxNumCmdPer1ms: Annotated[int, Field(ge=-1, lt=2**31)] | None = optional("Most commands in a millisecond.")
     enableFileCaching: Switch | None = optional("Whether files are read once only.")
     restitutionVelocityThreshold: Annotated[NonNegative, Unit("m/s")] | None = optional(
         "Velocity below which nothing bounces."

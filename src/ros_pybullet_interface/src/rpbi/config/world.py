@@ -117,6 +117,11 @@ class WorldConfig(ConfigModel):
     objects: ListOf[FileOrOverrides] = Field(
         (), description="Files of objects of your own types, see docs/extending.md."
     )
+    trusted_packages: ListOf[Text] = Field(
+        (),
+        description="Python packages from which services may import types, beside the types that are used at the "
+        "start.",
+    )
     rgbd_sensor: RgbdSensorConfig | None = optional(
         "Camera of colour, depth and segmentation; the first one if there are several."
     )

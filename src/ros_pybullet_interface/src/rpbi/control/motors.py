@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import math
 import time
@@ -189,12 +188,14 @@ class Motors:
         """
         mode = self.mode
         values = target.values_of(QUANTITIES[mode], f"the robot is under {MODE_NAMES[mode]}")
-        resolved = self._model.resolve(target.names, values)
-        velocities: Mapping[int, float] = {}
-        if mode in POSITION_MODES and len(target.velocity) == len(target.names):
-            with contextlib.suppress(ValueError):  # they are an aid: without them the positions are followed
-                velocities = self._model.resolve(target.names, target.velocity)
-        return Command(mode, resolved, velocities, target.stamp_ns)
+        # Others than those asked for are looked at too: what has one that is no number is not to be trusted.
+        resolved = {
+            quantity: self._model.resolve(target.names, given)
+            for quantity in dict.fromkeys(QUANTITIES.values())
+            if (given := getattr(target, quantity)) or given is values
+        }
+        velocities = resolved.get("velocity", {}) if mode in POSITION_MODES else {}
+        return Command(mode, resolved[QUANTITIES[mode]], velocities, target.stamp_ns)
 
     def follow(self, command: Command) -> None:
         """Follows a target from now on, unless the control mode has changed since it was checked."""

@@ -28,7 +28,7 @@ class Clock:
             raise ValueError(f"time step must be at least 1e-9 [s], got {time_step_s}")
         self.simulated = simulated
         self.tick = 0
-        self.stamp_ns = self.dt_ns if simulated else time.time_ns()
+        self.stamp_ns = self._on_time_ns = self.dt_ns if simulated else time.time_ns()
 
     @property
     def dt_s(self) -> float:
@@ -44,7 +44,8 @@ class Clock:
         """Goes on to the next tick."""
         self.tick += 1
         if self.simulated:
-            self.stamp_ns += self.dt_ns
+            self._on_time_ns += self.dt_ns
+            self.stamp_ns = max(self.stamp_ns + 1, self._on_time_ns)
         else:
             self.restamp()
 
@@ -57,6 +58,10 @@ class Clock:
         """Renews a wall-time stamp within the same tick, for state that is sent again while stopped."""
         if not self.simulated:
             self.stamp_ns = max(self.stamp_ns + 1, time.time_ns())
+
+    def tell_apart(self) -> None:
+        """Has what comes from now on another stamp than what was before, in any case; the coming ticks keep theirs."""
+        self.stamp_ns += 1
 
 
 class Schedule:

@@ -7,11 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from custom_ros_tools.schema import FARTHEST_M
 from rpbi.config.pybullet_models import ObjectTf
 from rpbi.geometry import Pose, normalized
-
-FARTHEST_M = 1e6
-"""Beyond this a body would not stay finite [m]."""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from custom_ros_tools.errors import PhysicsError, UnknownNameError
 from rpbi.bodies import Body, body_class
 from rpbi.bodies.body import MULTI_BODY
 from rpbi.bodies.dynamics import change_dynamics
+from rpbi.bodies.file_checks import check_files
 from rpbi.config.pybullet_world_models import PhysicsChange, SetGravity
 from rpbi.config.world import WorldConfig
 from rpbi.plugins import blame, blaming
@@ -107,6 +108,7 @@ def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:
         change_dynamics(bodies[entry.name], *entry.arguments)
     else:
         kind, config = entry.arguments
+        check_files(config)
         before = _body_ids(pb)
         try:
             make: Any = body_class(kind)  # each with a constructor of its own
@@ -120,7 +122,7 @@ def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:
                 pb.removeBody(body_id)
             if isinstance(error, Exception):
                 blame(body_class(kind), f"making '{entry.name}'", error)
-            if isinstance(error, pybullet.error):
+            if isinstance(error, (pybullet.error, OverflowError)):
                 raise PhysicsError(f"{entry.name}: {error}") from error
             raise
 

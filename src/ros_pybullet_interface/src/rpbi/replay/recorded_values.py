@@ -4,11 +4,13 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from custom_ros_tools.plugins import find
+from custom_ros_tools.plugins import UntrustedError, check_trusted, find
 from custom_ros_tools.schema import ConfigModel
 
 PAIRS = "pairs"
 """Key of a mapping whose keys are no texts, as a list of pairs."""
+QUOTED = 60
+"""Characters of a text that cannot be read that a message has."""
 
 
 def to_text(value: Any) -> str:
@@ -27,10 +29,13 @@ def from_text(text: str) -> Any:
     """Returns the value that `to_text` was given; lists come back as tuples.
 
     Raises:
-        ValueError: If the text is none that `to_text` writes, or names a class that is not there.
+        ValueError: If the text is none that `to_text` writes, or names a class that is not there or not trusted.
         ConfigError: If a configuration in it does not hold here, for instance because a file is missing.
     """
-    return _value(json.loads(text))
+    try:
+        return _value(json.loads(text))
+    except (RecursionError, TypeError) as error:
+        raise ValueError(f"expected what a recording has, got {text[:QUOTED]!r}...: {error}") from None
 
 
 def _plain(value: Any) -> Any:
@@ -75,7 +80,10 @@ def _class_name(value: Any) -> str:
 def _class_of(name: str) -> type:
     """Returns a class of values; no other can be named, so that a file cannot have just anything called."""
     try:
+        check_trusted(name)
         found = find(name)
+    except UntrustedError:
+        raise
     except ValueError as error:
         raise ValueError(f"'{name}' is not known here: {error}") from None
     if isinstance(found, type) and (

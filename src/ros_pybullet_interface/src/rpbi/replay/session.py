@@ -187,5 +187,7 @@ def apply_command(world: World, command: RecordedCommand) -> None:
             _CHANGES[what](world, name, value)
         else:
             world.act(name, what, value)
-    except (KeyError, TypeError, AttributeError) as error:
+    except InterfaceError:
+        raise
+    except Exception as error:  # the value fits neither the command nor the world, in whatever way
         raise ValueError(f"'{what}' of '{name}' makes no sense in this world: {error!r}") from error

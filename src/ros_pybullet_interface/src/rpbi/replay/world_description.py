@@ -8,9 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import pybullet
+from pydantic import ValidationError
 
-from custom_ros_tools.errors import ConfigError, Problem
-from rpbi.config.loading import LoadedWorld, ObjectConfig
+from custom_ros_tools.config import read_file
+from custom_ros_tools.errors import ConfigError, Problem, shortened
+from custom_ros_tools.plugins import full_name
+from custom_ros_tools.schema import ConfigModel
+from custom_ros_tools.schema.type_names import shown
+from rpbi.bodies import BodyConfig
+from rpbi.config.asset_files import LONGEST_PATH
+from rpbi.config.loading import LoadedWorld, ObjectConfig, WorldConfig
 from rpbi.urdf.files import is_temporary, write_description
 from rpbi.world import World
 
@@ -42,6 +49,26 @@ def describe(world: World) -> str:
     )
 
 
+class _Object(ConfigModel):
+    """An object of a description, with its configuration as text."""
+
+    type: str
+    file: str
+    config: str
+
+
+class _Description(ConfigModel):
+    """What `describe` writes, but for the format."""
+
+    pybullet: str
+    file: str
+    config: str
+    objects: list[_Object]
+    files: dict[str, str]
+    descriptions: dict[str, str]
+    start_hash: str
+
+
 class WorldDescription:
     """A description that was read.
 
@@ -58,22 +85,19 @@ class WorldDescription:
 
     def __init__(self, text: str) -> None:
         try:
-            data: dict[str, Any] = json.loads(text)
+            data = json.loads(text)
             if data["format"] != FORMAT:
                 raise ValueError(f"the world's description has format {data['format']}, this version reads {FORMAT}")
-            self.start_hash: str = data["start_hash"]
-            self._file: str = data["file"]
-            self._config: str = data["config"]
-            self._objects: list[dict[str, str]] = data["objects"]
-            self._descriptions: dict[str, str] = data["descriptions"]
-            files: dict[str, str] = data["files"]
-            written_by: str = data["pybullet"]
-        except (json.JSONDecodeError, KeyError, TypeError) as error:
-            raise ValueError(f"the world's description cannot be read: {error!r}") from None
+            read = _Description.model_validate({key: value for key, value in data.items() if key != "format"})
+        except (json.JSONDecodeError, ValidationError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            raise ValueError(f"the world's description cannot be read: {shortened(repr(error))}") from None
+        self.start_hash = read.start_hash
+        self._file, self._config, self._objects = read.file, read.config, read.objects
+        self._descriptions, written_by = read.descriptions, read.pybullet
         self.warnings = [
             f"{path}: is another file than when the world was recorded"
-            for path, digest in files.items()
-            if path not in self._descriptions and Path(path).is_file() and _hash_of(path) != digest
+            for path, digest in read.files.items()
+            if path not in self._descriptions and _has_changed(path, digest)
         ]
         if written_by != version("pybullet"):
             self.warnings.append(f"recorded with PyBullet {written_by}, replayed with {version('pybullet')}")
@@ -84,18 +108,19 @@ class WorldDescription:
         Raises:
             ConfigError: If it cannot be built here, for instance because a file is missing.
         """
-        config = from_text(self._config)
-        objects = [
-            ObjectConfig(each["type"], self._read(each["config"], each["file"]), each["file"]) for each in self._objects
-        ]
+        config = self._read(self._config, self._file, WorldConfig)
+        objects = [ObjectConfig(each.type, self._read(each.config, each.file), each.file) for each in self._objects]
         return World(LoadedWorld(config, tuple(objects), self._file), connection_mode=pybullet.DIRECT)
 
-    def _read(self, text: str, file: str) -> Any:
+    def _read(self, text: str, file: str, kind: type[ConfigModel] = BodyConfig) -> Any:
         for path, description in self._descriptions.items():
             if path in text:
                 text = text.replace(path, write_description(description))
         try:
-            return from_text(text)
+            config = from_text(text)
+            if not isinstance(config, kind):
+                raise ValueError(f"expected a {full_name(kind)}, got {shown(config)}")
+            return config
         except ValueError as error:  # pydantic's are such, too
             raise ConfigError([Problem(file, "", str(error))]) from None
 
@@ -107,9 +132,16 @@ def _files(data: Any) -> Iterator[str]:
     if isinstance(data, list):
         for item in data:
             yield from _files(item)
-    elif isinstance(data, str) and data.startswith("/") and Path(data).is_file():
+    elif isinstance(data, str) and data.startswith("/") and len(data) < LONGEST_PATH and Path(data).is_file():
         yield data
 
 
 def _hash_of(path: str) -> str:
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    return hashlib.sha256(read_file(path)).hexdigest()
+
+
+def _has_changed(path: str, digest: str) -> bool:
+    try:
+        return Path(path).is_file() and _hash_of(path) != digest
+    except OSError:  # building the world tells what is wrong with it
+        return False

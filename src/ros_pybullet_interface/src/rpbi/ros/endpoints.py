@@ -9,6 +9,7 @@ import rospy
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
 from custom_ros_tools.plugins import find, full_name
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
+from custom_ros_tools.ros.rospy_internals import close_poller_with
 from rpbi.bodies import Body
 
 Owners = Callable[[Body], Sequence[str]]
@@ -85,7 +86,9 @@ def subscribe(topic: Topic, context: Any, owner: str = "") -> rospy.Subscriber:
         except (InterfaceError, ValueError) as error:
             _warn(name, f"message refused: {error}")
 
-    return rospy.Subscriber(name, topic.message_type, take, queue_size=1, tcp_nodelay=True)
+    subscriber = rospy.Subscriber(name, topic.message_type, take, queue_size=1, tcp_nodelay=True)
+    close_poller_with(subscriber)
+    return subscriber
 
 
 def serve(service: Service, context: Any, owner: str = "") -> rospy.Service:

@@ -10,6 +10,7 @@ import pybullet
 import rospy
 
 from custom_ros_tools.errors import ConfigError, PhysicsError, Problem
+from custom_ros_tools.plugins import trust_only
 from custom_ros_tools.ros.buffered_socket import send_at_once
 from custom_ros_tools.ros.lifecycle.parameters import kept_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
@@ -84,6 +85,7 @@ class SimulatorNode:
                 config.real_time_factor,
             )
         self._world = World(loaded, simulated)
+        trust_only({"rpbi", *config.trusted_packages}, "name its package in trusted_packages of the main file")
         publishers = SamplePublishers(self._world)
         for name in self._world.bodies:
             publishers.find_topics(name)

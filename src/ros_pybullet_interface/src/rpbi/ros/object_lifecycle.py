@@ -4,7 +4,8 @@ import threading
 from collections.abc import Mapping
 from typing import Any
 
-from custom_ros_tools.errors import InterfaceError, UnknownNameError
+from custom_ros_tools.errors import ConfigError, InterfaceError, Problem, UnknownNameError
+from rpbi.bodies.file_checks import check_files
 from rpbi.config.sensors import RgbdSensorConfig
 from rpbi.ros.publishers.sample_publishers import SamplePublishers
 from rpbi.ros.publishers.topics import FastTopic
@@ -43,6 +44,7 @@ class ObjectLifecycle:
         """
         with self._lock:
             config = with_initial_state(config, file)
+            self._check_files(config, file)  # in this thread, since the simulation's has no time for new meshes
             self._ask(lambda: self._take_in(kind, config, file))
             try:
                 self._open(config.name)
@@ -99,6 +101,12 @@ class ObjectLifecycle:
     def end(self, timeout_s: float) -> None:
         """Waits until nobody is coming or going, and lets nobody from then on."""
         self._lock.acquire(timeout=timeout_s)
+
+    def _check_files(self, config: Any, file: str) -> None:
+        try:
+            check_files(config)
+        except ConfigError as error:
+            raise ConfigError([Problem(file, each.key, each.message) for each in error.problems]) from None
 
     def _take_in(self, kind: str, config: Any, file: str) -> None:
         """Does the simulation thread's part of adding."""

@@ -9,12 +9,11 @@ from typing import Any
 
 import rospy
 import tf2_ros
-from geometry_msgs.msg import TransformStamped
-from tf2_msgs.msg import TFMessage
 
 from custom_ros_tools.errors import InterfaceError, PluginError
 from custom_ros_tools.plugins import cause_of, full_name
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
+from custom_ros_tools.ros.tf_listener import TfListener
 from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Pose
 from rpbi.plugins import is_foreign
@@ -29,15 +28,10 @@ EARLY, LATE = 0.75, 1.5
 """Shares of a period: from the first on, a transform that comes is looked at; where more are to come, till the last."""
 STALE_AGAIN_AFTER_S = 30.0
 """How soon it is told again that a frame is stale [s] of wall time."""
-QUEUE_SIZE = 100
-NORM_TOLERANCE = 0.01
-"""How far the square of a quaternion's length may be from 1, as for tf2."""
 
 
-class TfListener:
-    """What is known of TF; `tf2_ros.TransformListener` does the same without looking at what comes.
-
-    tf2 refuses by itself what is no transform, but prints two lines on the console each time, however often it comes.
+class WatchedTf:
+    """What is known of TF.
 
     Attributes:
         watched: Frames of which it is told when they come.
@@ -50,9 +44,7 @@ class TfListener:
         self.came_s: dict[str, float] = {}
         self.something_came = threading.Event()
         self._buffer = tf2_ros.Buffer()
-        self._warn = ThrottledWarning()
-        rospy.Subscriber("/tf", TFMessage, self._take, self._buffer.set_transform, queue_size=QUEUE_SIZE)
-        rospy.Subscriber("/tf_static", TFMessage, self._take, self._buffer.set_transform_static, queue_size=QUEUE_SIZE)
+        self._listener = TfListener(self._buffer, self._note)
 
     def pose(self, parent: str, child: str) -> tuple[Pose, int] | None:
         """Returns the newest pose of a frame in another and its stamp [ns], 0 if static; None if there is none."""
@@ -64,32 +56,10 @@ class TfListener:
         pose = Pose((position.x, position.y, position.z), (quat.x, quat.y, quat.z, quat.w))
         return pose, found.header.stamp.to_nsec()
 
-    def _take(self, message: TFMessage, store: Callable[[TransformStamped, str], None]) -> None:
-        sender = message._connection_header.get("callerid", "")
-        for transform in message.transforms:
-            fault = fault_in(transform)
-            if fault is None:
-                store(transform, sender)
-                if transform.child_frame_id in self.watched:
-                    self.came_s[transform.child_frame_id] = time.monotonic()
-                    self.something_came.set()
-            else:
-                self._warn(f"TF from {sender}", f"'{transform.child_frame_id}' refused: {fault}")
-
-
-def fault_in(transform: TransformStamped) -> str | None:
-    """Returns what is wrong with a transform, None if nothing is."""
-    parent, child = transform.header.frame_id.strip("/"), transform.child_frame_id.strip("/")
-    position, quat = transform.transform.translation, transform.transform.rotation
-    if not parent or not child or parent == child:
-        return f"expected two frames, got '{parent}' and '{child}'"
-    # A sum is finite only if all of its parts are, unless they are far beyond any scene.
-    if not math.isfinite(position.x + position.y + position.z):
-        return f"expected a finite translation, got {position.x:g}, {position.y:g}, {position.z:g}"
-    norm = quat.x * quat.x + quat.y * quat.y + quat.z * quat.z + quat.w * quat.w
-    if not abs(norm - 1.0) < NORM_TOLERANCE:
-        return f"expected a quaternion of length 1, got {quat.x:g}, {quat.y:g}, {quat.z:g}, {quat.w:g}"
-    return None
+    def _note(self, child: str) -> None:
+        if child in self.watched:
+            self.came_s[child] = time.monotonic()
+            self.something_came.set()
 
 
 def refusal(slot: str, taken: Input, error: Exception) -> Exception:
@@ -158,15 +128,15 @@ class TfFollower:
     def __init__(self, put: Callable[[str, Any], None], time_s: Callable[[], float]) -> None:
         self._put, self._time_s = put, time_s
         self._followed: tuple[Followed, ...] = ()
-        self._listener: TfListener | None = None
+        self._tf: WatchedTf | None = None
         self._warn = ThrottledWarning(period_s=30.0)
 
     def follow(self, name: str, slot: str, pose_input: PoseInput) -> None:
         """Begins to follow a frame for a body or sensor."""
         self._followed = (*self._followed, Followed(name, slot, pose_input))
-        if self._listener is None:
-            self._listener = TfListener()
-            threading.Thread(target=self._run, args=(self._listener,), name="tf follower", daemon=True).start()
+        if self._tf is None:
+            self._tf = WatchedTf()
+            threading.Thread(target=self._run, args=(self._tf,), name="tf follower", daemon=True).start()
 
     def leave(self, name: str) -> None:
         """Follows nothing for a body or sensor any more."""
@@ -179,24 +149,24 @@ class TfFollower:
                 with contextlib.suppress(Exception):  # gone meanwhile, or refused as it was before
                     self._put(followed.slot, followed.last_pose)
 
-    def _run(self, listener: TfListener) -> None:
+    def _run(self, tf: WatchedTf) -> None:
         while not rospy.is_shutdown():
             followed = self._followed
-            listener.watched = frozenset(each.tf_id for each in followed)
-            listener.something_came.clear()
+            tf.watched = frozenset(each.tf_id for each in followed)
+            tf.something_came.clear()
             now_s = next_s = time.monotonic()
             next_s += LONGEST_NAP_S
             for each in followed:
-                due_s = each.due_s(listener.came_s.get(each.tf_id, -math.inf))
+                due_s = each.due_s(tf.came_s.get(each.tf_id, -math.inf))
                 if now_s >= due_s:
                     each.looked_s = now_s
-                    self._look(listener, each, now_s)
+                    self._look(tf, each, now_s)
                     due_s = now_s + each.period_s
                 next_s = min(next_s, due_s)
-            listener.something_came.wait(max(next_s - time.monotonic(), 0.001))
+            tf.something_came.wait(max(next_s - time.monotonic(), 0.001))
 
-    def _look(self, listener: TfListener, followed: Followed, now_s: float) -> None:
-        found = listener.pose(world_frame(), followed.tf_id)
+    def _look(self, tf: WatchedTf, followed: Followed, now_s: float) -> None:
+        found = tf.pose(world_frame(), followed.tf_id)
         if found is None:
             if followed.last_pose is None and now_s - followed.since_s > TF_MISSING_AFTER_S:
                 self._warn(

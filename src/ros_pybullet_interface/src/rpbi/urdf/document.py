@@ -10,12 +10,16 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
+from xml.parsers import expat
 
-from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.config import read_file
+from custom_ros_tools.errors import ConfigError, Problem, shortened
 from rpbi.geometry import Vector, scaled
 
 from .files import COMMENT, NOT_XML, beside_or_above, mesh_file
 
+MOST_BYTES = 64_000_000
+"""A file may be so long."""
 MOVING = ("revolute", "continuous", "prismatic")
 """Types of joints with one axis, which kinematics are solved for."""
 _ROBOT = re.compile(r"<robot\b.*</robot\s*>", re.DOTALL)
@@ -28,6 +32,30 @@ class Mimic(NamedTuple):
     joint: str
     multiplier: float
     offset: float
+
+
+class Edge(NamedTuple):
+    """A joint, as far as it ties links."""
+
+    joint: str
+    parent: str
+    child: str
+
+
+class Attribute(NamedTuple):
+    """A text in a URDF.
+
+    Attributes:
+        owner: The link or joint that it is of, for messages.
+        tag: The element that has it.
+        key: Its name.
+        text: What it says.
+    """
+
+    owner: str
+    tag: str
+    key: str
+    text: str
 
 
 class UrdfJoint(NamedTuple):
@@ -84,6 +112,7 @@ class UrdfDocument:
         tag: The element at the top, `robot` in a URDF.
         links: Names of all links.
         joint_types: Type of each joint by name, such as `revolute` or `fixed`.
+        edges: All joints, with the links that they tie, in the file's order.
         meshes: The meshes of links, as the file names them.
 
     Raises:
@@ -93,16 +122,19 @@ class UrdfDocument:
     def __init__(self, path: str, source: str | None = None, not_xml: str = "is not XML") -> None:
         self.path, self._source = path, Path(source or path)
         try:
-            self._root = _parse(self._source.read_text(encoding="utf-8", errors="replace"))
+            self._root = _parse(read_file(self._source, MOST_BYTES).decode(errors="replace"))
         except OSError as error:
             raise ConfigError([Problem(path, "", (error.strerror or str(error)).lower())]) from None
-        except ElementTree.ParseError as error:
+        except (expat.ExpatError, RecursionError) as error:
             raise ConfigError([Problem(path, "", f"{not_xml}: {error}")]) from None
         self.tag = self._root.tag
         self._joints = self._root.findall("joint")
         self.links = [link.get("name", "") for link in self._root.findall("link")]
         self.joint_types = {joint.get("name", ""): joint.get("type", "") for joint in self._joints}
         self.meshes = list(dict.fromkeys(mesh.get("filename", "") for mesh in self._root.iter("mesh")))
+        self.edges = [
+            Edge(joint.get("name", ""), _end(joint, "parent"), _end(joint, "child")) for joint in self._joints
+        ]
 
     @cached_property
     def joints(self) -> dict[str, UrdfJoint]:
@@ -122,6 +154,18 @@ class UrdfDocument:
         """
         found = {joint.get("name", ""): _mimic(joint) for joint in self._joints}
         return {name: mimic for name, mimic in found.items() if mimic is not None}
+
+    def meshes_of(self, part: str) -> list[str]:
+        """Returns the meshes of a part of links, `visual` or `collision`, as the file names them."""
+        found = self._root.iterfind(f"link/{part}//mesh")
+        return list(dict.fromkeys(mesh.get("filename", "") for mesh in found))
+
+    def attributes(self) -> Iterator[Attribute]:
+        """Yields all that stands in its links and joints."""
+        for owner in self._root:
+            for element in owner.iter():
+                for key, text in element.attrib.items():
+                    yield Attribute(f"{owner.tag} '{shortened(owner.get('name', ''))}'", element.tag, key, text)
 
     @property
     def links_without_inertial(self) -> set[str]:
@@ -246,7 +290,7 @@ def mimics_of(path: str) -> dict[str, Mimic]:
         ValueError: If a value makes no sense; it names the joint.
     """
     with suppress(ConfigError, OSError):
-        if "<mimic" in Path(path).read_text(encoding="utf-8", errors="replace"):  # saves most files the parsing
+        if b"<mimic" in read_file(path, MOST_BYTES):  # saves most files the parsing
             return UrdfDocument(path).mimics
     return {}
 
@@ -290,7 +334,11 @@ def _hang_on(robot: Element, base: str) -> None:
 def _parse(text: str) -> Element:
     text = COMMENT.sub(lambda comment: _blank(comment[0]), NOT_XML.sub("", text))
     robot = _ROBOT.search(text)
-    return ElementTree.fromstring(_blank(text[: robot.start()]) + robot[0] if robot else text)
+    # Without namespaces: PyBullet knows none, and many files have prefixes that they do not declare.
+    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    parser.Parse(_blank(text[: robot.start()]) + robot[0] if robot else text, True)
+    return builder.close()
 
 
 def _blank(text: str) -> str:

@@ -1,14 +1,13 @@
 """URDF files as PyBullet and ROS can read them."""
 
-import atexit
 import hashlib
 import re
-import tempfile
 from functools import lru_cache
 from pathlib import Path
 
-from custom_ros_tools.config import replace_package
+from custom_ros_tools.config import read_file, replace_package
 from custom_ros_tools.errors import ConfigError, Problem
+from rpbi.temporary import temporary_folder
 
 _FILENAME = re.compile(
     r"""(?P<before><(?:mesh|texture)\b[^>]*?\bfilename\s*=\s*)(?P<quote>["'])(?P<path>.*?)(?P=quote)"""
@@ -16,20 +15,18 @@ _FILENAME = re.compile(
 NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that XML 1.0 does not allow (https://www.w3.org/TR/xml/#charsets); PyBullet does not mind them."""
 COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
-_PACKAGE = "package://"
+PACKAGE = "package://"
 
 
 @lru_cache(maxsize=1)
 def _folder() -> Path:
     """Returns a folder for this process's rewritten files; it goes when the process ends."""
-    folder = tempfile.TemporaryDirectory(prefix="rpbi-urdf-")
-    atexit.register(folder.cleanup)
-    return Path(folder.name)
+    return Path(temporary_folder("urdf").name)
 
 
 def _read(path: Path) -> str:
     """Returns the text of a URDF file without its comments, and without characters that XML does not allow."""
-    return COMMENT.sub("", NOT_XML.sub("", path.read_text(encoding="utf-8")))
+    return COMMENT.sub("", NOT_XML.sub("", read_file(path).decode()))
 
 
 def resolve_meshes(path: str) -> str:
@@ -44,7 +41,7 @@ def resolve_meshes(path: str) -> str:
     """
     source = Path(path)
     text = _read(source)
-    if _PACKAGE not in text:
+    if PACKAGE not in text:
         return path
     problems: list[Problem] = []
 
@@ -105,7 +102,7 @@ def mesh_file(mesh: str, source: Path) -> Path:
     """
     if _is_of_unknown_package(mesh):
         # PyBullet takes package://FOLDER/FILE for a folder beside the URDF or above it, and its own robots use that.
-        found = beside_or_above(mesh.removeprefix(_PACKAGE), source.resolve())
+        found = beside_or_above(mesh.removeprefix(PACKAGE), source.resolve())
         if found is not None:
             return found
     try:
@@ -127,7 +124,7 @@ def _is_of_unknown_package(mesh: str) -> bool:
     try:
         replace_package(mesh)
     except ConfigError:
-        return mesh.startswith(_PACKAGE)
+        return mesh.startswith(PACKAGE)
     return False
 
 

@@ -3,27 +3,36 @@
 import logging
 import math
 from collections.abc import Callable, Collection, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import pybullet
 
-from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.errors import ConfigError, Problem, shortened
 from rpbi.config.asset_files import ROBOT_DESCRIPTION
 from rpbi.engine.client import Client
+from rpbi.meshes.checks import mesh_file_problem
+from rpbi.meshes.trial import Mesh, Use, faults_in
 
 from .document import UrdfDocument
-from .files import beside_or_above, resolve_meshes, write_description
+from .files import PACKAGE, beside_or_above, mesh_file, resolve_meshes, write_description
+from .structure import structure_problems, texts_for_numbers
 
 log = logging.getLogger(__name__)
 
 MESH_FORMATS = (".obj", ".stl", ".dae", ".cdf")
+MOST_PROBLEMS = 20
+"""So many faults of one file are told."""
 PLACEHOLDER_FACTOR = 10.0
 """Moments of inertia this many times what a link's size allows are taken for placeholders."""
 
 
 def urdf_problems(path: str) -> list[str]:
-    """Returns a sentence for each problem that is likely in a URDF file that PyBullet has refused, if there is any."""
+    """Returns a sentence for each reason not to have PyBullet load a URDF file: it would refuse it, or not survive it.
+
+    Its meshes are tried elsewhere, if this machine has not loaded them before.
+    """
     if path == ROBOT_DESCRIPTION:
         return [f"there is no parameter '{ROBOT_DESCRIPTION}'"]
     try:
@@ -31,16 +40,52 @@ def urdf_problems(path: str) -> list[str]:
     except ConfigError as error:
         return [str(error).replace(": is not XML", " is not XML")]
     if document.tag != "robot":
-        return [f"{path}: expected <robot> at the top, got <{document.tag}>"]
+        return [f"{path}: expected <robot> at the top, got <{shortened(document.tag)}>"]
     if not document.links and not document.is_soft:
         return [f"{path}: the robot has no <link>"]
-    problems = []
-    for mesh in document.meshes:
-        if Path(mesh).suffix.lower() not in MESH_FORMATS:
-            problems.append(f"{path}: mesh '{mesh}' is none of {', '.join(MESH_FORMATS)}")
-        elif beside_or_above(mesh, Path(path)) is None:
-            problems.append(f"{path}: no such mesh: {mesh} (looked for beside it and in all folders above)")
-    return problems
+    problems = list(islice(structure_problems(document), MOST_PROBLEMS)) or _mesh_problems(document)
+    return [f"{path}: {problem}" for problem in problems]
+
+
+def _mesh_problems(document: UrdfDocument) -> list[str]:
+    """Returns a sentence for each mesh that PyBullet would not find, would leave out or would not survive."""
+    problems: dict[str, None] = {}
+    meshes: dict[Mesh, str] = {}
+    for part, use in (("visual", Use.URDF_VISUAL), ("collision", Use.URDF_COLLISION)):
+        for name in document.meshes_of(part):
+            if Path(name).suffix.lower() not in MESH_FORMATS:
+                problems[f"mesh '{shortened(name)}' is none of {', '.join(MESH_FORMATS)}"] = None
+                continue
+            try:
+                file = str(_mesh_path(name, document.path))
+                if fault := mesh_file_problem(file):
+                    problems[f"mesh '{shortened(name)}': {fault}"] = None
+                elif not file.lower().endswith(".cdf"):
+                    meshes[Mesh(use, file)] = name
+            except ConfigError as error:
+                problems |= {f"mesh '{shortened(name)}': {each.message}": None for each in error.problems}
+            except OSError as error:
+                problems[str(error.strerror or error)] = None
+    for mesh, fault in faults_in(meshes).items():
+        problems[f"mesh '{shortened(meshes[mesh])}': {fault}"] = None
+    return list(problems)
+
+
+def _mesh_path(name: str, path: str) -> Path:
+    """Returns the file of a mesh, where PyBullet finds it once names of packages are resolved.
+
+    Raises:
+        ConfigError: If it is of an unknown package.
+        OSError: If there is none.
+    """
+    source = Path(path)
+    if name.startswith(PACKAGE):
+        return mesh_file(name, source)
+    found = beside_or_above(name.removeprefix("model://"), source)
+    if found is None:
+        looked = "looked for beside it and in all folders above"
+        raise FileNotFoundError(f"no such mesh: {shortened(name)} ({looked})")
+    return found
 
 
 def load_urdf(
@@ -62,31 +107,26 @@ def load_urdf(
         ConfigError: If it cannot be loaded; it names what is wrong with the file.
     """
     file: str = arguments["fileName"]
+    if messages := urdf_problems(file):
+        raise ConfigError([Problem(name, "loadURDF.fileName", message) for message in messages])
     try:
         prepared = prepare(file)
-        document = _parsed(prepared)
-        if pb.has_window and document is not None and (text := document.for_window()) is not None:
+        document = UrdfDocument(prepared)
+        if texts := texts_for_numbers(document):
+            log.warning("%s: expected numbers, PyBullet takes these for 0: %s", name, ", ".join(texts[:3]))
+        if pb.has_window and (text := document.for_window()) is not None:
             prepared = write_description(text)
         if not inertia_from_urdf:
             return int(pb.loadURDF(**{**arguments, "fileName": prepared}))
         flags = (arguments.get("flags") or 0) | pybullet.URDF_USE_INERTIA_FROM_FILE
         body_id = int(pb.loadURDF(**{**arguments, "fileName": prepared, "flags": flags}))
-        without = document.links_without_inertial if document is not None else set()
-        _complete_inertias(pb, name, body_id, without, arguments.get("globalScaling") or 1.0)
+        _complete_inertias(pb, name, body_id, document.links_without_inertial, arguments.get("globalScaling") or 1.0)
         return body_id
     except ConfigError as error:
         messages = [f"{problem.key or file}: {problem.message}" for problem in error.problems]
     except (pybullet.error, OSError, UnicodeDecodeError) as error:
-        messages = urdf_problems(file) or [f"PyBullet could not load it: {error}"]
+        messages = [f"PyBullet could not load it: {error}"]
     raise ConfigError([Problem(name, "loadURDF.fileName", message) for message in messages])
-
-
-def _parsed(file: str) -> UrdfDocument | None:
-    """Returns a URDF, None where PyBullet alone can make something of it: it takes unknown prefixes, for instance."""
-    try:
-        return UrdfDocument(file)
-    except ConfigError:
-        return None
 
 
 def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[str], scaling: float) -> None:

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import rosbag
 import rosgraph
-import rospy
+from sensor_msgs.msg import Image
+from tf2_msgs.msg import TFMessage
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.transform_messages import position_in, quat_in
@@ -31,6 +31,7 @@ from rpbi_examples import demo_report
 from rpbi_examples.draw_rate import draw_rate_hz
 from rpbi_examples.process_tree import kill_with_children
 from rpbi_utils import Recorder, bag_to_dataframes
+from rpbi_utils.ros.bag_reader import BagReader
 
 from .moving_robots import HZ as TARGET_HZ
 
@@ -218,15 +219,16 @@ def _diagnostics(table: pd.DataFrame) -> dict[str, Any]:
 
 def _messages(bag: Path, since_s: float) -> dict[str, int]:
     """Returns how many messages of each topic were recorded from a time on [s of ROS time]."""
-    with rosbag.Bag(str(bag)) as recording:
-        times = recording.read_messages(raw=True, start_time=rospy.Time.from_sec(since_s))
-        return Counter(topic for topic, _, _ in times)
+    with BagReader(bag) as recording:
+        return Counter(each.topic for each in recording.messages(recording.types) if each.record_time_s >= since_s)
 
 
 def _static_pose(bag: Path, frame: str) -> Pose:
     """Returns where the recording has a frame that does not move, in the world."""
-    with rosbag.Bag(str(bag)) as recording:
-        for _, message, _ in recording.read_messages(topics=["/tf_static"]):
+    with BagReader(bag) as recording:
+        for each in recording.messages(["/tf_static"]):
+            message = TFMessage()
+            message.deserialize(each.raw)
             for one in message.transforms:
                 if one.child_frame_id == frame:
                     x, y, z, w = quat_in(one.transform).tolist()
@@ -236,10 +238,12 @@ def _static_pose(bag: Path, frame: str) -> Pose:
 
 def _middle_image(bag: Path, topic: str, dtype: type, channels: int) -> np.ndarray | None:
     """Returns the image in the middle of the recording, shape (height, width, channels), None if there is none."""
-    with rosbag.Bag(str(bag)) as recording:
-        count = recording.get_message_count(topic)
-        for number, (_, message, _) in enumerate(recording.read_messages(topics=[topic])):
+    with BagReader(bag) as recording:
+        count = recording.counts.get(topic, 0)
+        for number, each in enumerate(recording.messages([topic])):
             if number == count // 2:
+                message = Image()
+                message.deserialize(each.raw)
                 return np.frombuffer(message.data, dtype).reshape(message.height, message.width, channels)
     return None
 

@@ -7,11 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import genpy
 import rospy
 from std_msgs.msg import String
 from tqdm import tqdm
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.plugins import trust_only
 from ros_pybullet_interface.msg import SimulationState, WorldCommands
 from rpbi.replay.session import Checkpoint, RecordedCommand, Recording, Replay, ReplayResult
 from rpbi.replay.world_description import WorldDescription
@@ -20,6 +22,8 @@ from rpbi_utils.errors import BagError
 from .bag_reader import BagReader
 
 _NAME = "replay"
+MOST_TICKS = 1_000_000_000
+"""Eleven days of a world at 1 kHz."""
 _TYPES: dict[str, Any] = {
     "rpbi/world_description": String,
     "rpbi/state": SimulationState,
@@ -38,9 +42,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("bag", type=Path, metavar="BAG", help="has rpbi/world_description, rpbi/state, rpbi/commands")
     parser.add_argument("--ns", default="/", help="namespace of the simulator; default: %(default)s")
+    parser.add_argument(
+        "--trust",
+        nargs="+",
+        default=[],
+        metavar="PACKAGE",
+        help="Python packages that the bag may have imported for types of objects, sensors and controllers of your own",
+    )
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
     arguments = parser.parse_args(rospy.myargv(sys.argv)[1:] if argv is None else argv)
     logging.basicConfig(format=f"{_NAME}: %(message)s", level=logging.ERROR)
+    trust_only({"rpbi", *arguments.trust}, "--trust PACKAGE, if you know who made the bag")
     try:
         recording = read_recording(arguments.bag, arguments.ns)
         for warning in recording.description.warnings:
@@ -51,6 +63,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             result = Replay(recording, bar.update).run()
     except (InterfaceError, OSError) as error:
         print(f"{_NAME}: {error}", file=sys.stderr)
+        return 1
+    except Exception as error:  # a bag may have anything in it
+        print(f"{_NAME}: {arguments.bag}: cannot be replayed: {type(error).__name__}: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         return 130
@@ -72,7 +87,10 @@ def read_recording(path: Path, namespace: str = "/") -> Recording:
         commands: dict[int, dict[int, RecordedCommand]] = {}
         for topic, _, raw, _ in bag.messages([topic for topic in topics if topic in bag.types]):
             message = topics[topic]()
-            message.deserialize(raw)
+            try:
+                message.deserialize(raw)
+            except genpy.DeserializationError as error:
+                raise BagError(path, f"damaged: a message of {topic}: {error}") from None
             if isinstance(message, String):
                 descriptions.append(message.data)
             elif isinstance(message, SimulationState):
@@ -84,6 +102,9 @@ def read_recording(path: Path, namespace: str = "/") -> Recording:
                 of_life.update({i: RecordedCommand(one.tick, one.name, one.what, one.data) for i, one in numbered})
     if len(set(descriptions)) != 1:
         raise BagError(path, "the simulator was started anew during the recording; a replay needs a bag of one session")
+    last = max((checkpoint.tick for checkpoint in checkpoints), default=0)
+    if last > MOST_TICKS:
+        raise BagError(path, f"damaged: expected at most {MOST_TICKS} ticks, got a state at tick {last}")
     if not any(checkpoint.tick for checkpoint in checkpoints):
         raise BagError(path, "no hashes in rpbi/state to compare (state_hash_hz in the main file is their rate)")
     try:

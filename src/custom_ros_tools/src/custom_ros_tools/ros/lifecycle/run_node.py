@@ -10,6 +10,7 @@ import atexit
 import contextlib
 import logging
 import os
+import resource
 import signal
 import sys
 import threading
@@ -23,6 +24,7 @@ import rospy
 from rosgraph_msgs.msg import Log
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.rospy_internals import keep_accepting
 
 from .master_watch import MasterWatch
 
@@ -38,6 +40,7 @@ LONGEST_WAIT_S = 2.0
 SENDING_S = 0.2
 INTERRUPTED_TOO_S = 1.0
 """How much later than the node of a service an interrupt may reach this one, where it goes to both [s]."""
+MOST_FILES = 8192
 
 
 def init_node(name: str, loggers: Iterable[str] = (), anonymous: bool = False, ros_time: bool = True) -> None:
@@ -45,6 +48,8 @@ def init_node(name: str, loggers: Iterable[str] = (), anonymous: bool = False, r
     rospy.init_node(name, anonymous=anonymous, disable_rostime=not ros_time, disable_signals=True)
     rospy.on_shutdown(_leave_parameters)
     _attach_logging({"custom_ros_tools", *loggers})
+    _allow_many_files()
+    keep_accepting()
     MasterWatch()
 
 
@@ -96,6 +101,9 @@ def run_node(
             if not ended.wait(INTERRUPTED_TOO_S):
                 _log_fatal_lines([f"{error}: its node has gone, or cannot be reached"])
                 sys.exit(1)
+        except MemoryError as error:
+            _log_fatal_lines([f"out of memory: {error or 'is there a limit, such as ulimit -v?'}"])
+            sys.exit(1)
         except rospy.ROSInterruptException:
             return
 
@@ -165,6 +173,14 @@ def _interrupt() -> None:
 def _wait_and_leave() -> None:
     signal.sigwait({signal.SIGINT})
     rospy.signal_shutdown("interrupted, or at its end")
+
+
+def _allow_many_files() -> None:
+    """Raises the limit of open files, of which every connection of a topic takes one, as far as that is allowed."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    most = MOST_FILES if hard == resource.RLIM_INFINITY else min(hard, MOST_FILES)
+    if soft != resource.RLIM_INFINITY and soft < most:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
 
 
 class _RosHandler(logging.Handler):

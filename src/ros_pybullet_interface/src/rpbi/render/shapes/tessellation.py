@@ -7,7 +7,6 @@ its own.
 """
 
 import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,6 +14,7 @@ import numpy as np
 import pybullet
 
 from rpbi.config.pybullet_models import CreateVisualShape
+from rpbi.temporary import temporary_folder
 
 from . import surfaces
 from .surfaces import Surface
@@ -31,7 +31,7 @@ class FineShapes:
     """Turns the shapes that PyBullet makes by itself into meshes, as files in a folder of its own."""
 
     def __init__(self) -> None:
-        self._folder = tempfile.TemporaryDirectory(prefix="rpbi-shapes-")
+        self._folder = temporary_folder("shapes")
         self._files: dict[bytes, str] = {}
         self._transparent_count = 0
         self._surface_of: dict[int, Callable[[CreateVisualShape], Surface | None]] = {

@@ -86,7 +86,7 @@ class ClockPublisher:
 
     def repeat(self) -> None:
         """Publishes the same tick again now and then while the world stands still, for those who come late."""
-        if time.monotonic() >= self._due_s:
+        if time.monotonic() >= self._due_s or self._clock.stamp_ns != self._sent_ns:
             self.publish_now()
 
     def _send(self) -> None:

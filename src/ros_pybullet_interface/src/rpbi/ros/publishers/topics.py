@@ -6,7 +6,7 @@ from typing import Any
 
 import rospy
 
-from custom_ros_tools.ros.rospy_internals import DirectSending
+from custom_ros_tools.ros.rospy_internals import DirectSending, close_poller_with
 
 QUEUE_SIZE = 1000
 """Messages kept for a slow subscriber before its oldest are dropped: it never holds physics up."""
@@ -30,6 +30,7 @@ class StateTopic(rospy.SubscribeListener):
             tcp_nodelay=True,  # else a message may wait 40 ms for the last one to be acknowledged
             queue_size=queue_size,
         )
+        close_poller_with(self._publisher)
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Callable[[Any], None]) -> None:
         """Notes a new subscriber; rospy calls it from a thread of its own."""

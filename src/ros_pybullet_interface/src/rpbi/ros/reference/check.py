@@ -30,6 +30,9 @@ def main() -> None:
         print("\n".join(problems), file=sys.stderr)
         print(f"{path}: {len(problems)} problem{'s' if len(problems) > 1 else ''}", file=sys.stderr)
         sys.exit(1)
+    except MemoryError as error:
+        print(f"{path}: out of memory: {error or 'is there a limit, such as ulimit -v?'}", file=sys.stderr)
+        sys.exit(1)
     _print(path, world, listed)
     world.close()
 

@@ -13,6 +13,7 @@ from std_srvs.srv import Trigger
 
 from custom_ros_tools.config import load_config, load_configs
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
+from custom_ros_tools.schema.type_names import shown
 from ros_pybullet_interface.msg import ObjectDynamics, PybulletObject
 from ros_pybullet_interface.srv import (
     AddPybulletObject,
@@ -62,6 +63,9 @@ from .hands import apply_wrench, attach, detach
 
 log = logging.getLogger(__name__)
 
+YAML_SUFFIXES = (".yaml", ".yml")
+MOST_BYTES = 2_000_000
+"""So long may a file be that a service names; reading takes time that the simulation wants."""
 NO_FOLDER = "~config"
 """Stands for the path of a YAML that came without one."""
 OBJECT_TYPES = {
@@ -160,7 +164,7 @@ def _read_object(node: NodeContext, asked: PybulletObject) -> tuple[dict[str, An
     """
     if asked.filename:
         path = _find(node, asked.filename, "filename")
-        return load_config(path), asked.filename, path
+        return load_config(path, MOST_BYTES), asked.filename, path
     if asked.config:
         return load_configs(asked.config, "config"), "config", NO_FOLDER
     raise InterfaceError("expected a filename or a config; got neither")
@@ -183,11 +187,13 @@ def _read_camera(node: NodeContext, text: str) -> tuple[Mapping[str, Any], str]:
         entry = parse_object_entry(data)
     except ValueError as error:
         raise InterfaceError(f"{FILE}: {error}") from None
-    return entry.apply_overrides(load_config(_find(node, entry.file, FILE))), entry.file
+    return entry.apply_overrides(load_config(_find(node, entry.file, FILE), MOST_BYTES)), entry.file
 
 
 def _find(node: NodeContext, name: str, key: str) -> str:
-    """Returns the path of the file that a key names."""
+    """Returns the path of the YAML file that a key names; a service tells nothing of others."""
+    if not name.lower().endswith(YAML_SUFFIXES):
+        raise InterfaceError(f"{key}: expected the name of a YAML file ({', '.join(YAML_SUFFIXES)}), got {shown(name)}")
     try:
         return find_file(name, NO_FOLDER, node.loading["search_paths"])
     except ValueError as error:

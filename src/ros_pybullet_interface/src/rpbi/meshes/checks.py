@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
+from custom_ros_tools.config import read_file
 from rpbi.config.pybullet_models import CreateCollisionShape, CreateVisualShape
 
 SOFT_MESH_FORMATS = (".obj", ".vtk")
@@ -12,8 +13,8 @@ SOFT_MESH_FORMATS = (".obj", ".vtk")
 def mesh_problems(shape: CreateVisualShape | CreateCollisionShape) -> list[tuple[str, str]]:
     """Returns key and message of each fault in what a shape says about its mesh."""
     problems = []
-    if shape.fileName is not None and shape.fileName.lower().endswith(".stl") and not _is_binary_stl(shape.fileName):
-        problems.append(("fileName", f"expected a whole binary STL file, got another kind or a part: {shape.fileName}"))
+    if shape.fileName is not None and (problem := mesh_file_problem(shape.fileName)):
+        problems.append(("fileName", f"{problem}: {shape.fileName}"))
     if shape.indices is not None:
         corners = len(shape.vertices or ())
         if len(shape.indices) % 3:
@@ -23,8 +24,15 @@ def mesh_problems(shape: CreateVisualShape | CreateCollisionShape) -> list[tuple
     return problems
 
 
+def mesh_file_problem(path: str) -> str:
+    """Returns what is wrong with a mesh file that PyBullet would leave out without a word; empty if nothing is seen."""
+    if path.lower().endswith(".stl") and not _is_binary_stl(path):
+        return "expected a whole binary STL file, got another kind or a part"
+    return ""
+
+
 def _is_binary_stl(path: str) -> bool:
-    data = Path(path).read_bytes()
+    data = read_file(path)
     triangles = int.from_bytes(data[80:84], "little")
     return len(data) > 84 and len(data) == 84 + 50 * triangles  # a header, and 50 bytes for each triangle
 
@@ -35,7 +43,7 @@ def soft_mesh_problems(path: str) -> list[str]:
     if kind not in SOFT_MESH_FORMATS:
         return [f"expected one of {', '.join(SOFT_MESH_FORMATS)}, got {path}"]
     try:
-        lines = [line.split() for line in Path(path).read_text(encoding="utf-8").splitlines()]
+        lines = [line.split() for line in read_file(path).decode().splitlines()]
         return [] if (_check_vtk if kind == ".vtk" else _check_obj)(lines) else [f"{path} is empty"]
     except UnicodeDecodeError:
         return [f"{path} is not text"]

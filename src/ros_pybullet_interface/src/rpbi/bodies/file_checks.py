@@ -1,0 +1,56 @@
+"""Files that a configuration names, looked at before PyBullet gets them: some would end the process."""
+
+from collections.abc import Iterator
+
+import pybullet
+
+from custom_ros_tools.errors import ConfigError, Problem
+from rpbi.config.pybullet_models import CreateCollisionShape, CreateVisualShape, LoadSoftBody, LoadURDF
+from rpbi.meshes.checks import mesh_problems, soft_mesh_problems
+from rpbi.meshes.trial import Mesh, Use, faults_in
+from rpbi.urdf.loading import urdf_problems
+
+from .body_config import BodyConfig
+
+
+def check_files(config: BodyConfig) -> None:
+    """Checks the meshes and the URDF of a body; those that this machine has not loaded before take a while.
+
+    Raises:
+        ConfigError: If one cannot be loaded; it has everything that is wrong.
+    """
+    problems = [Problem(config.name, key, message) for key, message in _problems(config)]
+    if problems:
+        raise ConfigError(problems)
+
+
+def _problems(config: BodyConfig) -> Iterator[tuple[str, str]]:
+    """Yields key and message of each fault."""
+    meshes: dict[Mesh, str] = {}
+    for key in type(config).model_fields:
+        asked = getattr(config, key)
+        if isinstance(asked, (CreateVisualShape, CreateCollisionShape)):
+            found = [(f"{key}.{inner}", message) for inner, message in mesh_problems(asked)]
+            yield from found
+            if asked.fileName is not None and not found and (use := _use_of(asked)) is not None:
+                meshes[Mesh(use, asked.fileName)] = f"{key}.fileName"
+        elif isinstance(asked, LoadURDF):
+            for message in urdf_problems(asked.fileName):
+                yield f"{key}.fileName", message
+        elif isinstance(asked, LoadSoftBody):
+            for inner in ("fileName", "simFileName"):
+                file = getattr(asked, inner)
+                if file is not None:
+                    problems = soft_mesh_problems(file)
+                    yield from ((f"{key}.{inner}", message) for message in problems)
+                    meshes |= {} if problems else {Mesh(Use.SOFT, file): f"{key}.{inner}"}
+    for mesh, fault in faults_in(meshes).items():
+        yield meshes[mesh], f"{fault}: {mesh.file}"
+
+
+def _use_of(shape: CreateVisualShape | CreateCollisionShape) -> Use | None:
+    """Returns what a shape's file is for, None if PyBullet does not read it."""
+    if shape.shapeType == pybullet.GEOM_MESH:
+        return Use.VISUAL if isinstance(shape, CreateVisualShape) else Use.COLLISION
+    is_field = shape.shapeType == pybullet.GEOM_HEIGHTFIELD and isinstance(shape, CreateCollisionShape)
+    return Use.HEIGHT_FIELD if is_field else None

@@ -1,0 +1,128 @@
+"""Entry point of the process in which meshes are tried: `python -m rpbi.meshes FD USE FILE ...`.
+
+It writes a line to the file descriptor for each mesh that it got through: empty, or why PyBullet does not take it. It
+may well crash, which is what it is for.
+"""
+
+import ctypes
+import math
+import os
+import resource
+import struct
+import sys
+import tempfile
+from typing import IO
+from xml.sax.saxutils import quoteattr
+
+import pybullet
+
+from custom_ros_tools.config import read_file
+
+from .trial import MOST_BYTES, MOST_CPU_S, Use
+
+GETS_NOTHING = b"cannot extract anything useful"
+"""What PyBullet says of a mesh that it leaves out; nothing else tells it of a visual one."""
+
+
+def main() -> None:
+    """Tries all meshes that the arguments name."""
+    for limit, most in ((resource.RLIMIT_AS, MOST_BYTES), (resource.RLIMIT_CPU, MOST_CPU_S), (resource.RLIMIT_CORE, 0)):
+        resource.setrlimit(limit, (most, most))
+    report, *meshes = sys.argv[1:]
+    said = tempfile.TemporaryFile()
+    os.dup2(said.fileno(), 1)
+    pybullet.connect(pybullet.DIRECT)
+    pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD)
+    for use, file in zip(meshes[::2], meshes[1::2], strict=True):
+        try:
+            _refuse_non_finite(file)
+            _USES[Use(use)](file)
+            message = ""
+        except (pybullet.error, MemoryError) as error:
+            message = str(error) or "out of memory"
+        if _says(said, GETS_NOTHING):
+            message = "it gets nothing out of it"
+        os.write(int(report), " ".join(message.split()).encode() + b"\n")
+
+
+def _refuse_non_finite(file: str) -> None:
+    """Refuses an STL file with a number that is none: with it, PyBullet crashes now and then."""
+    if file.lower().endswith(".stl"):
+        triangles = struct.iter_unpack("<12fH", read_file(file)[84:])
+        if not all(math.isfinite(sum(numbers)) for numbers in triangles):
+            raise pybullet.error("it has numbers that are not finite")
+
+
+def _says(said: IO[bytes], words: bytes) -> bool:
+    """Returns whether PyBullet, which prints by C, has said something since the last time."""
+    ctypes.CDLL(None).fflush(None)
+    found = words in os.pread(said.fileno(), 1 << 20, 0)
+    os.ftruncate(said.fileno(), 0)
+    os.lseek(said.fileno(), 0, os.SEEK_SET)
+    return found
+
+
+def _see(file: str) -> None:
+    shape = pybullet.createVisualShape(pybullet.GEOM_MESH, fileName=file)
+    _remove(pybullet.createMultiBody(baseVisualShapeIndex=shape))
+
+
+def _feel(file: str) -> None:
+    for flags in (0, pybullet.GEOM_FORCE_CONCAVE_TRIMESH):
+        shape = pybullet.createCollisionShape(pybullet.GEOM_MESH, fileName=file, flags=flags)
+        _remove(pybullet.createMultiBody(baseMass=0 if flags else 1, baseCollisionShapeIndex=shape))
+
+
+def _stand_on(file: str) -> None:
+    shape = pybullet.createCollisionShape(pybullet.GEOM_HEIGHTFIELD, fileName=file)
+    _remove(pybullet.createMultiBody(baseCollisionShapeIndex=shape))
+
+
+def _bend(file: str) -> None:
+    _remove(pybullet.loadSoftBody(file, useMassSpring=1))
+
+
+def _see_link(file: str) -> None:
+    body_id = _load_link(f"<visual>{_geometry(file)}</visual>", True)
+    if not pybullet.getVisualShapeData(body_id):
+        raise pybullet.error("PyBullet leaves it out")
+    _remove(body_id)
+
+
+def _feel_link(file: str) -> None:
+    for concave, is_fixed in (("no", False), ("no", True), ("yes", False), ("yes", True)):
+        body_id = _load_link(f"<collision concave='{concave}'>{_geometry(file)}</collision>", is_fixed)
+        if not pybullet.getCollisionShapeData(body_id, -1):
+            raise pybullet.error("PyBullet leaves it out")
+        _remove(body_id)
+
+
+def _geometry(file: str) -> str:
+    return f"<geometry><mesh filename={quoteattr(file)}/></geometry>"
+
+
+def _load_link(parts: str, is_fixed: bool) -> int:
+    with tempfile.NamedTemporaryFile("w", suffix=".urdf") as urdf:
+        urdf.write(f"<robot name='trial'><link name='link'>{parts}</link></robot>")
+        urdf.flush()
+        return int(pybullet.loadURDF(urdf.name, useFixedBase=is_fixed))
+
+
+def _remove(body_id: int) -> None:
+    if body_id < 0:
+        raise pybullet.error("PyBullet made nothing of it")
+    pybullet.stepSimulation()
+    pybullet.removeBody(body_id)
+
+
+_USES = {
+    Use.VISUAL: _see,
+    Use.COLLISION: _feel,
+    Use.HEIGHT_FIELD: _stand_on,
+    Use.SOFT: _bend,
+    Use.URDF_VISUAL: _see_link,
+    Use.URDF_COLLISION: _feel_link,
+}
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,168 @@
+"""Meshes that this machine has not loaded before are loaded in a process of their own first.
+
+PyBullet's loaders of OBJ, STL and COLLADA trust what a file says of itself: a broken one may end the process. What went
+well is remembered by its content, in the user's cache folder, so that every mesh is tried once.
+"""
+
+import enum
+import hashlib
+import logging
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from importlib.metadata import version
+from pathlib import Path
+from typing import NamedTuple
+
+from custom_ros_tools.config import read_file
+
+TRIAL = 2
+"""Number of the present kind of trial; meshes that went well in another are tried again."""
+MOST_BYTES = 4 * 2**30
+"""Memory that a trial may take."""
+MOST_CPU_S = 20
+"""Time that a trial may take [s] of the processor."""
+LONGEST_TRIAL_S = 60.0
+"""Time that a trial may take [s] of wall time."""
+MOST_TOGETHER = 100
+"""Meshes that one process tries, as long as it lives."""
+_NAMED = re.compile(rb"^\s*(?:mtllib|map_\w+)\s+(.*?)\s*$", re.MULTILINE)
+"""Files that an OBJ file and its materials name."""
+
+log = logging.getLogger(__name__)
+
+
+class Use(enum.Enum):
+    """What a mesh is for; PyBullet reads it in another way for each."""
+
+    VISUAL = "visual"
+    COLLISION = "collision"
+    HEIGHT_FIELD = "height_field"
+    SOFT = "soft"
+    URDF_VISUAL = "urdf_visual"
+    URDF_COLLISION = "urdf_collision"
+
+
+class Mesh(NamedTuple):
+    """A mesh file, and what it is for."""
+
+    use: Use
+    file: str
+
+
+_tried: dict[tuple[Mesh, int, int], bool] = {}
+"""Meshes that went well, by size and time of the last change [ns]: files that are the same need not be read again."""
+
+
+def faults_in(meshes: Iterable[Mesh]) -> dict[Mesh, str]:
+    """Returns what is wrong with those meshes that PyBullet cannot load."""
+    faults: dict[Mesh, str] = {}
+    unknown: dict[Mesh, Path] = {}
+    for mesh in dict.fromkeys(meshes):
+        try:
+            status = os.stat(mesh.file)
+            key = mesh, status.st_size, status.st_mtime_ns
+            if key not in _tried:
+                record = _folder() / f"{mesh.use.value}-{_hash_of(mesh.file)}"
+                if not _is_there(record):
+                    unknown[mesh] = record
+                _tried[key] = True
+        except OSError as error:
+            faults[mesh] = (error.strerror or str(error)).lower()
+    for mesh, fault in zip(unknown, _try(list(unknown))):
+        if fault:
+            faults[mesh] = fault
+        else:
+            _remember(unknown[mesh])
+    for mesh in faults:
+        for key in [key for key in _tried if key[0] == mesh]:
+            del _tried[key]
+    return faults
+
+
+def _try(meshes: Sequence[Mesh]) -> Iterator[str]:
+    """Yields for each mesh what is wrong with it, or an empty text."""
+    done = 0
+    while done < len(meshes):
+        batch = meshes[done : done + MOST_TOGETHER]
+        lines, end = _run(batch)
+        yield from lines
+        done += len(lines)
+        if len(lines) < len(batch):
+            yield end
+            done += 1
+
+
+def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
+    """Returns what a process says of the meshes that it got through, and what ended it early."""
+    reading, writing = os.pipe()
+    command = [sys.executable, "-P", "-m", __name__.rpartition(".")[0], str(writing)]
+    with open(reading, "rb") as report:
+        try:
+            process = subprocess.Popen(
+                [*command, *(part for mesh in meshes for part in (mesh.use.value, mesh.file))],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                pass_fds=[writing],
+            )
+        finally:
+            os.close(writing)
+        try:
+            process.wait(LONGEST_TRIAL_S)
+            end = _words(process.returncode)
+        except subprocess.TimeoutExpired:
+            end = f"PyBullet takes more than {LONGEST_TRIAL_S:g} s to load it"
+        finally:
+            process.kill()
+            process.wait()
+        lines = report.read().decode(errors="replace").splitlines()
+    return [f"PyBullet cannot load it: {line}" if line else "" for line in lines], end or "it could not be tried"
+
+
+def _words(returncode: int) -> str:
+    """Returns what the end of the process means."""
+    if returncode == -signal.SIGXCPU or returncode == -signal.SIGKILL:
+        return f"PyBullet takes more than {MOST_CPU_S} s to load it"
+    if returncode < 0:
+        return f"PyBullet crashes when it loads it ({signal.Signals(-returncode).name})"
+    return f"PyBullet cannot load it (exit code {returncode})" if returncode else ""
+
+
+def _hash_of(file: str) -> str:
+    """Returns the hash of all that PyBullet reads of a mesh."""
+    digest = hashlib.blake2b(f"{TRIAL} {version('pybullet')}".encode(), digest_size=16)
+    waiting, seen = [Path(file)], set()
+    while waiting:
+        path = waiting.pop()
+        if path in seen:
+            continue
+        seen.add(path)
+        with suppress(OSError):  # it may name what is not there
+            data = read_file(path)
+            digest.update(f"{path.suffix.lower()} {len(data)} ".encode() + data)
+            if path.suffix.lower() in (".obj", ".mtl"):
+                waiting += [path.parent / os.fsdecode(name) for name in _NAMED.findall(data) if b"\0" not in name]
+    return digest.hexdigest()
+
+
+def _folder() -> Path:
+    return Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")) / "rpbi" / "meshes"
+
+
+def _is_there(record: Path) -> bool:
+    with suppress(OSError):
+        return record.exists()
+    return False
+
+
+def _remember(record: Path) -> None:
+    try:
+        record.parent.mkdir(parents=True, exist_ok=True)
+        record.touch()
+    except OSError as error:
+        log.info("meshes that went well cannot be remembered, and are tried again next time: %s", error)

@@ -1,0 +1,54 @@
+"""Makes hostile files in a folder, reads each, and prints kind, seed, verdict and what was said, a line of JSON each.
+
+Arguments: the folder, the first seed, how many of each kind, and the kinds; `controls` are files that must not be fine
+with who reads them without care.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pybullet
+import rosbag
+from hostile_files import hostile_files, outcome_of, write_session
+
+TWO_ROOTS = '<robot name="r"><link name="a"/><link name="b"/><link name="c"/>{}</robot>'
+TWO_PARENTS = "".join(
+    f'<joint name="j{parent}" type="fixed"><parent link="{parent}"/><child link="c"/></joint>' for parent in "ab"
+)
+
+
+def main() -> None:
+    """Prints the verdicts."""
+    folder, first, count, *kinds = sys.argv[1:]
+    for kind in kinds:
+        if kind == "controls":
+            _print_controls(Path(folder))
+            continue
+        for hostile in hostile_files(kind, range(int(first), int(first) + int(count)), Path(folder)):
+            outcome = outcome_of(hostile.read, hostile.path.parent / "canary")
+            print(json.dumps([kind, hostile.seed, outcome.verdict, outcome.text]), flush=True)
+
+
+def _print_controls(folder: Path) -> None:
+    urdf, bag, canary = folder / "control.urdf", folder / "control.bag", folder / "canary"
+    urdf.write_text(TWO_ROOTS.format(TWO_PARENTS))
+    print(json.dumps(["urdf", 0, *outcome_of(lambda: _load(urdf))]))
+    write_session(bag, folder, definition_code=str(canary))
+    print(json.dumps(["bag", 0, *outcome_of(lambda: _read(bag), canary)]))
+
+
+def _load(urdf: Path) -> None:
+    pybullet.connect(pybullet.DIRECT)
+    pybullet.loadURDF(str(urdf))
+
+
+def _read(bag: Path) -> None:
+    with rosbag.Bag(str(bag)) as opened:
+        list(opened.read_messages(raw=True))
+
+
+if __name__ == "__main__":
+    main()
