@@ -10,6 +10,7 @@ from rpbi.ros.endpoints import Service, Topic
 from rpbi.ros.inputs import topic_input
 from rpbi.ros.node_topics import NODE_TOPICS
 from rpbi.ros.publishers.sample_topics import sample_topic
+from rpbi.ros.publishers.static_frames import TF_STATIC
 from rpbi.ros.publishers.topic_publisher import TF
 from rpbi.ros.publishers.world_markers import MARKERS
 from rpbi.ros.robots.trajectory_action import ACTION
@@ -53,6 +54,8 @@ def endpoints(world: World) -> list[Endpoint]:
         ConfigError: If a class of another package has no topic that can be found.
     """
     listed = [*_node_topics(world), *_window(world)]
+    if world.config.poses:
+        listed.append(_topic(PUBLISHES, TF_STATIC, ""))
     for name, body in world.bodies.items():
         listed += of_body(world, name, body)
     for name in world.cameras:
