@@ -20,6 +20,7 @@ from rpbi.ros.publishers.attachments import AttachmentPublisher
 from rpbi.ros.publishers.sample_publishers import SamplePublishers
 from rpbi.ros.publishers.static_frames import StaticFrames
 from rpbi.ros.publishers.world_markers import WorldMarkers
+from rpbi.ros.reference.interface_table import endpoints
 from rpbi.ros.services.node_services import NODE_SERVICES, NodeContext
 from rpbi.ros.window.topics import WindowTopics
 from rpbi.urdf.files import write_description
@@ -98,6 +99,7 @@ class SimulatorNode:
                 config.real_time_factor,
             )
         self._world = World(loaded, simulated)
+        endpoints(self._world)  # refuses what `./rpbi check` refuses
         use_own_frames(self._world.frames())
         self._frames = StaticFrames(config.poses)
         publishers = SamplePublishers(self._world)

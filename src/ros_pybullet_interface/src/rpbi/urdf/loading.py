@@ -17,7 +17,11 @@ from .files import beside_or_above, resolve_meshes, write_description
 
 log = logging.getLogger(__name__)
 
+MOST_JOINTS = 127
+"""Joints of a robot that PyBullet can tell of, fixed ones too."""
 MESH_FORMATS = (".obj", ".stl", ".dae", ".cdf")
+OTHER_FORMATS = {"sdf": "SDF", "world": "SDF", "gazebo": "SDF", "mujoco": "MJCF"}
+"""Formats of robots that are not read, by the element at the top of their files."""
 PLACEHOLDER_FACTOR = 10.0
 """Moments of inertia this many times what a link's size allows are taken for placeholders."""
 
@@ -30,6 +34,8 @@ def urdf_problems(path: str) -> list[str]:
         document = UrdfDocument(path)
     except ConfigError as error:
         return [str(error).replace(": is not XML", " is not XML")]
+    if document.tag in OTHER_FORMATS:
+        return [f"{path} is {OTHER_FORMATS[document.tag]}, not URDF; docs/robots.md says how to make a URDF of it"]
     if document.tag != "robot":
         return [f"{path}: expected <robot> at the top, got <{document.tag}>"]
     if not document.links and not document.is_soft:
@@ -38,7 +44,7 @@ def urdf_problems(path: str) -> list[str]:
     for mesh in document.meshes:
         if Path(mesh).suffix.lower() not in MESH_FORMATS:
             problems.append(f"{path}: mesh '{mesh}' is none of {', '.join(MESH_FORMATS)}")
-        elif beside_or_above(mesh, Path(path)) is None:
+        elif not mesh.startswith("package://") and beside_or_above(mesh, Path(path)) is None:
             problems.append(f"{path}: no such mesh: {mesh} (looked for beside it and in all folders above)")
     return problems
 
@@ -67,10 +73,15 @@ def load_urdf(
         document = _parsed(prepared)
         if pb.has_window and document is not None and (text := document.for_window()) is not None:
             prepared = write_description(text)
-        if not inertia_from_urdf:
-            return int(pb.loadURDF(**{**arguments, "fileName": prepared}))
-        flags = (arguments.get("flags") or 0) | pybullet.URDF_USE_INERTIA_FROM_FILE
+        flags = arguments.get("flags") or 0
+        if document is not None:
+            flags = flags_for(document, flags)
+            _warn_of_merging(name, document, flags & ~(arguments.get("flags") or 0))
+        if inertia_from_urdf:
+            flags |= pybullet.URDF_USE_INERTIA_FROM_FILE
         body_id = int(pb.loadURDF(**{**arguments, "fileName": prepared, "flags": flags}))
+        if not inertia_from_urdf:
+            return body_id
         without = document.links_without_inertial if document is not None else set()
         _complete_inertias(pb, name, body_id, without, arguments.get("globalScaling") or 1.0)
         return body_id
@@ -79,6 +90,20 @@ def load_urdf(
     except (pybullet.error, OSError, UnicodeDecodeError) as error:
         messages = urdf_problems(file) or [f"PyBullet could not load it: {error}"]
     raise ConfigError([Problem(name, "loadURDF.fileName", message) for message in messages])
+
+
+def flags_for(document: UrdfDocument, flags: int) -> int:
+    """Returns the flags by which PyBullet takes a URDF: of one with too many joints it merges the fixed ones.
+
+    PyBullet loads more than 127, but then tells neither of joints nor of links where they are.
+    """
+    return flags | (pybullet.URDF_MERGE_FIXED_LINKS if len(document.joint_types) > MOST_JOINTS else 0)
+
+
+def _warn_of_merging(name: str, document: UrdfDocument, added_flags: int) -> None:
+    if added_flags & pybullet.URDF_MERGE_FIXED_LINKS:
+        message = "%s: %d joints are more than the %d that PyBullet takes: fixed ones are left out, with their links"
+        log.warning(message, name, len(document.joint_types), MOST_JOINTS)
 
 
 def _parsed(file: str) -> UrdfDocument | None:

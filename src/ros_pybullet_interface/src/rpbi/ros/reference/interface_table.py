@@ -1,8 +1,9 @@
 """Which topics and services a world has, without starting anything."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
+from custom_ros_tools.errors import ConfigError, Problem
 from rpbi.bodies import Body
 from rpbi.engine.inputs import PoseInput
 from rpbi.ros.cameras.topics import camera_topics
@@ -51,7 +52,7 @@ def endpoints(world: World) -> list[Endpoint]:
     """Lists what the node opens for a world.
 
     Raises:
-        ConfigError: If a class of another package has no topic that can be found.
+        ConfigError: If a class of another package has no topic that can be found, or two things would have one name.
     """
     listed = [*_node_topics(world), *_window(world)]
     if world.config.poses:
@@ -60,7 +61,23 @@ def endpoints(world: World) -> list[Endpoint]:
         listed += of_body(world, name, body)
     for name in world.cameras:
         listed += of_camera(world, name)
-    return listed + [_service(each) for each in NODE_SERVICES]
+    listed += [_service(each) for each in NODE_SERVICES]
+    _refuse_clashes(world.loaded.file, listed)
+    return listed
+
+
+def _refuse_clashes(file: str, listed: Iterable[Endpoint]) -> None:
+    """Raises a ConfigError if two topics or services of different meaning have one name; TF is of all bodies."""
+    by_name: dict[tuple[str, str], Endpoint] = {}
+    problems = []
+    for each in listed:
+        first = by_name.setdefault((each.kind, each.name), each)
+        if first is not each and each.kind != FOLLOWS and each.name != TF.name:
+            types = f"as {first.type} and as {each.type}" if first.type != each.type else f"twice as {each.type}"
+            message = f"the node {each.kind} {each.name} {types}: give what it is named after another name"
+            problems.append(Problem(file, "", message))
+    if problems:
+        raise ConfigError(problems)
 
 
 def of_body(world: World, name: str, body: Body) -> Iterator[Endpoint]:
