@@ -265,8 +265,10 @@ class World:
         return self._sensors[name]
 
     def frames(self) -> set[str]:
-        """Returns the TF frames that it publishes, without prefix: the world's, links of bodies, and those of `poses`."""
-        links = (sensor for name in self.bodies for sensor in self.sensors_of(name) if isinstance(sensor, LinkPoseSensor))
+        """Returns the TF frames that it publishes, without prefix: its own, those of links, and those under `poses`."""
+        links = (
+            sensor for name in self.bodies for sensor in self.sensors_of(name) if isinstance(sensor, LinkPoseSensor)
+        )
         poses = (pose.tf_id for pose in self.config.poses)
         return {WORLD_FRAME, *poses, *(frame for sensor in links for frame in sensor.frames)}
 

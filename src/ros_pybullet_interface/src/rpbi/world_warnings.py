@@ -11,7 +11,6 @@ from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.bodies.robots.robot_config import RobotConfig
 from rpbi.config.world import WORLD_FRAME
 from rpbi.engine.inputs import PoseInput
-from rpbi.geometry import Pose
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.urdf.joints import Joint
 from rpbi.world import World
@@ -21,17 +20,14 @@ TOUCHING_M = 1e-3
 
 
 def world_warnings(world: World) -> list[Problem]:
-    """Returns what looks wrong at the start of a world that has made no step yet, by the files that say it.
-
-    Bodies that follow a frame whose pose the main file says are put there.
-    """
+    """Returns what looks wrong at the start of a world that has made no step yet, by the files that say it."""
     return [*_Frames(world).warnings(), *_gravity(world), *_limits(world), *_topics(world), *_overlaps(world)]
 
 
 def _file_of(world: World, name: str) -> str:
     """Returns the file of a body or camera."""
-    files = {item.config.name: item.file for item in (*world.loaded.objects, *world.loaded.cameras)}
-    return files.get(name, name)
+    files = {item.config.name: item.file for item in world.loaded.objects}
+    return {**files, **{camera.config.name: camera.file for camera in world.loaded.cameras}}[name]
 
 
 def _gravity(world: World) -> Iterator[Problem]:
@@ -66,8 +62,7 @@ def _topics(world: World) -> Iterator[Problem]:
 
 def _overlaps(world: World) -> Iterator[Problem]:
     """Yields a warning for each pair of bodies that are in each other, unless nothing can push them apart."""
-    placed = {*world.bodies} - {slot.split("/")[0] for slot in _Frames(world).unknown()}
-    solid = [body for name, body in world.bodies.items() if name in placed and body.has_physics and not body.is_soft]
+    solid = [body for body in world.bodies.values() if _has_place(world, body)]
     for one, other in combinations(solid, 2):
         found = world.pb.getClosestPoints(one.body_id, other.body_id, 0.0)
         depths = {(point[3], point[4]): -point[8] for point in sorted(found, key=lambda point: -point[8])}
@@ -76,6 +71,12 @@ def _overlaps(world: World) -> Iterator[Problem]:
             (link, other_link), depth = deepest
             parts = f"{_named(one, link)} and {_named(other, other_link)} are in each other by {depth:.2g} m"
             yield Problem(_file_of(world, one.name), "", f"at the start, {parts}, and will be pushed apart")
+
+
+def _has_place(world: World, body: Body) -> bool:
+    """Tells whether a body is felt, and is where it will be: not where another node's frame will take it from."""
+    is_placed = body.object_tf is None or world.config.pose_of(body.object_tf.tf_id) is not None
+    return body.has_physics and not body.is_soft and is_placed
 
 
 def _named(body: Body, link: int) -> str:
@@ -106,18 +107,8 @@ class _Frames:
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self._poses = {each.tf_id: each for each in world.config.poses}
         self._published = world.frames()
         self._followed = {slot: each for slot, each in world.inputs.items() if isinstance(each, PoseInput)}
-
-    def unknown(self) -> Iterator[str]:
-        """Puts bodies where the main file says that the frame is that they follow; yields the slots of all others."""
-        for slot, followed in self._followed.items():
-            pose = self._pose(self._plain(followed.tf_id))
-            if pose is None:
-                yield slot
-            elif (name := slot.split("/")[0]) in self._world.bodies:
-                self._world.bodies[name].set_base_pose(pose)
 
     def warnings(self) -> Iterator[Problem]:
         """Yields a warning for each frame that somebody needs and nobody publishes, or two do."""
@@ -133,10 +124,6 @@ class _Frames:
             name = slot.split("/")[0]
             if (missing := self._missing(followed.tf_id)) is not None:
                 yield Problem(_file_of(self._world, name), "object_tf.tf_id", f"'{name}' follows it: {missing}")
-
-    def _plain(self, frame: str) -> str:
-        prefix = self._world.config.tf_prefix
-        return frame.removeprefix(f"{prefix}/") if prefix else frame
 
     def _owner(self, frame: str) -> Body | None:
         """Returns the body whose frame it is by its name, if that can publish any."""
@@ -157,7 +144,7 @@ class _Frames:
 
     def _missing(self, tf_id: str) -> str | None:
         """Returns what is wrong with a frame that is needed, None if it is published."""
-        frame = self._plain(tf_id)
+        frame = self._world.config.without_prefix(tf_id)
         missing = f"nothing here publishes the TF frame '{tf_id}'"
         if frame in self._published:
             return None
@@ -171,14 +158,3 @@ class _Frames:
             return None
         key = "broadcast_link_states: true" if isinstance(body, JointedBody) else "broadcast_hz"
         return missing + (hint(frame, frames) if frames else f"; '{body.name}' does with {key}")
-
-    def _pose(self, frame: str) -> Pose | None:
-        """Returns where a frame is in the world, as far as the main file says."""
-        pose, passed = Pose(), set[str]()
-        while frame != WORLD_FRAME:
-            if frame in passed or frame not in self._poses:
-                return None
-            passed.add(frame)
-            pose = self._poses[frame].pose @ pose
-            frame = self._plain(self._poses[frame].parent)
-        return pose

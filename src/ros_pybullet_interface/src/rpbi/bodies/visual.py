@@ -31,6 +31,11 @@ class VisualObject(ShapeObject):
     example = {"createVisualShape": {"shapeType": "GEOM_SPHERE", "radius": 0.1}, "object_tf": {"tf_id": "FRAME"}}
 
     def __init__(self, pb: Client, config: VisualObjectConfig) -> None:
-        place = {"basePosition": config.basePosition, "baseOrientation": config.baseOrientation}
-        super().__init__(pb, config.name, config.createVisualShape, **place)
+        super().__init__(
+            pb,
+            config.name,
+            config.createVisualShape,
+            basePosition=config.basePosition,
+            baseOrientation=config.baseOrientation,
+        )
         self.object_tf = config.object_tf

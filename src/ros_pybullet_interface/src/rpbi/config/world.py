@@ -162,11 +162,32 @@ class WorldConfig(ConfigModel):
 
     @model_validator(mode="after")
     def _frames_have_one_pose(self) -> Self:
-        names = [pose.tf_id for pose in self.poses]
-        for index, name in enumerate(names):
-            if name in names[:index]:
-                raise KeyedError(f"poses[{index}].tf_id", f"'{name}' has a pose already")
+        parents: dict[str, str] = {}
+        for index, pose in enumerate(self.poses):
+            if pose.tf_id in parents:
+                raise KeyedError(f"poses[{index}].tf_id", f"'{pose.tf_id}' has a pose already")
+            above = pose.parent
+            while above in parents:
+                above = parents[above]
+            if above == pose.tf_id:
+                raise KeyedError(f"poses[{index}].parent", f"'{pose.parent}' hangs on '{pose.tf_id}' itself")
+            parents[pose.tf_id] = pose.parent
         return self
+
+    def pose_of(self, frame: str) -> Pose | None:
+        """Returns where a TF frame is in the world, as far as `poses` says that; None if it does not."""
+        poses = {each.tf_id: each for each in self.poses}
+        pose = Pose()
+        while (frame := self.without_prefix(frame)) != WORLD_FRAME:
+            if frame not in poses:
+                return None
+            step = poses.pop(frame)
+            pose, frame = step.pose @ pose, step.parent
+        return pose
+
+    def without_prefix(self, frame: str) -> str:
+        """Returns the name of a TF frame without `tf_prefix`, if it has it."""
+        return frame if self.tf_prefix is None else frame.removeprefix(f"{self.tf_prefix}/")
 
     @classmethod
     def from_main_file(cls, content: WorldConfig) -> WorldConfig:
