@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 from pathlib import Path
 
 import yaml
-from worlds import FLOOR, ball, box, iiwa, write_world
+from worlds import FLOOR, ball, box, write_world
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -57,12 +58,13 @@ def test_warnings_are_told_apart_from_errors_and_only_errors_fail(tmp_path):
     ]
 
 
-def test_names_that_would_clash_in_ros_are_refused(tmp_path):
-    springs = {"joint_trajectory_controller": {"type": "joint_impedance", "active": False}}
-    write_world(tmp_path, robots=(iiwa(joint_trajectory_controller={}, controllers=springs),))
-    code, _, told = check("world.yaml", tmp_path)
-    assert code == 1 and len(told) == 2
-    assert "the node publishes rpbi/iiwa/joint_trajectory_controller/state as ros_pybullet_interface/" in told[0]
+def test_the_world_of_the_docs_is_fine(tmp_path):
+    blocks = re.findall(r"```yaml\n# (\w+\.yaml)\n(.*?)```", (ROOT / "docs" / "worlds.md").read_text(), re.DOTALL)
+    for name, text in blocks:
+        (tmp_path / name).write_text(text)
+    code, lines, told = check("world.yaml", tmp_path)
+    assert (code, told) == (0, [])
+    assert [line.split()[:2] for line in lines[1:4]] == [["collision", "floor"], ["dynamic", "box"], ["robot", "arm,"]]
 
 
 def test_a_workspace_that_the_user_has_sourced_counts_and_its_examples_come_first(tmp_path):
