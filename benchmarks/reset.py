@@ -25,8 +25,6 @@ def run(quick: bool) -> list[Result]:
     main = CONFIGS / "basic_example_kuka_lwr" / "config.yaml"
     with Session() as ros:
         ros.simulator(yaml.safe_load(main.read_text()))
-        ros.place_camera()
-        ros.start(["rosrun", "tf2_ros", "static_transform_publisher", *"0 0 0 0 0 0 rpbi/world rpbi/floor".split()])
         ros.start(["rosbag", "record", "-O", str(ros.folder / "resets.bag"), "/tf", "/clock", JOINT_STATES])
         program = ros.program("reset_often", resets)
         found = ros.result_of(program)

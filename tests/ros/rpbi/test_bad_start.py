@@ -162,3 +162,29 @@ def test_files_that_are_named_relatively_in_a_parameter_are_not_looked_for_in_a_
     write_world(tmp_path, dynamic=(ball(),))
     [line] = fails({"connect": {"connection_mode": "DIRECT"}, "dynamic_objects": ["ball.yaml"]})
     assert line.startswith("~config: dynamic_objects[0]: no such file: ball.yaml (looked in ")
+
+
+@pytest.mark.parametrize(
+    ("parameters", "expected"),
+    [
+        ({"config_file": 3}, "~config_file: expected a file name, got 3"),
+        ({"config_file": "world.yaml", "config": [1]}, "~config: expected a mapping of keys to values, got list"),
+        ({"config_file": "none.yaml"}, "none.yaml: no such file or directory"),
+        ({"config_file": "world.yaml", "config": {"timeStep": -1.0}}, "world.yaml: timeStep: must be > 0"),
+    ],
+)
+def test_a_file_that_is_named_wrongly_or_changed_to_nonsense_is_refused(ros, tmp_path, parameters, expected):
+    write_world(tmp_path, dynamic=(ball(),))
+    for name, value in {"working_directory": f"{tmp_path}\n", **parameters}.items():
+        rospy.set_param(f"{NODE}/{name}", value)
+    process = ros.start(["rosrun", "ros_pybullet_interface", "ros_pybullet_interface_node.py"])
+    assert process.wait(60.0) == 1
+    assert expected in ros.output(process)
+    assert "Traceback" not in ros.output(process)
+
+
+def test_names_that_would_clash_are_refused_as_check_does(fails, tmp_path):
+    springs = {"joint_trajectory_controller": {"type": "joint_impedance", "active": False}}
+    robot = iiwa("b", joint_trajectory_controller={}, controllers=springs)
+    [line] = fails(main_config(tmp_path, robots=(robot,)))
+    assert line.startswith("~config: the node publishes rpbi/b/joint_trajectory_controller/state as ")

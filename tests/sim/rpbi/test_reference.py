@@ -6,8 +6,11 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import pybullet
 import pytest
+from worlds import iiwa, write_world
 
+from custom_ros_tools.errors import ConfigError
 from ik_ros.schemas import schema_files
 from rpbi.bodies import BODY_TYPES
 from rpbi.reference.markdown import link
@@ -49,6 +52,16 @@ def test_all_that_the_page_lists_is_explained(world: World) -> None:
             assert row.name == FOLLOWED
         elif row.type not in {each.type for each in WITH_CONTROL_MSGS}:
             assert row.meaning.endswith("."), row
+
+
+@pytest.mark.parametrize("name", ["joint_trajectory_controller", "joint_states"])
+def test_a_controller_that_is_named_like_a_topic_of_its_robot_is_refused(tmp_path: Path, name: str) -> None:
+    controllers = {name: {"type": "joint_impedance", "active": False}}
+    robot = iiwa(joint_trajectory_controller={}, controllers=controllers)
+    world = World.from_file(write_world(tmp_path, robots=(robot,)), connection_mode=pybullet.DIRECT)
+    with pytest.raises(ConfigError, match=rf"world.yaml: the node \w+ rpbi/iiwa/{name}/\w+ (as \S+ and|twice) as \S+: give"):
+        endpoints(world)
+    world.close()
 
 
 def test_all_frames_of_the_world_are_in_the_table(world: World) -> None:

@@ -14,6 +14,7 @@ from rpbi.config.loading import LoadedWorld, load_world
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.config.pybullet_world_models import PhysicsChange
 from rpbi.config.sensors import RgbdSensorConfig
+from rpbi.config.world import WORLD_FRAME
 from rpbi.constraints.attachment_config import AttachmentConfig
 from rpbi.engine.actions import ACTIONS, MOVES_AT_ONCE
 from rpbi.engine.client import Client
@@ -22,6 +23,7 @@ from rpbi.engine.command_log import CommandLog, WorldCommand
 from rpbi.engine.contents import WorldContents, state_hash
 from rpbi.engine.inputs import Input
 from rpbi.engine.mailbox import Mailbox
+from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.rgbd import RgbdSensor
 from rpbi.sensors.sensor import Sensor
 
@@ -262,6 +264,14 @@ class World:
     def sensors_of(self, name: str) -> list[Sensor]:
         """Returns the sensors of a body, or the camera of that name."""
         return self._sensors[name]
+
+    def frames(self) -> set[str]:
+        """Returns the TF frames that it publishes, without prefix: its own, those of links, and those under `poses`."""
+        links = (
+            sensor for name in self.bodies for sensor in self.sensors_of(name) if isinstance(sensor, LinkPoseSensor)
+        )
+        poses = (pose.tf_id for pose in self.config.poses)
+        return {WORLD_FRAME, *poses, *(frame for sensor in links for frame in sensor.frames)}
 
     @property
     def is_connected(self) -> bool:

@@ -2,6 +2,7 @@
 
 from pydantic import Field
 
+from custom_ros_tools.schema import Position, Quat
 from rpbi.config.pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ObjectTf
 from rpbi.config.sensors import ContactsConfig
 from rpbi.engine.client import Client
@@ -18,13 +19,15 @@ class CollisionObjectConfig(BodyConfig):
     createVisualShape: CreateVisualShape = Field(description="What it looks like.")
     createCollisionShape: CreateCollisionShape = Field(description="What it feels like.")
     changeDynamics: ChangeDynamics | None = Field(None, description="Friction, restitution and the like.")
+    basePosition: Position = Field((0.0, 0.0, 0.0), description="Position, with object_tf until TF comes.")
+    baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Orientation, x, y, z, w; likewise.")
     useMaximalCoordinates: MaximalCoordinates = False
-    object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, it stays at the origin.")
+    object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, it stays where it is.")
     contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
 
 
 class CollisionObject(ShapeObject):
-    """An object of infinite mass that follows a TF frame or stays at the origin."""
+    """An object of infinite mass that follows a TF frame or stays where it is put."""
 
     Config = CollisionObjectConfig
     section = "collision_objects"
@@ -41,6 +44,8 @@ class CollisionObject(ShapeObject):
             config.name,
             config.createVisualShape,
             config.createCollisionShape,
+            basePosition=config.basePosition,
+            baseOrientation=config.baseOrientation,
             useMaximalCoordinates=config.useMaximalCoordinates,
         )
         self._follow(config.object_tf)

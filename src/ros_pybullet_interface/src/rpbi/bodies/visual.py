@@ -2,6 +2,7 @@
 
 from pydantic import Field
 
+from custom_ros_tools.schema import Position, Quat
 from rpbi.config.pybullet_models import CreateCollisionShape, CreateVisualShape, ObjectTf
 from rpbi.engine.client import Client
 
@@ -16,11 +17,13 @@ class VisualObjectConfig(BodyConfig):
     createCollisionShape: CreateCollisionShape | None = Field(
         None, description="Accepted and ignored, so that a collision object can be turned into a visual one."
     )
-    object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, it stays at the origin.")
+    basePosition: Position = Field((0.0, 0.0, 0.0), description="Position, with object_tf until TF comes.")
+    baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Orientation, x, y, z, w; likewise.")
+    object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, it stays where it is.")
 
 
 class VisualObject(ShapeObject):
-    """An object without collision shape that follows a TF frame or stays at the origin."""
+    """An object without collision shape that follows a TF frame or stays where it is put."""
 
     Config = VisualObjectConfig
     section = "visual_objects"
@@ -28,5 +31,11 @@ class VisualObject(ShapeObject):
     example = {"createVisualShape": {"shapeType": "GEOM_SPHERE", "radius": 0.1}, "object_tf": {"tf_id": "FRAME"}}
 
     def __init__(self, pb: Client, config: VisualObjectConfig) -> None:
-        super().__init__(pb, config.name, config.createVisualShape)
+        super().__init__(
+            pb,
+            config.name,
+            config.createVisualShape,
+            basePosition=config.basePosition,
+            baseOrientation=config.baseOrientation,
+        )
         self.object_tf = config.object_tf

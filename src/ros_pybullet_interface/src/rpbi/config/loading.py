@@ -4,6 +4,7 @@ import contextlib
 import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from custom_ros_tools.config import load_config, replace_package
@@ -53,17 +54,21 @@ class LoadedWorld:
     cameras: tuple[CameraConfig, ...] = ()
 
 
-def load_world(path: str, robot_description: str | None = None) -> LoadedWorld:
+def load_world(
+    path: str, robot_description: str | None = None, overrides: Mapping[str, Any] = MappingProxyType({})
+) -> LoadedWorld:
     """Reads a main YAML file and all files that it names.
 
     Args:
         path: The main file; `{package}/path` and `package://package/path` are resolved.
         robot_description: File that the word `robot_description` stands for; without it, the word stays.
+        overrides: Keys and values that replace those of the main file; mappings are merged key by key.
 
     Raises:
         ConfigError: With all problems of all files.
     """
-    return _Reader(load_config(path), path, replace_package(path), robot_description).read()
+    data = ObjectEntry(path, overrides).apply_overrides(load_config(path))
+    return _Reader(data, path, replace_package(path), robot_description).read()
 
 
 def load_world_dict(data: Mapping[str, Any], file: str, robot_description: str | None = None) -> LoadedWorld:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import inspect
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, ValidationInfo, create_model
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, ValidationInfo, create_model, model_validator
 
 from custom_ros_tools.schema import (
     AlsoTakes,
@@ -15,15 +15,22 @@ from custom_ros_tools.schema import (
     FrameId,
     Hz,
     HzOrOff,
+    KeyedError,
     ListOf,
     NonNegative,
     Pixels,
+    Position,
+    Quat,
     Seconds,
     Switch,
     Text,
+    Unit,
+    Vec3,
     optional,
 )
+from custom_ros_tools.transforms import quat_of
 from rpbi.constraints.attachment_config import AttachmentConfig
+from rpbi.geometry import Pose
 
 from .asset_files import find_folder
 from .object_entry import FileOrOverrides
@@ -62,6 +69,36 @@ Folders = Annotated[
     BeforeValidator(_as_list),
     AlsoTakes({"type": "string", "minLength": 1}),
 ]
+
+
+WORLD_FRAME = "rpbi/world"
+"""The TF frame that all poses are in."""
+
+
+class FramePose(ConfigModel):
+    """A TF frame that nobody else publishes, and where it is; the interface puts it on TF as a static one."""
+
+    tf_id: FrameId = Field(description="Name of the frame.")
+    parent: FrameId = Field(WORLD_FRAME, description="The frame that its pose is in.")
+    position: Position = Field((0.0, 0.0, 0.0), description="Its position.")
+    orientation: Quat | None = optional("Its orientation, x, y, z, w; none by default.")
+    rpy: Annotated[Vec3, Unit("rad")] | None = optional(
+        "Its orientation in other words: roll, pitch and yaw, about the fixed x, y and z one after the other."
+    )
+
+    @model_validator(mode="after")
+    def _is_somewhere_in_one_way(self) -> Self:
+        if self.tf_id in (WORLD_FRAME, self.parent):
+            raise KeyedError("tf_id", f"expected another frame than {WORLD_FRAME} and the parent, got '{self.tf_id}'")
+        if self.orientation is not None and self.rpy is not None:
+            raise KeyedError("rpy", "says the same as orientation: give one of both")
+        return self
+
+    @property
+    def pose(self) -> Pose:
+        """Its pose in the parent."""
+        x, y, z, w = quat_of(self.rpy).tolist() if self.rpy else self.orientation or (0.0, 0.0, 0.0, 1.0)
+        return Pose(self.position, (x, y, z, w))
 
 
 class WorldConfig(ConfigModel):
@@ -113,6 +150,7 @@ class WorldConfig(ConfigModel):
     visualizer_image_width: Pixels = Field(640, description="Columns of that image.")
     visualizer_image_height: Pixels = Field(480, description="Its rows.")
     markers_hz: HzOrOff = Field(10.0, description="How often `rpbi/markers` is looked after, in wall time; 0 is off.")
+    poses: ListOf[FramePose] = Field((), description="Where TF frames are that nobody else publishes.")
     attachments: ListOf[AttachmentConfig] = Field((), description="What holds what from the start on.")
     objects: ListOf[FileOrOverrides] = Field(
         (), description="Files of objects of your own types, see docs/extending.md."
@@ -126,6 +164,35 @@ class WorldConfig(ConfigModel):
         "Camera of colour, depth and segmentation; the first one if there are several."
     )
     rgbd_sensors: ListOf[FileOrOverrides] = Field((), description="Files of further cameras.")
+
+    @model_validator(mode="after")
+    def _frames_have_one_pose(self) -> Self:
+        parents: dict[str, str] = {}
+        for index, pose in enumerate(self.poses):
+            if pose.tf_id in parents:
+                raise KeyedError(f"poses[{index}].tf_id", f"'{pose.tf_id}' has a pose already")
+            above = pose.parent
+            while above in parents:
+                above = parents[above]
+            if above == pose.tf_id:
+                raise KeyedError(f"poses[{index}].parent", f"'{pose.parent}' hangs on '{pose.tf_id}' itself")
+            parents[pose.tf_id] = pose.parent
+        return self
+
+    def pose_of(self, frame: str) -> Pose | None:
+        """Returns where a TF frame is in the world, as far as `poses` says that; None if it does not."""
+        poses = {each.tf_id: each for each in self.poses}
+        pose = Pose()
+        while (frame := self.without_prefix(frame)) != WORLD_FRAME:
+            if frame not in poses:
+                return None
+            step = poses.pop(frame)
+            pose, frame = step.pose @ pose, step.parent
+        return pose
+
+    def without_prefix(self, frame: str) -> str:
+        """Returns the name of a TF frame without `tf_prefix`, if it has it."""
+        return frame if self.tf_prefix is None else frame.removeprefix(f"{self.tf_prefix}/")
 
     @classmethod
     def from_main_file(cls, content: WorldConfig) -> WorldConfig:

@@ -16,7 +16,7 @@ class Client:
 
     Args:
         mode: PyBullet's connection mode, such as `pybullet.DIRECT`.
-        options: Further arguments of `pybullet.connect`.
+        options: Further arguments of `pybullet.connect`, for other modes than DIRECT, which takes none.
 
     Raises:
         PhysicsError: If PyBullet does not connect.
@@ -24,7 +24,7 @@ class Client:
 
     def __init__(self, mode: int = pybullet.DIRECT, **options: Any) -> None:
         try:
-            self.client_id: int = pybullet.connect(mode, **options)
+            self.client_id: int = pybullet.connect(mode, **(options if mode != pybullet.DIRECT else {}))
         except pybullet.error as error:
             raise PhysicsError(f"PyBullet did not connect: {error}") from error
         self.has_window = mode != pybullet.DIRECT

@@ -11,6 +11,7 @@ from rpbi.config.loading import LoadedWorld
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.config.pybullet_world_models import PhysicsChange
 from rpbi.config.sensors import FIRST_TOPIC_NAME, RgbdSensorConfig
+from rpbi.config.world import WorldConfig
 from rpbi.constraints.attachments import Attachments
 from rpbi.control.pose_follower import PoseFollower
 from rpbi.plugins import blaming
@@ -85,6 +86,7 @@ class WorldContents:
         self.contacts = ContactReader(pb, self.bodies)
         self.attachments = Attachments(pb, self.bodies)
         self.log: list[LogEntry] = []
+        self._config = WorldConfig()
         self._filled_entries = 0
         """How many entries of the log are of filling it."""
 
@@ -112,6 +114,8 @@ class WorldContents:
                 raise
         except ConfigError as error:
             raise ConfigError([Problem(file or name, each.key, each.message) for each in error.problems]) from None
+        if body.object_tf is not None and (pose := self._config.pose_of(body.object_tf.tf_id)) is not None:
+            body.teleport(pose)
         if body.pose_follower is not None:
             self.stepping.append(body.pose_follower)
         if type(body).before_step is not Body.before_step:
@@ -171,6 +175,7 @@ class WorldContents:
             ConfigError: If something cannot be loaded; then all of the rest is there.
         """
         inputs_before = self.inputs
+        self._config = loaded.config
         self._append(LogEntry("", "world", loaded.config))
         problems: list[Problem] = []
         for item in loaded.objects:
@@ -220,6 +225,8 @@ class WorldContents:
     def _take_camera(self, camera: RgbdSensor) -> None:
         self.cameras = {**self.cameras, camera.name: camera}
         self._register(camera.name, (camera,), camera.inputs())
+        if camera.pose is None:
+            camera.pose = self._config.pose_of(camera.config.object_tf.tf_id)
 
     def _require_new(self, name: str, file: str | None) -> None:
         if name in self.sensors:

@@ -15,6 +15,7 @@ from rpbi.geometry import Pose, normalized
 from rpbi.urdf.document import MOVING, UrdfDocument
 from rpbi.urdf.files import write_description
 from rpbi.urdf.joints import Joint
+from rpbi.urdf.loading import flags_for
 
 from .chain import Chain, Target
 from .limits import Limits
@@ -131,7 +132,10 @@ class Kinematics:
         """Returns all joints in the order in which PyBullet loads them."""
         pb = self._pb
         body_id = pb.loadURDF(
-            write_description(self._document.bare()), useFixedBase=True, globalScaling=self._scaling, flags=flags
+            write_description(self._document.bare()),
+            useFixedBase=True,
+            globalScaling=self._scaling,
+            flags=flags_for(self._document, flags),
         )
         joints = Joint.all_of(pb, body_id)
         self._root_link = pb.getBodyInfo(body_id)[0].decode()

@@ -1,10 +1,14 @@
 """Headers of messages: names of TF frames, and stamps of the world's clock."""
 
+from collections.abc import Container
+
 import genpy
 
+from rpbi.config.world import WORLD_FRAME
 from rpbi.engine.clock import NS_PER_S
 
 _prefix = ""
+_own_frames: Container[str] = ()
 
 FRAMES = {
     "rpbi/world": "The world, parent of all others. Poses in YAML, topics and services are in it.",
@@ -21,6 +25,17 @@ def use_prefix(prefix: str | None) -> None:
     _prefix = f"{prefix}/" if prefix else ""
 
 
+def use_own_frames(frames: Container[str]) -> None:
+    """Takes these frames, without prefix, for those of this node's world wherever YAML names them."""
+    global _own_frames
+    _own_frames = frames
+
+
+def named_frame(frame: str) -> str:
+    """Returns the full name of a frame that YAML names: with the prefix if it is one of this node's world."""
+    return prefixed(frame) if frame in _own_frames else frame
+
+
 def prefixed(frame: str) -> str:
     """Returns the full name of a frame of this node's world, such as `rpbi/kuka_lwr`."""
     return _prefix + frame
@@ -28,7 +43,7 @@ def prefixed(frame: str) -> str:
 
 def world_frame() -> str:
     """Returns the frame that all poses are in: `rpbi/world`, with the prefix if there is one."""
-    return prefixed("rpbi/world")
+    return prefixed(WORLD_FRAME)
 
 
 def to_ros_time(stamp_ns: int) -> genpy.Time:

@@ -1,6 +1,7 @@
 """The simulator node: a world with ROS around it."""
 
 import logging
+import os
 import sys
 import threading
 from collections.abc import Callable
@@ -15,34 +16,49 @@ from custom_ros_tools.ros.buffered_socket import send_at_once
 from custom_ros_tools.ros.lifecycle.parameters import kept_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from rpbi.config.asset_files import ROBOT_DESCRIPTION
-from rpbi.config.loading import load_world_dict
+from rpbi.config.loading import LoadedWorld, load_world, load_world_dict
 from rpbi.ros.publishers.attachments import AttachmentPublisher
 from rpbi.ros.publishers.sample_publishers import SamplePublishers
+from rpbi.ros.publishers.static_frames import StaticFrames
 from rpbi.ros.publishers.world_markers import WorldMarkers
+from rpbi.ros.reference.interface_table import endpoints
 from rpbi.ros.services.node_services import NODE_SERVICES, NodeContext
 from rpbi.ros.window.topics import WindowTopics
 from rpbi.urdf.files import write_description
 from rpbi.world import World
 
 from .endpoints import serve
-from .headers import use_prefix
+from .headers import use_own_frames, use_prefix
 from .initial_state import start_where_robots_are
 from .object_lifecycle import ObjectLifecycle
 from .requests import Requests
 from .simulation import Simulation
 
 
-def config_parameter() -> dict[str, Any]:
-    """Returns the main configuration, `~config`.
+def configured_world(robot_description: str | None) -> LoadedWorld:
+    """Reads the world that `~config_file` names, with what `~config` says in its place, or that of `~config` alone.
+
+    Args:
+        robot_description: File that the word `robot_description` stands for.
 
     Raises:
-        ConfigError: If there is none.
+        ConfigError: If there is none, or with all that is wrong with it.
     """
-    config = rospy.get_param("~config", None)
-    if config is None:
-        how = 'load it with <rosparam param="config" file="WORLD.yaml"/> inside the <node>'
+    file, config = (rospy.get_param(name, None) for name in ("~config_file", "~config"))
+    if file is None and config is None:
+        how = 'load it with <rosparam param="config" file="WORLD.yaml"/> inside the <node>, or name it by ~config_file'
         raise ConfigError([Problem("~config", "", f"missing: expected the main configuration; {how}")])
-    return config
+    if file is None:
+        return load_world_dict(config, "~config", robot_description)
+    if not isinstance(file, str) or not file:
+        raise ConfigError([Problem("~config_file", "", f"expected a file name, got {file!r}")])
+    if not isinstance(config, dict | None):
+        message = f"expected a mapping of keys to values, got {type(config).__name__}"
+        raise ConfigError([Problem("~config", "", message)])
+    folder = str(rospy.get_param("~working_directory", "")).rstrip("\n")
+    if not file.startswith(("{", "package://")):
+        file = os.path.join(folder, file)
+    return load_world(file, robot_description, config or {})
 
 
 def parameter_above(name: str) -> Any:
@@ -64,7 +80,7 @@ sys.setswitchinterval(0.0005)
 
 
 class SimulatorNode:
-    """Builds the world of `~config` and connects everything in it to ROS.
+    """Builds the configured world and connects everything in it to ROS.
 
     Raises:
         ConfigError: If the configuration is wrong; it has everything that is.
@@ -74,8 +90,7 @@ class SimulatorNode:
     def __init__(self) -> None:
         urdf = parameter_above("robot_description")
         description = None if urdf is None else write_description(urdf)
-        loaded = load_world_dict(config_parameter(), "~config", description)
-        loaded = start_where_robots_are(loaded)
+        loaded = start_where_robots_are(configured_world(description))
         config = loaded.config
         use_prefix(config.tf_prefix)
         simulated = bool(parameter_above("use_sim_time"))
@@ -85,6 +100,9 @@ class SimulatorNode:
                 config.real_time_factor,
             )
         self._world = World(loaded, simulated)
+        endpoints(self._world)  # refuses what `./rpbi check` refuses
+        use_own_frames(self._world.frames())
+        self._frames = StaticFrames(config.poses)
         trust_only({"rpbi", *config.trusted_packages}, "name its package in trusted_packages of the main file")
         publishers = SamplePublishers(self._world)
         for name in self._world.bodies:

@@ -26,7 +26,13 @@ class Parameter(NamedTuple):
 
 
 PARAMETERS = (
-    Parameter("~config", False, "The main YAML file as a mapping; required."),
+    Parameter("~config_file", False, "The main YAML file; a relative path is looked for in `~working_directory`."),
+    Parameter("~working_directory", False, "Folder that a relative `~config_file` is in."),
+    Parameter(
+        "~config",
+        False,
+        "The main YAML file as a mapping, or with `~config_file` the keys that differ; one of both is required.",
+    ),
     Parameter(
         "use_sim_time", False, "Whether stamps are the world's time, else wall time; from here or a namespace above."
     ),

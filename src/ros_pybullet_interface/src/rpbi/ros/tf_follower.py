@@ -18,7 +18,7 @@ from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Pose
 from rpbi.plugins import is_foreign
 
-from .headers import world_frame
+from .headers import named_frame, world_frame
 
 TF_MISSING_AFTER_S = 5.0
 """How long a TF frame may be missing before that is worth a warning [s] of wall time."""
@@ -84,7 +84,7 @@ class Followed:
 
     def __init__(self, name: str, slot: str, pose_input: PoseInput) -> None:
         self.name, self.slot, self.pose_input = name, slot, pose_input
-        self.tf_id = pose_input.tf_id
+        self.tf_id = named_frame(pose_input.tf_id)
         self.period_s = 1.0 / pose_input.hz
         self.since_s = time.monotonic()
         self.looked_s = self.news_s = -math.inf

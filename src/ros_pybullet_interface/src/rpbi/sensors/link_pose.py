@@ -16,6 +16,9 @@ class LinkPoseSensor(Sensor):
     Args:
         links: Whether to tell every link as `rpbi/NAME/LINK`; otherwise the root link alone.
         root_frame: TF frame of the root link; without it, it is as any link's.
+
+    Attributes:
+        frames: TF frames of its poses, without prefix, that of the root link first.
     """
 
     sample_type = LinkPoseSample
@@ -25,7 +28,7 @@ class LinkPoseSensor(Sensor):
         self._body = body
         self._indices = body.link_indices if links else ()
         self.root_frame = root_frame or f"rpbi/{body.name}/{body.root_link}"
-        self._frames = (self.root_frame, *(f"rpbi/{body.name}/{body.link_name(index)}" for index in self._indices))
+        self.frames = (self.root_frame, *(f"rpbi/{body.name}/{body.link_name(index)}" for index in self._indices))
 
     def read(self, tick: int) -> LinkPoseSample:
         """Reads the base and all links."""
@@ -34,6 +37,6 @@ class LinkPoseSensor(Sensor):
         if not math.isfinite(sum(base.position)):
             raise PhysicsError(f"{self.name}: pose is not finite any more at tick {tick}: {base.position}")
         if not self._indices:
-            return LinkPoseSample(self.name, self._frames, (base,))
+            return LinkPoseSample(self.name, self.frames, (base,))
         states = pb.getLinkStates(body_id, self._indices, computeForwardKinematics=1)
-        return LinkPoseSample(self.name, self._frames, (base, *(Pose(state[4], state[5]) for state in states)))
+        return LinkPoseSample(self.name, self.frames, (base, *(Pose(state[4], state[5]) for state in states)))

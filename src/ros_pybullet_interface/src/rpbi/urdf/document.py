@@ -446,4 +446,5 @@ def _words(vector: Vector) -> str:
 
 
 def _text(element: Element) -> str:
-    return ElementTree.tostring(element, encoding="unicode")
+    """Returns the text of an element, with a line for each tag: PyBullet cannot read very long lines."""
+    return ElementTree.tostring(element, encoding="unicode").replace("><", ">\n<")

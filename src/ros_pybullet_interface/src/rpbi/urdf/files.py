@@ -85,9 +85,9 @@ def description_for_ros(path: str) -> str:
     source = Path(path)
 
     def address(match: re.Match[str]) -> str:
-        mesh = match["path"]
+        mesh = _with_two_slashes(match["path"])
         if "://" in mesh and not _is_of_unknown_package(mesh):
-            return match[0]
+            return f"{match['before']}{match['quote']}{mesh}{match['quote']}"
         file = mesh_file(mesh, source) if _is_of_unknown_package(mesh) else source.parent / mesh
         return f"{match['before']}{match['quote']}file://{file.resolve()}{match['quote']}"
 
@@ -100,6 +100,7 @@ def mesh_file(mesh: str, source: Path) -> Path:
     Raises:
         ConfigError: If it belongs to an unknown package or does not exist.
     """
+    mesh = _with_two_slashes(mesh)
     if _is_of_unknown_package(mesh):
         # PyBullet takes package://FOLDER/FILE for a folder beside the URDF or above it, and its own robots use that.
         found = beside_or_above(mesh.removeprefix(PACKAGE), source.resolve())
@@ -118,6 +119,11 @@ def beside_or_above(name: str, source: Path) -> Path | None:
     """Returns where PyBullet finds a file that a URDF names: beside it or in a folder above."""
     files = (folder / name for folder in source.absolute().parents)
     return next((file for file in files if file.is_file()), None)
+
+
+def _with_two_slashes(mesh: str) -> str:
+    """Returns what a URDF says of a mesh with `package://PACKAGE` for `package:///PACKAGE`, which some URDFs have."""
+    return f"{PACKAGE}{mesh.removeprefix(PACKAGE).lstrip('/')}" if mesh.startswith(PACKAGE) else mesh
 
 
 def _is_of_unknown_package(mesh: str) -> bool:

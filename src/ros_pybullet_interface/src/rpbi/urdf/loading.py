@@ -21,9 +21,13 @@ from .structure import structure_problems, texts_for_numbers
 
 log = logging.getLogger(__name__)
 
+MOST_JOINTS = 127
+"""Joints of a robot that PyBullet can tell of, fixed ones too."""
 MESH_FORMATS = (".obj", ".stl", ".dae", ".cdf")
 MOST_PROBLEMS = 20
 """So many faults of one file are told."""
+OTHER_FORMATS = {"sdf": "SDF", "world": "SDF", "gazebo": "SDF", "mujoco": "MJCF"}
+"""Formats of robots that are not read, by the element at the top of their files."""
 PLACEHOLDER_FACTOR = 10.0
 """Moments of inertia this many times what a link's size allows are taken for placeholders."""
 
@@ -39,6 +43,8 @@ def urdf_problems(path: str) -> list[str]:
         document = UrdfDocument(path)
     except ConfigError as error:
         return [str(error).replace(": is not XML", " is not XML")]
+    if document.tag in OTHER_FORMATS:
+        return [f"{path} is {OTHER_FORMATS[document.tag]}, not URDF; docs/robots.md says how to make a URDF of it"]
     if document.tag != "robot":
         return [f"{path}: expected <robot> at the top, got <{shortened(document.tag)}>"]
     if not document.links and not document.is_soft:
@@ -116,10 +122,14 @@ def load_urdf(
             log.warning("%s: expected numbers, PyBullet takes these for 0: %s", name, ", ".join(texts[:3]))
         if pb.has_window and (text := document.for_window()) is not None:
             prepared = write_description(text)
-        if not inertia_from_urdf:
-            return int(pb.loadURDF(**{**arguments, "fileName": prepared}))
-        flags = (arguments.get("flags") or 0) | pybullet.URDF_USE_INERTIA_FROM_FILE
+        flags = arguments.get("flags") or 0
+        flags = flags_for(document, flags)
+        _warn_of_merging(name, document, flags & ~(arguments.get("flags") or 0))
+        if inertia_from_urdf:
+            flags |= pybullet.URDF_USE_INERTIA_FROM_FILE
         body_id = int(pb.loadURDF(**{**arguments, "fileName": prepared, "flags": flags}))
+        if not inertia_from_urdf:
+            return body_id
         _complete_inertias(pb, name, body_id, document.links_without_inertial, arguments.get("globalScaling") or 1.0)
         return body_id
     except ConfigError as error:
@@ -127,6 +137,20 @@ def load_urdf(
     except (pybullet.error, OSError, UnicodeDecodeError) as error:
         messages = [f"PyBullet could not load it: {error}"]
     raise ConfigError([Problem(name, "loadURDF.fileName", message) for message in messages])
+
+
+def flags_for(document: UrdfDocument, flags: int) -> int:
+    """Returns the flags by which PyBullet takes a URDF: of one with too many joints it merges the fixed ones.
+
+    PyBullet loads more than 127, but then tells neither of joints nor of links where they are.
+    """
+    return flags | (pybullet.URDF_MERGE_FIXED_LINKS if len(document.joint_types) > MOST_JOINTS else 0)
+
+
+def _warn_of_merging(name: str, document: UrdfDocument, added_flags: int) -> None:
+    if added_flags & pybullet.URDF_MERGE_FIXED_LINKS:
+        message = "%s: %d joints are more than the %d that PyBullet takes: fixed ones are left out, with their links"
+        log.warning(message, name, len(document.joint_types), MOST_JOINTS)
 
 
 def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[str], scaling: float) -> None:

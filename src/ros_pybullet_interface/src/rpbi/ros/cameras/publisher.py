@@ -18,6 +18,7 @@ from rpbi.render.client import RenderClient
 from rpbi.render.depth import DepthNoise
 from rpbi.render.frame import Camera
 from rpbi.render.priority import take_part
+from rpbi.ros.headers import named_frame
 from rpbi.samples import SceneSample
 from rpbi.sensors.rgbd import RgbdSensor
 from rpbi.world import World
@@ -67,7 +68,7 @@ class ScenePublisher:
             if not self._renderer.knows_demand(name):
                 self._wait_for(partial(self._renderer.knows_demand, name), name, "the renderer is not up")
             if sensor.pose is None and sensor.wanted:
-                missing = f"there is no TF to '{sensor.config.object_tf.tf_id}'"
+                missing = f"there is no TF to '{named_frame(sensor.config.object_tf.tf_id)}'"
                 self._wait_for(partial(_is_placed_or_unwanted, sensor), name, missing)
 
     def publish(self, sample: SceneSample, stamp_ns: int) -> None:
@@ -157,7 +158,7 @@ def _camera(sensor: RgbdSensor) -> Camera:
         noise = DepthNoise(config.depth_noise_m, config.depth_noise_growth_per_m, seed)
     return Camera(
         sensor.name,
-        config.object_tf.tf_id,
+        named_frame(config.object_tf.tf_id),
         Intrinsics(size.width, size.height, size.fov, near_m, far_m),
         sensor.topic_name,
         config.pointcloud,

@@ -14,7 +14,7 @@ from rpbi.bodies import Body
 from rpbi.bodies.visual_shapes import BodyShape, ShapeKind, body_shapes, followed_frame, link_frame, link_pose
 from rpbi.geometry import Pose
 from rpbi.ros.endpoints import Topic
-from rpbi.ros.headers import prefixed, world_frame
+from rpbi.ros.headers import named_frame, prefixed, world_frame
 from rpbi.world import World
 
 MARKER_TYPES = {
@@ -121,7 +121,8 @@ class WorldMarkers:
 
     def _add(self, key: _Key, body: Body, shape: BodyShape) -> None:
         own = link_frame(body, self._world.sensors_of(body.name), shape.link)
-        frame = followed_frame(body) if own is None else prefixed(own)
+        followed = followed_frame(body)
+        frame = prefixed(own) if own else named_frame(followed) if followed else None
         pose = shape.pose_in_link
         if frame is None:
             frame = world_frame()

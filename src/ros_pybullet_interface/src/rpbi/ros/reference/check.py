@@ -11,34 +11,62 @@ from custom_ros_tools.errors import InterfaceError
 from rpbi.bodies import kind_of
 from rpbi.config.loading import load_world
 from rpbi.world import World
+from rpbi.world_warnings import world_warnings
 
 from .interface_table import Endpoint, endpoints
 
 
 def main() -> None:
-    """Runs the command; exits with 1 if the world has problems."""
+    """Runs the command; exits with 1 if the world has errors."""
     parser = argparse.ArgumentParser(prog="./rpbi check", description="Finds all problems of a world.")
     parser.add_argument("world", metavar="WORLD.yaml", help="main YAML file; {package}/path is resolved")
     path = parser.parse_args().world
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # so that it may be piped into `head`
-    logging.basicConfig(format="warning: %(message)s", level=logging.WARNING)
+    warnings = _Warnings()
+    logging.getLogger().addHandler(warnings)
     try:
         world = World(load_world(path), connection_mode=pybullet.DIRECT)
         listed = endpoints(world)
     except InterfaceError as error:
         problems = str(error).splitlines()
-        print("\n".join(problems), file=sys.stderr)
-        print(f"{path}: {len(problems)} problem{'s' if len(problems) > 1 else ''}", file=sys.stderr)
+        print("\n".join(f"error: {problem}" for problem in problems), file=sys.stderr)
+        print(f"{path}: {_counted(len(problems), 'error')}{warnings.counted()}", file=sys.stderr)
         sys.exit(1)
     except MemoryError as error:
         print(f"{path}: out of memory: {error or 'is there a limit, such as ulimit -v?'}", file=sys.stderr)
         sys.exit(1)
-    _print(path, world, listed)
+    for warning in world_warnings(world):
+        warnings.tell(str(warning))
+    _print(path, world, listed, warnings.counted())
     world.close()
 
 
-def _print(path: str, world: World, listed: list[Endpoint]) -> None:
-    print(f"{path}: fine; {1.0 / world.clock.dt_s:g} ticks a second")
+class _Warnings(logging.Handler):
+    """Prints warnings, also those that are logged, and counts them."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self._count = 0
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.tell(record.getMessage())
+
+    def tell(self, message: str) -> None:
+        """Prints a warning."""
+        self._count += 1
+        print(f"warning: {message}", file=sys.stderr)
+
+    def counted(self) -> str:
+        """Returns how many there were, to be put at the end of a line."""
+        return f", {_counted(self._count, 'warning')}" if self._count else ""
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def _print(path: str, world: World, listed: list[Endpoint], warnings: str) -> None:
+    print(f"{path}: fine; {1.0 / world.clock.dt_s:g} ticks a second{warnings}")
     for name, body in world.bodies.items():
         joints = f", {len(body.link_indices)} joints" if body.link_indices else ""
         print(f"  {kind_of(body):<12} {name}{joints}")

@@ -31,8 +31,8 @@ CAMERAS = """\
 named after the simulator with `_camera` behind. Nothing is drawn that nobody subscribes to. The rate is `hz` of the
 camera, see [cameras.md](cameras.md)."""
 FOLLOWED = """\
-All have the prefix `tf_prefix` of the main file, if there is one. The node listens to TF where `object_tf` names a
-frame that a body or camera follows."""
+All have the prefix `tf_prefix` of the main file, if there is one, as have the frames under `poses`. The node listens to
+TF where `object_tf` names a frame that a body or camera follows."""
 OTHERS = """\
 The nodes of custom_ros_tools, which remap joint states and publish transforms and markers, are told in
 [custom_ros_tools.md](custom_ros_tools.md#nodes). The commands of rpbi_utils have no topics of their own, see

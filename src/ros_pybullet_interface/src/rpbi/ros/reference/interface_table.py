@@ -1,8 +1,9 @@
 """Which topics and services a world has, without starting anything."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
+from custom_ros_tools.errors import ConfigError, Problem
 from rpbi.bodies import Body
 from rpbi.engine.inputs import PoseInput
 from rpbi.ros.cameras.topics import camera_topics
@@ -10,6 +11,7 @@ from rpbi.ros.endpoints import Service, Topic
 from rpbi.ros.inputs import topic_input
 from rpbi.ros.node_topics import NODE_TOPICS
 from rpbi.ros.publishers.sample_topics import sample_topic
+from rpbi.ros.publishers.static_frames import TF_STATIC
 from rpbi.ros.publishers.topic_publisher import TF
 from rpbi.ros.publishers.world_markers import MARKERS
 from rpbi.ros.robots.trajectory_action import ACTION
@@ -50,14 +52,32 @@ def endpoints(world: World) -> list[Endpoint]:
     """Lists what the node opens for a world.
 
     Raises:
-        ConfigError: If a class of another package has no topic that can be found.
+        ConfigError: If a class of another package has no topic that can be found, or two things would have one name.
     """
     listed = [*_node_topics(world), *_window(world)]
+    if world.config.poses:
+        listed.append(_topic(PUBLISHES, TF_STATIC, ""))
     for name, body in world.bodies.items():
         listed += of_body(world, name, body)
     for name in world.cameras:
         listed += of_camera(world, name)
-    return listed + [_service(each) for each in NODE_SERVICES]
+    listed += [_service(each) for each in NODE_SERVICES]
+    _refuse_clashes(world.loaded.file, listed)
+    return listed
+
+
+def _refuse_clashes(file: str, listed: Iterable[Endpoint]) -> None:
+    """Raises a ConfigError if two topics or services of different meaning have one name; TF is of all bodies."""
+    by_name: dict[tuple[str, str], Endpoint] = {}
+    problems = []
+    for each in listed:
+        first = by_name.setdefault((each.kind, each.name), each)
+        if first is not each and each.kind != FOLLOWS and each.name != TF.name:
+            types = f"as {first.type} and as {each.type}" if first.type != each.type else f"twice as {each.type}"
+            message = f"the node {each.kind} {each.name} {types}: give what it is named after another name"
+            problems.append(Problem(file, "", message))
+    if problems:
+        raise ConfigError(problems)
 
 
 def of_body(world: World, name: str, body: Body) -> Iterator[Endpoint]:

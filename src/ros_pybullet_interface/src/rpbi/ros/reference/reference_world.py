@@ -20,6 +20,7 @@ _MAIN = {
     "enable_keyboard_publisher": True,
     "enable_mouse_publisher": True,
     "publish_visualizer_image_hz": 10.0,
+    "poses": [{"tf_id": FOLLOWED}],
 }
 _CAMERA = {"name": "camera", "pointcloud": True, "object_tf": {"tf_id": FOLLOWED}}
 

@@ -1,0 +1,160 @@
+"""What is probably not meant in a world, although it can be built."""
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import pybullet
+
+from custom_ros_tools.errors import Problem, closest, hint
+from rpbi.bodies import Body
+from rpbi.bodies.robots.jointed import JointedBody
+from rpbi.bodies.robots.robot_config import RobotConfig
+from rpbi.config.world import WORLD_FRAME
+from rpbi.engine.inputs import PoseInput
+from rpbi.sensors.link_pose import LinkPoseSensor
+from rpbi.urdf.joints import Joint
+from rpbi.world import World
+
+TOUCHING_M = 1e-3
+"""Bodies that are in each other by less only touch: PyBullet has margins around meshes."""
+
+
+def world_warnings(world: World) -> list[Problem]:
+    """Returns what looks wrong at the start of a world that has made no step yet, by the files that say it."""
+    return [*_Frames(world).warnings(), *_gravity(world), *_limits(world), *_topics(world), *_overlaps(world)]
+
+
+def _file_of(world: World, name: str) -> str:
+    """Returns the file of a body or camera."""
+    files = {item.config.name: item.file for item in world.loaded.objects}
+    return {**files, **{camera.config.name: camera.file for camera in world.loaded.cameras}}[name]
+
+
+def _gravity(world: World) -> Iterator[Problem]:
+    if any(world.pb.gravity) or "setGravity" in world.config.model_fields_set:
+        return
+    free = [name for name, body in world.bodies.items() if not _is_still(body, -1)]
+    if free:
+        message = f"missing, so there is no gravity, and {', '.join(free)} will not fall; write {{gravZ: -9.81}}, or 0"
+        yield Problem(world.loaded.file, "setGravity", message)
+
+
+def _limits(world: World) -> Iterator[Problem]:
+    for name, body in world.bodies.items():
+        if body.is_soft:
+            continue
+        joints = [joint for joint in Joint.all_of(body.pb, body.body_id) if joint.is_driven]
+        states = body.pb.getJointStates(body.body_id, [joint.index for joint in joints]) if joints else ()
+        for joint, (position, *_) in zip(joints, states):
+            if not joint.allows(position):
+                key = f"initial_joint_position.{joint.name}" if isinstance(body, JointedBody) else "loadURDF.fileName"
+                message = f"at the start, {joint.limit_violation(position)}"
+                yield Problem(_file_of(world, name), key, message)
+
+
+def _topics(world: World) -> Iterator[Problem]:
+    for item in world.loaded.objects:
+        topic = item.config.initial_joint_state_topic if isinstance(item.config, RobotConfig) else None
+        if topic:
+            message = f"the world only starts if joint states come on {topic}"
+            yield Problem(item.file, "initial_joint_state_topic", message)
+
+
+def _overlaps(world: World) -> Iterator[Problem]:
+    """Yields a warning for each pair of bodies that are in each other, unless nothing can push them apart."""
+    solid = [body for body in world.bodies.values() if _has_place(world, body)]
+    for one, other in combinations(solid, 2):
+        found = world.pb.getClosestPoints(one.body_id, other.body_id, 0.0)
+        depths = {(point[3], point[4]): -point[8] for point in sorted(found, key=lambda point: -point[8])}
+        depths = {links: depth for links, depth in depths.items() if not _are_still(one, other, *links)}
+        if depths and (deepest := max(depths.items(), key=lambda item: item[1]))[1] > TOUCHING_M:
+            (link, other_link), depth = deepest
+            parts = f"{_named(one, link)} and {_named(other, other_link)} are in each other by {depth:.2g} m"
+            yield Problem(_file_of(world, one.name), "", f"at the start, {parts}, and will be pushed apart")
+
+
+def _has_place(world: World, body: Body) -> bool:
+    """Tells whether a body is felt, and is where it will be: not where another node's frame will take it from."""
+    is_placed = body.object_tf is None or world.config.pose_of(body.object_tf.tf_id) is not None
+    return body.has_physics and not body.is_soft and is_placed
+
+
+def _named(body: Body, link: int) -> str:
+    return f"'{body.name}'" if not body.joint_indices else f"'{body.name}/{body.link_name(link)}'"
+
+
+def _are_still(one: Body, other: Body, link: int, other_link: int) -> bool:
+    return _is_still(one, link) and _is_still(other, other_link)
+
+
+def _is_still(body: Body, link: int) -> bool:
+    """Tells whether a link stays where it is, whatever pushes it: the base if it is fixed, and what is fixed to it."""
+    if body.is_soft:
+        return False
+    if not body.has_physics:
+        return True
+    while link >= 0:
+        info = body.pb.getJointInfo(body.body_id, link)
+        if info[2] != pybullet.JOINT_FIXED:
+            return False
+        link = info[16]
+    load = getattr(getattr(body, "config", None), "loadURDF", None)
+    return bool(load is not None and load.useFixedBase) or body.dynamics_info(-1)[0] == 0.0
+
+
+class _Frames:
+    """The TF frames that a world publishes, and those that it follows."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._published = world.frames()
+        self._followed = {slot: each for slot, each in world.inputs.items() if isinstance(each, PoseInput)}
+
+    def warnings(self) -> Iterator[Problem]:
+        """Yields a warning for each frame that somebody needs and nobody publishes, or two do."""
+        main = self._world.loaded.file
+        for index, each in enumerate(self._world.config.poses):
+            key = f"poses[{index}]"
+            owner = self._owner(each.tf_id)
+            if owner is not None and each.tf_id in self._links_on_tf(owner):
+                yield Problem(main, f"{key}.tf_id", f"'{owner.name}' publishes '{each.tf_id}' too")
+            if (missing := self._missing(each.parent)) is not None:
+                yield Problem(main, f"{key}.parent", missing)
+        for slot, followed in self._followed.items():
+            name = slot.split("/")[0]
+            if (missing := self._missing(followed.tf_id)) is not None:
+                yield Problem(_file_of(self._world, name), "object_tf.tf_id", f"'{name}' follows it: {missing}")
+
+    def _owner(self, frame: str) -> Body | None:
+        """Returns the body whose frame it is by its name, if that can publish any."""
+        parts = frame.split("/")
+        body = self._world.bodies.get(parts[1]) if len(parts) > 1 and parts[0] == "rpbi" else None
+        can_publish = isinstance(body, JointedBody) or hasattr(getattr(body, "config", None), "broadcast_hz")
+        return body if can_publish else None
+
+    def _links_on_tf(self, body: Body) -> set[str]:
+        """Returns the frames of a body, also those that robot_state_publisher makes of its joint states."""
+        frames: set[str] = set()
+        for sensor in self._world.sensors_of(body.name):
+            if isinstance(sensor, LinkPoseSensor):
+                frames.update(sensor.frames)
+                if sensor.frames == (f"rpbi/{body.name}/{body.root_link}",):
+                    frames.update(f"rpbi/{body.name}/{body.link_name(index)}" for index in body.link_indices)
+        return frames
+
+    def _missing(self, tf_id: str) -> str | None:
+        """Returns what is wrong with a frame that is needed, None if it is published."""
+        frame = self._world.config.without_prefix(tf_id)
+        missing = f"nothing here publishes the TF frame '{tf_id}'"
+        if frame in self._published:
+            return None
+        body = self._owner(frame)
+        if body is None:
+            match = closest(frame, self._published - {WORLD_FRAME})
+            question = f"; did you mean '{match}'?" if match else ""
+            return f"{missing}{question}; say where it is under `poses`, or have another node publish it"
+        frames = self._links_on_tf(body)
+        if frame in frames:
+            return None
+        key = "broadcast_link_states: true" if isinstance(body, JointedBody) else "broadcast_hz"
+        return missing + (hint(frame, frames) if frames else f"; '{body.name}' does with {key}")

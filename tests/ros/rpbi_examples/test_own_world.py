@@ -1,0 +1,103 @@
+"""A world of a user's own, by `./rpbi launch`."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+import rosgraph
+import rospy
+import tf2_ros
+from node_world import objects
+from ros_system import wait_until
+from visualization_msgs.msg import MarkerArray
+from worlds import FLOOR, box, write_world
+
+from ros_pybullet_interface.msg import SimulationState
+
+ROOT = Path(__file__).resolve().parents[3]
+TABLE_TOP_M = 0.5
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with a world in it, whose files name each other relatively."""
+    folder = tmp_path / "my world"
+    folder.mkdir()
+    table = {key: value for key, value in box("table", (0.3, 0.2, 0.25)).items() if key != "baseMass"}
+    write_world(
+        folder,
+        collision=(FLOOR, {**table, "object_tf": {"tf_id": "rpbi/table"}}),
+        dynamic=(box("cup", (0.02, 0.02, 0.05), basePosition=[0.6, 0.1, TABLE_TOP_M + 0.05], broadcast_hz=50.0),),
+        poses=[
+            {"tf_id": "rpbi/table", "position": [0.6, 0.0, 0.25], "rpy": [0.0, 0.0, math.pi / 2]},
+            {"tf_id": "rpbi/handle", "parent": "rpbi/cup", "position": [0.03, 0.0, 0.0]},
+        ],
+        connect={"connection_mode": "GUI"},  # which opens only when the launch file is told so
+    )
+    return folder
+
+
+def launch(ros, folder, world, **arguments):
+    """Runs a world as a user in a folder does."""
+    given = " ".join(f"{key}:={value}" for key, value in arguments.items())
+    return ros.start(["bash", "-c", f"cd '{folder}' && exec '{ROOT}/rpbi' launch '{world}' headless:=true {given}"])
+
+
+def come_up(ros, process, namespace):
+    """Waits until a world is up and returns the types of its objects by name."""
+    found = wait_until(lambda: process.poll() is not None or objects(ros, namespace), f"{namespace} is up")
+    assert process.poll() is None, ros.output(process)
+    return found
+
+
+def places():
+    """Returns what waits for a transform between two frames."""
+    buffer = tf2_ros.Buffer(debug=False)
+    listener = tf2_ros.TransformListener(buffer)
+
+    def look(parent, child):
+        try:
+            return buffer.lookup_transform(parent, child, rospy.Time(0)).transform
+        except tf2_ros.TransformException:
+            return None
+
+    def place(parent, child):
+        assert listener is not None  # it lives as long as this function
+        return wait_until(lambda: look(parent, child), f"there is TF from {parent} to {child}")
+
+    return place
+
+
+def test_two_of_one_file_run_on_one_master_each_with_its_own_frames(ros, folder):
+    left = launch(ros, folder, "world.yaml", ns="left", tf_prefix="left", use_sim_time="false")
+    path = folder / "world.yaml"
+    right = launch(ros, "/", path, ns="right", tf_prefix="right", use_sim_time="false", real_time_factor=0.5)
+    place = places()
+    for name, process, factor in (("left", left, 1.0), ("right", right, 0.5)):
+        assert come_up(ros, process, f"/{name}/") == {"floor": "collision", "table": "collision", "cup": "dynamic"}
+        state = ros.listen(f"/{name}/rpbi/state", SimulationState)
+        assert state.wait_for(1)[0].real_time_factor_asked == factor
+        table = place(f"{name}/rpbi/world", f"{name}/rpbi/table")
+        assert (table.translation.x, table.translation.z) == (0.6, 0.25)
+        assert (table.rotation.z, table.rotation.w) == pytest.approx((math.sqrt(0.5), math.sqrt(0.5)))
+        handle = place(f"{name}/rpbi/world", f"{name}/rpbi/handle")
+        assert handle.translation.x == pytest.approx(0.63, abs=1e-3)
+        assert handle.translation.z == pytest.approx(TABLE_TOP_M + 0.05, abs=2e-3), "the cup stands on the table"
+        markers = ros.listen(f"/{name}/rpbi/markers", MarkerArray).wait_for(1)[0].markers
+        frames = {marker.ns: marker.header.frame_id for marker in markers}
+        assert frames == {frame: f"{name}/rpbi/{frame}" for frame in ("table", "cup")} | {"floor": f"{name}/rpbi/world"}
+    assert "[WARN]" not in ros.output(left)
+    assert "/rpbi/status" not in [name for name, _ in rospy.get_published_topics()]
+
+
+def test_a_world_that_cannot_be_built_ends_the_launch_with_all_that_is_wrong(ros, folder):
+    (folder / "cup.yaml").write_text("name: cup\n")
+    process = launch(ros, folder, "world.yaml")
+    process.wait(60.0)
+    printed = ros.output(process)
+    assert "cup.yaml: baseMass: missing" in printed and "cup.yaml: createVisualShape: missing" in printed
+    assert "Traceback" not in printed
+    with pytest.raises(rosgraph.MasterError):
+        rosgraph.Master("/tests").lookupService("/rpbi/list_objects")

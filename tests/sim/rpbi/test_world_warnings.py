@@ -1,0 +1,138 @@
+"""What is probably not meant in a world is told, and nothing else."""
+
+from __future__ import annotations
+
+import pybullet
+import pytest
+from worlds import FLOOR, ball, box, iiwa, write_world
+
+from rpbi.world import World
+from rpbi.world_warnings import world_warnings
+
+GRAVITY = {"setGravity": {"gravZ": -9.81}}
+PIN = """<robot name="pin"><link name="base"/>
+<link name="rod"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="slide" type="prismatic"><parent link="base"/><child link="rod"/><axis xyz="0 0 1"/>
+<limit lower="0.1" upper="0.2" effort="1" velocity="1"/></joint></robot>"""
+
+
+@pytest.fixture
+def warnings_of(tmp_path):
+    """Returns the warnings of a world."""
+
+    def build(**parts) -> list[str]:
+        world = World.from_file(write_world(tmp_path, **parts), connection_mode=pybullet.DIRECT)
+        try:
+            return [str(warning).replace(f"{tmp_path}/", "") for warning in world_warnings(world)]
+        finally:
+            world.close()
+
+    return build
+
+
+def follower(name, tf_id, **more):
+    table = {key: value for key, value in box(name, **more).items() if key != "baseMass"}
+    return {**table, "object_tf": {"tf_id": tf_id}}
+
+
+def test_a_sound_world_has_none(warnings_of):
+    resting = box(basePosition=[1.0, 0.0, 0.1])  # on the floor
+    assert warnings_of(collision=(FLOOR,), dynamic=(resting,), robots=(iiwa(),)) == []
+
+
+def test_no_gravity_is_told_if_something_could_fall_and_nobody_says_that_it_is_meant(tmp_path, warnings_of):
+    weightless = {"name": "free", "loadURDF": {"fileName": "cube_small.urdf", "basePosition": [0, 0, 1]}}
+    path = write_world(tmp_path, dynamic=(ball(),), urdfs=(weightless,), robots=(iiwa(),), collision=(FLOOR,))
+    text = (tmp_path / "world.yaml").read_text().replace("setGravity:\n  gravZ: -9.81\n", "")
+    (tmp_path / "world.yaml").write_text(text)
+    world = World.from_file(path)
+    [told] = [str(each) for each in world_warnings(world) if each.key == "setGravity"]
+    world.close()
+    assert "no gravity, and ball, free will not fall" in told
+    assert not [each for each in warnings_of(dynamic=(ball(),), setGravity={"gravZ": 0.0}) if "gravity" in each]
+    assert warnings_of(robots=(iiwa(),), collision=(FLOOR,), setGravity={}) == []
+
+
+def test_bodies_in_each_other_are_told_with_the_depth(warnings_of):
+    low = box("low", basePosition=[1.0, 0.0, 0.06])
+    other = box("other", basePosition=[1.18, 0.0, 0.1])
+    told = warnings_of(collision=(FLOOR,), dynamic=(low, other), robots=(iiwa(),))
+    assert told == [
+        "floor.yaml: at the start, 'floor' and 'low' are in each other by 0.04 m, and will be pushed apart",
+        "low.yaml: at the start, 'low' and 'other' are in each other by 0.02 m, and will be pushed apart",
+    ]
+
+
+def test_the_link_of_a_robot_that_is_in_something_is_named_but_not_what_stands_still_anyway(warnings_of):
+    plinth = {**follower("plinth", "x"), "basePosition": [0.0, 0.0, -0.05]}  # the foot of the arm is in it
+    del plinth["object_tf"]
+    hit = ball("hit", radius_m=0.05, basePosition=[0.0, 0.0, 1.2])
+    told = warnings_of(collision=(plinth,), dynamic=(hit,), robots=(iiwa(),))
+    assert len(told) == 1 and "'hit' and 'iiwa/lbr_iiwa_link_" in told[0]
+
+
+def test_bodies_that_follow_a_frame_are_looked_at_where_the_main_file_puts_it(warnings_of):
+    table = follower("table", "rpbi/table")
+    thing = box("thing", basePosition=[3.0, 0.0, 0.15])
+    poses = [{"tf_id": "rpbi/table", "position": [3.0, 0.0, 0.0]}]
+    told = warnings_of(collision=(table,), dynamic=(thing,), poses=poses)
+    assert told == [
+        "table.yaml: at the start, 'table' and 'thing' are in each other by 0.05 m, and will be pushed apart"
+    ]
+    at_origin = box("thing", basePosition=[0.0, 0.0, 0.15])
+    assert warnings_of(collision=(table,), dynamic=(at_origin,), poses=poses) == []
+
+
+def test_frames_that_nobody_publishes_are_told_with_who_follows_them_and_what_to_do(warnings_of):
+    lone, near = follower("lone", "bench"), follower("near", "rpbi/tabel", basePosition=[9.0, 0.0, 0.0])
+    held, kept = follower("held", "rpbi/iiwa/lbr_iiwa_link_7"), follower("kept", "rpbi/ball")
+    camera = {"name": "eye", "object_tf": {"tf_id": "rpbi/iiwa/lbr_iiwa_link_9"}}
+    parts = {"collision": (lone, near, held, kept), "poses": [{"tf_id": "rpbi/table"}, {"tf_id": "p", "parent": "q"}]}
+    told = warnings_of(**parts, dynamic=(ball(basePosition=[5, 5, 5]),), robots=(iiwa(),), rgbd_sensor=camera)
+    nothing = "nothing here publishes the TF frame"
+    assert told == [
+        f"world.yaml: poses[1].parent: {nothing} 'q'; say where it is under `poses`, or have another node publish it",
+        f"lone.yaml: object_tf.tf_id: 'lone' follows it: {nothing} 'bench'; say where it is under `poses`, or have "
+        "another node publish it",
+        f"near.yaml: object_tf.tf_id: 'near' follows it: {nothing} 'rpbi/tabel'; did you mean 'rpbi/table'?; say where "
+        "it is under `poses`, or have another node publish it",
+        f"held.yaml: object_tf.tf_id: 'held' follows it: {nothing} 'rpbi/iiwa/lbr_iiwa_link_7'; 'iiwa' does with "
+        "broadcast_link_states: true",
+        f"kept.yaml: object_tf.tf_id: 'kept' follows it: {nothing} 'rpbi/ball'; 'ball' does with broadcast_hz",
+        f"world.yaml: object_tf.tf_id: 'eye' follows it: {nothing} 'rpbi/iiwa/lbr_iiwa_link_9'; 'iiwa' does with "
+        "broadcast_link_states: true",
+    ]
+    told = warnings_of(
+        **parts,
+        dynamic=(ball(basePosition=[5, 5, 5], broadcast_hz=10.0),),
+        robots=(iiwa(broadcast_link_states=True),),
+        rgbd_sensor=camera,
+    )
+    assert [warning.split(":")[0] for warning in told] == ["world.yaml", "lone.yaml", "near.yaml", "world.yaml"]
+    assert "'rpbi/iiwa/lbr_iiwa_link_9'; did you mean 'rpbi/iiwa/lbr_iiwa_link_" in told[-1]
+    twice = warnings_of(dynamic=(ball(broadcast_hz=10.0),), poses=[{"tf_id": "rpbi/ball"}])
+    assert twice == ["world.yaml: poses[0].tf_id: 'ball' publishes 'rpbi/ball' too"]
+
+
+def test_links_that_robot_state_publisher_makes_are_taken_to_be_there(warnings_of):
+    held = follower("held", "rpbi/iiwa/lbr_iiwa_link_7")
+    assert warnings_of(collision=(held,), robots=(iiwa(broadcast_root_tf_hz=10.0),)) == []
+
+
+@pytest.mark.parametrize("kind", ["robots", "urdfs"])
+def test_joints_that_start_beyond_their_limits_are_told(tmp_path, warnings_of, kind):
+    (tmp_path / "pin.urdf").write_text(PIN)
+    pin = {"name": "pin", "loadURDF": {"fileName": "pin.urdf", "useFixedBase": True}}
+    if kind == "robots":
+        pin["setJointMotorControlArray"] = {"controlMode": "POSITION_CONTROL"}
+    [told] = warnings_of(**{kind: (pin,)})
+    assert told.endswith("at the start, joint 'slide' must be within 0.1 to 0.2 m, got 0")
+    if kind == "robots":
+        assert warnings_of(robots=({**pin, "initial_joint_position": {"slide": 0.15}},)) == []
+
+
+def test_a_robot_that_waits_for_another_is_told(warnings_of):
+    [told] = warnings_of(robots=(iiwa(initial_joint_state_topic="real/joint_states"),))
+    assert (
+        told == "iiwa.yaml: initial_joint_state_topic: the world only starts if joint states come on real/joint_states"
+    )
