@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from custom_ros_tools.transforms import Array
 from rpbi.control.trajectories.trajectory import minimum_jerk
 from rpbi.geometry import Vector
 from rpbi.kinematics import Kinematics
@@ -32,6 +31,8 @@ PUSH_HEIGHT_M, TRAVEL_HEIGHT_M = 0.05, 0.25
 """Height of the ball [m] while it pushes, and above the box."""
 PUSH_SPEED, TRAVEL_SPEED = 0.15, 0.35
 """Mean speed of the ball [m/s]."""
+JOINT_SPEED = 0.8
+"""Mean speed of the joint that has farthest to go [rad/s], on the way from any posture."""
 SHORTEST_S = 0.5
 """Least time for a straight line [s]."""
 SPACING_M = 0.02
@@ -120,42 +121,42 @@ class Pusher:
         """
         here = self._kinematics.forward(positions, BALL).position
         before, after = push.beside(CLEARANCE_M), push.beside(CLEARANCE_M - math.dist(push.start, push.end))
-        corners = (
-            (here[0], here[1], TRAVEL_HEIGHT_M),
+        corners = [
             (*before, TRAVEL_HEIGHT_M),
             (*before, PUSH_HEIGHT_M),
             (*push.beside(GAP_M), PUSH_HEIGHT_M),
             (*push.end, PUSH_HEIGHT_M),
             (*after, PUSH_HEIGHT_M),
             (*after, TRAVEL_HEIGHT_M),
-        )
-        from_any_posture = CubicSpline((0.0, 1.0), (positions, self._solve(corners[0])))
-        up = Move(from_any_posture, _duration(math.dist(here, corners[0]), TRAVEL_SPEED))
-        return [
-            up,
-            *(
-                self._line(start, end, PUSH_SPEED if end[:2] == push.end else TRAVEL_SPEED)
-                for start, end in pairwise(corners)
-            ),
         ]
+        if here[2] < TRAVEL_HEIGHT_M - CLEARANCE_M:
+            corners.insert(0, (here[0], here[1], TRAVEL_HEIGHT_M))
+        lines = (
+            self._line(start, end, PUSH_SPEED if end[:2] == push.end else TRAVEL_SPEED)
+            for start, end in pairwise(corners)
+        )
+        return [self._approach(positions, corners[0]), *lines]
+
+    def _approach(self, positions: Sequence[float], point: Vector) -> Move:
+        """Returns the move from any posture [rad] to the one with the ball at a point [m]."""
+        ends = np.array((positions, self._solve(point)))
+        return Move(CubicSpline((0.0, 1.0), ends), max(np.abs(ends[1] - ends[0]).max() / JOINT_SPEED, SHORTEST_S))
 
     def _line(self, start: Vector, end: Vector, speed: float) -> Move:
         """Returns the move of the ball along a straight line [m] at a mean speed [m/s]."""
         length = math.dist(start, end)
         ways = np.linspace(0.0, 1.0, max(2, math.ceil(length / SPACING_M) + 1))
         points = np.outer(1.0 - ways, start) + np.outer(ways, end)
-        return Move(CubicSpline(ways, np.array([self._solve(point) for point in points])), _duration(length, speed))
+        return Move(
+            CubicSpline(ways, [self._solve(point) for point in points.tolist()]), max(length / speed, SHORTEST_S)
+        )
 
-    def _solve(self, point: Sequence[float] | Array) -> tuple[float, ...]:
+    def _solve(self, point: Sequence[float]) -> tuple[float, ...]:
         """Returns the joint positions [rad] with the ball at a point [m], always the same for the same point."""
-        posture = POSTURE.copy()
+        posture = POSTURE.tolist()
         posture[2] = ELBOW_LEAN * point[1]
         problem = PybulletProblem(BALL, point, POINTING_DOWN, currentPosition=posture, residualThreshold=1e-4)
         solution = self._kinematics.solve(problem)
         if not solution.success:
             raise ValueError(f"({point[0]:.2f}, {point[1]:.2f}, {point[2]:.2f}) m is out of reach: {solution.message}")
         return solution.positions
-
-
-def _duration(length: float, speed: float) -> float:
-    return max(length / speed, SHORTEST_S)

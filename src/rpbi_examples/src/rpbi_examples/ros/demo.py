@@ -34,7 +34,7 @@ from rpbi_examples.draw_rate import draw_rate_hz
 from rpbi_examples.process_tree import kill_with_children
 from rpbi_utils import Recorder, bag_to_dataframes
 
-from .moving_robots import HZ as TARGET_HZ
+from .joint_targets import HZ as TARGET_HZ
 
 EXAMPLE = "basic_example_kuka_lwr"
 WORLD = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"
