@@ -110,18 +110,20 @@ class World:
         self._note(config.name, "add", (kind, config))
         return body
 
-    def add_camera(self, config: RgbdSensorConfig, file: str | None = None) -> RgbdSensor:
+    def add_camera(self, config: RgbdSensorConfig | Mapping[str, Any], file: str | None = None) -> RgbdSensor:
         """Adds a camera; when it raises, the world is as it was.
 
         The first one, and the next to come once that has gone, has the topics `rpbi/camera/...`.
 
         Args:
-            config: What it is.
+            config: What it is, or what its YAML says.
             file: Where it came from, for messages; without it, they have the camera's name.
 
         Raises:
-            ConfigError: If the name is taken.
+            ConfigError: If the name is taken, or the mapping does not fit.
         """
+        if isinstance(config, Mapping):
+            config = RgbdSensorConfig.parse(config, file or str(config.get("name", "camera")))
         return self._contents.add_camera(config, file)
 
     def remove(self, name: str) -> None:
