@@ -80,8 +80,8 @@ class Demand(NamedTuple):
     """Who looks at a camera.
 
     Attributes:
-        streams: What is looked at, out of `colour`, `depth`, `segmentation`, `points` (which take colour and depth)
-            and `info`.
+        streams: What is looked at, out of `colour`, `jpeg` (which takes colour), `depth`, `segmentation`, `points`
+            (which take colour and depth) and `info`.
         seen: How many viewers have ever come; a larger number than before means that somebody is new.
     """
 

@@ -101,7 +101,7 @@ class Mirror:
         self.show(sample.bodies)
         drawing = renderer.draw(intrinsics, sample.camera, "segmentation" in streams, self.transparent)
         images: dict[str, Any] = {}
-        if {"colour", "points"}.intersection(streams):
+        if {"colour", "jpeg", "points"}.intersection(streams):
             images["colour"] = _without_alpha(drawing.rgba)
         if {"depth", "points"}.intersection(streams):
             images["depth"] = depth_in_metres(drawing.depth_buffer, intrinsics)
