@@ -26,6 +26,8 @@ ARM = link_triangles(EXAMPLES / "robots/kuka_lwr.urdf", EXAMPLES)
 CAMERA = "/rpbi/camera"
 BOX_SIZE_M = np.array([0.20, 0.16, 0.12])
 
+FORCES = "Forces on the box"
+"""The display of arrows that stick out of the box."""
 DARK_GREEN = (0, 60, 0)
 """A background that nothing in the scene looks like."""
 DIFFERENT = 12
@@ -142,7 +144,8 @@ def show(example, screen, shipped):
     def show(classes, is_shown, what):
         config = yaml.safe_load(CONFIG_FILE.read_text())
         manager = config["Visualization Manager"]
-        manager["Displays"] = [display for display in manager["Displays"] if display["Class"] in classes]
+        shown = [display for display in manager["Displays"] if display["Class"] in classes]
+        manager["Displays"] = [display for display in shown if display["Name"] != FORCES]
         manager["Global Options"]["Background Color"] = "; ".join(map(str, DARK_GREEN))
         path = example.write_yaml("_".join(sorted(classes)).replace("/", "-") + ".rviz", config)
         rviz = start_with_rviz(example, screen, "rviz", "-d", str(path))

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import math
 import os
+import re
 import signal
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 import rosgraph
 import rospy
 from camera_world import CAMERA, HEIGHT_M, box_world, place, renderers
+from PIL import Image as Picture
 from ros_system import wait_until
-from sensor_msgs.msg import CameraInfo, Image, JointState
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_srvs.srv import Trigger
 from worlds import iiwa
 
 COLOUR, DEPTH, SEGMENTATION = (f"/rpbi/camera/{suffix}" for suffix in ("colour/image", "depth/image", "segmentation"))
+ROOT = Path(__file__).resolve().parents[3]
 COLOUR_INFO, DEPTH_INFO = "/rpbi/camera/colour/camera_info", "/rpbi/camera/depth/camera_info"
 
 
@@ -57,6 +63,28 @@ def test_images_of_a_frame_share_stamp_frame_and_intrinsics(ros, placed):
     assert (info.distortion_model, info.D) == ("plumb_bob", (0.0,) * 5)
     floor_m = pixels(depth, np.float32)[2:10, 2:10]
     assert floor_m == pytest.approx(HEIGHT_M - 0.005, abs=1e-3)
+
+
+def test_jpegs_are_the_colour_images_of_their_stamps_with_a_fraction_of_the_bytes(ros, placed):
+    colour, jpeg = ros.listen(COLOUR, Image), ros.listen(f"{COLOUR}/compressed", CompressedImage)
+    ros.simulator(world(ros), use_sim_time=True)
+    colour.wait_for(10), jpeg.wait_for(10)
+    raw = {image.header.stamp: pixels(image, np.uint8, 3) for image in list(colour.messages)}
+    shared = [image for image in list(jpeg.messages) if image.header.stamp in raw]
+    assert len(shared) >= 5
+    for image in shared:
+        assert (image.header.frame_id, image.format) == ("rpbi/eye", "rgb8; jpeg compressed bgr8")
+        decoded = np.asarray(Picture.open(io.BytesIO(image.data)).convert("RGB"), float)
+        assert np.abs(decoded - raw[image.header.stamp]).mean() < 3.0
+        assert len(image.data) < raw[image.header.stamp].size / 5
+
+
+def test_the_viewer_of_the_page_on_networks_shows_them(ros, placed):
+    (block,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs/network.md").read_text(), re.DOTALL)
+    ros.simulator(world(ros), use_sim_time=True)
+    viewer = ros.start([sys.executable, "-c", block])
+    assert viewer.wait(60.0) == 0, ros.output(viewer)
+    assert re.search(r"\(120, 160, 3\) \d+ bytes", ros.output(viewer))
 
 
 def test_segmentation_of_what_is_not_there_is_65535(ros, placed):

@@ -14,6 +14,8 @@ import pytest
 from PIL import Image
 from ros_system import wait_until
 
+from rpbi_utils import bag_to_dataframes
+
 ROOT = Path(__file__).resolve().parents[3]
 JOINTS = [f"lwr_arm_{number}_joint" for number in range(7)]
 
@@ -21,7 +23,7 @@ JOINTS = [f"lwr_arm_{number}_joint" for number in range(7)]
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory):
     out = tmp_path_factory.mktemp("demo")
-    command = ["rosrun", "rpbi_examples", "demo.py", "--headless", "--seconds", "3", "--out", str(out)]
+    command = ["rosrun", "rpbi_examples", "demo.py", "--headless", "--seconds", "8", "--out", str(out)]
     return out, subprocess.run(command, capture_output=True, text=True, timeout=180)
 
 
@@ -32,6 +34,7 @@ def test_it_writes_all_that_it_promises(demo):
         "joint_states.parquet",
         "joints.png",
         "efforts.png",
+        "forces.png",
         "colour.png",
         "depth.png",
         "summary.json",
@@ -51,18 +54,30 @@ def test_slowness_is_told_and_only_what_is_required_fails(demo):
     images = {topic for topic in too_few if "/camera/" in topic}
     assert len(re.findall(r"^SLOW: images came at ", run.stderr, re.MULTILINE)) == bool(images)
     assert all(f"{topic} came at " in run.stderr for topic in too_few - failed - images)
-    assert len(summary["topics"]) == 8
+    assert len(summary["topics"]) == 10
     assert all(row["messages"] > 0 for row in summary["topics"].values())
     assert summary["figures"]["draw_rate_hz"] > 0
 
 
-def test_the_table_has_all_joints_by_name_and_they_move(demo):
+def test_the_table_has_all_joints_by_name_and_all_move_from_rest(demo):
     out, _ = demo
     table = pd.read_parquet(out / "joint_states.parquet", engine="fastparquet")
     for joint in JOINTS:
         assert {f"position/{joint}", f"velocity/{joint}", f"effort/{joint}"} <= set(table.columns)
-    assert max(table[f"position/{joint}"].std() for joint in JOINTS) > 0.01  # they move one after the other
+        assert table[f"position/{joint}"].std() > 0.01
+        assert abs(table[f"velocity/{joint}"].iloc[:10]).max() < 0.02, "it begins at rest"
     assert table.index.is_monotonic_increasing
+
+
+def test_the_arm_pushes_the_box(demo):
+    out, run = demo
+    contacts = bag_to_dataframes(out / "recording.bag", "/rpbi/box/contacts")["/rpbi/box/contacts"]
+    by_arm = contacts[contacts["other_body"] == "kuka_lwr"]
+    assert set(by_arm["other_link"]) == {"end_effector_ball"}
+    figures = json.loads((out / "summary.json").read_text())["figures"]
+    assert figures["push_max_n"] == pytest.approx(by_arm["normal_force"].groupby(level=0).sum().max(), abs=0.01)
+    friction = 0.8 * 9.81 * 0.7 * 0.9  # mass, gravity, and both bodies' friction
+    assert friction / 2 < figures["push_mean_n"] < friction * 2
 
 
 def test_the_camera_sees_something(demo):
@@ -75,7 +90,7 @@ def test_the_camera_sees_something(demo):
 def test_bad_arguments_are_named():
     run = subprocess.run(["rosrun", "rpbi_examples", "demo.py", "--seconds", "0"], capture_output=True, text=True)
     assert run.returncode == 2
-    assert "--seconds: expected 1 to 3600, got 0" in run.stderr
+    assert "--seconds: expected 2 to 3600, got 0" in run.stderr
 
 
 def test_a_place_that_cannot_be_written_is_told_in_one_line():

@@ -16,13 +16,14 @@ import pytest
 import rosbag
 import roslib.message
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import TransformStamped, Vector3, WrenchStamped
+from geometry_msgs.msg import Point, TransformStamped, Vector3, WrenchStamped
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan, PointCloud2
 from std_msgs.msg import Float64, Float64MultiArray, Header, String
 from tf2_msgs.msg import TFMessage
 
 from custom_ros_tools.errors import UnknownNameError
+from ros_pybullet_interface.msg import ContactPoint, Contacts
 from rpbi_utils import bag_to_dataframes
 
 TYPES = [
@@ -196,6 +197,21 @@ def test_diagnostics_are_rows_with_columns_by_key(write_bag: Callable[..., Path]
     assert list(table["level"]) == [1, 0]
     assert list(table["values/factor"]) == ["0.99", ""]
     assert list(table["values/overruns"]) == ["3", None]
+
+
+def test_contacts_are_rows_and_times_without_contact_are_seen(write_bag: Callable[..., Path]) -> None:
+    floor = ContactPoint(link="link0", other_body="floor", position=Point(0.1, 0.2, 0.0), normal_force=8.0)
+    arm = ContactPoint(link="link0", other_body="arm", position=Point(0.3, 0.2, 0.1), normal_force=5.0)
+    headers = [Header(stamp=genpy.Time(second), frame_id="rpbi/world") for second in (1, 2, 3)]
+    touching = Contacts(headers[1], Vector3(5.0, 0.0, 8.0), [floor, arm])
+    messages = [Contacts(headers[0], Vector3(), []), touching, Contacts(headers[2], Vector3(0.0, 0.0, 8.0), [floor])]
+    table = bag_to_dataframes(write_bag(("/contacts", message) for message in messages))["/contacts"]
+    assert list(table.index) == [1.0, 2.0, 2.0, 3.0]
+    assert list(table["other_body"]) == [None, "floor", "arm", "floor"]
+    assert list(table["force/z"]) == [0.0, 8.0, 8.0, 8.0]
+    assert list(table["position/x"].iloc[1:]) == [0.1, 0.3, 0.1] and math.isnan(table["position/x"].iloc[0])
+    assert list(table["normal_force"].groupby(level="time").sum()) == [0.0, 13.0, 8.0]
+    assert table.shape[1] == 1 + 3 + 3 + 20, "record_time, header, sum, and the fields of a point"
 
 
 def test_topics_without_header_are_indexed_by_the_time_of_recording(write_bag: Callable[..., Path]) -> None:

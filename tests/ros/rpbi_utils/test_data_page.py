@@ -18,6 +18,8 @@ from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
+from ros_pybullet_interface.msg import ContactPoint, Contacts
+
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = (ROOT / "docs/data.md").read_text()
 
@@ -35,10 +37,14 @@ def recording(write_bag: Callable[..., Path]) -> Path:
         loop = DiagnosticStatus(name="loop", values=[KeyValue("overruns", str(index))])
         pixels = np.full((2, 3), 1.5, np.float32)
         image = Image(header=header, height=2, width=3, encoding="32FC1", step=12, data=pixels.tobytes())
+        arm = ContactPoint(link="link0", other_body="kuka_lwr", normal_force=index / 10)
+        floor = ContactPoint(link="link0", other_body="floor", normal_force=8.0)
+        contacts = Contacts(header=header, points=[floor, arm] if index % 2 else [floor])
         messages += [
             ("/rpbi/kuka_lwr/joint_states/target", target),
             ("/rpbi/kuka_lwr/joint_states", state),
             ("/tf", TFMessage([box])),
+            ("/rpbi/box/contacts", contacts),
             ("/diagnostics", DiagnosticArray(header, [loop])),
             ("/rpbi/camera/depth/image", image),
         ]
@@ -50,7 +56,7 @@ def test_the_examples_run_one_after_the_other(
 ) -> None:
     monkeypatch.chdir(recording.parent)
     blocks = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
-    assert len(blocks) == 7
+    assert len(blocks) == 8
     names: dict[str, Any] = {}
     for block in blocks:
         exec(compile(block, "docs/data.md", "exec"), names)
@@ -60,7 +66,9 @@ def test_the_examples_run_one_after_the_other(
     assert len(names["path"]) == 100
     assert names["values"]["values/overruns"].max() == 99
     assert (names["metres"] == 1.5).all() and names["metres"].shape == (2, 3)
-    assert "largest error: 0.0100 rad" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "largest error: 0.0100 rad" in printed
+    assert "pushed with up to 9.9 N, for 50% of the time" in printed
 
 
 def test_the_command_has_the_options_of_the_page(recording: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import genpy
 import numpy as np
+import pandas as pd
 import pytest
 from geometry_msgs.msg import WrenchStamped
 from std_msgs.msg import Float64, Header
@@ -45,3 +46,13 @@ def test_one_message_has_no_rate(write_bag: WriteBag) -> None:
 def test_topics_are_sorted_and_an_empty_bag_has_none(write_bag: WriteBag) -> None:
     assert list(topic_report(write_bag([("/b", Float64()), ("/a", Float64())])).index) == ["/a", "/b"]
     assert len(topic_report(write_bag([], name="empty.bag"))) == 0
+
+
+def test_it_is_printed_with_all_columns_however_narrow_the_terminal_is(write_bag: WriteBag) -> None:
+    topic = "/a/very/long/name/of/a/topic/that/leaves/no/space/in/a/terminal/of/eighty/columns"
+    report = topic_report(write_bag([(topic, Float64())] * 3))
+    with pd.option_context("display.width", 80, "display.max_columns", 4, "display.max_colwidth", 20):
+        assert "..." in repr(pd.DataFrame(report)), "else nothing is left out anyway"
+        printed = str(report)
+    assert "..." not in printed and len(printed.splitlines()) == 3
+    assert all(word in printed for word in (topic, "std_msgs/Float64", *report.columns))

@@ -4,7 +4,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rpbi_examples.demo_report import as_text, failures, measured_rates, slow_lines, tracking_error
+from rpbi_examples.demo_report import (
+    as_text,
+    contact_force,
+    failures,
+    force_figures,
+    measured_rates,
+    slow_lines,
+    tracking_error,
+)
 
 IMAGES, REQUIRED = ("/image", "/info"), ("/states", "/tf")
 
@@ -95,3 +103,19 @@ def test_two_targets_with_one_stamp_do_no_harm():
     states = pd.DataFrame({"position/a": [1.0]}, index=[1.0])
     targets = pd.DataFrame({"position/a": [0.0, 0.7]}, index=[0.5, 0.5])
     assert tracking_error(states, targets).loc["a", "max"] == pytest.approx(0.3)
+
+
+def test_forces_of_contacts_are_added_up_and_0_where_the_arm_does_not_touch():
+    others = [None, "floor", "arm", "arm", "floor"]
+    contacts = pd.DataFrame(
+        {"other_body": others, "normal_force": [np.nan, 8.0, 2.0, 3.0, 8.0]}, index=[0.1, 0.2, 0.2, 0.2, 0.3]
+    )
+    push = contact_force(contacts, "arm")
+    assert push.to_dict() == {0.1: 0.0, 0.2: 5.0, 0.3: 0.0}
+    assert force_figures(push) == {"push_mean_n": 5.0, "push_max_n": 5.0}
+
+
+def test_a_box_that_nothing_has_touched_has_no_force():
+    push = contact_force(pd.DataFrame({"force/x": [0.0, 0.0]}, index=[0.1, 0.2]), "arm")
+    assert push.to_dict() == {0.1: 0.0, 0.2: 0.0}
+    assert force_figures(push) == {"push_mean_n": 0.0, "push_max_n": 0.0}

@@ -14,6 +14,8 @@ import yaml
 
 from .errors import ConfigError, Problem, closest, shortened
 
+_SOURCES = Path(__file__).resolve().parents[3]
+"""Where the packages of this workspace are, if it runs from its sources."""
 MOST_BYTES = 16_000_000
 """A YAML file or text may be so long."""
 MOST_VALUES = 1_000_000
@@ -22,7 +24,9 @@ _PACKAGE = re.compile(r"package://(?P<uri>[^/{}]+)|\{(?P<braces>[^{}]*)\}")
 
 
 def ros_package_path(package: str) -> str:
-    """Returns the folder of a ROS package, which is looked for in ROS_PACKAGE_PATH.
+    """Returns the folder of a ROS package.
+
+    It is looked for in ROS_PACKAGE_PATH, and then among the packages that this one stands with.
 
     Raises:
         ConfigError: If there is no such package.
@@ -40,7 +44,8 @@ def ros_package_path(package: str) -> str:
 @lru_cache(maxsize=4)
 def _packages(search_path: str) -> rospkg.RosPack:
     """Returns what is known under one value of ROS_PACKAGE_PATH; reading it again would cost a crawl."""
-    return rospkg.RosPack()
+    is_source = (_SOURCES / "custom_ros_tools" / "package.xml").is_file()  # installed, it stands with other things
+    return rospkg.RosPack([*rospkg.get_ros_paths(), *([str(_SOURCES)] if is_source else [])])
 
 
 def replace_package(path: str) -> str:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import pybullet
 
 from custom_ros_tools.errors import UnknownNameError
 from rpbi.bodies.dynamics import LinkDynamics, read_dynamics
-from rpbi.config.loading import LoadedWorld, load_world
+from rpbi.config.loading import LoadedWorld, load_object, load_world
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.config.pybullet_world_models import PhysicsChange
 from rpbi.config.sensors import RgbdSensorConfig
@@ -93,12 +93,12 @@ class World:
         """
         return cls(load_world(path), **options)
 
-    def add(self, kind: str, config: BodyConfig, file: str | None = None) -> Body:
+    def add(self, kind: str, config: BodyConfig | Mapping[str, Any], file: str | None = None) -> Body:
         """Adds a body; when it raises, the world is as it was.
 
         Args:
             kind: A key of BODY_TYPES, or `module:Class`.
-            config: Configuration of that type.
+            config: Configuration of that type, or what its YAML says.
             file: Where it came from, for messages; without it, they have the body's name.
 
         Raises:
@@ -106,22 +106,26 @@ class World:
             PhysicsError: If PyBullet refuses.
             PluginError: If a class of another package fails.
         """
+        if isinstance(config, Mapping):
+            config = load_object(kind, config, file or str(config.get("name", kind)))
         body = self._contents.add(kind, config, file)
         self._note(config.name, "add", (kind, config))
         return body
 
-    def add_camera(self, config: RgbdSensorConfig, file: str | None = None) -> RgbdSensor:
+    def add_camera(self, config: RgbdSensorConfig | Mapping[str, Any], file: str | None = None) -> RgbdSensor:
         """Adds a camera; when it raises, the world is as it was.
 
         The first one, and the next to come once that has gone, has the topics `rpbi/camera/...`.
 
         Args:
-            config: What it is.
+            config: What it is, or what its YAML says.
             file: Where it came from, for messages; without it, they have the camera's name.
 
         Raises:
-            ConfigError: If the name is taken.
+            ConfigError: If the name is taken, or the mapping does not fit.
         """
+        if isinstance(config, Mapping):
+            config = RgbdSensorConfig.parse(config, file or str(config.get("name", "camera")))
         return self._contents.add_camera(config, file)
 
     def remove(self, name: str) -> None:
@@ -150,30 +154,39 @@ class World:
         name, _, link = object_name.partition("/")
         return read_dynamics(self._contents.body(name), link)
 
-    def change_dynamics(self, object_name: str, change: ChangeDynamics) -> None:
+    def change_dynamics(self, object_name: str, change: ChangeDynamics | Mapping[str, Any]) -> None:
         """Changes how an object or a link behaves; when it raises, nothing has changed.
 
         Args:
             object_name: `NAME`, or `NAME/LINK` for one of its links.
-            change: What to change.
+            change: What to change, or a mapping of its keys.
 
         Raises:
+            ConfigError: If the mapping does not fit.
             UnknownNameError: If there is none of that name.
             ValueError: If it makes no sense for that link.
             PhysicsError: If PyBullet refuses.
         """
+        if isinstance(change, Mapping):
+            change = ChangeDynamics.parse(change, object_name)
         name, _, link = object_name.partition("/")
         self._contents.change_dynamics(name, link, change)
         self._note(object_name, "dynamics", change)
 
-    def attach(self, config: AttachmentConfig) -> None:
+    def attach(self, config: AttachmentConfig | Mapping[str, Any]) -> None:
         """Attaches a body to another; when it raises, nothing has changed.
 
+        Args:
+            config: The attachment, or a mapping of its keys.
+
         Raises:
+            ConfigError: If the mapping does not fit.
             UnknownNameError: If there is no such body or link.
             ValueError: If its name is taken, or the two cannot be attached.
             PhysicsError: If PyBullet refuses.
         """
+        if isinstance(config, Mapping):
+            config = AttachmentConfig.parse(config, "attachment")
         self.attachments.add(config)
         self._note(config.name, "attach", config)
 
@@ -215,20 +228,24 @@ class World:
         Args:
             name: The body.
             what: A key of ACTIONS.
-            value: What that takes.
+            value: What that takes; for a named tuple a mapping of its fields will do.
             do: Does the same to the body in another way, for instance with something prepared by another thread.
 
         Returns:
             What the action returns.
 
         Raises:
-            UnknownNameError: If there is no such body.
+            UnknownNameError: If there is no such body or action.
             ValueError: If the value is refused.
         """
         body = self._contents.body(name)
+        if what not in ACTIONS:
+            raise UnknownNameError("action", what, list(ACTIONS))
+        action = ACTIONS[what]
+        value = action.value(value)
         if what in MOVES_AT_ONCE:
             self.attachments.refuse_moving(name)
-        result = ACTIONS[what](body, self.clock, value) if do is None else do(body)
+        result = action.do(body, self.clock, value) if do is None else do(body)
         self._note_pushed(body)
         self._note(name, what, value)
         return result
@@ -238,7 +255,8 @@ class World:
 
         Args:
             slot: `NAME/INPUT`, such as `kuka_lwr/target`.
-            value: What that input takes.
+            value: What that input takes. For a target of joints a mapping of them to numbers will do, for a named
+                tuple one of its fields.
 
         Raises:
             UnknownNameError: If there is no such input, or the value names something unknown.

@@ -82,6 +82,42 @@ def plot_efforts(states: pd.DataFrame, joints: list[str], path: Path) -> None:
     _save(figure, path, "Motor efforts")
 
 
+def contact_force(contacts: pd.DataFrame, other_body: str) -> pd.Series:
+    """Returns the normal forces with which another body presses [N], added up, by time [s]; 0 where it does not touch.
+
+    Args:
+        contacts: A row a contact with `other_body` and `normal_force`, and one for each time without any.
+        other_body: The other body.
+    """
+    if "other_body" not in contacts:  # nothing has touched at all
+        return pd.Series(0.0, contacts.index)
+    forces = contacts["normal_force"].where(contacts["other_body"] == other_body)
+    return forces.groupby(level=0).sum()
+
+
+def force_figures(push: pd.Series) -> dict[str, float]:
+    """Returns the mean force while it touches and the largest one [N], both 0 if it never does."""
+    touching = push[push > 0.0]
+    if touching.empty:
+        return {"push_mean_n": 0.0, "push_max_n": 0.0}
+    return {"push_mean_n": round(float(touching.mean()), 2), "push_max_n": round(float(touching.max()), 2)}
+
+
+def plot_forces(push: pd.Series, wrist: pd.DataFrame, start_s: float, path: Path) -> None:
+    """Draws the force of the arm on the box [N], by time, and what the sensor in its wrist feels."""
+    figure, (above, below) = plt.subplots(2, sharex=True, figsize=(9, 5))
+    above.plot(push.index - start_s, push, color="#e8731a", lw=1.2)
+    above.set_ylabel("arm on box [N]")
+    for axis, colour in zip("xyz", ("#c0392b", "#27864a", "#2c5f8a")):
+        below.plot(wrist.index - start_s, wrist[f"wrench/force/{axis}"], color=colour, lw=1.0, label=axis)
+    below.set_ylabel("force in the wrist [N]")
+    below.set_xlabel("simulated time [s]")
+    below.legend(fontsize=8, ncols=3, loc="upper right")
+    for part in (above, below):
+        part.grid(alpha=0.3)
+    _save(figure, path, "Contact: force of the arm on the box, and the force-torque sensor in the wrist")
+
+
 def save_colour(pixels: npt.NDArray[np.uint8], path: Path) -> None:
     """Writes a colour image of shape (height, width, 3)."""
     plt.imsave(path, pixels)

@@ -79,6 +79,17 @@ def _transforms(layout: Layout, raw: bytes) -> Plan:
     return rows, [], []
 
 
+def _contacts(layout: Layout, raw: bytes) -> Plan:
+    """One row a contact, with stamp and sum of forces of its message; where nothing touches, one row with these."""
+    message = {path: leaf for path, leaf in layout.leaves.items() if not path.startswith("points/")}
+    points: list[Columns] = [{} for _ in range(layout.counts["points"])]
+    for path, leaf in layout.leaves.items():
+        if path.startswith("points/"):
+            _, index, value = path.split("/", 2)
+            points[int(index)][value] = leaf
+    return [message | point for point in points] or [message], [], []
+
+
 def _diagnostics(layout: Layout, raw: bytes) -> Plan:
     """One row a status, with a column for each of its keys."""
     leaves, counts, rows, keys = layout.leaves, layout.counts, [], []
@@ -99,6 +110,7 @@ PLANS: dict[str, Callable[[Layout, bytes], Plan]] = {
     "tf2_msgs/TFMessage": _transforms,
     "tf/tfMessage": _transforms,
     "diagnostic_msgs/DiagnosticArray": _diagnostics,
+    "ros_pybullet_interface/Contacts": _contacts,
 }
 
 

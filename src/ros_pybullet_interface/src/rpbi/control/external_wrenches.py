@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import pybullet
 
 from custom_ros_tools.errors import UnknownNameError
 from rpbi.geometry import Load, Pose, Vector, plus, rotated
+from rpbi.plain_values import as_tuple
 from rpbi.urdf.joints import LARGEST
 
 TIMEOUT_S = 0.5
@@ -65,14 +66,14 @@ class ExternalWrenches:
         """Whether something acts in the coming tick."""
         return bool(self._acting)
 
-    def check(self, wrench: ExternalWrench) -> ExternalWrench:
-        """Returns a wrench with the name of its link; any thread may call it.
+    def check(self, given: ExternalWrench | Mapping[str, Any]) -> ExternalWrench:
+        """Returns a wrench with the name of its link, from one or a mapping of its fields; any thread may call it.
 
         Raises:
             UnknownNameError: If the body has no such link.
             ValueError: If the link is static, or a number is not finite or too large.
         """
-        name = self._name
+        name, wrench = self._name, as_tuple(ExternalWrench, given)
         link = wrench.link.removeprefix(f"{name}/") if wrench.link != name else ""
         link = link or self._root_link
         if link not in self._indices:

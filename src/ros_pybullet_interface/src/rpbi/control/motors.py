@@ -92,8 +92,8 @@ class MotorGains(NamedTuple):
     """
 
     names: Sequence[str]
-    position: Sequence[float]
-    velocity: Sequence[float]
+    position: Sequence[float] = ()
+    velocity: Sequence[float] = ()
 
 
 class Motors:

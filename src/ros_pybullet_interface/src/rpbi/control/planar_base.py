@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, NamedTuple
+from collections.abc import Mapping
+from typing import Annotated, Any, NamedTuple
 
 import pybullet
 from pydantic import Field
@@ -12,6 +13,7 @@ from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import ConfigModel, Positive, Seconds, Unit
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose, Twist
+from rpbi.plain_values import as_tuple
 from rpbi.urdf.document import UrdfDocument, UrdfJoint
 from rpbi.urdf.files import resolve_meshes, write_description
 
@@ -35,15 +37,15 @@ class PlanarVelocity(NamedTuple):
     yaw: float = 0.0
 
     @classmethod
-    def checked(cls, twist: Twist) -> PlanarVelocity:
-        """Returns what a twist asks of a base that stays in its plane.
+    def checked(cls, twist: Twist | Mapping[str, Any]) -> PlanarVelocity:
+        """Returns what a twist, or a mapping of its fields, asks of a base that stays in its plane.
 
         Raises:
             ValueError: If a number is not finite or points out of the plane; it names what does.
         """
         given = {
             f"{part}.{axis}": value
-            for part, vector in twist._asdict().items()
+            for part, vector in as_tuple(Twist, twist)._asdict().items()
             for axis, value in zip("xyz", vector, strict=True)
         }
         bad = [f"{key}={value}" for key, value in given.items() if not math.isfinite(value)]

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
+from rpbi.config.pybullet_args import CONTROL_MODES
+from rpbi.control.controllers.manager import ControllerSwitch, NewGains
+from rpbi.control.external_wrenches import ExternalWrench
 from rpbi.control.motion import Motion
+from rpbi.control.motors import MotorGains
 from rpbi.control.timed_motion import TimedMotion
 from rpbi.control.trajectories.request import GoalTolerances, TrajectoryRequest
+from rpbi.geometry import Pose
+from rpbi.plain_values import as_tuple
+from rpbi.urdf.joints import JointTarget
 
 from .clock import Clock
 
@@ -16,11 +24,11 @@ class TimedGoal(NamedTuple):
     """Where joints are to be, and when.
 
     Attributes:
-        positions: Positions [rad or m] by joint index.
+        positions: Positions [rad or m], either all by joint index or all by name.
         duration_s: In what time [s].
     """
 
-    positions: Mapping[int, float]
+    positions: Mapping[Any, float]
     duration_s: float
 
 
@@ -33,7 +41,7 @@ class RecordedTrajectory(NamedTuple):
     """
 
     request: TrajectoryRequest
-    tolerances: GoalTolerances | None
+    tolerances: GoalTolerances | None = None
 
     @classmethod
     def of(cls, request: TrajectoryRequest, tolerances: GoalTolerances | None, clock: Clock) -> RecordedTrajectory:
@@ -49,7 +57,10 @@ def _stop_motion(body: Any, _: Clock, reason: str) -> bool:
 
 
 def _move(body: Any, _: Clock, goal: TimedGoal) -> Motion:
-    motion = TimedMotion(body.model, goal.positions, goal.duration_s)
+    positions: Any = goal.positions
+    if any(isinstance(joint, str) for joint in positions):
+        positions = body.model.resolve_driven(tuple(positions), tuple(positions.values()))
+    motion = TimedMotion(body.model, positions, goal.duration_s)
     body.drive.run(motion)
     return motion
 
@@ -62,19 +73,38 @@ def _follow(body: Any, clock: Clock, recorded: RecordedTrajectory) -> Motion:
     return motion
 
 
-ACTIONS: dict[str, Callable[[Any, Clock, Any], Any]] = {
-    "teleport": lambda body, _, pose: body.teleport(pose),
-    "set_joint_state": lambda body, _, target: body.set_joint_state(target),
-    "switch_mode": lambda body, _, mode: body.switch_mode(mode),
-    "switch_controllers": lambda body, _, switch: body.switch_controllers(switch),
-    "set_controller_gains": lambda body, _, gains: body.controllers.configure(gains),
-    "set_gains": lambda body, _, gains: body.motors.set_gains(gains),
-    "stop_motion": _stop_motion,
-    "move": _move,
-    "follow": _follow,
-    "push": lambda body, _, wrench: body.push(wrench),
-    "cancel": lambda body, clock, reason: body.follower.cancel(reason, clock),
+class Action(NamedTuple):
+    """Something that can be done to a body.
+
+    Attributes:
+        do: Does it, with the world's clock and a value.
+        value: Returns that value of what somebody gave, who may write mappings for named tuples.
+            It raises ValueError for what is neither.
+    """
+
+    do: Callable[[Any, Clock, Any], Any]
+    value: Callable[[Any], Any]
+
+
+def _tuple_of(kind: type) -> Callable[[Any], Any]:
+    return partial(as_tuple, kind)
+
+
+ACTIONS: dict[str, Action] = {
+    "teleport": Action(lambda body, _, pose: body.teleport(pose), _tuple_of(Pose)),
+    "set_joint_state": Action(
+        lambda body, _, target: body.set_joint_state(target), partial(JointTarget.of, quantity="position")
+    ),
+    "switch_mode": Action(lambda body, _, mode: body.switch_mode(mode), CONTROL_MODES.parse),
+    "switch_controllers": Action(lambda body, _, switch: body.switch_controllers(switch), _tuple_of(ControllerSwitch)),
+    "set_controller_gains": Action(lambda body, _, gains: body.controllers.configure(gains), _tuple_of(NewGains)),
+    "set_gains": Action(lambda body, _, gains: body.motors.set_gains(gains), _tuple_of(MotorGains)),
+    "stop_motion": Action(_stop_motion, str),
+    "move": Action(_move, _tuple_of(TimedGoal)),
+    "follow": Action(_follow, _tuple_of(RecordedTrajectory)),
+    "push": Action(lambda body, _, wrench: body.push(wrench), _tuple_of(ExternalWrench)),
+    "cancel": Action(lambda body, clock, reason: body.follower.cancel(reason, clock), str),
 }
-"""Each does something to a body, with the world's clock and a value."""
+"""What can be done to bodies, by name."""
 MOVES_AT_ONCE = ("teleport", "set_joint_state")
 """Those that put a body elsewhere, which attachments would pull back."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from custom_ros_tools.schema import FARTHEST_M
 from rpbi.config.pybullet_models import ObjectTf
 from rpbi.geometry import Pose, normalized
+from rpbi.plain_values import as_tuple
 
 
 @dataclass(frozen=True)
@@ -52,13 +53,13 @@ class PoseInput(Input):
         return cls(check_pose, apply, tf_id=object_tf.tf_id, hz=object_tf.hz, timeout_s=object_tf.timeout_s)
 
 
-def check_pose(pose: Pose) -> Pose:
-    """Returns the pose with its quaternion normalised.
+def check_pose(given: Pose | Mapping[str, Any]) -> Pose:
+    """Returns a pose, or that of a mapping of its fields, with its quaternion normalised.
 
     Raises:
-        ValueError: If a number is not finite or the quaternion is zero.
+        ValueError: If it is none, a number is not finite or the quaternion is zero.
     """
-    position, quat = pose
+    position, quat = as_tuple(Pose, given)
     if not all(map(math.isfinite, (*position, *quat))):
         raise ValueError(f"pose must be finite, got {position}, {quat}")
     if max(map(abs, position)) > FARTHEST_M:

@@ -1,7 +1,7 @@
 """The log of all that came into a world, and its replay."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 from typing import Any, NamedTuple
 
@@ -75,6 +75,27 @@ class LogEntry(NamedTuple):
     name: str
     what: str
     arguments: Any = None
+
+
+class LoadLogReader:
+    """Reads a load log bit by bit.
+
+    Args:
+        log: The log, which may grow at any time, and begins anew when its world is reset.
+    """
+
+    def __init__(self, log: Sequence[LogEntry]) -> None:
+        self._log = log
+        self._first: LogEntry | None = None
+        self._count = 0
+
+    def take(self) -> tuple[LogEntry, ...]:
+        """Returns what has come since the last time; of a log that began anew, all."""
+        if self._log and self._log[0] is not self._first:
+            self._first, self._count = self._log[0], 0
+        new = tuple(self._log[self._count :])
+        self._count += len(new)
+        return new
 
 
 def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:

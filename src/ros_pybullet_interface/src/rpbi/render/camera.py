@@ -7,6 +7,7 @@ without offset has its principal point at ((width - 1) / 2, (height - 1) / 2).
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pybullet
 
+from custom_ros_tools.transforms import finite_vector, pose_of
 from rpbi.geometry import Pose
 
 Array = npt.NDArray[np.floating[Any]]
@@ -78,6 +80,28 @@ def camera_matrix(projection: Array, width_px: int, height_px: int) -> Array:
     cx = (1.0 - projection[0, 2]) * width_px / 2.0 - 0.5
     cy = (1.0 + projection[1, 2]) * height_px / 2.0 - 0.5
     return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+
+
+def looking_at(position: Sequence[float], target: Sequence[float]) -> Pose:
+    """Returns the pose of an optical frame [m] that looks from a position to a target, with the horizon level.
+
+    A camera that looks straight up or down has the world's x axis to its right.
+
+    Raises:
+        ValueError: If both are the same, or one is not three finite numbers.
+    """
+    eye = finite_vector(position, 3, "position")
+    forward = finite_vector(target, 3, "target") - eye
+    distance = np.linalg.norm(forward)
+    if distance < 1e-9:
+        raise ValueError(f"target: must not be where the camera is, got {tuple(eye.tolist())} twice")
+    forward /= distance
+    right = np.cross(forward, (0.0, 0.0, 1.0))
+    right = right / np.linalg.norm(right) if np.linalg.norm(right) > 1e-6 else np.array((1.0, 0.0, 0.0))
+    T = np.eye(4)
+    T[:3, :3] = np.stack((right, np.cross(forward, right), forward), axis=1)
+    quat = pose_of(T)[1].tolist()
+    return Pose(tuple(eye.tolist()), tuple(quat))
 
 
 def view_matrix(camera: Pose) -> Array:

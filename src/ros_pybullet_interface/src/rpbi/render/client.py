@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from rpbi.engine.load_log import LogEntry
+from rpbi.engine.load_log import LoadLogReader, LogEntry
 from rpbi.samples import SceneSample
 
 from .channel import Channel
@@ -68,7 +68,6 @@ class RenderClient:
         self._start_at_s = 0.0
         self._failures = 0
         self._last: dict[str, Scene] = {}
-        self._first_entry: LogEntry | None = None
         self._forget()
         self._do: dict[type, Callable[[Any], None]] = {
             Ready: self._take_ready,
@@ -237,18 +236,15 @@ class RenderClient:
         """Forgets what the process knew."""
         self.wanted = frozenset()
         self._demands: dict[str, Demand] = {}
-        self._logged = 0
+        self._unread = LoadLogReader(self._log)
         self._waiting: dict[str, Scene] = {}
         self._under_way: set[str] = set()
         self._served: dict[str, int] = {}
         self._shown_ns: dict[str, int] = {}
 
     def _send_log(self) -> None:
-        if self._log and self._log[0] is not self._first_entry:  # the log of a world that was reset begins anew
-            self._first_entry, self._logged = self._log[0], 0
-        if len(self._log) != self._logged and self._channel is not None:
-            self._channel.send(WorldChanged(tuple(self._log[self._logged :])))
-            self._logged = len(self._log)
+        if self._channel is not None and (entries := self._unread.take()):
+            self._channel.send(WorldChanged(entries))
 
     def _send_waiting(self, name: str) -> None:
         if self._channel is None or name in self._under_way or name not in self._waiting:

@@ -1,10 +1,15 @@
 """What the renderer process makes, and for whom."""
 
+from __future__ import annotations
+
+import zlib
 from collections.abc import Mapping
 from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
+
+from rpbi.config.sensors import RgbdSensorConfig
 
 from .camera import Intrinsics
 from .depth import DepthNoise
@@ -30,6 +35,24 @@ class Camera(NamedTuple):
     pointcloud: bool = False
     synchronous: bool = False
     noise: DepthNoise | None = None
+
+    @classmethod
+    def of(cls, config: RgbdSensorConfig, topic_name: str = "") -> Camera:
+        """Returns the camera that a YAML describes."""
+        size = config.intrinsics
+        noise = None
+        if config.depth_noise_m or config.depth_noise_growth_per_m:
+            seed = zlib.crc32(config.name.encode()) if config.seed is None else config.seed
+            noise = DepthNoise(config.depth_noise_m, config.depth_noise_growth_per_m, seed)
+        return cls(
+            config.name,
+            config.object_tf.tf_id,
+            Intrinsics(size.width, size.height, size.fov, *size.range),
+            topic_name,
+            config.pointcloud,
+            config.synchronous,
+            noise,
+        )
 
 
 class Frame(NamedTuple):
@@ -57,8 +80,8 @@ class Demand(NamedTuple):
     """Who looks at a camera.
 
     Attributes:
-        streams: What is looked at, out of `colour`, `depth`, `segmentation`, `points` (which take colour and depth)
-            and `info`.
+        streams: What is looked at, out of `colour`, `jpeg` (which takes colour), `depth`, `segmentation`, `points`
+            (which take colour and depth) and `info`.
         seen: How many viewers have ever come; a larger number than before means that somebody is new.
     """
 

@@ -1,7 +1,8 @@
 """The renderer's own copy of the world."""
 
 import logging
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,11 @@ from rpbi.render.shapes.soft_shapes import SoftShapes
 from rpbi.render.shapes.tessellation import FineShapes
 from rpbi.render.shapes.transparency import Transparency, TransparentShape
 from rpbi.samples import BodyState
+
+from .camera import depth_in_metres
+from .frame import Camera, Frame
+from .messages import Scene
+from .renderers import Renderer
 
 log = logging.getLogger(__name__)
 
@@ -78,6 +84,33 @@ class Mirror:
             if not state.nodes:
                 self.pose(state)
 
+    def frame(self, renderer: Renderer, scene: Scene, camera: Camera, streams: Collection[str]) -> Frame:
+        """Returns what a camera sees of a scene.
+
+        Args:
+            renderer: Draws what is in the client of this world.
+            scene: Where everything is.
+            camera: The camera.
+            streams: What is asked for, see `Demand`.
+        """
+        sample, intrinsics = scene.sample, camera.intrinsics
+        frame = Frame(camera, sample.tick, sample.stamp_ns)
+        if set(streams) == {"info"}:
+            return frame
+        assert sample.camera is not None
+        self.show(sample.bodies)
+        drawing = renderer.draw(intrinsics, sample.camera, "segmentation" in streams, self.transparent)
+        images: dict[str, Any] = {}
+        if {"colour", "jpeg", "points"}.intersection(streams):
+            images["colour"] = _without_alpha(drawing.rgba)
+        if {"depth", "points"}.intersection(streams):
+            images["depth"] = depth_in_metres(drawing.depth_buffer, intrinsics)
+            if camera.noise is not None:
+                camera.noise.add_to(images["depth"], sample.tick, intrinsics.near_m, intrinsics.far_m)
+        if "segmentation" in streams:
+            images["segmentation"] = self.to_simulator_ids(drawing.body_ids, scene.body_ids)
+        return frame._replace(**images)
+
     def pose(self, state: BodyState) -> None:
         """Puts a rigid body where it was in the simulator."""
         body = self._bodies.get(state.name)
@@ -113,3 +146,10 @@ class Mirror:
         table[-1] = -1  # an id of -1 reads the last entry
         translated: npt.NDArray[np.int32] = table[body_ids]
         return translated
+
+
+def _without_alpha(rgba: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    rgb = np.empty((*rgba.shape[:2], 3), np.uint8)
+    for channel in range(3):  # four times as fast as copying pixel by pixel
+        rgb[..., channel] = rgba[..., channel]
+    return rgb

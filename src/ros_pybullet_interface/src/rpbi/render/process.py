@@ -7,13 +7,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
-from .camera import depth_in_metres
 from .channel import Channel
 from .egl import EglError
-from .frame import NO_DEMAND, Camera, Demand, Frame, Sink
+from .frame import NO_DEMAND, Camera, Demand, Sink
 from .messages import CameraAdded, CameraRemoved, Demanded, Ready, Report, Scene, SetUp, Shown, Taken, WorldChanged
 from .mirror import Mirror
 from .priority import give_way, take_part
@@ -111,29 +107,10 @@ class RenderProcess:
         if camera is None:
             return
         if streams:
-            self._sink.write(self._frame(scene, camera, streams))
+            assert self._renderer is not None and self._mirror is not None
+            self._sink.write(self._mirror.frame(self._renderer, scene, camera, streams))
         if camera.synchronous:
             self._channel.send(Shown(sample.name, sample.stamp_ns))
-
-    def _frame(self, scene: Scene, camera: Camera, streams: frozenset[str]) -> Frame:
-        sample, intrinsics = scene.sample, camera.intrinsics
-        frame = Frame(camera, sample.tick, sample.stamp_ns)
-        if streams == {"info"}:
-            return frame
-        assert self._renderer is not None and self._mirror is not None and sample.camera is not None
-        self._mirror.show(sample.bodies)
-        segmentation = "segmentation" in streams
-        drawing = self._renderer.draw(intrinsics, sample.camera, segmentation, self._mirror.transparent)
-        images: dict[str, Any] = {}
-        if streams & {"colour", "points"}:
-            images["colour"] = _without_alpha(drawing.rgba)
-        if streams & {"depth", "points"}:
-            images["depth"] = depth_in_metres(drawing.depth_buffer, intrinsics)
-            if camera.noise is not None:
-                camera.noise.add_to(images["depth"], sample.tick, intrinsics.near_m, intrinsics.far_m)
-        if segmentation:
-            images["segmentation"] = self._mirror.to_simulator_ids(drawing.body_ids, scene.body_ids)
-        return frame._replace(**images)
 
     def _send_demands(self) -> None:
         now_s = time.monotonic()
@@ -156,10 +133,3 @@ class ReportHandler(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Sends a record."""
         self._channel.send(Report(record.levelno, self.format(record)))
-
-
-def _without_alpha(rgba: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-    rgb = np.empty((*rgba.shape[:2], 3), np.uint8)
-    for channel in range(3):  # four times as fast as copying pixel by pixel
-        rgb[..., channel] = rgba[..., channel]
-    return rgb

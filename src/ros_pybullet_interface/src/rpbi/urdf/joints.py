@@ -6,12 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pybullet
 
 from custom_ros_tools.errors import UnknownNameError
+from custom_ros_tools.schema.type_names import shown
 from rpbi.engine.client import Client
+from rpbi.plain_values import joint_values
 
 from .document import Mimic
 
@@ -127,6 +129,21 @@ class JointTarget(NamedTuple):
     velocity: Sequence[float] = ()
     effort: Sequence[float] = ()
     stamp_ns: int = 0
+
+    @classmethod
+    def of(cls, given: JointTarget | Mapping[str, float], quantity: str) -> JointTarget:
+        """Returns a target; a mapping of joints to numbers becomes one of that quantity.
+
+        Raises:
+            ValueError: If it is neither.
+        """
+        if isinstance(given, cls):
+            return given
+        if not isinstance(given, Mapping):
+            raise ValueError(f"expected a JointTarget or a mapping of joints to numbers, got {shown(given)}")
+        values = joint_values(given)
+        given_values: dict[str, Any] = {quantity: tuple(values.values())}
+        return cls(tuple(values), **given_values)
 
     def values_of(self, quantity: str, reason: str) -> Sequence[float]:
         """Returns the values of one quantity.

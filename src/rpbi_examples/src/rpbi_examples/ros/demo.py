@@ -20,10 +20,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import rosgraph
+import rospy
 from sensor_msgs.msg import Image
+from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.services import call_service
 from custom_ros_tools.ros.transform_messages import position_in, quat_in
 from rpbi.config.loading import load_world
 from rpbi.geometry import Pose
@@ -33,12 +36,13 @@ from rpbi_examples.process_tree import kill_with_children
 from rpbi_utils import Recorder, bag_to_dataframes
 from rpbi_utils.ros.bag_reader import BagReader
 
-from .moving_robots import HZ as TARGET_HZ
+from .joint_targets import HZ as TARGET_HZ
 
 EXAMPLE = "basic_example_kuka_lwr"
 WORLD = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"
 STATES = "/rpbi/kuka_lwr/joint_states"
 TARGETS = "/rpbi/kuka_lwr/joint_states/target"
+CONTACTS, WRIST = "/rpbi/box/contacts", "/rpbi/kuka_lwr/lwr_arm_6_joint/ft_sensor"
 COLOUR, DEPTH = "/rpbi/camera/colour/image", "/rpbi/camera/depth/image"
 REQUIRED_TOPICS = (STATES, "/tf")
 """Topics that no slow machine may thin out; their rates count in simulated time."""
@@ -80,8 +84,8 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--strict", action="store_true", help="images and all else must reach their rates, too")
     parser.add_argument("--out", type=Path, default=Path("out/demo"), help="where to write, default out/demo")
     arguments = parser.parse_args()
-    if not 1.0 <= arguments.seconds <= 3600.0:
-        parser.error(f"--seconds: expected 1 to 3600, got {arguments.seconds:g}")
+    if not 2.0 <= arguments.seconds <= 3600.0:
+        parser.error(f"--seconds: expected 2 to 3600, got {arguments.seconds:g}")
     arguments.headless = arguments.headless or not os.environ.get("DISPLAY")
     return arguments
 
@@ -94,6 +98,7 @@ def _demo(arguments: argparse.Namespace) -> int:
     with _example(arguments.headless, out / "launch.log"):
         with Recorder(bag, [*expected_hz, "/diagnostics", "/tf_static"], timeout_s=START_TIMEOUT_S):
             _say(f"recording {arguments.seconds:g} s of {len(expected_hz)} topics into {bag}")
+            call_service("/rpbi/start", Trigger)  # from the first tick on, with the arm at rest
             time.sleep(arguments.seconds)
     _say("reading the bag")
     summary = _report(bag, expected_hz, arguments.seconds, out)
@@ -117,13 +122,14 @@ def _example(headless: bool, log: Path) -> Iterator[None]:
     os.environ["ROS_IP"] = "127.0.0.1"
     os.environ.pop("ROS_HOSTNAME", None)
     _say(f"launching {EXAMPLE} (ROS_MASTER_URI={os.environ['ROS_MASTER_URI']}, log: {log})")
-    command = ["roslaunch", "-p", str(port), "rpbi_examples", f"{EXAMPLE}.launch", f"headless:={headless}"]
+    arguments = [f"headless:={headless}", "start:=false"]
+    command = ["roslaunch", "-p", str(port), "rpbi_examples", f"{EXAMPLE}.launch", *arguments]
     with open(log, "w", encoding="utf-8") as output:
         process = subprocess.Popen(
             command, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True
         )
     try:
-        _wait_until_moving(process, log)
+        _wait_until_ready(process, log)
         yield
     finally:
         process.send_signal(signal.SIGINT)
@@ -133,8 +139,8 @@ def _example(headless: bool, log: Path) -> Iterator[None]:
             kill_with_children(process)
 
 
-def _wait_until_moving(process: subprocess.Popen, log: Path) -> None:
-    """Waits until the arm gets targets, by when everything else is up."""
+def _wait_until_ready(process: subprocess.Popen, log: Path) -> None:
+    """Waits until the arm is about to get targets, by when everything else is up."""
     end_s = time.monotonic() + START_TIMEOUT_S
     while time.monotonic() < end_s and process.poll() is None:
         if _is_published(TARGETS) and _is_published(COLOUR):
@@ -155,12 +161,15 @@ def _is_published(topic: str) -> bool:
 def _expected_rates() -> dict[str, float]:
     """Returns the rate of each topic [Hz], from the files that the example is made of."""
     world = load_world(WORLD)
-    robot: Any = next(item.config for item in world.objects if item.type == "robot")
+    configs: dict[str, Any] = {item.config.name: item.config for item in world.objects}
+    robot = configs["kuka_lwr"]
     camera = world.config.rgbd_sensor
     assert camera is not None
     rates = {
         STATES: robot.joint_state_publisher_hz,
         TARGETS: TARGET_HZ,
+        WRIST: robot.joint_state_publisher_hz,
+        CONTACTS: configs["box"].contacts.hz,
         "/tf": robot.broadcast_link_states_hz,
         "/clock": min(1.0 / world.config.timeStep, 1000.0),
     }
@@ -172,7 +181,7 @@ def _report(bag: Path, expected_hz: dict[str, float], seconds: float, out: Path)
 
     Rates are those of the last seconds: before, the recorder was connecting, on a busy machine for long.
     """
-    tables = bag_to_dataframes(bag, [STATES, TARGETS, "/clock", "/diagnostics"])
+    tables = bag_to_dataframes(bag, [STATES, TARGETS, WRIST, CONTACTS, "/clock", "/diagnostics"])
     states, targets, clock = tables[STATES], tables[TARGETS], tables["/clock"]["clock"]
     duration_s = float(clock.iloc[-1] - clock.iloc[0])
     measured_s = min(duration_s, demo_report.ENOUGH * seconds)
@@ -181,6 +190,8 @@ def _report(bag: Path, expected_hz: dict[str, float], seconds: float, out: Path)
     demo_report.plot_joints(states, targets, out / "joints.png")
     error = demo_report.tracking_error(states, targets)
     demo_report.plot_efforts(states, list(error.index), out / "efforts.png")
+    push = demo_report.contact_force(tables[CONTACTS], "kuka_lwr")
+    demo_report.plot_forces(push, tables[WRIST], states.index[0], out / "forces.png")
     world = load_world(WORLD)
     assert world.config.rgbd_sensor is not None
     for picture in (out / "colour.png", out / "depth.png"):  # a very busy machine may draw none
@@ -200,6 +211,7 @@ def _report(bag: Path, expected_hz: dict[str, float], seconds: float, out: Path)
                     "recorded_s": round(duration_s, 3), "measured_s": round(measured_s, 3),
                     "tracking_error_rms_rad": round(float(error["rms"].max()), 5),
                     "tracking_error_max_rad": round(float(error["max"].max()), 5),
+                    **demo_report.force_figures(push),
                     "bag_mb": round(bag.stat().st_size / 1e6, 1)},
     }  # fmt: skip
     (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
@@ -207,8 +219,8 @@ def _report(bag: Path, expected_hz: dict[str, float], seconds: float, out: Path)
 
 
 def _diagnostics(table: pd.DataFrame) -> dict[str, Any]:
-    """Returns what the simulator told of itself."""
-    own = table[table["name"].str.endswith(": simulation")]
+    """Returns what the simulator told of itself while it ran, once a second."""
+    own = table[table["name"].str.endswith(": simulation") & (table["message"] != "stopped")]
     overruns = own["values/overruns_total"].astype(int)
     return {
         "real_time_factor": round(float(own["values/real_time_factor"].astype(float).mean()), 4),

@@ -2,24 +2,22 @@
 
 import math
 import sys
-import threading
 
 import rospy
 from geometry_msgs.msg import Point, PoseStamped, Twist
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Header, Int64
+from std_msgs.msg import Header
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from custom_ros_tools.ros.services import call_service, get_srv_handler
+from custom_ros_tools.ros.services import call_service
 from custom_ros_tools.tf import TfInterface
-from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem, Contacts, JointInfo
-from ros_pybullet_interface.srv import ResetEffState, RobotInfo, RobotInfoResponse
+from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem, Contacts
+from ros_pybullet_interface.srv import ResetEffState
 from rpbi_examples.motions import POINTING_DOWN, PlanarPose, Route, Swing, hand_position, wiped
 
-HZ = 50.0
-"""How often targets are sent."""
+from .joint_targets import HZ, JointTargets
+
 LINK = "lbr_iiwa_link_7"
 SETTLING_S = 0.5
 """How long the arm presses before it wipes [s]."""
@@ -61,31 +59,12 @@ def _robot_name() -> str:
 
 
 def _swing() -> None:
-    name = _robot_name()
-    info: RobotInfoResponse = get_srv_handler(f"rpbi/{name}/robot_info", RobotInfo)()
-    joints = [joint for joint in info.joint_info if not joint.is_fixed]
-    state = dict(zip(info.current_joint_state.name, info.current_joint_state.position))
-    swing = Swing([state[joint.jointName] for joint in joints], *zip(*map(_limits, joints)))
-    publisher = rospy.Publisher(f"rpbi/{name}/joint_states/target", JointState, queue_size=10)
-    running = threading.Event()
-    rospy.Subscriber(
-        "rpbi/status", Int64, lambda status: running.set() if status.data == 1 else running.clear(), queue_size=1
-    )
-    rate = rospy.Rate(HZ)
+    robot = JointTargets(_robot_name())
+    swing = Swing(robot.positions, *zip(*robot.limits))
     time_s = 0.0
-    while not rospy.is_shutdown():
-        if running.is_set():
-            target = JointState(name=[joint.jointName for joint in joints], position=swing.at(time_s))
-            target.header.stamp = rospy.Time.now()
-            publisher.publish(target)
-            time_s += 1.0 / HZ
-        rate.sleep()
-
-
-def _limits(joint: JointInfo) -> tuple[float, float]:
-    """Returns lower and upper position limit; PyBullet gives an inverted range where there is none."""
-    limited = joint.jointLowerLimit < joint.jointUpperLimit
-    return (joint.jointLowerLimit, joint.jointUpperLimit) if limited else (float("-inf"), float("inf"))
+    while True:
+        robot.send(swing.at(time_s))
+        time_s += 1.0 / HZ
 
 
 def _drive() -> rospy.Subscriber:

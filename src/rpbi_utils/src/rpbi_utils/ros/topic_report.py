@@ -12,13 +12,20 @@ _STAMP = struct.Struct("<4xII")  # behind the `seq` of a header
 _COLUMNS = ("type", "messages", "bytes", "rate_hz", "max_gap_s", "first", "last")
 
 
-def topic_report(path: str | Path) -> pd.DataFrame:
+class TopicReport(pd.DataFrame):
+    """A table that is printed whole, however wide the terminal is; what is made of it is an ordinary table."""
+
+    def __repr__(self) -> str:
+        return self.to_string()
+
+
+def topic_report(path: str | Path) -> TopicReport:
     """Measures every topic of a bag.
 
     Returns:
-        One row a topic (the index), sorted by name, with the columns `type`, `messages`, `bytes` (serialised,
-        before compression), `rate_hz` (mean, from the first to the last message; NaN if they have the same
-        time), `max_gap_s` (longest time without a message in between), `first` and `last` [s of ROS time].
+        A table with one row a topic (the index), sorted by name, with the columns `type`, `messages`, `bytes`
+        (serialised, before compression), `rate_hz` (mean, from the first to the last message; NaN if they have the
+        same time), `max_gap_s` (longest time without a message in between), `first` and `last` [s of ROS time].
         Times are the stamps of headers, or of recording where there is none, as for `/tf`.
 
     Raises:
@@ -34,7 +41,7 @@ def topic_report(path: str | Path) -> pd.DataFrame:
             ("|".join(sorted(each.name for each in types)), len(times[topic]), sizes[topic], *_rhythm(times[topic]))
             for topic, types in bag.types.items()
         ]
-        return pd.DataFrame(rows, index=pd.Index(list(bag.types), name="topic"), columns=_COLUMNS)
+        return TopicReport(rows, index=pd.Index(list(bag.types), name="topic"), columns=_COLUMNS)
 
 
 def _time(message: BagMessage) -> float:

@@ -16,7 +16,7 @@ from rpbi.control.controllers.controller import Arm, RobotState
 from rpbi.control.controllers.impedance import JointImpedance
 from rpbi.control.controllers.manager import ControllerManager, ControllerSwitch, controller_problems
 from rpbi.control.joint_drive import JointDrive
-from rpbi.control.motors import Command, LimitReports, Motors, joined
+from rpbi.control.motors import QUANTITIES, Command, LimitReports, Motors, joined
 from rpbi.control.robot_model import RobotModel
 from rpbi.control.trajectories.config import trajectory_problems
 from rpbi.control.trajectories.follower import TrajectoryFollower
@@ -116,7 +116,10 @@ class Robot(JointedBody):
         return (*joint_states, *controllers, *self.force_torque_sensors, *trajectory, *contacts, *super().sensors())
 
     def inputs(self) -> Mapping[str, Input]:
-        """Takes `target`, a JointTarget of what the control mode asks for, beside the pose of its base."""
+        """Takes `target` beside the pose of its base.
+
+        It is a JointTarget, or a mapping of joints to numbers, of what the control mode asks for.
+        """
         target = Input(self._check_target, self.drive.follow, merge=joined)
         return {**super().inputs(), "target": target, **self._controller_inputs()}
 
@@ -207,7 +210,8 @@ class Robot(JointedBody):
             self._robot_model.close()
         super().remove()
 
-    def _check_target(self, target: JointTarget) -> tuple[Command]:
+    def _check_target(self, given: JointTarget | Mapping[str, float]) -> tuple[Command]:
+        target = JointTarget.of(given, QUANTITIES[self.motors.mode])
         command = self.motors.check(target)
         if not self._told_followers:
             self._tell_followers(target.names)

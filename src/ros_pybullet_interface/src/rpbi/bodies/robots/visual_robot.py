@@ -39,10 +39,11 @@ class VisualRobot(JointedBody):
         return data.get("is_visual_robot") in (True, 1)
 
     def inputs(self) -> Mapping[str, Input]:
-        """Takes `target`, a JointTarget of positions [rad or m], beside the pose of its base."""
+        """Takes `target`, a JointTarget or mapping of joints to positions [rad or m], beside the pose of its base."""
         return {**super().inputs(), "target": Input(self._check_target, self._show, merge=dict.__or__)}
 
-    def _check_target(self, target: JointTarget) -> dict[int, float]:
+    def _check_target(self, given: JointTarget | Mapping[str, float]) -> dict[int, float]:
+        target = JointTarget.of(given, "position")
         return self.model.resolve(target.names, target.values_of("position", "a visual robot shows positions"))
 
     def _show(self, positions: dict[int, float]) -> None:

@@ -76,8 +76,10 @@ class CartesianImpedanceController(Controller):
         """Axes of the springs, as columns, shape (6, 6); None for those of the world."""
         self._posture_stiffness = np.full(len(arm.chosen), config.posture_stiffness)
 
-    def check(self, key: str, value: PoseTarget) -> PoseTarget:
+    def check(self, key: str, value: PoseTarget | Pose | Mapping[str, Any]) -> PoseTarget:
         """Takes finite poses."""
+        if not isinstance(value, PoseTarget):
+            return PoseTarget(check_pose(value))
         return value._replace(pose=check_pose(value.pose))
 
     def start(self, state: RobotState, tick: int) -> None:

@@ -42,8 +42,9 @@ class JointImpedanceController(Controller):
         self._places = {joint.name: place for place, joint in enumerate(self._joints)}
         self._springs = JointImpedance(config, self._joints, arm.dt_s)
 
-    def check(self, key: str, value: JointTarget) -> JointTarget:
-        """Takes targets for some or all of its joints."""
+    def check(self, key: str, value: JointTarget | Mapping[str, float]) -> JointTarget:
+        """Takes targets for some or all of its joints, or a mapping of them to positions [rad or m]."""
+        value = JointTarget.of(value, "position")
         positions = value.values_of("position", "its targets are positions")
         for name, position in zip(value.names, positions, strict=True):
             joint = self._joint(name)

@@ -49,8 +49,8 @@ class ControllerSwitch(NamedTuple):
         stop: Names of those to stop, first.
     """
 
-    start: Sequence[str]
-    stop: Sequence[str]
+    start: Sequence[str] = ()
+    stop: Sequence[str] = ()
 
 
 class NewGains(NamedTuple):

@@ -9,7 +9,7 @@ from typing import Any
 
 import rosgraph
 import rospy
-from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from std_msgs.msg import Header
 
 from custom_ros_tools.ros.lifecycle.run_node import init_node
@@ -18,7 +18,7 @@ from rpbi.render.frame import Camera, Demand, Frame
 from rpbi.ros.headers import to_ros_time
 from rpbi.ros.publishers.topics import StateTopic
 
-from .topics import camera_info, camera_topics, cloud_message, image_message
+from .topics import camera_info, camera_topics, cloud_message, compressed_message, image_message
 
 SINK = "rpbi.ros.cameras.image_publisher:ImagePublisher"
 
@@ -152,7 +152,9 @@ class _CameraTopics:
         for _, topic in self._topics.values():
             topic.close()
 
-    def _message(self, stream: str, frame: Frame, header: Header) -> CameraInfo | Image | PointCloud2 | None:
+    def _message(
+        self, stream: str, frame: Frame, header: Header
+    ) -> CameraInfo | CompressedImage | Image | PointCloud2 | None:
         if stream == "info":
             self._info.header = header
             return self._info
@@ -160,4 +162,6 @@ class _CameraTopics:
             if self._cloud is None or frame.depth is None or frame.colour is None:
                 return None
             return cloud_message(self._cloud.of(frame.depth, frame.colour), header)
+        if stream == "jpeg":
+            return compressed_message(frame, header)
         return image_message(stream, frame, header)

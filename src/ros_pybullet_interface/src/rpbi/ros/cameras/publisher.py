@@ -3,7 +3,6 @@
 import contextlib
 import sys
 import time
-import zlib
 from collections.abc import Callable, Mapping
 from functools import partial
 
@@ -13,9 +12,7 @@ from rosnode import cleanup_master_blacklist
 
 from custom_ros_tools.errors import PhysicsError
 from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
-from rpbi.render.camera import Intrinsics
 from rpbi.render.client import RenderClient
-from rpbi.render.depth import DepthNoise
 from rpbi.render.frame import Camera
 from rpbi.render.priority import take_part
 from rpbi.ros.headers import named_frame
@@ -123,7 +120,8 @@ class ScenePublisher:
                 self._renderer.remove(name)
         for name, sensor in cameras.items():
             if self._sensors.get(name) is not sensor:
-                self._renderer.add(_camera(sensor))
+                camera = Camera.of(sensor.config, sensor.topic_name)
+                self._renderer.add(camera._replace(frame_id=named_frame(camera.frame_id)))
         self._sensors = cameras
         self._synchronous = tuple(sensor for sensor in cameras.values() if sensor.config.synchronous)
 
@@ -146,25 +144,6 @@ def _unregister(node: str) -> None:
     """Takes leave of the ROS master for a node that had to be killed."""
     with contextlib.suppress(OSError, rosgraph.MasterException):
         cleanup_master_blacklist(rosgraph.Master(rospy.get_name()), [node])
-
-
-def _camera(sensor: RgbdSensor) -> Camera:
-    config = sensor.config
-    size = config.intrinsics
-    near_m, far_m = size.range
-    noise = None
-    if config.depth_noise_m or config.depth_noise_growth_per_m:
-        seed = zlib.crc32(config.name.encode()) if config.seed is None else config.seed
-        noise = DepthNoise(config.depth_noise_m, config.depth_noise_growth_per_m, seed)
-    return Camera(
-        sensor.name,
-        named_frame(config.object_tf.tf_id),
-        Intrinsics(size.width, size.height, size.fov, near_m, far_m),
-        sensor.topic_name,
-        config.pointcloud,
-        config.synchronous,
-        noise,
-    )
 
 
 def _is_placed_or_unwanted(sensor: RgbdSensor) -> bool:

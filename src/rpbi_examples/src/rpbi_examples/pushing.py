@@ -1,0 +1,162 @@
+"""How an arm pushes a box over the floor with the ball at its hand, from one place to another and back."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from rpbi.control.trajectories.trajectory import minimum_jerk
+from rpbi.geometry import Vector
+from rpbi.kinematics import Kinematics
+from rpbi.kinematics.problem import PybulletProblem
+
+from .motions import PlanarPose
+
+BALL = "end_effector_ball"
+BALL_RADIUS_M = 0.015
+PLACES = ((-0.6, 0.2), (-0.6, -0.2))
+"""Where the centre of the box is pushed to, one after the other: x and y in the frame of the arm's base [m]."""
+HALF_SIDES_M = (0.10, 0.08)
+"""Half of the box's sides along its own x and y [m]."""
+NEAR_M = 0.05
+"""A box that one push more would not bring nearer by so much is there [m]."""
+CLEARANCE_M = 0.04
+"""How far the ball is from the box before and after a push [m]."""
+GAP_M = 0.001
+"""How far it is from the box when it begins to push, from rest [m]."""
+PUSH_HEIGHT_M, TRAVEL_HEIGHT_M = 0.05, 0.25
+"""Height of the ball [m] while it pushes, and above the box."""
+PUSH_SPEED, TRAVEL_SPEED = 0.15, 0.35
+"""Mean speed of the ball [m/s]."""
+JOINT_SPEED = 0.8
+"""Mean speed of the joint that has farthest to go [rad/s], on the way from any posture."""
+SHORTEST_S = 0.5
+"""Least time for a straight line [s]."""
+SPACING_M = 0.02
+"""Distance of the points of a line for which inverse kinematics are solved [m]."""
+POINTING_DOWN = (1.0, 0.0, 0.0, 0.0)
+"""Orientation of the hand as x, y, z, w."""
+POSTURE = np.radians((0.0, 30.0, 0.0, -90.0, 0.0, 60.0, 0.0))
+"""Where the search for joint positions starts [rad]..."""
+ELBOW_LEAN = 1.5
+"""... with the third joint turned by so much for each metre that the ball is to the side [rad/m]."""
+
+
+class Push(NamedTuple):
+    """A push along a straight line, in the frame of the arm's base.
+
+    Attributes:
+        start: Where the ball touches the box, x and y [m].
+        end: Where it stops.
+    """
+
+    start: tuple[float, float]
+    end: tuple[float, float]
+
+    def beside(self, way_m: float) -> tuple[float, float]:
+        """Returns the point so far before the start, or from the start on if it is negative [m]."""
+        length = math.dist(self.start, self.end)
+        x, y = ((begin - end) / length * way_m for begin, end in zip(self.start, self.end))
+        return self.start[0] + x, self.start[1] + y
+
+
+class Move(NamedTuple):
+    """Joint positions over time, from rest to rest.
+
+    Attributes:
+        path: Positions of the joints [rad] along the way, which goes from 0 to 1.
+        duration_s: How long it takes [s].
+    """
+
+    path: CubicSpline
+    duration_s: float
+
+    def at(self, time_s: float) -> tuple[float, ...]:
+        """Returns the positions [rad] at a time since its start [s]."""
+        (way,) = minimum_jerk((0.0,), (1.0,), 0.0, self.duration_s).sample(time_s).position
+        return tuple(self.path(way).tolist())
+
+    @property
+    def end(self) -> tuple[float, ...]:
+        """The positions at its end [rad]."""
+        return self.at(self.duration_s)
+
+
+def next_push(box: PlanarPose, goal: tuple[float, float]) -> Push | None:
+    """Returns the push that brings a box nearest to a goal, None if it is there.
+
+    The ball pushes the middle of one of the four sides, straight at it: so the box hardly turns.
+    """
+    best, least = None, math.dist((box.x, box.y), goal) - NEAR_M
+    for turns in range(4):
+        angle = box.yaw + turns * math.pi / 2.0
+        ahead = math.cos(angle), math.sin(angle)
+        way = ahead[0] * (goal[0] - box.x) + ahead[1] * (goal[1] - box.y)
+        left = math.dist((box.x + way * ahead[0], box.y + way * ahead[1]), goal)
+        if way > 0.0 and left < least:
+            back = HALF_SIDES_M[turns % 2] + BALL_RADIUS_M
+            start, end = ((box.x + s * ahead[0], box.y + s * ahead[1]) for s in (-back, way - back))
+            best, least = Push(start, end), left
+    return best
+
+
+class Pusher:
+    """Plans the moves of a push.
+
+    Args:
+        kinematics: The arm's, a KUKA LWR4+ with the ball.
+    """
+
+    def __init__(self, kinematics: Kinematics) -> None:
+        self._kinematics = kinematics
+
+    def moves(self, positions: Sequence[float], push: Push) -> list[Move]:
+        """Returns the moves from some joint positions [rad]: up, over, down, to the box, the push, back and up.
+
+        Raises:
+            ValueError: If something on the way is out of reach.
+        """
+        here = self._kinematics.forward(positions, BALL).position
+        before, after = push.beside(CLEARANCE_M), push.beside(CLEARANCE_M - math.dist(push.start, push.end))
+        corners = [
+            (*before, TRAVEL_HEIGHT_M),
+            (*before, PUSH_HEIGHT_M),
+            (*push.beside(GAP_M), PUSH_HEIGHT_M),
+            (*push.end, PUSH_HEIGHT_M),
+            (*after, PUSH_HEIGHT_M),
+            (*after, TRAVEL_HEIGHT_M),
+        ]
+        if here[2] < TRAVEL_HEIGHT_M - CLEARANCE_M:
+            corners.insert(0, (here[0], here[1], TRAVEL_HEIGHT_M))
+        lines = (
+            self._line(start, end, PUSH_SPEED if end[:2] == push.end else TRAVEL_SPEED)
+            for start, end in pairwise(corners)
+        )
+        return [self._approach(positions, corners[0]), *lines]
+
+    def _approach(self, positions: Sequence[float], point: Vector) -> Move:
+        """Returns the move from any posture [rad] to the one with the ball at a point [m]."""
+        ends = np.array((positions, self._solve(point)))
+        return Move(CubicSpline((0.0, 1.0), ends), max(np.abs(ends[1] - ends[0]).max() / JOINT_SPEED, SHORTEST_S))
+
+    def _line(self, start: Vector, end: Vector, speed: float) -> Move:
+        """Returns the move of the ball along a straight line [m] at a mean speed [m/s]."""
+        length = math.dist(start, end)
+        ways = np.linspace(0.0, 1.0, max(2, math.ceil(length / SPACING_M) + 1))
+        points = np.outer(1.0 - ways, start) + np.outer(ways, end)
+        return Move(
+            CubicSpline(ways, [self._solve(point) for point in points.tolist()]), max(length / speed, SHORTEST_S)
+        )
+
+    def _solve(self, point: Sequence[float]) -> tuple[float, ...]:
+        """Returns the joint positions [rad] with the ball at a point [m], always the same for the same point."""
+        posture = POSTURE.tolist()
+        posture[2] = ELBOW_LEAN * point[1]
+        problem = PybulletProblem(BALL, point, POINTING_DOWN, currentPosition=posture, residualThreshold=1e-4)
+        solution = self._kinematics.solve(problem)
+        if not solution.success:
+            raise ValueError(f"({point[0]:.2f}, {point[1]:.2f}, {point[2]:.2f}) m is out of reach: {solution.message}")
+        return solution.positions

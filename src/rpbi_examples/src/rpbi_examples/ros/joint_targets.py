@@ -1,0 +1,61 @@
+"""Targets of a robot's joints, by its topics and services."""
+
+import threading
+from collections.abc import Sequence
+
+import rospy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Int64
+
+from custom_ros_tools.ros.services import get_srv_handler
+from ros_pybullet_interface.msg import JointInfo
+from ros_pybullet_interface.srv import RobotInfo, RobotInfoResponse
+
+HZ = 50.0
+"""How often targets are sent."""
+
+
+class JointTargets:
+    """Sends targets to all joints of a robot that move, as long as the world runs.
+
+    Attributes:
+        positions: Where the joints were at the start [rad or m].
+        limits: Lower and upper limit of each, infinite where there is none.
+    """
+
+    def __init__(self, robot_name: str) -> None:
+        info: RobotInfoResponse = get_srv_handler(f"rpbi/{robot_name}/robot_info", RobotInfo)()
+        joints = [joint for joint in info.joint_info if not joint.is_fixed]
+        state = dict(zip(info.current_joint_state.name, info.current_joint_state.position))
+        self._names = [joint.jointName for joint in joints]
+        self.positions: tuple[float, ...] = tuple(state[name] for name in self._names)
+        self.limits = [_limits(joint) for joint in joints]
+        self._publisher = rospy.Publisher(f"rpbi/{robot_name}/joint_states/target", JointState, queue_size=10)
+        self._running = threading.Event()
+        rospy.Subscriber("rpbi/status", Int64, self._take_status, queue_size=1)
+        self._rate = rospy.Rate(HZ)
+
+    def send(self, positions: Sequence[float]) -> None:
+        """Sends positions [rad or m], and returns when the next ones are due.
+
+        Raises:
+            rospy.ROSInterruptException: If ROS shuts down meanwhile.
+        """
+        while not self._running.is_set():
+            self._rate.sleep()
+        target = JointState(name=self._names, position=positions)
+        target.header.stamp = rospy.Time.now()
+        self._publisher.publish(target)
+        self._rate.sleep()
+
+    def _take_status(self, status: Int64) -> None:
+        if status.data == 1:
+            self._running.set()
+        else:
+            self._running.clear()
+
+
+def _limits(joint: JointInfo) -> tuple[float, float]:
+    """Returns lower and upper position limit; PyBullet gives an inverted range where there is none."""
+    limited = joint.jointLowerLimit < joint.jointUpperLimit
+    return (joint.jointLowerLimit, joint.jointUpperLimit) if limited else (float("-inf"), float("inf"))

@@ -1,0 +1,86 @@
+"""The KUKA of the demo pushes its box to and fro, as its node has it do."""
+
+import math
+from itertools import cycle, islice
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from custom_ros_tools.config import replace_package
+from rpbi.kinematics import Kinematics
+from rpbi.samples import ContactsSample
+from rpbi.world import World
+from rpbi_examples.motions import PlanarPose
+from rpbi_examples.pushing import NEAR_M, PLACES, Pusher, next_push
+
+WORLD = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"
+TICKS_A_TARGET = 10
+ROUNDS = 4
+
+
+@pytest.fixture(scope="module")
+def kinematics():
+    kinematics = Kinematics(replace_package("{rpbi_examples}/robots/kuka_lwr.urdf"))
+    yield kinematics
+    kinematics.close()
+
+
+@pytest.fixture(scope="module")
+def session(kinematics):
+    """Targets of the joints, sums of normal forces of the arm on the box, and where the box came to rest."""
+    world, pusher = World.from_file(WORLD), Pusher(kinematics)
+    positions = tuple(world.bodies["kuka_lwr"].joint_positions().values())
+    targets, forces, boxes = [positions], [], []
+    for goal in islice(cycle(PLACES), ROUNDS):
+        while (push := next_push(box_of(world), goal)) is not None:
+            assert len(boxes) < 2 * ROUNDS, "it does not get there"
+            for move in pusher.moves(positions, push):
+                count = round(move.duration_s * 50)
+                for number in range(1, count + 1):
+                    positions = move.at(number / count * move.duration_s)
+                    targets.append(positions)
+                    world.put("kuka_lwr/target", dict(zip(kinematics.joint_names, positions)))
+                    samples = [sample for _ in range(TICKS_A_TARGET) for sample in world.step()]
+                    forces += [force_of_arm(sample) for sample in samples if isinstance(sample, ContactsSample)]
+            boxes.append((box_of(world), goal))
+    world.close()
+    return SimpleNamespace(targets=np.array(targets), forces=np.array(forces), boxes=boxes)
+
+
+def box_of(world):
+    """Returns where the box is in the frame of the arm's base."""
+    base = world.bodies["kuka_lwr"].base_pose()
+    (x, y, _), quat = base.inverse() @ world.bodies["box"].base_pose()
+    return PlanarPose(x, y, 2.0 * math.atan2(quat[2], quat[3]))
+
+
+def force_of_arm(sample):
+    return sum(point.normal_force for point in sample.points if point.other_body == "kuka_lwr")
+
+
+def test_each_push_brings_the_box_to_its_place_and_hardly_turns_it(session):
+    assert len(session.boxes) == ROUNDS
+    for box, goal in session.boxes:
+        assert math.dist((box.x, box.y), goal) < NEAR_M
+        assert abs(box.yaw) < 0.1
+
+
+def test_it_pushes_with_the_friction_of_the_box_and_lets_go_of_it(session):
+    touching = session.forces[session.forces > 0.0]
+    assert 0.2 < len(touching) / len(session.forces) < 0.8
+    assert touching.mean() == pytest.approx(0.8 * 9.81 * 0.7 * 1.0, rel=0.35)
+
+
+def test_all_joints_move_within_their_limits_and_speeds_and_no_move_begins_with_a_jump(session, kinematics):
+    assert (np.ptp(session.targets, axis=0) > 0.2).all()
+    assert (session.targets > kinematics.limits.lower).all() and (session.targets < kinematics.limits.upper).all()
+    velocities = np.diff(session.targets, axis=0) * 50.0
+    assert (np.abs(velocities) < (1.92, 1.92, 2.27, 2.27, 2.27, 3.14, 3.14)).all()
+    assert np.abs(np.diff(velocities, axis=0)).max() * 50.0 < 20.0
+
+
+def test_what_is_out_of_reach_is_told(kinematics):
+    push = next_push(PlanarPose(-1.5, 0.0, 0.0), PLACES[0])
+    with pytest.raises(ValueError, match=r"\(-1\.6.*\) m is out of reach"):
+        Pusher(kinematics).moves((0.0,) * 7, push)
