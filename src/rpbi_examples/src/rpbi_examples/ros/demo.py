@@ -61,8 +61,6 @@ def main() -> None:
         sys.exit(_demo(arguments))
     except (InterfaceError, OSError) as error:
         sys.exit(f"demo: {error}")
-    except KeyboardInterrupt:
-        sys.exit(130)
 
 
 def _leave(number: int, _: object) -> None:

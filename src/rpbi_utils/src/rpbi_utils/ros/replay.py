@@ -52,8 +52,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (InterfaceError, OSError) as error:
         print(f"{_NAME}: {error}", file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
-        return 130
     return _report(result)
 
 
