@@ -41,6 +41,7 @@ TARGETS = "/rpbi/kuka_lwr/joint_states/target"
 COLOUR, DEPTH = "/rpbi/camera/colour/image", "/rpbi/camera/depth/image"
 REQUIRED_TOPICS = (STATES, "/tf")
 """Topics that no slow machine may thin out; their rates count in simulated time."""
+REPLAY_TOPICS = ("/rpbi/world_description", "/rpbi/state", "/rpbi/commands")
 CAMERA_TOPICS = (COLOUR, DEPTH, "/rpbi/camera/colour/camera_info", "/rpbi/camera/depth/camera_info")
 START_TIMEOUT_S = 180.0
 STOP_TIMEOUT_S = 30.0
@@ -89,7 +90,8 @@ def _demo(arguments: argparse.Namespace) -> int:
     bag = out / "recording.bag"
     expected_hz = _expected_rates()
     with _example(arguments.headless, out / "launch.log"):
-        with Recorder(bag, [*expected_hz, "/diagnostics", "/tf_static"], timeout_s=START_TIMEOUT_S):
+        topics = [*expected_hz, "/diagnostics", "/tf_static", *REPLAY_TOPICS]
+        with Recorder(bag, topics, timeout_s=START_TIMEOUT_S):
             _say(f"recording {arguments.seconds:g} s of {len(expected_hz)} topics into {bag}")
             time.sleep(arguments.seconds)
     _say("reading the bag")
