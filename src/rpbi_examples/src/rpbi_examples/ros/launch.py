@@ -1,4 +1,4 @@
-"""The command `launch`: runs an example when all of its arguments are arguments of its launch file."""
+"""The command `launch`: runs an example or a launch file when all of its arguments are arguments of its launch file."""
 
 import re
 import sys
@@ -11,6 +11,9 @@ from roslaunch.arg_dump import get_args
 from custom_ros_tools.config import ros_package_path
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
 
+WORLDS = (".yaml", ".yml")
+WORLD = "world"
+"""Launch file that runs a world of the user's."""
 _COMMENT = re.compile(r"<!--\s*(.*?)\s*-->", re.DOTALL)
 
 
@@ -29,7 +32,9 @@ def main() -> int:
         return 0
     name, *arguments = sys.argv[1:]
     try:
-        path = examples.get(name.removesuffix(".launch"))
+        if name.endswith(WORLDS):
+            name, arguments = WORLD, [f"config:={name}", *arguments]
+        path = Path(name) if name.endswith(".launch") and Path(name).is_file() else examples.get(name.removesuffix(".launch"))
         if path is None:
             raise UnknownNameError("example", name, list(examples))
         sys.argv = ["roslaunch", str(path), *arguments]  # roslaunch takes values of arguments from there
