@@ -60,9 +60,8 @@ def test_an_unknown_command_is_refused_with_the_list(bare):
 def test_a_checkout_in_a_folder_with_spaces_is_refused_at_once(bare):
     done = run([bare, "check", WORLD])
     assert done.returncode == 1
-    assert done.stderr == (
-        f"This checkout is in '{bare.parent}': rosrun and others of ROS's own tools take no path with spaces. Move it.\n"
-    )
+    assert done.stderr.startswith(f"This checkout is in '{bare.parent}': ")
+    assert done.stderr.endswith(" take no path with spaces. Move it.\n") and done.stderr.count("\n") == 1
 
 
 PROGRAMS: dict[str, list[str]] = {
@@ -125,7 +124,9 @@ MOMENTS = {
 
 @pytest.mark.parametrize("moment", MOMENTS)
 @pytest.mark.parametrize(
-    "words", [["check", WORLD], ["launch", "run_kuka"], ["list"], ["test", "tests/test_lint.py"]], ids=lambda words: words[0]
+    "words",
+    [["check", WORLD], ["launch", "run_kuka"], ["list"], ["test", "tests/test_lint.py"]],
+    ids=lambda words: words[0],
 )
 def test_ctrl_c_at_once_ends_a_command_without_a_traceback(words, moment, tmp_path):
     with open(tmp_path / "log", "w") as log:

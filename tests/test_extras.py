@@ -43,7 +43,13 @@ def test_an_unknown_extra_is_refused_with_the_known_ones():
 
 @pytest.mark.parametrize(
     ("arguments", "chosen"),
-    [("", False), ("--quick", False), ("-k grasp", False), ("tests/unit", True), ("-x tests/test_lint.py::test_x", True)],
+    [
+        ("", False),
+        ("--quick", False),
+        ("-k grasp", False),
+        ("tests/unit", True),
+        ("-x tests/test_lint.py::test_x", True),
+    ],
 )
 def test_extras_are_wanted_unless_tests_are_chosen(arguments, chosen):
     script = (ROOT / "rpbi").read_text()

@@ -12,11 +12,12 @@ _rpbi_arguments() {
   sed -n 's/^  <arg name="\([^"]*\)" default=.*/\1:=/p' "$1/src/rpbi_examples/launch/$2.launch" 2>/dev/null
 }
 
-# Prints what is in the running world; quick, since it asks nothing that would have to be built.
-_rpbi_objects() {
-  local command=${COMP_WORDS[0]/#\~/$HOME}
-  [[ ! -e $1/devel/setup.bash ]] || "$command" list 2>/dev/null </dev/null | sed 's/ .*//'
-}
+# Prints what is in the running world; sets nothing up, unlike ./rpbi list.
+_rpbi_objects() (
+  # shellcheck disable=SC1091 # catkin writes it
+  { source "$1/devel/setup.bash" && timeout 5 "$1/.venv/bin/python3" "$1/src/rpbi_utils/nodes/world" list; } 2>/dev/null |
+    sed 's/ .*//'
+)
 
 # Prints what may stand where the cursor is, a word a line. Arguments: the checkout, the word, the words before it.
 _rpbi_words() {
@@ -38,10 +39,11 @@ _rpbi_words() {
   esac
 }
 
-# Prints the pattern of the files that may stand there; nothing if none may.
+# Prints the pattern of the files that may stand there, nothing if none may. Arguments: the words before it.
 _rpbi_files() {
-  case $1 in
+  case ${2-} in
     check) echo '*.yaml' ;;
+    launch) [[ ${3-} ]] || echo '*.launch' ;;
     spawn) echo '*.@(yaml|urdf)' ;;
     replay) echo '*.bag' ;;
     test | demo | bench) echo '*' ;;
@@ -61,7 +63,7 @@ _rpbi() {
   mapfile -t COMPREPLY < <(compgen -W "$(_rpbi_words "$root" "$whole" "${words[@]}")" -- "$whole")
   COMPREPLY=("${COMPREPLY[@]#"$kept"}")
   [[ ${COMPREPLY[*]} != *:= ]] || compopt -o nospace
-  pattern=$(_rpbi_files "${words[1]-}")
+  pattern=$(_rpbi_files "${words[@]}")
   [[ $pattern && $whole != -* ]] || return
   compopt -o filenames
   while IFS= read -r file; do

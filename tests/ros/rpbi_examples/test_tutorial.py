@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import subprocess
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -25,6 +26,10 @@ COMMANDS = [
 LAUNCH = " launch "
 
 
+def _has_ended_or_answers(launched: subprocess.Popen) -> bool:
+    return launched.poll() is not None or subprocess.run([ROOT / "rpbi", "list"], capture_output=True).returncode == 0
+
+
 @pytest.fixture(scope="module")
 def followed(ros_master, tmp_path_factory):
     """The folder after all commands of the page, four times as fast as there; and what each command printed."""
@@ -37,11 +42,7 @@ def followed(ros_master, tmp_path_factory):
         for command in COMMANDS:
             if LAUNCH in command:
                 launched = system.start(["bash", "-c", f"cd {folder} && exec {command} real_time_factor:=4"])
-                listing = [ROOT / "rpbi", "list"]
-                wait_until(
-                    lambda: launched.poll() is not None or subprocess.run(listing, capture_output=True).returncode == 0,
-                    "the world runs",
-                )
+                wait_until(partial(_has_ended_or_answers, launched), "the world runs")
                 assert launched.poll() is None, system.output(launched)
                 continue
             done = subprocess.run(["bash", "-c", command], cwd=folder, capture_output=True, text=True, timeout=120.0)

@@ -12,6 +12,7 @@ from nav_msgs.msg import Odometry
 from node_world import main_config, objects
 from ros_system import RosSystem, find_executable, wait_until
 from sensor_msgs.msg import JointState
+from terminal import Terminal
 from worlds import FLOOR, box, iiwa
 
 from custom_ros_tools.config import load_config
@@ -157,12 +158,24 @@ def test_without_a_simulator_it_says_where_one_is(ros, monkeypatch):
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
     done = in_process("move", "box", "0", "0", "1")
     assert done.returncode == 1
-    assert done.stderr.startswith("move: no ROS master answers at http://127.0.0.1:1: start a simulator, for instance by")
+    assert done.stderr.startswith(
+        "move: no ROS master answers at http://127.0.0.1:1: start a simulator, for instance by"
+    )
 
 
 def test_the_namespace_may_be_that_of_the_process(ros, monkeypatch):
     monkeypatch.setenv("ROS_NAMESPACE", "lab")
     assert in_process("list").stdout.startswith("floor ")
+
+
+def test_names_are_completed_in_bash(ros, tmp_path):
+    kept = {name: os.environ[name] for name in ("ROS_MASTER_URI", "ROS_IP", "ROS_HOME")}
+    terminal = Terminal(tmp_path, ROS_NAMESPACE="lab", **kept)
+    try:
+        assert terminal.completed("./rpbi move mo\t") == "./rpbi move mobile"
+        assert terminal.offered("./rpbi remove \t") == {"floor", "arm", "mobile"}
+    finally:
+        terminal.close()
 
 
 def test_kinds_are_known_by_their_keys():

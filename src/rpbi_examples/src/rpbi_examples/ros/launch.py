@@ -34,11 +34,12 @@ def main() -> int:
     try:
         if name.endswith(WORLDS):
             name, arguments = WORLD, [f"config:={name}", *arguments]
-        path = Path(name) if name.endswith(".launch") and Path(name).is_file() else examples.get(name.removesuffix(".launch"))
-        if path is None:
+        is_file = name.endswith(".launch") and Path(name).is_file()
+        file = Path(name) if is_file else examples.get(name.removesuffix(".launch"))
+        if file is None:
             raise UnknownNameError("example", name, list(examples))
-        sys.argv = ["roslaunch", str(path), *arguments]  # roslaunch takes values of arguments from there
-        _check_arguments(path, arguments)
+        sys.argv = ["roslaunch", str(file), *arguments]  # roslaunch takes values of arguments from there
+        _check_arguments(file, arguments)
     except (InterfaceError, roslaunch.RLException) as error:
         print(f"launch: {error}", file=sys.stderr)
         return 2

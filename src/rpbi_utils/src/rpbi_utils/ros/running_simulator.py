@@ -36,8 +36,12 @@ class RunningSimulator:
         self._services = {name for name, _ in serving}
         self._subscribed = {name for name, _ in subscribed}
         if self.full_name(LIST) not in self._services:
-            others = sorted(name.removesuffix(f"/{LIST}") or "/" for name in self._services if name.endswith(f"/{LIST}"))
-            where = f"in the namespace {self._namespace.rstrip('/')}" if self._namespace != "/" else "without a namespace"
+            others = sorted(
+                name.removesuffix(f"/{LIST}") or "/" for name in self._services if name.endswith(f"/{LIST}")
+            )
+            where = (
+                f"in the namespace {self._namespace.rstrip('/')}" if self._namespace != "/" else "without a namespace"
+            )
             advice = f"; there is one in {', '.join(others)}: use --ns" if others else ""
             raise InterfaceError(f"no simulator runs {where} on the ROS master at {uri}{advice}")
 

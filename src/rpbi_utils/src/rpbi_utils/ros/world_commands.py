@@ -117,7 +117,9 @@ def _spawn(simulator: RunningSimulator, arguments: argparse.Namespace) -> str:
         return str(simulator.call("rpbi/add_rgbd_sensor", SetString, config_to_str({FILE: path, **changes})).message)
     asked = PybulletObject(object_type=getattr(PybulletObject, kind.upper()))
     if is_urdf:
-        asked.config = config_to_str({**data, **changes, "loadURDF": {**data["loadURDF"], **changes.get("loadURDF", {})}})
+        asked.config = config_to_str(
+            {**data, **changes, "loadURDF": {**data["loadURDF"], **changes.get("loadURDF", {})}}
+        )
     elif changes:
         asked.config = config_to_str({FILE: path, **changes})
     else:
@@ -167,7 +169,9 @@ def _send(simulator: RunningSimulator, arguments: argparse.Namespace) -> str:
     body, _, link = arguments.name.partition("/")
     duration_s = arguments.duration_s
     if (arguments.drive or arguments.push) and arguments.targets:
-        raise InterfaceError(f"expected --drive, --push or targets of joints, got {' '.join(arguments.targets)} as well")
+        raise InterfaceError(
+            f"expected --drive, --push or targets of joints, got {' '.join(arguments.targets)} as well"
+        )
     if arguments.push:
         push = Wrench(force=Vector3(*arguments.push))
         fields = {"object_name": arguments.name, "wrench": push, "frame": "world", "duration": duration_s}
