@@ -8,7 +8,6 @@ from pathlib import Path
 import roslaunch
 from roslaunch.arg_dump import get_args
 
-from custom_ros_tools.config import ros_package_path
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
 
 WORLDS = (".yaml", ".yml")
@@ -18,19 +17,19 @@ _COMMENT = re.compile(r"<!--\s*(.*?)\s*-->", re.DOTALL)
 
 
 def main() -> int:
-    """Runs the command; without arguments, it lists the examples.
+    """Runs the command; its first argument is the folder of the launch files. Without others, it lists the examples.
 
     Returns:
         The exit code: 2 if there is no such example or argument, else that of roslaunch.
     """
-    folder = Path(ros_package_path("rpbi_examples")) / "launch"
-    examples = {path.stem: path for path in sorted(folder.glob("*.launch"))}
-    if len(sys.argv) < 2:
+    _, folder, *given = sys.argv
+    examples = {path.stem: path for path in sorted(Path(folder).glob("*.launch"))}
+    if not given:
         print("Examples, for ./rpbi launch EXAMPLE [name:=value ...]; --ros-args instead of values lists the names:")
         for name, path in examples.items():
             print(f"  {name:<28} {_purpose(path)}")
         return 0
-    name, *arguments = sys.argv[1:]
+    name, *arguments = given
     try:
         if name.endswith(WORLDS):
             name, arguments = WORLD, [f"config:={name}", *arguments]
