@@ -88,7 +88,3 @@ def _renderer() -> str:
     # PyBullet and its plugin print a lot around it
     names = [line.partition(": ")[2] for line in found.stdout.splitlines() if line.startswith("renderer: ")]
     return names[0] if names else "none"
-
-
-if __name__ == "__main__":
-    main()

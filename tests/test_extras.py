@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+from ros_system import support_on_path
 
 ROOT = Path(__file__).resolve().parent.parent
 FILES = sorted(ROOT.glob("requirements*.txt"))
@@ -36,6 +39,35 @@ def test_an_unknown_extra_is_refused_with_the_known_ones():
     answer = subprocess.run([str(ROOT / "rpbi"), "setup", "ikk"], capture_output=True, text=True, timeout=60.0)
     assert answer.returncode == 2
     assert "There is no extra 'ikk'; there are: assets ik mpc." in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "chosen"),
+    [
+        ("", False),
+        ("--quick", False),
+        ("-k grasp", False),
+        ("tests/unit", True),
+        ("-x tests/test_lint.py::test_x", True),
+    ],
+)
+def test_extras_are_wanted_unless_tests_are_chosen(arguments, chosen):
+    script = (ROOT / "rpbi").read_text()
+    function = script[script.index("names_tests()") : script.index("run_tests()")]
+    done = subprocess.run(["bash", "-c", f"{function}\nnames_tests {arguments}"], cwd=ROOT)
+    assert (done.returncode == 0) == chosen
+
+
+@pytest.mark.parametrize("lenient", [True, False])
+def test_chosen_tests_that_miss_an_extra_are_skipped_with_its_name(lenient):
+    """Without the option, which `./rpbi test PATH` adds, they fail."""
+    files = ["test_tasks.py", "test_tasks_solver.py", "test_trajectory_solver.py", "test_schemas.py"]
+    options = ["-n", "0", "-p", "without_extras", *["--skip-missing-extras"] * lenient]
+    command = [sys.executable, "-m", "pytest", *options, *(f"tests/unit/ik_ros/{file}" for file in files)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env={**os.environ, **support_on_path()})
+    assert (done.returncode == 0) == lenient, done.stdout
+    for extra in ("ik", "mpc") if lenient else ():
+        assert re.search(rf"SKIPPED .* is not installed: ./rpbi setup {extra}\n", done.stdout), done.stdout
 
 
 @pytest.mark.parametrize("wanted", [[], ["mpc"]], ids=["none", "mpc"])

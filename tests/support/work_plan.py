@@ -1,8 +1,9 @@
-"""Plugin for pytest: which worker runs which tests, and in which order."""
+"""Plugin for pytest: which tests run, on which worker, and in which order."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +17,44 @@ FIRST = ("ros/ik_ros", "ros/rpbi_examples", "gui", "ros")
 QUICK_FOLDERS = ("unit", "sim")
 """Folders all of whose tests are quick, as those of the top are; elsewhere those with the mark."""
 
+EXTRA_OF = {"pinocchio": "ik", "daqp": "ik", "casadi": "mpc"}
+"""Extra that has a module."""
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Knows `--quick`."""
+    """Knows `--quick` and `--skip-missing-extras`."""
     parser.addoption("--quick", action="store_true", help="unit, sim and one test of each ROS path, for every day")
+    text = "skip tests that need an extra that is not installed"
+    parser.addoption("--skip-missing-extras", action="store_true", help=text)
+
+
+def _missing_extra(error: BaseException | None) -> str | None:
+    """Returns what an error and its causes say of an extra that is not installed."""
+    while error is not None:
+        if type(error).__name__ == "MissingDependency":
+            return str(error)
+        if isinstance(error, ModuleNotFoundError) and error.name in EXTRA_OF:
+            return f"'{error.name}' is not installed: ./rpbi setup {EXTRA_OF[error.name]}"
+        error = error.__cause__
+    return None
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_make_collect_report(collector: pytest.Collector) -> Generator[None, Any, None]:
+    """Makes a file whose imports miss an extra a skipped one, if that is asked for."""
+    report = (yield).get_result()
+    missing = report.call.excinfo and _missing_extra(report.call.excinfo.value)
+    if missing and collector.config.getoption("skip_missing_extras"):
+        report.outcome, report.longrepr, report.result = "skipped", (str(collector.path), 1, f"Skipped: {missing}"), []
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo) -> Generator[None, Any, None]:
+    """Makes a test that misses an extra a skipped one, if that is asked for."""
+    report = (yield).get_result()
+    missing = call.excinfo and _missing_extra(call.excinfo.value)
+    if missing and item.config.getoption("skip_missing_extras"):
+        report.outcome, report.longrepr = "skipped", (str(item.path), item.location[1], f"Skipped: {missing}")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Writes the JSON Schemas of solvers anew."""
 
-from ik_ros.schemas import main
+from custom_ros_tools.ros.node import run_command
 
-main()
+run_command("ik_ros.schemas:main")

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Checks a world without a ROS master."""
 
-from rpbi.ros.reference.check import main
+from custom_ros_tools.ros.node import run_command
 
-main()
+run_command("rpbi.ros.reference.check:main")

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Prints a robot description as ROS wants it, for the parameters of launch files."""
 
-from rpbi.ros.robots.info import main
+from custom_ros_tools.ros.node import run_command
 
-main()
+run_command("rpbi.ros.robots.info:main")

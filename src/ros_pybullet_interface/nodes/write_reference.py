@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Writes schemas and reference pages; see rpbi.ros.reference.write."""
 
-from rpbi.ros.reference.write import main
+from custom_ros_tools.ros.node import run_command
 
-main()
+run_command("rpbi.ros.reference.write:main")

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Runs the demo."""
 
-from rpbi_examples.ros.demo import main
+from custom_ros_tools.ros.node import run_command
 
-main()
+run_command("rpbi_examples.ros.demo:main")

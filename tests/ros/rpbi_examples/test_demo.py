@@ -59,6 +59,14 @@ def test_slowness_is_told_and_only_what_is_required_fails(demo):
     assert summary["figures"]["draw_rate_hz"] > 0
 
 
+def test_its_recording_runs_again(demo):
+    out, _ = demo
+    replay = ["rosrun", "rpbi_utils", "replay", str(out / "recording.bag"), "--quiet"]
+    done = subprocess.run(replay, capture_output=True, text=True, timeout=180)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert re.fullmatch(r"\d+ states agree over \d{4,} ticks\n", done.stdout)
+
+
 def test_the_table_has_all_joints_by_name_and_all_move_from_rest(demo):
     out, _ = demo
     table = pd.read_parquet(out / "joint_states.parquet", engine="fastparquet")

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
 
+import pybullet
 import pytest
 import scripted_session as script
+import yaml
+from worlds import box, write_world
 
 from custom_ros_tools.errors import ConfigError
 from rpbi.config.loading import load_world
@@ -18,6 +22,7 @@ from rpbi.geometry import Pose
 from rpbi.replay.recorded_values import from_text, to_text
 from rpbi.replay.session import Replay
 from rpbi.replay.world_description import WorldDescription
+from rpbi.world import World
 
 TICKS = 3000
 EXAMPLES = Path(__file__).resolve().parents[3] / "src" / "rpbi_examples" / "configs"
@@ -181,3 +186,22 @@ def test_what_cannot_be_recorded_says_so():
 def test_a_recording_can_have_nothing_called_but_values(text):
     with pytest.raises(ValueError):
         from_text(text)
+
+
+@pytest.mark.parametrize("how", ["relative", "full", "package"])
+def test_an_object_file_that_has_changed_is_warned_of_however_it_is_named(how, tmp_path, monkeypatch):
+    folder = tmp_path / "my_lab"
+    folder.mkdir()
+    (folder / "package.xml").write_text("<package><name>my_lab</name></package>")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path}:{os.environ.get('ROS_PACKAGE_PATH', '')}")
+    write_world(folder, dynamic=(box("box"),))
+    name = {"relative": "", "full": f"{folder}/", "package": "{my_lab}/"}[how] + "box.yaml"
+    main = yaml.safe_load((folder / "world.yaml").read_text()) | {"dynamic_objects": [name]}
+    (folder / "world.yaml").write_text(yaml.safe_dump(main))
+    world = World.from_file(str(folder / "world.yaml"), connection_mode=pybullet.DIRECT)
+    text = script.describe(world)
+    world.close()
+    assert WorldDescription(text).warnings == []
+    with open(folder / "box.yaml", "a") as file:
+        file.write("# changed\n")
+    assert WorldDescription(text).warnings == [f"{folder}/box.yaml: is another file than when the world was recorded"]

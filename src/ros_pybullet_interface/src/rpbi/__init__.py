@@ -1,0 +1,33 @@
+"""The simulator: worlds, bodies, sensors, renderer and, in `rpbi.ros`, its node."""
+
+import os
+import sys
+from importlib import import_module
+
+_GREETING = b"pybullet build time: "
+
+
+def _import_pybullet() -> None:
+    """Imports PyBullet without the line about its build, which it prints on standard error when it is imported first.
+
+    All else that is printed meanwhile, such as a warning of NumPy, is printed afterwards.
+    """
+    try:
+        stderr = os.dup(2)
+    except OSError:  # there is none
+        return
+    with os.fdopen(os.memfd_create("stderr"), "rb") as printed, os.fdopen(stderr, "wb", buffering=0) as original:
+        sys.stderr.flush()
+        os.dup2(printed.fileno(), 2)
+        try:
+            import_module("pybullet")
+        finally:
+            sys.stderr.flush()
+            os.dup2(stderr, 2)
+            printed.seek(0)
+            for line in printed:
+                if not line.startswith(_GREETING):
+                    original.write(line)
+
+
+_import_pybullet()

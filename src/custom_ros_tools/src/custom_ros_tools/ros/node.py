@@ -1,7 +1,8 @@
-"""What the programs of nodes call; it imports nothing that starts a thread."""
+"""What the programs of nodes and commands call; it imports nothing that starts a thread."""
 
 import pkgutil
 import signal
+import sys
 
 
 def run(main: str) -> None:
@@ -12,3 +13,26 @@ def run(main: str) -> None:
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     pkgutil.resolve_name(main)()
+
+
+def run_command(main: str) -> None:
+    """Runs a command's `module:function` and exits with what it returns; Ctrl-C ends it without a traceback.
+
+    Until the function is imported, Ctrl-C ends the process at once, from then on it is a KeyboardInterrupt. Who starts
+    the process with SIGINT blocked, as `env --block-signal=INT` does, leaves no moment before that either. In a process
+    that ignores SIGINT, as behind the `&` of a script, it stays ignored.
+    """
+    heeds = signal.getsignal(signal.SIGINT) != signal.SIG_IGN
+    if heeds:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    function = pkgutil.resolve_name(main)
+    try:
+        if heeds:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+        sys.exit(function())
+    except KeyboardInterrupt:
+        sys.exit(130)
+    finally:
+        if heeds:  # while Python is leaving, too
+            signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -112,7 +112,7 @@ class _Reader:
             for data, file, context in self._files(section):
                 with self._noting_problems(file):
                     kind = type_of(section, data)
-                    yield ObjectConfig(kind, load_object(kind, data, file, context), file)
+                    yield ObjectConfig(kind, load_object(kind, data, file, context), file, context["file"])
         self._claim_name(self._data.get("rgbd_sensor"), self._file, "rgbd_sensor.name")
 
     def _further_cameras(self) -> Iterator[CameraConfig]:

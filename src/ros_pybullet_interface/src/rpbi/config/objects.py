@@ -30,11 +30,13 @@ class ObjectConfig:
         type: Key of its class in the table of body types, or `module:Class`.
         config: Its validated configuration.
         file: The file it came from, as the user wrote it.
+        path: Where that file is; empty if there is none.
     """
 
     type: str
     config: BodyConfig
     file: str
+    path: str = ""
 
 
 def object_sections() -> dict[str, type[BodyConfig]]:

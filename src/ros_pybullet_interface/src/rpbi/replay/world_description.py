@@ -33,7 +33,8 @@ def describe(world: World) -> str:
     Files are named with the hashes of their contents; robot descriptions that have no file of their own are in it.
     """
     loaded = world.loaded
-    files = sorted(set(_files([item.config.model_dump(mode="json") for item in loaded.objects])))
+    named = _files([item.config.model_dump(mode="json") for item in loaded.objects])
+    files = sorted({*named, *(item.path for item in loaded.objects if item.path)})
     return json.dumps(
         {
             "format": FORMAT,

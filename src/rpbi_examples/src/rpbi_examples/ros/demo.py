@@ -46,6 +46,7 @@ CONTACTS, WRIST = "/rpbi/box/contacts", "/rpbi/kuka_lwr/lwr_arm_6_joint/ft_senso
 COLOUR, DEPTH = "/rpbi/camera/colour/image", "/rpbi/camera/depth/image"
 REQUIRED_TOPICS = (STATES, "/tf")
 """Topics that no slow machine may thin out; their rates count in simulated time."""
+REPLAY_TOPICS = ("/rpbi/world_description", "/rpbi/state", "/rpbi/commands")
 CAMERA_TOPICS = (COLOUR, DEPTH, "/rpbi/camera/colour/camera_info", "/rpbi/camera/depth/camera_info")
 START_TIMEOUT_S = 180.0
 STOP_TIMEOUT_S = 30.0
@@ -66,8 +67,6 @@ def main() -> None:
         sys.exit(_demo(arguments))
     except (InterfaceError, OSError) as error:
         sys.exit(f"demo: {error}")
-    except KeyboardInterrupt:
-        sys.exit(130)
 
 
 def _leave(number: int, _: object) -> None:
@@ -96,7 +95,8 @@ def _demo(arguments: argparse.Namespace) -> int:
     bag = out / "recording.bag"
     expected_hz = _expected_rates()
     with _example(arguments.headless, out / "launch.log"):
-        with Recorder(bag, [*expected_hz, "/diagnostics", "/tf_static"], timeout_s=START_TIMEOUT_S):
+        topics = [*expected_hz, "/diagnostics", "/tf_static", *REPLAY_TOPICS]
+        with Recorder(bag, topics, timeout_s=START_TIMEOUT_S):
             _say(f"recording {arguments.seconds:g} s of {len(expected_hz)} topics into {bag}")
             call_service("/rpbi/start", Trigger)  # from the first tick on, with the arm at rest
             time.sleep(arguments.seconds)

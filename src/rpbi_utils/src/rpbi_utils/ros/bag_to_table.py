@@ -31,8 +31,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (InterfaceError, OSError) as error:
         print(f"{_NAME}: {error}", file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
-        return 130
     if not arguments.quiet:
         print(_text(written) if len(written) else "no topic to write")
     return 0

@@ -67,8 +67,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     except Exception as error:  # a bag may have anything in it
         print(f"{_NAME}: {arguments.bag}: cannot be replayed: {type(error).__name__}: {error}", file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
-        return 130
     return _report(result)
 
 

@@ -166,28 +166,29 @@ def _read_object(node: NodeContext, asked: PybulletObject) -> tuple[dict[str, An
         path = _find(node, asked.filename, "filename")
         return load_config(path, MOST_BYTES), asked.filename, path
     if asked.config:
-        return load_configs(asked.config, "config"), "config", NO_FOLDER
+        return _read_text(node, asked.config, "config")
     raise InterfaceError("expected a filename or a config; got neither")
 
 
-def _add_camera(node: NodeContext, request: SetStringRequest) -> Answer:
-    """Adds a camera: the keys of `rgbd_sensor` as YAML text, or `file` and the keys that differ."""
-    data, file = _read_camera(node, request.data)
-    config = RgbdSensorConfig.parse(data, file)
-    node.objects.add_camera(config, file)
-    return Answer(True, f"added '{config.name}'")
-
-
-def _read_camera(node: NodeContext, text: str) -> tuple[Mapping[str, Any], str]:
-    """Returns the keys of a camera and what to call where they came from."""
-    data = load_configs(text, "data")
+def _read_text(node: NodeContext, text: str, key: str) -> tuple[dict[str, Any], str, str]:
+    """Does the same with YAML text under a key: all of it, or `file` and the keys that differ."""
+    data = load_configs(text, key)
     if FILE not in data:
-        return data, "data"
+        return data, key, NO_FOLDER
     try:
         entry = parse_object_entry(data)
     except ValueError as error:
         raise InterfaceError(f"{FILE}: {error}") from None
-    return entry.apply_overrides(load_config(_find(node, entry.file, FILE), MOST_BYTES)), entry.file
+    path = _find(node, entry.file, FILE)
+    return entry.apply_overrides(load_config(path, MOST_BYTES)), entry.file, path
+
+
+def _add_camera(node: NodeContext, request: SetStringRequest) -> Answer:
+    """Adds a camera: the keys of `rgbd_sensor` as YAML text, or `file` and the keys that differ."""
+    data, file, _ = _read_text(node, request.data, "data")
+    config = RgbdSensorConfig.parse(data, file)
+    node.objects.add_camera(config, file)
+    return Answer(True, f"added '{config.name}'")
 
 
 def _find(node: NodeContext, name: str, key: str) -> str:

@@ -1,0 +1,85 @@
+"""A simulator that runs: whether there is one, what is in it, and how its services are called."""
+
+from typing import Any
+
+import rosgraph
+import rospy
+
+from custom_ros_tools.errors import InterfaceError, UnknownNameError
+from ros_pybullet_interface.srv import ListObjects
+
+LIST = "rpbi/list_objects"
+"""A service that every simulator has, and nobody else."""
+
+
+class RunningSimulator:
+    """The simulator of a namespace.
+
+    Args:
+        namespace: Its namespace, such as `left`; without it, that of this process.
+
+    Raises:
+        InterfaceError: If there is no ROS master, or none of its nodes is a simulator in that namespace.
+    """
+
+    def __init__(self, namespace: str | None = None) -> None:
+        self._namespace = rosgraph.names.get_ros_namespace() if namespace is None else f"/{namespace.strip('/')}/"
+        self._namespace = self._namespace.replace("//", "/")
+        uri = rosgraph.get_master_uri()
+        try:
+            _, subscribed, serving = rosgraph.Master("/rpbi_world").getSystemState()
+        except (OSError, rosgraph.MasterException, ValueError):
+            raise InterfaceError(
+                f"no ROS master answers at {uri}: start a simulator, for instance by ./rpbi launch, "
+                "or name its master in ROS_MASTER_URI"
+            ) from None
+        self._services = {name for name, _ in serving}
+        self._subscribed = {name for name, _ in subscribed}
+        if self.full_name(LIST) not in self._services:
+            others = sorted(
+                name.removesuffix(f"/{LIST}") or "/" for name in self._services if name.endswith(f"/{LIST}")
+            )
+            where = (
+                f"in the namespace {self._namespace.rstrip('/')}" if self._namespace != "/" else "without a namespace"
+            )
+            advice = f"; there is one in {', '.join(others)}: use --ns" if others else ""
+            raise InterfaceError(f"no simulator runs {where} on the ROS master at {uri}{advice}")
+
+    def full_name(self, name: str) -> str:
+        """Returns the full name of one of its topics or services, such as `rpbi/step`."""
+        return f"{self._namespace}{name}"
+
+    def call(self, name: str, service_type: type, *arguments: object, **fields: object) -> Any:
+        """Calls one of its services and returns the answer.
+
+        Raises:
+            InterfaceError: If nobody answers, or the answer is that it did not succeed.
+        """
+        full_name = self.full_name(name)
+        try:
+            answer = rospy.ServiceProxy(full_name, service_type)(*arguments, **fields)
+        except (rospy.ServiceException, OSError) as error:
+            raise InterfaceError(f"{full_name} does not answer: {error}") from None
+        if not getattr(answer, "success", True):
+            raise InterfaceError(answer.message)
+        return answer
+
+    def objects(self) -> dict[str, str]:
+        """Returns the types of its objects and cameras by name."""
+        listed = self.call(LIST, ListObjects)
+        return dict(zip(listed.names, listed.types))
+
+    def require(self, body: str, name: str, what: str) -> str:
+        """Returns a topic or service of a body, `rpbi/BODY/NAME`, which not every body has.
+
+        Raises:
+            UnknownNameError: If there is no such body.
+            InterfaceError: If it has none; the message has `what` such a body would be.
+        """
+        wanted = f"rpbi/{body}/{name}"
+        if self.full_name(wanted) not in self._services | self._subscribed:
+            objects = self.objects()
+            if body not in objects:
+                raise UnknownNameError("object", body, list(objects))
+            raise InterfaceError(f"'{body}' is of type {objects[body]}, expected {what}")
+        return wanted

@@ -1,0 +1,185 @@
+"""`./rpbi list`, `spawn`, `remove`, `move` and `send`, in a running world."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+from mobile_base import mobile_base
+from nav_msgs.msg import Odometry
+from node_world import main_config, objects
+from ros_system import RosSystem, find_executable, wait_until
+from sensor_msgs.msg import JointState
+from terminal import Terminal
+from worlds import FLOOR, box, iiwa
+
+from custom_ros_tools.config import load_config
+from rpbi.bodies import BODY_TYPES
+from rpbi.config.loading import load_world
+from rpbi_utils.ros.world_commands import kind_in, main
+
+CONFIGS = Path(__file__).resolve().parents[3] / "src/rpbi_examples/configs"
+
+
+@pytest.fixture(scope="module")
+def ros(ros_master, tmp_path_factory):
+    """A world in the namespace `lab`, with two robots."""
+    folder = tmp_path_factory.mktemp("world commands")
+    system = RosSystem(folder)
+    try:
+        robots = (iiwa("arm"), mobile_base(folder, loadURDF={"basePosition": [-1.0, 0.0, 0.0]}))
+        system.simulator(main_config(folder, collision=(FLOOR,), robots=robots), namespace="/lab/")
+        yield system
+    finally:
+        system.close()
+
+
+@pytest.fixture
+def say(ros, capsys):
+    """Runs a command in the namespace; returns its exit code and what it printed on both streams."""
+
+    def run(line: str, *more: str) -> tuple[int, str]:
+        code = main([*line.split(), *more, "--ns", "lab"])
+        printed = capsys.readouterr()
+        return code, (printed.out + printed.err).strip()
+
+    return run
+
+
+def position(ros, name: str) -> tuple[float, float, float]:
+    """Returns where a body is."""
+    states = ros.listen(f"/lab/rpbi/{name}/base_state", Odometry)
+    at = states.wait_for()[-1].pose.pose.position
+    return at.x, at.y, at.z
+
+
+def in_process(*words: str) -> subprocess.CompletedProcess[str]:
+    command = [find_executable("rpbi_utils", "world"), *words]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60.0)
+
+
+def test_an_object_comes_under_another_name_at_another_place_and_goes(ros, say):
+    file = ros.write_yaml("box.yaml", box("box", base_state_hz=50))
+    assert say("spawn", file, "--name", "second", "--at", "0.5", "-1e0", "0.1", "--rpy", "0", "0", "-90deg") == (
+        0,
+        "added 'second'",
+    )
+    assert position(ros, "second") == pytest.approx((0.5, -1.0, 0.1), abs=0.01)
+    assert say("list") == (0, "floor   collision\narm     robot\nmobile  mobile_robot\nsecond  dynamic")
+    assert say("move second 0.5 1 0.1") == (0, "'second' was put there")
+    assert say("send second --push 30 0 0 --for 0.2") == (0, "acts on 'second' for 0.2 s")
+    wait_until(lambda: position(ros, "second")[0] > 0.52, "the box is pushed")
+    assert say("remove second floor nothing")[0] == 1, "all or none"
+    assert say("remove second") == (0, "removed 'second'")
+    assert "second" not in objects(ros, "/lab/")
+
+
+def test_a_urdf_needs_no_yaml(ros, say):
+    assert say("spawn kuka_iiwa/model.urdf --type robot --name other --at 0 1.5 0") == (0, "added 'other'")
+    assert say("spawn r2d2.urdf --at 2 2 0.6") == (0, "added 'r2d2'")
+    assert {"other": "robot", "r2d2": "urdf"}.items() <= objects(ros, "/lab/").items()
+    assert say("remove other r2d2") == (0, "removed 'other'\nremoved 'r2d2'")
+
+
+def test_files_beside_the_yaml_are_found_though_keys_differ(ros, say):
+    (ros.folder / "part.urdf").write_text('<robot name="p"><link name="l"/></robot>')
+    file = ros.write_yaml("part.yaml", {"name": "part", "loadURDF": {"fileName": "part.urdf", "useFixedBase": True}})
+    assert say("spawn", file, "--name", "part_2", "--at", "3", "3", "1") == (0, "added 'part_2'")
+    assert say("remove part_2")[0] == 0
+
+
+def test_a_camera_comes_and_goes(ros, say):
+    camera = {"name": "eye", "hz": 1, "intrinsics": {"width": 32, "height": 24, "fov": 60, "range": [0.1, 5.0]},
+              "object_tf": {"tf_id": "eye", "hz": 10}}  # fmt: skip
+    file = ros.write_yaml("eye.yaml", camera)
+    assert say("spawn", file, "--at", "0", "0", "1")[1].endswith("object_tf says, not --at or --rpy")
+    assert say("spawn", file) == (0, "added 'eye'")
+    assert say("remove eye") == (0, "removed 'eye'")
+
+
+def test_joints_and_links_move_in_a_given_time(ros, say):
+    code, text = say("move arm lbr_iiwa_joint_2:=30deg lbr_iiwa_joint_4:=-1.2 --in 0.3")
+    assert code == 0 and text.startswith("reached")
+    state = ros.listen("/lab/rpbi/arm/joint_states", JointState).wait_for()[-1]
+    assert dict(zip(state.name, state.position))["lbr_iiwa_joint_2"] == pytest.approx(0.5236, abs=0.01)
+    code, text = say("move arm/lbr_iiwa_link_7 0.5 -0.2 0.6 180deg 0 0 --in 0.5")
+    assert code == 0 and "link 'lbr_iiwa_link_7' is" in text
+    assert say("move arm/lbr_iiwa_link_7 5 0 0 --in 0.5")[0] == 1
+    assert say("move arm --home --in 0.5")[0] == 0
+    assert say("move arm --stop") == (1, "move: no motion is running")
+
+
+def test_targets_and_velocities_are_sent(ros):
+    states = ros.listen("/lab/rpbi/arm/joint_states", JointState)
+    done = in_process("send", "arm", "lbr_iiwa_joint_1:=-0.4", "--ns", "lab")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "sent\n", "")
+    wait_until(lambda: states.messages and states.messages[-1].position[0] < -0.39, "the joint is there")
+    x, _, _ = position(ros, "mobile")
+    done = in_process("send", "mobile", "--drive", "0.5", "0", "0", "--for", "0.5", "--ns", "lab")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "drove for 0.5 s\n", "")
+    wait_until(lambda: position(ros, "mobile")[0] > x + 0.1, "it has driven")
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("spawn nothing.yaml", "spawn: no such file: nothing.yaml (looked in "),
+        ("spawn {nothing}/box.yaml", "spawn: unknown ROS package 'nothing'"),
+        ("remove amr", "remove: unknown object 'amr': known are floor, arm, mobile; did you mean 'arm'?"),
+        ("move amr --home", "move: unknown object 'amr': known are floor, arm, mobile; did you mean 'arm'?"),
+        ("move floor --home", "move: 'floor' is of type collision, expected a robot"),
+        ("move arm lbr_iiwa_jont_2:=1", "move: unknown joint 'lbr_iiwa_jont_2': known are lbr_iiwa_joint_1,"),
+        ("move arm lbr_iiwa_joint_2:=much", "move: expected a number, got much"),
+        ("move arm lbr_iiwa_joint_2:=nan", "move: expected a number, got nan"),
+        ("move arm 1 2", "move: expected JOINT:=POSITION ..., X Y Z, "),
+        ("move arm", "move: expected JOINT:=POSITION ..., X Y Z, "),
+        ("move arm 1 --home", "move: --home takes the name of a robot and nothing else"),
+        ("send arm", "send: expected JOINT:=VALUE ...; the joints of 'arm' are lbr_iiwa_joint_1,"),
+        ("send arm --drive 1 0 0", "send: 'arm' is of type robot, expected a robot with planar_base"),
+        ("send arm a:=1 --push 1 0 0", "send: expected --drive, --push or targets of joints, got a:=1 as well"),
+        ("send floor --push 1 0 0", "send: 'floor/link0' is static, no force moves it"),
+    ],
+)
+def test_what_cannot_be_is_told(say, line, told):
+    code, text = say(line)
+    assert code == 1
+    assert text.startswith(told), text
+
+
+def test_without_a_simulator_it_says_where_one_is(ros, monkeypatch):
+    done = in_process("list")
+    assert done.returncode == 1
+    assert done.stderr == (
+        f"list: no simulator runs without a namespace on the ROS master at {os.environ['ROS_MASTER_URI']}; "
+        "there is one in /lab: use --ns\n"
+    )
+    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
+    done = in_process("move", "box", "0", "0", "1")
+    assert done.returncode == 1
+    assert done.stderr.startswith(
+        "move: no ROS master answers at http://127.0.0.1:1: start a simulator, for instance by"
+    )
+
+
+def test_the_namespace_may_be_that_of_the_process(ros, monkeypatch):
+    monkeypatch.setenv("ROS_NAMESPACE", "lab")
+    assert in_process("list").stdout.startswith("floor ")
+
+
+def test_names_are_completed_in_bash(ros, tmp_path):
+    kept = {name: os.environ[name] for name in ("ROS_MASTER_URI", "ROS_IP", "ROS_HOME")}
+    terminal = Terminal(tmp_path, ROS_NAMESPACE="lab", **kept)
+    try:
+        assert terminal.completed("./rpbi move mo\t") == "./rpbi move mobile"
+        assert terminal.offered("./rpbi remove \t") == {"floor", "arm", "mobile"}
+    finally:
+        terminal.close()
+
+
+def test_kinds_are_known_by_their_keys():
+    for world in CONFIGS.glob("*/config.yaml"):
+        for item in load_world(str(world)).objects:
+            assert BODY_TYPES[kind_in(load_config(item.path))].section == BODY_TYPES[item.type].section, item.path
+    assert kind_in(load_config(str(CONFIGS / "pybullet_rgbd_example/config.yaml"))["rgbd_sensor"]) == "camera"

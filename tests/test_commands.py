@@ -1,0 +1,143 @@
+"""The command line `./rpbi`: help, refusals, and Ctrl-C at once."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from ros_system import find_executable, wait_until
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = (ROOT / "docs/commands.md").read_text()
+SECTIONS = dict(re.findall(r"^## ([a-z]+)\n\n(.*?)\n(?=^## )", PAGE, re.DOTALL | re.MULTILINE))
+WORLD = str(ROOT / "src/rpbi_examples/configs/grasp_example/config.yaml")
+
+
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A checkout in which nothing is set up, in a folder with a space; the path of its ./rpbi."""
+    folder = tmp_path_factory.mktemp("bare") / "my checkout"
+    (folder / "docs").mkdir(parents=True)
+    shutil.copy(ROOT / "rpbi", folder)
+    shutil.copy(ROOT / "docs/commands.md", folder / "docs")
+    return folder / "rpbi"
+
+
+def run(command: list[str | Path]) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command, capture_output=True, text=True, timeout=60.0)
+
+
+@pytest.mark.parametrize("command", SECTIONS)
+def test_help_of_a_command_is_its_section_and_sets_nothing_up(bare, command):
+    for words in ([command, "--help"], [command, "-h"], ["help", command]):
+        done = run([bare, *words])
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout == SECTIONS[command]
+    assert f"./rpbi {command}" in SECTIONS[command]
+    assert sorted(path.name for path in bare.parent.iterdir()) == ["docs", "rpbi"]
+
+
+def test_the_list_has_a_line_for_each_command(bare):
+    done = run([bare])
+    assert done.returncode == 0
+    listed = dict(re.findall(r"^  (\w+) +(.+)$", done.stdout, re.MULTILINE))
+    assert listed.keys() == SECTIONS.keys()
+    assert all(f"\n{line}\n" in SECTIONS[command] for command, line in listed.items())
+
+
+def test_an_unknown_command_is_refused_with_the_list(bare):
+    done = run([bare, "lanch"])
+    assert done.returncode == 2
+    assert done.stderr.startswith("There is no command 'lanch'.\nUsage: ./rpbi COMMAND")
+
+
+def test_a_checkout_in_a_folder_with_spaces_is_refused_at_once(bare):
+    done = run([bare, "check", WORLD])
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"This checkout is in '{bare.parent}': ")
+    assert done.stderr.endswith(" take no path with spaces. Move it.\n") and done.stderr.count("\n") == 1
+
+
+PROGRAMS: dict[str, list[str]] = {
+    "demo": [find_executable("rpbi_examples", "demo.py")],
+    "check": [find_executable("ros_pybullet_interface", "check_world.py")],
+    "replay": [find_executable("rpbi_utils", "replay")],
+    "bench": [sys.executable, str(ROOT / "benchmarks")],
+    **{name: [find_executable("rpbi_utils", "world"), name] for name in ("list", "spawn", "remove", "move", "send")},
+}
+
+
+@pytest.mark.parametrize("command", PROGRAMS)
+def test_the_page_has_the_options_that_the_program_has(command):
+    told = run([*PROGRAMS[command], "--help"]).stdout
+    assert set(re.findall(r"(?<!\w)--\w+", told)) - {"--help"} == set(re.findall(r"(?<!\w)--\w+", SECTIONS[command]))
+
+
+def test_launch_lists_the_examples():
+    done = run([ROOT / "rpbi", "launch"])
+    examples = {path.stem for path in (ROOT / "src/rpbi_examples/launch").glob("*.launch")}
+    assert set(re.findall(r"^  (\w+) +\S", done.stdout, re.MULTILINE)) == examples
+
+
+def test_launch_refuses_an_example_that_is_not_there():
+    done = run([ROOT / "rpbi", "launch", "basic_exmple_kuka_lwr"])
+    assert done.returncode == 2
+    assert re.match(r"launch: unknown example .*soft_body.*did you mean 'basic_example_kuka_lwr'\?\n$", done.stderr)
+
+
+def test_launch_refuses_an_argument_that_the_launch_file_lacks():
+    done = run([ROOT / "rpbi", "launch", "run_kuka", "gui:=false", "__ns:=left", "real_time_facotr:=0"])
+    assert done.returncode == 2
+    assert done.stderr == (
+        "launch: unknown argument of run_kuka 'real_time_facotr': "
+        "known are gui, headless, real_time_factor, rviz, use_sim_time; did you mean 'real_time_factor'?\n"
+    )
+
+
+def _answers(process_id: int) -> bool:
+    """Tells whether a process has its own way with SIGINT, as Python has soon after its start."""
+    status = Path(f"/proc/{process_id}/status").read_text()
+    masks = re.findall(r"^Sig(?:Cgt|Ign):\t(\w+)$", status, re.MULTILINE)
+    return any(int(mask, 16) & 1 << (signal.SIGINT - 1) for mask in masks)
+
+
+def _sources_the_workspace(process: subprocess.Popen) -> bool:
+    """Tells whether catkin's Python program runs in the group of a process."""
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            group = int((path / "stat").read_text().rpartition(")")[2].split()[2])
+            if group == process.pid and "_setup_util.py" in (path / "cmdline").read_text():
+                return _answers(int(path.name))
+        except OSError:  # it has just ended
+            continue
+    return False
+
+
+def _python_has_started(process: subprocess.Popen) -> bool:
+    command = Path(f"/proc/{process.pid}/cmdline").read_text()
+    return command.startswith("python3\0") and _answers(process.pid)
+
+
+MOMENTS = {"sourcing the workspace": _sources_the_workspace, "Python has started": _python_has_started}
+
+
+@pytest.mark.parametrize("moment", MOMENTS)
+@pytest.mark.parametrize(
+    "words",
+    [["check", WORLD], ["launch", "run_kuka"], ["list"], ["test", "tests/test_lint.py"]],
+    ids=lambda words: words[0],
+)
+def test_ctrl_c_at_once_ends_a_command_without_a_traceback(words, moment, tmp_path):
+    with open(tmp_path / "log", "w") as log:
+        process = subprocess.Popen([ROOT / "rpbi", *words], stdout=log, stderr=log, start_new_session=True)
+    wait_until(lambda: process.poll() is not None or MOMENTS[moment](process), moment, every_s=0.0)
+    os.killpg(process.pid, signal.SIGINT)
+    interrupted = {130, -signal.SIGINT, *([int(pytest.ExitCode.INTERRUPTED)] if words[0] == "test" else [])}
+    assert process.wait(60.0) in interrupted
+    assert "Traceback" not in (tmp_path / "log").read_text()
