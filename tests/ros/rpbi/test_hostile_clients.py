@@ -64,7 +64,6 @@ TEXTS = (
 def node(module_ros):
     secret = module_ros.folder / "secret.txt"
     secret.write_text("root:$6$hush\n")
-    arm = iiwa(joint_trajectory_controller={}, controllers={"springs": {"type": "joint_impedance", "active": False}})
     config = main_config(
         module_ros.folder,
         collision=(FLOOR, {**FLOOR, "name": "follower", "object_tf": {"tf_id": "marker", "hz": 100}}),

@@ -59,7 +59,9 @@ def test_a_controller_that_is_named_like_a_topic_of_its_robot_is_refused(tmp_pat
     controllers = {name: {"type": "joint_impedance", "active": False}}
     robot = iiwa(joint_trajectory_controller={}, controllers=controllers)
     world = World.from_file(write_world(tmp_path, robots=(robot,)), connection_mode=pybullet.DIRECT)
-    with pytest.raises(ConfigError, match=rf"world.yaml: the node \w+ rpbi/iiwa/{name}/\w+ (as \S+ and|twice) as \S+: give"):
+    with pytest.raises(
+        ConfigError, match=rf"world.yaml: the node \w+ rpbi/iiwa/{name}/\w+ (as \S+ and|twice) as \S+: give"
+    ):
         endpoints(world)
     world.close()
 

@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import rosgraph
-import rospy
 from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage

@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import rospy
+from cob_srvs.srv import SetString
+from custom_srvs.srv import SetTransform
 from geometry_msgs.msg import Quaternion, Transform, Twist, Vector3, Wrench
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from custom_ros_tools.config import config_to_str, load_config
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
-from custom_ros_tools.srv import SetString, SetTransform
 from custom_ros_tools.transforms import quat_of
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem, PybulletObject
 from ros_pybullet_interface.srv import AddPybulletObject, ApplyWrench, ResetEffState, ResetJointState, RobotInfo
