@@ -33,6 +33,7 @@ def terminal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Terminal]:
         ("./rpbi launch gras\t", "./rpbi launch grasp_example"),
         ("./rpbi launch grasp_example real\t0", "./rpbi launch grasp_example real_time_factor:=0"),
         ("./rpbi launch grasp_example gui:=true headl\ttrue", "./rpbi launch grasp_example gui:=true headless:=true"),
+        ("./rpbi docs --h\t", "./rpbi docs --help"),
         ("./rpbi demo --head\t", "./rpbi demo --headless"),
         ("./rpbi demo --headless --sec\t", "./rpbi demo --headless --seconds"),
         ("./rpbi check my\tl\t", "./rpbi check my worlds/lab.yaml"),

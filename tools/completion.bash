@@ -24,7 +24,7 @@ _rpbi_words() {
   local root=$1 word=$2 command=${4-} first=${5-} last=${!#} page=$1/docs/commands.md
   local section='/^## '$command'$/,/^## /'
   (($# > 3)) || { sed -n 's/^## \([a-z]*\)$/\1/p' "$page" && return; }
-  [[ $word != -* ]] || { sed -n "$section p" "$page" | grep -oE -- '--[a-z-]+' | sort -u && return; }
+  [[ $word != -* ]] || { { echo --help && sed -n "$section p" "$page" | grep -oE -- '--[a-z-]+'; } | sort -u && return; }
   case $command in
     help) sed -n 's/^## \([a-z]*\)$/\1/p' "$page" ;;
     launch)
