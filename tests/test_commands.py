@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from ros_system import find_executable, wait_until
+from worlds import FLOOR, box, iiwa, write_world
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs/commands.md").read_text()
@@ -62,6 +63,16 @@ def test_a_checkout_in_a_folder_with_spaces_is_refused_at_once(bare):
     assert done.returncode == 1
     assert done.stderr.startswith(f"This checkout is in '{bare.parent}': ")
     assert done.stderr.endswith(" take no path with spaces. Move it.\n") and done.stderr.count("\n") == 1
+
+
+def test_check_says_nothing_but_its_own(tmp_path):
+    """PyBullet tells of its build when it is imported; a world's folder may have spaces."""
+    folder = tmp_path / "my worlds"
+    folder.mkdir()
+    world = write_world(folder, collision=(FLOOR,), dynamic=(box(),), robots=(iiwa(),))
+    done = run([ROOT / "rpbi", "check", world])
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(f"{world}: fine; ")
 
 
 PROGRAMS: dict[str, list[str]] = {

@@ -20,6 +20,7 @@ def terminal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Terminal]:
     (folder / "my worlds" / "lab.yaml").touch()
     (folder / "notes.txt").touch()
     (folder / "run.bag").touch()
+    (folder / "mine.launch").write_text('<launch>\n  <arg name="speed" default="1"/>\n</launch>\n')
     terminal = Terminal(folder)
     yield terminal
     terminal.close()
@@ -33,6 +34,8 @@ def terminal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Terminal]:
         ("./rpbi launch gras\t", "./rpbi launch grasp_example"),
         ("./rpbi launch grasp_example real\t0", "./rpbi launch grasp_example real_time_factor:=0"),
         ("./rpbi launch grasp_example gui:=true headl\ttrue", "./rpbi launch grasp_example gui:=true headless:=true"),
+        ("./rpbi launch mi\tsp\t2", "./rpbi launch mine.launch speed:=2"),
+        ("./rpbi docs --h\t", "./rpbi docs --help"),
         ("./rpbi demo --head\t", "./rpbi demo --headless"),
         ("./rpbi demo --headless --sec\t", "./rpbi demo --headless --seconds"),
         ("./rpbi check my\tl\t", "./rpbi check my worlds/lab.yaml"),

@@ -7,9 +7,12 @@ _rpbi_root() {
   command=$(readlink -f "$(type -P -- "$command")") && dirname "$command"
 }
 
-# Prints the arguments of an example's launch file, as NAME:=.
+# Prints the arguments of a launch file, an example's or one that runs a world, as NAME:=.
 _rpbi_arguments() {
-  sed -n 's/^  <arg name="\([^"]*\)" default=.*/\1:=/p' "$1/src/rpbi_examples/launch/$2.launch" 2>/dev/null
+  local file=$2
+  [[ -e $file && $file == *.launch ]] || file=$1/src/rpbi_examples/launch/${2%.launch}.launch
+  [[ $2 != *.yaml ]] || file=$1/src/rpbi_examples/launch/world.launch
+  sed -n 's/^ *<arg name="\([^"]*\)" default=.*/\1:=/p' "$file" 2>/dev/null
 }
 
 # Prints what is in the running world; sets nothing up, unlike ./rpbi list.
@@ -24,12 +27,12 @@ _rpbi_words() {
   local root=$1 word=$2 command=${4-} first=${5-} last=${!#} page=$1/docs/commands.md
   local section='/^## '$command'$/,/^## /'
   (($# > 3)) || { sed -n 's/^## \([a-z]*\)$/\1/p' "$page" && return; }
-  [[ $word != -* ]] || { sed -n "$section p" "$page" | grep -oE -- '--[a-z-]+' | sort -u && return; }
+  [[ $word != -* ]] || { { echo --help && sed -n "$section p" "$page" | grep -oE -- '--[a-z-]+'; } | sort -u && return; }
   case $command in
     help) sed -n 's/^## \([a-z]*\)$/\1/p' "$page" ;;
     launch)
       [[ $first ]] || { cd "$root/src/rpbi_examples/launch" && printf '%s\n' *.launch | sed 's/\.launch$//'; }
-      [[ ! $first ]] || _rpbi_arguments "$root" "${first%.launch}"
+      [[ ! $first ]] || _rpbi_arguments "$root" "$first"
       ;;
     setup) (cd "$root" && printf '%s\n' requirements-*.txt) | sed 's/requirements-\(.*\)\.txt/\1/' ;;
     bench) sed -n "/^BENCHMARKS/,/^)/p; /^WHEN_NAMED/p" "$root/benchmarks/run.py" | grep -oE '"[a-z_]+"' | tr -d '"' ;;
@@ -43,7 +46,7 @@ _rpbi_words() {
 _rpbi_files() {
   case ${2-} in
     check) echo '*.yaml' ;;
-    launch) [[ ${3-} ]] || echo '*.launch' ;;
+    launch) [[ ${3-} ]] || echo '*.@(launch|yaml)' ;;
     spawn) echo '*.@(yaml|urdf)' ;;
     replay) echo '*.bag' ;;
     test | demo | bench) echo '*' ;;
