@@ -453,8 +453,8 @@ def test_configurations_that_make_no_sense_are_named(build, tmp_path, more, key)
     ("text", "message"),
     [
         ("<robot><link", "is not XML"),
-        ("<robot name='r'/>", "expected one link that is no joint's child, found none"),
-        ("<robot name='r'><link name='a'/><link name='b'/></robot>", "found a, b"),
+        ("<robot name='r'/>", "the robot has no <link>"),
+        ("<robot name='r'><link name='a'/><link name='b'/></robot>", "expected one link that hangs on no joint, got a, b"),
     ],
 )
 def test_a_description_without_one_root_is_refused(build, tmp_path, text, message):

@@ -83,7 +83,7 @@ def test_package_with_three_slashes_is_package_with_two(build, tmp_path, monkeyp
         [told] = re.findall("filename='(.*?)'", description_for_ros(str(tmp_path / "x.urdf")))
         assert told in ("package://their_robot/cube.obj", f"file://{package}/cube.obj"), "RViz finds it"
     (tmp_path / "x.urdf").write_text("<robot name='x'>" + link("l0", mesh.replace("cube", "none")) + "</robot>")
-    with pytest.raises(ConfigError, match=r"none.obj: unknown ROS package|no such file"):
+    with pytest.raises(ConfigError, match="unknown ROS package"):
         build(tmp_path / "x.urdf")
 
 
