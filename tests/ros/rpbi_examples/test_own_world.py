@@ -39,10 +39,14 @@ def folder(tmp_path):
     return folder
 
 
-def launch(ros, folder, world, **arguments):
-    """Runs a world as a user in a folder does."""
+RPBI = f"'{ROOT}/rpbi' launch world.yaml"
+ROSLAUNCH = "roslaunch rpbi_examples world.launch config:=world.yaml"
+
+
+def launch(ros, folder, command, **arguments):
+    """Runs the world as a user in its folder does."""
     given = " ".join(f"{key}:={value}" for key, value in arguments.items())
-    return ros.start(["bash", "-c", f"cd '{folder}' && exec '{ROOT}/rpbi' launch '{world}' headless:=true {given}"])
+    return ros.start(["bash", "-c", f"cd '{folder}' && exec {command} headless:=true {given}"])
 
 
 def come_up(ros, process, namespace):
@@ -71,9 +75,9 @@ def places():
 
 
 def test_two_of_one_file_run_on_one_master_each_with_its_own_frames(ros, folder):
-    left = launch(ros, folder, "world.yaml", ns="left", tf_prefix="left", use_sim_time="false")
-    path = folder / "world.yaml"
-    right = launch(ros, "/", path, ns="right", tf_prefix="right", use_sim_time="false", real_time_factor=0.5)
+    left = launch(ros, folder, RPBI, ns="left", tf_prefix="left", use_sim_time="false")
+    more = {"use_sim_time": "false", "real_time_factor": 0.5}
+    right = launch(ros, folder, ROSLAUNCH, ns="right", tf_prefix="right", **more)
     place = places()
     for name, process, factor in (("left", left, 1.0), ("right", right, 0.5)):
         assert come_up(ros, process, f"/{name}/") == {"floor": "collision", "table": "collision", "cup": "dynamic"}
@@ -94,7 +98,7 @@ def test_two_of_one_file_run_on_one_master_each_with_its_own_frames(ros, folder)
 
 def test_a_world_that_cannot_be_built_ends_the_launch_with_all_that_is_wrong(ros, folder):
     (folder / "cup.yaml").write_text("name: cup\n")
-    process = launch(ros, folder, "world.yaml")
+    process = launch(ros, folder, RPBI)
     process.wait(60.0)
     printed = ros.output(process)
     assert "cup.yaml: baseMass: missing" in printed and "cup.yaml: createVisualShape: missing" in printed
