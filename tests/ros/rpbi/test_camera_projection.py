@@ -70,7 +70,8 @@ def listeners(module_ros):
     listeners = {topic: module_ros.listen(f"/rpbi/camera/{topic}", kind) for topic, kind in TOPICS.items()}
     listeners["tf"], listeners["tf_static"] = (module_ros.listen(f"/{name}", TFMessage) for name in ("tf", "tf_static"))
     listeners["joints"] = module_ros.listen("/rpbi/kuka_lwr/joint_states", JointState)
-    module_ros.start(["roslaunch", "rpbi_examples", "basic_example_kuka_lwr.launch", "headless:=true"])
+    arguments = ["headless:=true", "swing:=true"]  # a hand that pushes the box would be behind it
+    module_ros.start(["roslaunch", "rpbi_examples", "basic_example_kuka_lwr.launch", *arguments])
     return listeners
 
 

@@ -27,6 +27,19 @@ def test_package_is_found_on_ros_package_path(package: Path) -> None:
     assert ros_package_path("my_robot") == str(package)
 
 
+def test_packages_of_this_workspace_are_found_where_nothing_is_sourced(monkeypatch: pytest.MonkeyPatch) -> None:
+    sources = Path(__file__).resolve().parents[3] / "src"
+    monkeypatch.delenv("ROS_PACKAGE_PATH")
+    assert ros_package_path("rpbi_examples") == str(sources / "rpbi_examples")
+
+
+def test_a_package_on_ros_package_path_comes_before_that_of_this_workspace(package: Path) -> None:
+    other = package.parent / "rpbi_examples"
+    other.mkdir()
+    (other / "package.xml").write_text((package / "package.xml").read_text().replace("my_robot", "rpbi_examples"))
+    assert ros_package_path("rpbi_examples") == str(other)
+
+
 @pytest.mark.parametrize("path", ["{my_robot}/a/b.yaml", "package://my_robot/a/b.yaml"])
 def test_package_in_a_path_is_resolved(package: Path, path: str) -> None:
     assert replace_package(path) == f"{package}/a/b.yaml"
