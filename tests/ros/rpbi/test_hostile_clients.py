@@ -62,15 +62,12 @@ TEXTS = (
 
 @pytest.fixture(scope="module")
 def node(module_ros):
-    secret = module_ros.folder / "secret.txt"
-    secret.write_text("root:$6$hush\n")
+    arm = iiwa(joint_trajectory_controller={}, controllers={"springs": {"type": "joint_impedance", "active": False}})
     config = main_config(
         module_ros.folder,
         collision=(FLOOR, {**FLOOR, "name": "follower", "object_tf": {"tf_id": "marker", "hz": 100}}),
         dynamic=(ball(broadcast_hz=50, basePosition=[1.5, 0.0, 5.0]),),
-        robots=(
-            iiwa(joint_trajectory_controller={}, controllers={"springs": {"type": "joint_impedance", "active": False}}),
-        ),
+        robots=(arm,),
         setAdditionalSearchPath="pybullet_data_path",
     )
     return module_ros.simulator(config, use_sim_time=True)

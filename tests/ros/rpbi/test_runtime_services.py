@@ -9,10 +9,12 @@ import rospy
 from cob_srvs.srv import SetString
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Vector3, WrenchStamped
-from node_world import main_config
+from node_world import add, main_config, remove
 from ros_system import wait_until
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty, Trigger
+from tf2_msgs.msg import TFMessage
 from worlds import FLOOR, ball, iiwa
 
 from ros_pybullet_interface.msg import SimulationState, WorldCommands
@@ -163,3 +165,19 @@ def test_bad_requests_are_refused_by_key_and_change_nothing(ros, simulator, serv
     assert ros.call("/rpbi/set_sensor_rate", SetSensorRate, "ball/tf", 50.0).success
     wait_until(lambda: commands(entered)[-1:] == ["sensor_rate"], "a good request is told")
     assert set(commands(entered)) <= {"sensor_rate"}, "no other has entered the world"
+
+
+def test_an_object_that_comes_back_elsewhere_in_a_stopped_world_has_another_stamp(ros, simulator):
+    def ball_at(x):
+        found = [each for message in list(tf.messages) for each in message.transforms if "ball" in each.child_frame_id]
+        return [each.header.stamp.to_nsec() for each in found], found and found[-1].transform.translation.x == x
+
+    ros.call("/rpbi/stop", Trigger)
+    tf, clock = ros.listen("/tf", TFMessage), ros.listen("/clock", Clock)
+    for x in (2.0, 3.0, 4.0):
+        assert remove(ros, "ball").success
+        assert add(ros, config=ball(basePosition=[x, 1.0, 0.1], broadcast_hz=100)).success
+        wait_until(lambda x=x: ball_at(x)[1], "TF has it where it is now")
+    stamps_ns = ball_at(4.0)[0]
+    assert len(stamps_ns) >= 3 and stamps_ns == sorted(set(stamps_ns))
+    wait_until(lambda: clock.messages[-1].clock.to_nsec() >= stamps_ns[-1], "the clock has come to it")

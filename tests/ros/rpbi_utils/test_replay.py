@@ -229,6 +229,50 @@ def test_a_description_of_another_version_is_refused(bag, tmp_path):
     assert "format 0" in done.stderr
 
 
+HOSTILE = {
+    "a type of nobody": (("rpbi.config.world:WorldConfig", "this:x"), "'this:x' is not trusted, so it is not imported"),
+    "a type of an object": (
+        ('"type": "dynamic"', '"type": "this:x"'),
+        "'this:x' is not trusted, so it is not imported",
+    ),
+    "no world": (("rpbi.config.world:WorldConfig", "rpbi.config.world:Nothing"), "has no 'Nothing'"),
+    "no objects": (('"objects": [', '"objects": 3, "others": ['), "description cannot be read: objects: expected"),
+}
+
+
+@pytest.mark.parametrize("case", HOSTILE)
+def test_a_hostile_description_is_refused_in_one_line(bag, tmp_path, case):
+    (old, new), told = HOSTILE[case]
+
+    def replace(topic, message):
+        if topic == "/rpbi/world_description":
+            assert old in message.data
+            message.data = message.data.replace(old, new)
+        return message
+
+    done = _replay(_changed(bag, tmp_path / "hostile.bag", replace))
+    assert done.returncode == 1
+    [line] = (line for line in done.stderr.splitlines() if "pybullet build time" not in line)
+    assert line.startswith("replay: ") and told in line
+
+
+def test_a_tick_without_end_and_files_of_the_kernel_do_not_hold_it_up(bag, tmp_path):
+    def spoil(topic, message):
+        if topic == "/rpbi/state":
+            message.tick = 2**63
+        return message
+
+    done = _replay(_changed(bag, tmp_path / "late.bag", spoil))
+    assert done.returncode == 1 and f"got a state at tick {2**63}" in done.stderr
+
+    def read_kernel(topic, message):
+        if topic == "/rpbi/world_description":
+            message.data = message.data.replace('"files": {', '"files": {"/proc/kmsg": "0", "/dev/zero": "0", ')
+        return message
+
+    assert _replay(_changed(bag, tmp_path / "kernel.bag", read_kernel)).returncode == 0
+
+
 def test_another_namespace_is_asked_for_and_found(bag, tmp_path):
     path = tmp_path / "named.bag"
     with rosbag.Bag(str(bag)) as given, rosbag.Bag(str(path), "w") as written:

@@ -99,3 +99,22 @@ def test_a_restart_counts_from_0_and_goes_on_with_the_stamps(simulated):
     assert clock.stamp_ns > before_ns
     if simulated:
         assert clock.stamp_ns == before_ns + clock.dt_ns
+
+
+def test_stamps_within_a_tick_differ_and_the_coming_ticks_keep_theirs() -> None:
+    clock = Clock(0.001)
+    clock.advance()
+    for turn in range(1, 4):
+        clock.tell_apart()
+        assert (clock.tick, clock.stamp_ns) == (1, 2_000_000 + turn)
+    clock.advance()
+    assert (clock.tick, clock.stamp_ns) == (2, 3_000_000)
+
+
+def test_stamps_never_repeat_however_many_are_told_apart() -> None:
+    clock = Clock(1e-9)
+    for _ in range(5):
+        clock.tell_apart()
+    before = clock.stamp_ns
+    clock.advance()
+    assert clock.stamp_ns == before + 1

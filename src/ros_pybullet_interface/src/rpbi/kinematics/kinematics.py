@@ -9,13 +9,14 @@ from contextlib import contextmanager
 import numpy as np
 import pybullet
 
-from custom_ros_tools.errors import PhysicsError, UnknownNameError
+from custom_ros_tools.errors import ConfigError, PhysicsError, Problem, UnknownNameError
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose, normalized
 from rpbi.urdf.document import MOVING, UrdfDocument
 from rpbi.urdf.files import write_description
 from rpbi.urdf.joints import Joint
 from rpbi.urdf.loading import flags_for
+from rpbi.urdf.structure import structure_problems
 
 from .chain import Chain, Target
 from .limits import Limits
@@ -39,12 +40,14 @@ class Kinematics:
         limits: Their limits.
 
     Raises:
-        ConfigError: If the description cannot be read or is not well-formed.
+        ConfigError: If the description cannot be read, is not well-formed or makes no robot.
         PhysicsError: If PyBullet cannot load it.
     """
 
     def __init__(self, urdf_path: str, scaling: float = 1.0, flags: int = 0) -> None:
         self._document = UrdfDocument(urdf_path, not_xml="expected well-formed XML")
+        if problems := list(structure_problems(self._document)):
+            raise ConfigError([Problem(urdf_path, "", problem) for problem in problems])
         self._scaling = scaling
         self._lock = threading.Lock()
         self._pb = Client(pybullet.DIRECT)

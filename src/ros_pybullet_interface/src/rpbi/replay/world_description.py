@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import pybullet
-from pydantic import ValidationError
 
 from custom_ros_tools.config import read_file
 from custom_ros_tools.errors import ConfigError, Problem, shortened
@@ -89,8 +88,11 @@ class WorldDescription:
             data = json.loads(text)
             if data["format"] != FORMAT:
                 raise ValueError(f"the world's description has format {data['format']}, this version reads {FORMAT}")
-            read = _Description.model_validate({key: value for key, value in data.items() if key != "format"})
-        except (json.JSONDecodeError, ValidationError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            described = {key: value for key, value in data.items() if key != "format"}
+            read = _Description.parse(described, "")
+        except ConfigError as error:
+            raise ValueError(f"the world's description cannot be read: {error.problems[0]}") from None
+        except (json.JSONDecodeError, KeyError, TypeError, AttributeError, RecursionError) as error:
             raise ValueError(f"the world's description cannot be read: {shortened(repr(error))}") from None
         self.start_hash = read.start_hash
         self._file, self._config, self._objects = read.file, read.config, read.objects
