@@ -14,9 +14,7 @@ from ros_system import RosSystem, wait_until
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = (ROOT / "docs/tutorial.md").read_text()
-FILES = {
-    name: text for text, name in re.findall(r"```(?:yaml|python)\n(# (\S+).*?)```", PAGE, flags=re.DOTALL)
-}
+FILES = {name: text for text, name in re.findall(r"```(?:yaml|python)\n(# (\S+).*?)```", PAGE, flags=re.DOTALL)}
 """The files on the page, by the names in their first lines."""
 COMMANDS = [
     line.replace("~/rpbi", str(ROOT))
@@ -54,9 +52,8 @@ def followed(ros_master, tmp_path_factory):
 
 
 def test_the_page_has_all_that_it_takes():
-    assert set(FILES) == {
-        "world.yaml", "floor.yaml", "table.yaml", "box.yaml", "ball.yaml", "panda.yaml", "look.py", "lift.py", "path.py",
-    }  # fmt: skip
+    yamls = {f"{name}.yaml" for name in ("world", "floor", "table", "box", "ball", "panda")}
+    assert set(FILES) == {*yamls, "look.py", "lift.py", "path.py"}
     assert sum(LAUNCH in command for command in COMMANDS) == 1
 
 

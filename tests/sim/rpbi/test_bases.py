@@ -454,7 +454,10 @@ def test_configurations_that_make_no_sense_are_named(build, tmp_path, more, key)
     [
         ("<robot><link", "is not XML"),
         ("<robot name='r'/>", "the robot has no <link>"),
-        ("<robot name='r'><link name='a'/><link name='b'/></robot>", "expected one link that hangs on no joint, got a, b"),
+        (
+            "<robot name='r'><link name='a'/><link name='b'/></robot>",
+            "expected one link that hangs on no joint, got a, b",
+        ),
     ],
 )
 def test_a_description_without_one_root_is_refused(build, tmp_path, text, message):
