@@ -22,10 +22,8 @@ import pandas as pd
 import rosbag
 import rosgraph
 import rospy
-from std_srvs.srv import Trigger
 
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.ros.services import call_service
 from custom_ros_tools.ros.transform_messages import position_in, quat_in
 from rpbi.config.loading import load_world
 from rpbi.geometry import Pose
@@ -95,8 +93,8 @@ def _demo(arguments: argparse.Namespace) -> int:
     expected_hz = _expected_rates()
     with _example(arguments.headless, out / "launch.log"):
         with Recorder(bag, [*expected_hz, "/diagnostics", "/tf_static"], timeout_s=START_TIMEOUT_S):
+            _start_world()  # recorded from the first tick on, with the arm at rest
             _say(f"recording {arguments.seconds:g} s of {len(expected_hz)} topics into {bag}")
-            call_service("/rpbi/start", Trigger)  # from the first tick on, with the arm at rest
             time.sleep(arguments.seconds)
     _say("reading the bag")
     summary = _report(bag, expected_hz, arguments.seconds, out)
@@ -146,6 +144,17 @@ def _wait_until_ready(process: subprocess.Popen, log: Path) -> None:
         time.sleep(0.1)
     tail = "\n".join(log.read_text(errors="replace").splitlines()[-20:])
     raise InterfaceError(f"the example did not come up; the end of {log}:\n{tail}")
+
+
+def _start_world() -> None:
+    """Has the world run; by a process of its own, since rospy, waiting for a service, swallows what signals raise."""
+    command = ["rosservice", "call", "/rpbi/start"]
+    try:
+        answer = subprocess.run(command, capture_output=True, text=True, timeout=START_TIMEOUT_S)
+    except subprocess.TimeoutExpired:
+        raise InterfaceError(f"the world did not start: no answer within {START_TIMEOUT_S:g} s") from None
+    if "success: True" not in answer.stdout:
+        raise InterfaceError(f"the world did not start: {answer.stdout}{answer.stderr}")
 
 
 def _is_published(topic: str) -> bool:
