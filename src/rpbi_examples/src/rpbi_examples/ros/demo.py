@@ -21,11 +21,9 @@ import numpy as np
 import pandas as pd
 import rosgraph
 from sensor_msgs.msg import Image
-from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.ros.services import call_service
 from custom_ros_tools.ros.transform_messages import position_in, quat_in
 from rpbi.config.loading import load_world
 from rpbi.geometry import Pose
@@ -96,8 +94,8 @@ def _demo(arguments: argparse.Namespace) -> int:
     with _example(arguments.headless, out / "launch.log"):
         topics = [*expected_hz, "/diagnostics", "/tf_static", *REPLAY_TOPICS]
         with Recorder(bag, topics, timeout_s=START_TIMEOUT_S):
+            _start_world()  # recorded from the first tick on, with the arm at rest
             _say(f"recording {arguments.seconds:g} s of {len(expected_hz)} topics into {bag}")
-            call_service("/rpbi/start", Trigger)  # from the first tick on, with the arm at rest
             time.sleep(arguments.seconds)
     _say("reading the bag")
     summary = _report(bag, expected_hz, arguments.seconds, out)
@@ -147,6 +145,17 @@ def _wait_until_ready(process: subprocess.Popen, log: Path) -> None:
         time.sleep(0.1)
     tail = "\n".join(log.read_text(errors="replace").splitlines()[-20:])
     raise InterfaceError(f"the example did not come up; the end of {log}:\n{tail}")
+
+
+def _start_world() -> None:
+    """Has the world run; by a process of its own, since rospy, waiting for a service, swallows what signals raise."""
+    command = ["rosservice", "call", "/rpbi/start"]
+    try:
+        answer = subprocess.run(command, capture_output=True, text=True, timeout=START_TIMEOUT_S)
+    except subprocess.TimeoutExpired:
+        raise InterfaceError(f"the world did not start: no answer within {START_TIMEOUT_S:g} s") from None
+    if "success: True" not in answer.stdout:
+        raise InterfaceError(f"the world did not start: {answer.stdout}{answer.stderr}")
 
 
 def _is_published(topic: str) -> bool:
