@@ -12,6 +12,8 @@ import tf2_ros
 from ros_system import RosSystem, wait_until
 from rviz_view import RvizView, find_view, launch_with_rviz
 
+from custom_ros_tools.ros.tf_listener import TfListener
+
 CONFIG_FILE = Path(__file__).resolve().parents[3] / "src/rpbi_examples/rviz/kuka_lwr_ik_example.rviz"
 TARGET, TIP = "rpbi/figure_eight", "rpbi/kuka_lwr/end_effector_ball"
 HANDLE_M = 0.16
@@ -38,7 +40,7 @@ def example(ros_master, screen, tmp_path_factory):
 def position(example):
     """Where a frame is in the world [m]."""
     buffer = tf2_ros.Buffer(debug=False)
-    listener = tf2_ros.TransformListener(buffer)
+    listener = TfListener(buffer)
 
     def position(frame):
         found = buffer.lookup_transform("rpbi/world", frame, rospy.Time(0)).transform.translation

@@ -16,6 +16,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import SetBool
 from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit
 
+from custom_ros_tools.ros.tf_listener import TfListener
 from ik_ros.msg import IKProblem
 
 TARGET = Pose(Point(0.3, -0.2, 0.5), Quaternion(0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5)))
@@ -229,7 +230,7 @@ def test_simulated_robot_is_asked_itself(ros, target):
         rospy.set_param("/ik_setup_node", {"config": config, "start_on_init": True})
         ros.start(["rosrun", "ik_ros", "ik_setup_node.py", "pybullet", "__name:=ik_setup_node", "ik:=rpbi/arm/ik"])
         buffer = tf2_ros.Buffer(debug=False)
-        tf2_ros.TransformListener(buffer)
+        TfListener(buffer)
 
         def is_there():
             try:
@@ -249,7 +250,7 @@ def test_frame_that_is_dragged_in_rviz_is_broadcast_where_the_handles_are(ros):
     shown = ros.listen("ik_target/update_full", InteractiveMarkerInit).wait_for()[-1].markers[0]
     assert (shown.header.frame_id, shown.name, len(shown.controls)) == ("foot", "dragged", 6)
     buffer = tf2_ros.Buffer(debug=False)
-    tf2_ros.TransformListener(buffer)
+    TfListener(buffer)
 
     def position():
         try:

@@ -15,6 +15,7 @@ from ros_system import wait_until
 from sensor_msgs.msg import JointState
 from worlds import iiwa
 
+from custom_ros_tools.ros.tf_listener import TfListener
 from ros_pybullet_interface.msg import PybulletObject
 
 FIRST = "lbr_iiwa_joint_1"
@@ -56,7 +57,7 @@ def test_robot_state_publisher_gives_the_same_link_frames(ros, tmp_path):
         ]
     )
     buffer = tf2_ros.Buffer(debug=False)
-    tf2_ros.TransformListener(buffer)
+    TfListener(buffer)
 
     def pose(parent: str, child: str):
         transform = buffer.lookup_transform(parent, child, rospy.Time(0)).transform
@@ -93,7 +94,7 @@ def test_two_worlds_share_a_master_and_a_tf_tree(ros, tmp_path):
         wait_until(lambda: left.messages and left.messages[-1].position[0] > 0.45, "the left arm moves")
     assert abs(right.wait_for(1)[-1].position[0]) < 0.01, "the right arm does not"
     buffer = tf2_ros.Buffer(debug=False)
-    tf2_ros.TransformListener(buffer)
+    TfListener(buffer)
     for side in ("left", "right"):
         frames = (f"{side}/rpbi/world", f"{side}/rpbi/iiwa/lbr_iiwa_link_7")
         wait_until(lambda frames=frames: buffer.can_transform(*frames, rospy.Time(0)), f"{frames} are on TF")

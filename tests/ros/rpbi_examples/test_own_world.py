@@ -14,6 +14,7 @@ from ros_system import wait_until
 from visualization_msgs.msg import MarkerArray
 from worlds import FLOOR, box, write_world
 
+from custom_ros_tools.ros.tf_listener import TfListener
 from ros_pybullet_interface.msg import SimulationState
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -59,7 +60,7 @@ def come_up(ros, process, namespace):
 def places():
     """Returns what waits for a transform between two frames."""
     buffer = tf2_ros.Buffer(debug=False)
-    listener = tf2_ros.TransformListener(buffer)
+    listener = TfListener(buffer)
 
     def look(parent, child):
         try:

@@ -17,6 +17,7 @@ from ros_system import wait_until
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from custom_ros_tools.ros.tf_listener import TfListener
 from ros_pybullet_interface.msg import Contacts, ControllerState
 from ros_pybullet_interface.srv import ResetJointState, SwitchControllers
 from rpbi_examples.motions import CIRCLE_CENTRE, CIRCLE_RADIUS
@@ -44,7 +45,7 @@ def _serves(name: str) -> bool:
 def position() -> Callable[[str], tuple[float, float, float] | None]:
     """Tells where a frame is in the world [m]."""
     buffer = tf2_ros.Buffer(debug=False)
-    tf2_ros.TransformListener(buffer)
+    TfListener(buffer)
 
     def look(frame: str) -> tuple[float, float, float] | None:
         try:

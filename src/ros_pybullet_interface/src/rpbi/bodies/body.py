@@ -66,6 +66,9 @@ class Body:
         inertial = self.dynamics_info(-1)
         self.inertial_pose_in_base = Pose(inertial[3], inertial[4])
         self._base_pose_in_inertial = self.inertial_pose_in_base.inverse()
+        self._inertial: Any = None
+        self._base = Pose()
+        """What PyBullet told last of the base, and the pose that follows from it: most bodies rest most of the time."""
         self.pose_follower: PoseFollower | None = None
         """What moves its base, which is fixed, along the poses of `object_tf`; None if it is put there."""
         self.dynamics_changes = 0
@@ -198,7 +201,10 @@ class Body:
         """Returns the pose of a link's URDF frame in the world, by PyBullet's index, -1 for the base."""
         if index >= 0:
             return Pose(*self.pb.getLinkState(self.body_id, index, computeForwardKinematics=1)[4:6])
-        return Pose(*self.pb.getBasePositionAndOrientation(self.body_id)) @ self._base_pose_in_inertial
+        inertial = self.pb.getBasePositionAndOrientation(self.body_id)
+        if inertial != self._inertial:
+            self._inertial, self._base = inertial, Pose(*inertial) @ self._base_pose_in_inertial
+        return self._base
 
     def base_pose(self) -> Pose:
         """Returns the pose of the base link's URDF frame in the world."""
