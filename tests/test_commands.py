@@ -69,7 +69,7 @@ def test_check_says_nothing_but_its_own(tmp_path):
     """PyBullet tells of its build when it is imported; a world's folder may have spaces."""
     folder = tmp_path / "my worlds"
     folder.mkdir()
-    world = write_world(folder, collision=(FLOOR,), dynamic=(box(),), robots=(iiwa(),))
+    world = write_world(folder, collision=(FLOOR,), dynamic=(box(basePosition=[1.0, 0.0, 0.2]),), robots=(iiwa(),))
     done = run([ROOT / "rpbi", "check", world])
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith(f"{world}: fine; ")

@@ -12,6 +12,14 @@ from rpbi.engine.inputs import Input
 from rpbi.sensors import BodySensor
 
 
+class Runaway(DynamicObject):
+    """An object that is soon beyond all numbers."""
+
+    def before_step(self, tick: int) -> None:
+        super().before_step(tick)
+        self.pb.resetBaseVelocity(self.body_id, (1e200, 0.0, 0.0))
+
+
 class ThingConfig(BodyConfig):
     """YAML of a thing: where it fails, and an input that it takes, with its topic."""
 

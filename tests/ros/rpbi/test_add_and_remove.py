@@ -302,7 +302,7 @@ WITH_MESH = "<robot name='r'><link name='a'><visual><geometry><mesh filename='{}
     ("urdf", "expected"),
     [
         ("<robot name='r'><link name='a'>", "is not XML"),
-        ("<sdf/>", "expected <robot> at the top, got <sdf>"),
+        ("<sdf/>", "is SDF, not URDF"),
         (WITH_MESH.format("m/none.stl"), "no such mesh: m/none.stl"),
         (WITH_MESH.format("package://none/a.stl"), "unknown ROS package 'none'"),
     ],

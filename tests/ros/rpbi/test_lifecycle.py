@@ -24,6 +24,7 @@ from ros_pybullet_interface.msg import PybulletObject
 from ros_pybullet_interface.srv import AddPybulletObject
 
 NODE = "/ros_pybullet_interface"
+SUPPORT = str(Path(__file__).resolve().parents[2] / "support")
 ENDS_WITHIN_S = 60.0  # it takes less than 2 s; a busy machine must not fail the test
 CAMERA = {"name": "camera", "object_tf": {"tf_id": "camera"}, "intrinsics": {"width": 64, "height": 48}}
 STATES = {
@@ -169,11 +170,10 @@ def test_services_that_wait_when_it_ends_get_an_answer_or_an_error(ros, tmp_path
 
 def test_a_world_that_breaks_stands_still_and_says_so_once(ros, tmp_path):
     rosout = Rosout(ros)
-    config = _config(tmp_path, start_pybullet_after_initialization=False)
-    process = ros.simulator(config)
+    config = _config(tmp_path, start_pybullet_after_initialization=False, trusted_packages=["faulty_lab"])
+    process = ros.simulator(config, PYTHONPATH=os.pathsep.join((SUPPORT, os.environ["PYTHONPATH"])))
     status = ros.listen("/rpbi/status", Int64)
-    velocity = {"linearVelocity": [1e200, 0.0, 0.0]}
-    fast = ball("fast", basePosition=[0.0, 0.0, 50.0], resetBaseVelocity=velocity, broadcast_hz=1000)
+    fast = ball("fast", basePosition=[0.0, 0.0, 50.0], broadcast_hz=1000, type="faulty_lab:Runaway")
     assert add(ros, PybulletObject.DYNAMIC, fast).success
     for _ in range(2):
         assert ros.call("/rpbi/start", Trigger).success
