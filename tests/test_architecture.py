@@ -21,6 +21,7 @@ MODULES = {
     "custom_ros_tools": "custom_ros_tools",
     "ros_pybullet_interface": "rpbi",
     "ik_ros": "ik_ros",
+    "operator_node": "operator_node",
     "rpbi_utils": "rpbi_utils",
     "rpbi_examples": "rpbi_examples",
 }
@@ -29,8 +30,9 @@ ALLOWED = {
     "custom_ros_tools": set(),
     "ros_pybullet_interface": {"custom_ros_tools"},
     "ik_ros": {"custom_ros_tools", "ros_pybullet_interface"},
+    "operator_node": {"custom_ros_tools", "ros_pybullet_interface"},
     "rpbi_utils": {"custom_ros_tools", "ros_pybullet_interface"},
-    "rpbi_examples": {"custom_ros_tools", "ros_pybullet_interface", "ik_ros", "rpbi_utils"},
+    "rpbi_examples": {"custom_ros_tools", "ros_pybullet_interface", "ik_ros", "operator_node", "rpbi_utils"},
 }
 """What each package may depend on."""
 MIDDLEWARE = re.compile(r"^(rospy|tf2_ros|rosbag|rosgraph|roslib|genpy|\w+_msgs|\w+_srvs)$")

@@ -17,7 +17,14 @@ ROOT = Path(__file__).resolve().parent.parent
 MOST_MODULES = 12
 MOST_SMALL = 25
 SMALL_LINES = 80
-TABLES = ("rpbi.bodies", "rpbi.sensors", "ik_ros.solvers", "ik_ros.tasks")
+TABLES = (
+    "rpbi.bodies",
+    "rpbi.sensors",
+    "ik_ros.solvers",
+    "ik_ros.tasks",
+    "operator_node.devices",
+    "operator_node.mappings",
+)
 """Packages whose classes have a file each, whoever imports them."""
 ONE_PLACE = {
     "rospy's private parts": r"\.impl\b",

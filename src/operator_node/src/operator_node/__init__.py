@@ -1,0 +1,1 @@
+"""People in the world: input devices, mappings, force feedback, motion capture, teleoperation."""
