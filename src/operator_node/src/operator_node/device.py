@@ -38,8 +38,8 @@ class Device(ABC):
     """An input device, opened, read and closed by one thread, which is the main one.
 
     Its options are its `Config`, in YAML or as parameters of its node. It only says what the hardware says: retrying,
-    repeating, stamps, time-outs and the reading of zeros when it has gone are up to who reads it, and so are checks that
-    what it says is finite and within [-1, 1].
+    repeating, stamps, time-outs and the reading of zeros when it has gone are up to who reads it, and so are checks
+    that what it says is finite and within [-1, 1].
 
     Attributes:
         Config: Model of its options.
