@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import pytest
 import rospy
 from keyboard.msg import Key
 from node_world import Rosout, publishing
@@ -75,10 +74,9 @@ def test_unknown_key_ends_the_node_with_what_was_meant(ros):
         assert told in ros.output(process)
 
 
-@pytest.mark.parametrize("executable", ["joy_remap", "joy_remap_node"])
-def test_joy_is_repeated_with_new_stamps_until_input_ceases(ros, executable):
+def test_joy_is_repeated_with_new_stamps_until_input_ceases(ros):
     rospy.set_param("/joy_remap", {"hz": 50})
-    ros.start(["rosrun", "operator_node", executable])
+    ros.start(["rosrun", "operator_node", "joy_remap"])
     out = ros.listen("joy_out", Joy)
     with publishing("joy_in", Joy) as device:
         assert not out.messages, "nothing before the first message"
@@ -93,11 +91,10 @@ def test_joy_is_repeated_with_new_stamps_until_input_ceases(ros, executable):
     assert {each.header.frame_id for each in out.messages} == {"stick"}
 
 
-@pytest.mark.parametrize("executable", ["operator_interface_logger", "interface_logger_node"])
-def test_window_has_each_signal_of_its_duration(ros, executable):
+def test_window_has_each_signal_of_its_duration(ros):
     rosout = Rosout(ros)
     rospy.set_param("/operator_interface_logger", {"window_duration": 1000.0})
-    ros.start(["rosrun", "operator_node", executable])
+    ros.start(["rosrun", "operator_node", "operator_interface_logger"])
     windows = ros.listen("operator_node/window", Float64MultiArray)
     with publishing("operator_node/signal", Float64MultiArray) as signal:
         wait_until(lambda: windows.is_connected, "the window is heard")

@@ -36,13 +36,11 @@ class Frame:
         return [(each.translation.x, each.translation.y, each.translation.z) for each in self.transforms]
 
 
-def start(
-    ros, package: str = "operator_node", start_on_init: bool = True, timeout_s: float = 0.5, **config: Any
-) -> Frame:
+def start(ros, start_on_init: bool = True, timeout_s: float = 0.5, **config: Any) -> Frame:
     parameters = {"config": {**FRAMES, **config}, "start_on_init": start_on_init, "input_timeout_s": timeout_s}
     rospy.set_param("/teleop_tf_node", parameters)
     frame = Frame(ros)
-    ros.start(["rosrun", package, "teleop_tf_node.py"])
+    ros.start(["rosrun", "teleop", "teleop_tf_node.py"])
     rospy.wait_for_service("teleop_box_limits", timeout=60.0)
     return frame
 
@@ -53,10 +51,9 @@ def held(signal: rospy.Publisher, values: list[float], condition: Any, what: str
 
 
 @pytest.mark.quick
-@pytest.mark.parametrize("package", ["operator_node", "teleop"])
-def test_frame_moves_while_a_signal_comes_and_stops_when_it_ceases(ros, package):
+def test_frame_moves_while_a_signal_comes_and_stops_when_it_ceases(ros):
     rosout = Rosout(ros)
-    frame = start(ros, package, timeout_s=0.2)
+    frame = start(ros, timeout_s=0.2)
     wait_until(lambda: frame.positions, "it is broadcast where it starts")
     assert frame.positions[0] == (0.0, 0.0, 0.0)
     with publishing("operator_node/signal", Float64MultiArray) as signal:

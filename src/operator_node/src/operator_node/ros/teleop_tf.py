@@ -42,6 +42,7 @@ class TeleopTf:
         self._teleop = Teleop(self._config, parameters.input_timeout_s)
         self._lock = threading.RLock()
         self._is_on = False
+        self._broadcast_at: rospy.Time | None = None
         self._warn = ThrottledWarning()
         self._topic = TransformTopic(self._config.parent_frame_id, self._config.target_frame_id)
         teleop = Toggle("teleoperation", self._start, self._stop)
@@ -80,13 +81,18 @@ class TeleopTf:
         with self._lock:
             if not self._is_on:
                 if self._config.broadcast_always:
-                    self._broadcast()
+                    self._broadcast_once_a_stamp()
                 return
-            silence = self._input.silence() if self._teleop.moves else ""
-            if silence:
-                self._warn(self._input.topic, f"{silence}: the frame stands still")
+            if self._teleop.moves and self._input.has_ceased("the frame stands still"):
                 self._teleop.stop()
             self._teleop.step(time.monotonic())
+            self._broadcast_once_a_stamp()
+
+    def _broadcast_once_a_stamp(self) -> None:
+        """Broadcasts unless time stands still: TF takes the first of two transforms with one stamp, and warns."""
+        now = rospy.Time.now()
+        if now != self._broadcast_at:
+            self._broadcast_at = now
             self._broadcast()
 
     def _broadcast(self) -> None:

@@ -6,6 +6,8 @@ from typing import Any
 
 import rospy
 
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
+
 QUEUE_SIZE = 10
 """Old input is of no use to anybody."""
 
@@ -25,6 +27,7 @@ class WatchedInput:
     def __init__(self, topic: str, message_type: type, take: Callable[[Any], None], timeout_s: float = 0.0) -> None:
         self._take, self._timeout_s = take, timeout_s
         self._last_s: float | None = None
+        self._warn = ThrottledWarning()
         self._subscriber = rospy.Subscriber(topic, message_type, self._note, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
     @property
@@ -32,15 +35,18 @@ class WatchedInput:
         """Full name of the topic."""
         return str(self._subscriber.resolved_name)
 
-    def silence(self) -> str:
-        """Returns why its input has ceased; empty if it has not, or has not begun yet."""
+    def has_ceased(self, consequence: str) -> bool:
+        """Returns whether its input has ceased, which it has not before it began; if so, warns of a consequence."""
         if self._last_s is None:
-            return ""
+            return False
         if self._subscriber.get_num_connections() == 0:
-            return "nobody publishes it any more"
-        if self._timeout_s and time.monotonic() - self._last_s > self._timeout_s:
-            return f"nothing has come for {self._timeout_s:g} s"
-        return ""
+            reason = "nobody publishes it any more"
+        elif self._timeout_s and time.monotonic() - self._last_s > self._timeout_s:
+            reason = f"nothing has come for {self._timeout_s:g} s"
+        else:
+            return False
+        self._warn(self.topic, f"{reason}: {consequence}")
+        return True
 
     def _note(self, message: Any) -> None:
         self._last_s = time.monotonic()

@@ -8,7 +8,7 @@ from sensor_msgs.msg import Joy
 
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
+from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
 from operator_node.node_configs import JoyRemapParameters
 from operator_node.ros.stamps import stamp
 from operator_node.ros.watched_input import QUEUE_SIZE, WatchedInput
@@ -29,7 +29,6 @@ class JoyRemap:
         parameters = private_parameters(JoyRemapParameters)
         self._lock = threading.Lock()
         self._joy: Joy | None = None
-        self._warn = ThrottledWarning()
         self._publisher = rospy.Publisher("joy_out", Joy, queue_size=QUEUE_SIZE, tcp_nodelay=True)
         self._input = WatchedInput("joy_in", Joy, self._take, parameters.input_timeout_s)
         WallTimer(parameters.hz, self._publish)
@@ -43,9 +42,7 @@ class JoyRemap:
             if self._joy is None:
                 return
             message = copy.copy(self._joy)
-            silence = self._input.silence()
-            if silence:
-                self._warn(self._input.topic, f"{silence}: axes and buttons are zero")
+            if self._input.has_ceased("axes and buttons are zero"):
                 message.axes, message.buttons = [0.0] * len(message.axes), [0] * len(message.buttons)
                 self._joy = None
             message.header = copy.copy(message.header)

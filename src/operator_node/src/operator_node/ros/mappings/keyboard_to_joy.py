@@ -11,7 +11,7 @@ from std_msgs.msg import Header
 from custom_ros_tools.errors import collecting_problems
 from custom_ros_tools.ros.lifecycle.parameters import private_config, private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
+from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
 from operator_node.key_axes import KeyAxes
 from operator_node.node_configs import KeyboardToJoyConfig, KeyboardToJoyParameters
 from operator_node.ros.stamps import stamp
@@ -41,7 +41,6 @@ class KeyboardToJoy:
         self._timeout_s = parameters.key_timeout_s
         self._lock = threading.Lock()
         self._pressed_s: dict[int, float] = {}
-        self._warn = ThrottledWarning()
         self._publisher = rospy.Publisher("joy", Joy, queue_size=QUEUE_SIZE, tcp_nodelay=True)
         self._down = WatchedInput("keyboard/keydown", Key, self._press)
         self._up = WatchedInput("keyboard/keyup", Key, self._release)
@@ -61,9 +60,7 @@ class KeyboardToJoy:
 
     def _repeat(self) -> None:
         with self._lock:
-            silence = self._down.silence() if self._pressed_s else ""
-            if silence:
-                self._warn(self._down.topic, f"{silence}: all keys count as released")
+            if self._pressed_s and self._down.has_ceased("all keys count as released"):
                 self._pressed_s.clear()
             if self._timeout_s:
                 since_s = time.monotonic() - self._timeout_s

@@ -124,9 +124,7 @@ class OperatorNode(ABC):
 
     def _look(self) -> None:
         with self._lock:
-            silence = self._joy.silence() if any(self._in_force) else ""
-            if silence:
-                self._warn(self._joy.topic, f"{silence}: the signal is zero")
+            if any(self._in_force) and self._joy.has_ceased("the signal is zero"):
                 self._end_signal()
 
     def _repeat(self) -> None:
