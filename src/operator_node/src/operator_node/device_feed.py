@@ -59,6 +59,7 @@ class DeviceFeed:
         problem: Why the device is not open; None if it is.
         published: Count of readings handed on.
         refused: Count of readings that were not, by reason.
+        free_axes: Indices of the axes that have been at rest since the device was opened.
     """
 
     def __init__(self, name: str, device: Device, config: FeedConfig, publish: Callable[[Reading], None]) -> None:
@@ -67,8 +68,10 @@ class DeviceFeed:
         self.refused: Counter[str] = Counter()
         self._name, self._device, self._config, self._publish = name, device, config, publish
         self._last: Reading | None = None
-        self._free_axes: set[int] = set()
+        self.free_axes: set[int] = set()
         self._free_buttons: set[int] = set()
+        self._buttons: tuple[int, ...] = ()
+        """As the device has them."""
         self._open_at_s = self._repeat_at_s = -math.inf
         self._is_absent = False
         self._warned_s: dict[str, float] = {}
@@ -154,7 +157,7 @@ class DeviceFeed:
         if self._is_absent:
             logger.info("%s: it is there now", self._name)
         self.problem, self._is_absent = None, False
-        self._free_axes.clear()
+        self.free_axes.clear()
         self._free_buttons.clear()
         self._last = None
         self._hand_on(self._resting())
@@ -184,13 +187,13 @@ class DeviceFeed:
     def _next(self, timeout_s: float) -> Reading | None:
         """Returns the next reading, and with it those that follow within the coalescing time."""
         first = self._device.read(timeout_s)
-        if first is None or self._last is None or first.buttons != self._last.buttons:
+        if first is None or first.buttons != self._buttons:
             return first
         end_s = time.monotonic() + self._config.coalesce_interval
         reading, events, refused = first, [*first.events], [*first.refused]
         for _ in range(MOST_READINGS):
             left_s = end_s - time.monotonic()
-            if left_s <= 0.0 or reading.buttons != first.buttons or events:
+            if left_s <= 0.0 or reading.buttons != first.buttons or events or refused:
                 break
             newer = self._device.read(left_s)
             if newer is not None:
@@ -202,9 +205,10 @@ class DeviceFeed:
     def _take(self, reading: Reading) -> None:
         for reason in reading.refused:
             self._refuse(reason)
-        reason = problem_of(reading, self._device.axes, self._device.buttons)
-        if reason is not None:
-            self._refuse(reason)
+        self._buttons = reading.buttons
+        problem = problem_of(reading, self._device.axes, self._device.buttons)
+        if problem is not None:
+            self._refuse(problem)
             return
         reading = self._from_rest(reading)
         if self._last is None or reading.events or reading[:2] != self._last[:2]:
@@ -215,11 +219,10 @@ class DeviceFeed:
         resting = self._resting().axes
         for index, (value, rest) in enumerate(zip(reading.axes, resting)):
             if abs(value - rest) <= AT_REST:
-                self._free_axes.add(index)
+                self.free_axes.add(index)
         self._free_buttons.update(index for index, value in enumerate(reading.buttons) if value == 0)
         axes = (
-            value if index in self._free_axes else rest
-            for index, (value, rest) in enumerate(zip(reading.axes, resting))
+            value if index in self.free_axes else rest for index, (value, rest) in enumerate(zip(reading.axes, resting))
         )
         buttons = (value if index in self._free_buttons else 0 for index, value in enumerate(reading.buttons))
         return reading._replace(axes=tuple(axes), buttons=tuple(buttons))

@@ -1,5 +1,6 @@
 """A joystick or gamepad."""
 
+import contextlib
 import math
 import re
 from collections import deque
@@ -16,6 +17,7 @@ from .sdl import pygame_with_joysticks, triggers_of
 RAW = 32768
 """What pygame divides axes by."""
 FULL = 32767
+UNPLUGGED = "it was unplugged"
 RUMBLE_MS = 200
 """How long a force is felt unless it is repeated."""
 
@@ -75,15 +77,16 @@ class Joystick(Device):
             from operator_node.emulators.joystick import VirtualJoystick
 
             self._virtual = VirtualJoystick()
-        pygame.event.get()  # by which it finds those that came
+        with contextlib.suppress(SystemError):  # see `_fetch`
+            pygame.event.get()  # by which it finds those that came
         index = self._index()
         try:
-            self._joystick = joystick = pygame.joystick.Joystick(index)
+            self._joystick = pygame.joystick.Joystick(index)
         except pygame.error as error:
             raise DeviceError("joystick", f"it cannot be opened: {error}; may you read /dev/input?") from None
         given = self._config.triggers
         self._triggers = triggers_of(index) if given is None else frozenset(given)
-        self._pressed = [joystick.get_button(number) for number in range(joystick.get_numbuttons())]
+        self._look_at_buttons()
         self._events.clear()
         self._name_all()
         self._is_new = True
@@ -91,10 +94,7 @@ class Joystick(Device):
     def read(self, timeout_s: float) -> Reading | None:
         if self._joystick is None:
             raise DeviceError("joystick", "it is not open")
-        pygame = self._pygame
-        if not self._events and timeout_s > 0.0:
-            self._events.append(pygame.event.wait(max(1, math.ceil(1e3 * timeout_s))))
-        self._events.extend(pygame.event.get())
+        self._fetch(timeout_s)
         self._take_events()
         if not self._is_new:
             return None
@@ -140,6 +140,28 @@ class Joystick(Device):
             raise DeviceError("joystick", f"there is no number {number}; there are {', '.join(names) or 'none'}")
         return number
 
+    def _fetch(self, timeout_s: float) -> None:
+        """Waits for events if none wait.
+
+        pygame 2.1 loses what has come when a joystick goes that nobody has opened; then all is looked at anew.
+        """
+        event = self._pygame.event
+        try:
+            if not self._events and timeout_s > 0.0:
+                self._events.append(event.wait(max(1, math.ceil(1e3 * timeout_s))))
+            self._events.extend(event.get())
+        except SystemError:
+            joysticks = self._pygame.joystick
+            there = [joysticks.Joystick(index).get_instance_id() for index in range(joysticks.get_count())]
+            if self._joystick.get_instance_id() not in there:
+                raise DeviceError("joystick", UNPLUGGED) from None
+            self._look_at_buttons()
+            self._is_new = True
+
+    def _look_at_buttons(self) -> None:
+        joystick = self._joystick
+        self._pressed = [joystick.get_button(number) for number in range(joystick.get_numbuttons())]
+
     def _take_events(self) -> None:
         """Notes what has happened, up to the next button, so that the shortest tap is a reading."""
         pygame, ours = self._pygame, self._joystick.get_instance_id()
@@ -148,7 +170,7 @@ class Joystick(Device):
             if getattr(event, "instance_id", None) != ours:
                 continue
             if event.type == pygame.JOYDEVICEREMOVED:
-                raise DeviceError("joystick", "it was unplugged")
+                raise DeviceError("joystick", UNPLUGGED)
             self._is_new = True
             if event.type in (pygame.JOYBUTTONDOWN, pygame.JOYBUTTONUP):
                 self._press(event.button, event.type == pygame.JOYBUTTONDOWN)

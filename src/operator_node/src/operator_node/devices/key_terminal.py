@@ -16,7 +16,11 @@ from .key_window import CODES
 
 ESCAPE = "\x1b"
 SEQUENCES = {
-    **{f"{start}{end}": name for start in ("[", "O") for end, name in zip("ABCDHF", ("UP", "DOWN", "RIGHT", "LEFT", "HOME", "END"))},
+    **{
+        f"{start}{end}": name
+        for start in ("[", "O")
+        for end, name in zip("ABCDHF", ("UP", "DOWN", "RIGHT", "LEFT", "HOME", "END"))
+    },
     "[1~": "HOME",
     "[2~": "INSERT",
     "[3~": "DELETE",

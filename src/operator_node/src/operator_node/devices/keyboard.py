@@ -53,6 +53,7 @@ class Keyboard(Device):
         self._config = config
         self._axes = KeyAxes(config.axes, config.buttons)
         self._source: KeyWindow | KeyTerminal | None = None
+        self._is_new = False
         self._reset()
 
     def open(self) -> None:

@@ -43,7 +43,11 @@ class Mouse(Device):
     def __init__(self, config: MouseConfig) -> None:
         self._config = config
         self._window: Window | None = None
-        self._reset()
+        self._origin: tuple[int, int] | None = None
+        self._drag = (0.0, 0.0)
+        self._held = [0, 0, 0]
+        self._wheel, self._wheel_over_s = 0.0, math.inf
+        self._is_new = False
 
     def open(self) -> None:
         self._reset()
@@ -72,8 +76,7 @@ class Mouse(Device):
         self._window = None
 
     def _reset(self) -> None:
-        self._origin: tuple[int, int] | None = None
-        self._drag = (0.0, 0.0)
+        self._origin, self._drag = None, (0.0, 0.0)
         self._held = [0, 0, 0]
         self._wheel, self._wheel_over_s = 0.0, math.inf
         self._is_new = True

@@ -13,19 +13,22 @@ from typing import Annotated
 
 from pydantic import Field
 
-from custom_ros_tools.schema import ConfigModel, Count, NonNegative, Positive, Switch, Text, Unit, Vec3, optional
+from custom_ros_tools.schema import ConfigModel, Count, NonNegative, Positive, Switch, Text, Vec3, optional
 from operator_node.device import Device, DeviceError, Reading
 
 SOCKET, SETTINGS = "/var/run/spnav.sock", "/etc/spnavrc"
 PACKET = struct.Struct("=8i")
 WORD = struct.Struct("=i")
-REQUEST_PROTOCOL_1 = 0x7FAA5501
-REQUEST_MASK, PROTOCOL_TAG = 0x7FFFFF00, 0x7FAA5500
+REQUEST = 0x7FAA0000
+"""What is added to the types of requests, and of the answers to them."""
+PROTOCOL_TAG = REQUEST | 0x5500
+PROTOCOL_MASK = 0x7FFFFF00
+"""All but the version in the word by which a version is agreed on."""
 SENSITIVITY = struct.pack("=f", 1.0)
 MOTION, PRESS, RELEASE, DEVICE, LAST_EVENT = 0, 1, 2, 3, 6
 """Types of packets; those up to the last one are events."""
-GET_BUTTONS = 0x2002
-ANSWERS = range(0x1000, 0x4000)
+GET_BUTTONS = REQUEST | 0x2003
+ANSWERS = range(REQUEST | 0x1000, REQUEST | 0x4000)
 ANSWER_TIMEOUT_S = 0.3
 LARGEST = 32767
 """No 6-D mouse says more."""
@@ -70,7 +73,12 @@ class Spacenav(Device):
         self.config = config
         self._socket: socket.socket | None = None
         self._received = bytearray()
-        self._forget()
+        self._motion: tuple[float, ...] = (0.0,) * 6
+        self._pressed: list[int] = []
+        self._refused: list[str] = []
+        self._refused_in_a_row = 0
+        self._static_at_s = math.inf
+        self._is_new = False
 
     def open(self) -> None:
         self._forget()
@@ -120,7 +128,7 @@ class Spacenav(Device):
         self._received.clear()
         self._motion = (0.0,) * 6
         self._pressed = [0] * len(self.buttons)
-        self._refused: list[str] = []
+        self._refused = []
         self._refused_in_a_row = 0
         self._is_new = False
         self._static_at_s = time.monotonic() + POLL_S * self.config.static_count_threshold
@@ -129,14 +137,14 @@ class Spacenav(Device):
 
     def _agree(self) -> int:
         """Asks for protocol 1 and returns which one it is; daemons that know only 0 do not answer."""
-        self._send(WORD.pack(REQUEST_PROTOCOL_1))
+        self._send(WORD.pack(PROTOCOL_TAG | 1))
         end_s = time.monotonic() + ANSWER_TIMEOUT_S
         while len(self._received) < WORD.size:
             left_s = end_s - time.monotonic()
             if left_s <= 0.0 or not self._receive(left_s):
                 return 0
         (answer,) = WORD.unpack_from(self._received)
-        if answer & REQUEST_MASK != PROTOCOL_TAG:
+        if answer & PROTOCOL_MASK != PROTOCOL_TAG:
             return 0  # the beginning of an event
         del self._received[: WORD.size]
         return 1

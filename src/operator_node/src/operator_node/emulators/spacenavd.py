@@ -17,16 +17,19 @@ from operator_node.devices.spacenav import (
     MOTION,
     PACKET,
     PRESS,
+    PROTOCOL_MASK,
     PROTOCOL_TAG,
     RELEASE,
-    REQUEST_MASK,
+    REQUEST,
     WORD,
     socket_path,
 )
 
 FULL = 350
 """What most devices say at the end of an axis."""
-SET_NAME, SET_SENSITIVITY, SET_MASK, GET_NAME, GET_AXES = 0x1000, 0x1001, 0x1003, 0x2000, 0x2003
+SET_NAME, SET_SENSITIVITY, SET_MASK, GET_NAME, GET_AXES = (
+    REQUEST | number for number in (0x1000, 0x1001, 0x1003, 0x2000, 0x2002)
+)
 EVENT_BITS = {MOTION: 1, PRESS: 2, RELEASE: 2, DEVICE: 4}
 MASK_AT_FIRST = {0: 3, 1: 7}
 """Which events a client gets that has asked for none, by the version of its protocol."""
@@ -114,16 +117,16 @@ class SpacenavDaemon:
 
     def _serve(self) -> None:
         while True:
-            sockets = {client.socket: client for client in self._clients}
-            ready, _, _ = select.select([self._wake_reader, self._listener, *sockets], [], [])
+            clients = {client.socket.fileno(): client for client in self._clients}
+            ready, _, _ = select.select([self._wake_reader, self._listener.fileno(), *clients], [], [])
             if self._wake_reader in ready:
                 return
-            for each in ready:
+            for number in ready:
                 with self._lock:
-                    if each is self._listener:
-                        self._clients.append(Client(self._listener.accept()[0]))
+                    if number in clients:
+                        self._hear(clients[number])
                     else:
-                        self._hear(sockets[each])
+                        self._clients.append(Client(self._listener.accept()[0]))
 
     def _hear(self, client: Client) -> None:
         received = b""
@@ -149,7 +152,7 @@ class SpacenavDaemon:
             return False
         (word,) = WORD.unpack_from(client.received)
         del client.received[: WORD.size]
-        if self._protocol == 1 and word & REQUEST_MASK == PROTOCOL_TAG:  # else it is a sensitivity
+        if self._protocol == 1 and word & PROTOCOL_MASK == PROTOCOL_TAG:  # else it is a sensitivity
             client.protocol = min(word & 0xFF, self._protocol)
             client.mask = MASK_AT_FIRST[client.protocol]
             self._send(client, WORD.pack(PROTOCOL_TAG | client.protocol))
@@ -186,7 +189,7 @@ class SpacenavDaemon:
 
     def _drop(self, client: Client) -> None:
         client.socket.close()
-        self._clients.remove(client)
+        self._clients = [each for each in self._clients if each is not client]
 
 
 def main() -> None:
