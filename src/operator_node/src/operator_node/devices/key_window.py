@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Sequence
 from tkinter import Event, Misc
+from typing import NamedTuple
 
 from operator_node.key_axes import KEY_CODES
 
@@ -14,7 +15,7 @@ WIDTH_PX, HEIGHT_PX = 420, 220
 LOCKS = {0x02: CAPS_LOCK, 0x10: NUM_LOCK}
 """Bit of a lock by its bit in an event's state."""
 REPEAT_GAP_S = 0.003
-"""X says of a key that is held that it goes up and at once down again; what is up for longer really is."""
+"""X says of a key that is held that it goes up and in the same moment down again; so long the second is waited for."""
 NAMES = {
     "BackSpace": "BACKSPACE",
     "Tab": "TAB",
@@ -90,6 +91,22 @@ def code_of(name: str, number: int) -> int:
     return code if code in CODES and number < 256 else 0
 
 
+class Rising(NamedTuple):
+    """A key that goes up, unless X says that it has gone down in the same moment.
+
+    Attributes:
+        place: Its place on the keyboard.
+        time: The moment, by X.
+        locks: The locks that were on.
+        due_s: When it has gone up, by `time.monotonic`.
+    """
+
+    place: int
+    time: int
+    locks: int
+    due_s: float
+
+
 class KeyWindow:
     """Notes the keys that are pressed while its window has the keyboard, and shows those that are held.
 
@@ -105,8 +122,8 @@ class KeyWindow:
         self._keys, self._explanation = keys, explanation
         self._codes: dict[int, int] = {}
         """Code of each key that is held by its place on the keyboard: its symbol depends on others."""
-        self._rising: dict[int, tuple[float, int]] = {}
-        self._has_focus = True
+        self._rising: Rising | None = None
+        self._has_focus = False
         self._drawn: object = None
         self._window = window = Window("keyboard", "keyboard", WIDTH_PX, HEIGHT_PX)
         window.bind("<KeyPress>", self._press)
@@ -120,13 +137,10 @@ class KeyWindow:
     def wait(self, timeout_s: float) -> None:
         """Deals with what has happened, or happens next; see `Window.wait`."""
         now_s = time.monotonic()
-        due_s = min((due_s for due_s, _ in self._rising.values()), default=math.inf)
+        due_s = self._rising.due_s if self._rising else math.inf
         self._window.wait(max(0.0, min(timeout_s, due_s - now_s)))
-        now_s = time.monotonic()
-        for place, (due_s, locks) in [*self._rising.items()]:
-            if now_s >= due_s:
-                del self._rising[place]
-                self._keys.release(self._codes.pop(place), locks)
+        if self._rising and time.monotonic() >= self._rising.due_s:
+            self._let_rise()
         if self._drawn != (tuple(self._keys.codes), self._has_focus):
             self._draw()
 
@@ -135,21 +149,29 @@ class KeyWindow:
         self._window.close()
 
     def _press(self, event: "Event[Misc]") -> None:
-        if self._rising.pop(event.keycode, None) is not None:
-            return  # a repetition
+        if self._rising and (event.keycode, event.time) == self._rising[:2]:
+            self._rising = None  # a repetition
+            return
+        self._let_rise()
         code = code_of(event.keysym, event.keysym_num)
         self._codes[event.keycode] = code
         self._keys.press(code, _locks(event))
 
     def _release(self, event: "Event[Misc]") -> None:
+        self._let_rise()
         if event.keycode in self._codes:
-            self._rising[event.keycode] = (time.monotonic() + REPEAT_GAP_S, _locks(event))
+            self._rising = Rising(event.keycode, event.time, _locks(event), time.monotonic() + REPEAT_GAP_S)
+
+    def _let_rise(self) -> None:
+        if self._rising is not None:
+            self._keys.release(self._codes.pop(self._rising.place), self._rising.locks)
+        self._rising = None
 
     def _set_focus(self, has_focus: bool) -> None:
         self._has_focus = has_focus
         if not has_focus:
             self._codes.clear()
-            self._rising.clear()
+            self._rising = None
             self._keys.release_all()
 
     def _draw(self) -> None:

@@ -7,7 +7,7 @@ from tkinter import Event, Misc
 from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, Fraction, Seconds
-from operator_node.device import Device, Reading
+from operator_node.device import Device, DeviceError, Reading
 
 from .window import INK, Window
 
@@ -60,7 +60,8 @@ class Mouse(Device):
         self._draw()
 
     def read(self, timeout_s: float) -> Reading | None:
-        assert self._window is not None, "not open"
+        if self._window is None:
+            raise DeviceError("mouse", "it is not open")
         self._window.wait(max(0.0, min(timeout_s, self._wheel_over_s - time.monotonic())))
         if time.monotonic() >= self._wheel_over_s:
             self._wheel, self._wheel_over_s, self._is_new = 0.0, math.inf, True
