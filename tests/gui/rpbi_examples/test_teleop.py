@@ -1,8 +1,12 @@
-"""Real key presses, mouse drags, and joystick and 6-D mouse by what stands in for them, move the arm of the example."""
+"""Real key presses, mouse drags, and joystick and 6-D mouse by what stands in for them, move the arm of the example.
+
+With the environment variable TELEOP_DEVICES=all they all do, else the keys, which leaves half a minute to other tests.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -16,11 +20,12 @@ from std_msgs.msg import Float64MultiArray
 from custom_ros_tools.ros.tf_listener import TfListener
 from operator_node.emulators.spacenavd import SpacenavDaemon
 
-SLOW_S = 300.0
+SLOW_S = 60.0
 TARGET, TIP = "rpbi/teleop_tip", "rpbi/kuka_lwr/end_effector_ball"
 AWAY, RIGHT, UP = np.array([-1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 """Directions of a person who stands behind the arm, in the world."""
 SPEED = "speed:=0.4"
+all_devices = pytest.mark.skipif(os.environ.get("TELEOP_DEVICES") != "all", reason="runs with TELEOP_DEVICES=all")
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +33,7 @@ def example(ros_master, screen, tmp_path_factory) -> Iterator[RosSystem]:
     """The example, in which the arm is at its target."""
     system = RosSystem(tmp_path_factory.mktemp("teleop"))
     try:
-        arguments = ("teleop.launch", "headless:=true", "real_time_factor:=4", SPEED)
+        arguments = ("teleop.launch", "headless:=true", "ik_hz:=30", SPEED)
         process = system.start(["roslaunch", "rpbi_examples", *arguments], **screen.environment)
         wait_until(lambda: "the arm tracks its target" in system.output(process), "the arm is there", SLOW_S)
         yield system
@@ -90,6 +95,7 @@ def test_keys_move_the_arm(screen, follows):
         follows(direction, nothing, lambda: screen.run("xdotool", "keyup", key))  # noqa: B023 (it is called here)
 
 
+@all_devices
 def test_mouse_moves_the_arm(example, screen, follows):
     with device(example, screen, "mouse"):
         screen.run(
@@ -99,17 +105,20 @@ def test_mouse_moves_the_arm(example, screen, follows):
         follows(-RIGHT, nothing, lambda: screen.run("xdotool", "mouseup", "1"))
 
 
+@all_devices
 def test_joystick_moves_the_arm(example, screen, follows):
     with device(example, screen, "joystick", "virtual:=true"):
-        stick = rospy.Publisher("joy/virtual", Joy, queue_size=10)
+        stick, joy = rospy.Publisher("joy/virtual", Joy, queue_size=10), example.listen("joy", Joy)
 
-        def hold(*axes: float) -> None:
-            stick.publish(Joy(axes=[*axes, *[0.0] * (4 - len(axes)), 1.0, 1.0, 0.0, 0.0], buttons=[0] * 11))
+        def hold(away: float) -> None:
+            stick.publish(Joy(axes=[0.0, away, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0], buttons=[0] * 11))
 
-        follows(-AWAY, lambda: hold(0.0, -0.8), lambda: hold(0.0, 0.0))
+        wait_until(lambda: hold(0.08) or (joy.messages and joy.messages[-1].axes[1]), "the stick has been at rest")
+        follows(-AWAY, lambda: hold(-0.8), lambda: hold(0.0))
         stick.unregister()
 
 
+@all_devices
 def test_6d_mouse_moves_the_arm(example, screen, follows, tmp_path):
     cap = SpacenavDaemon(tmp_path / "spnav.sock")
     with device(example, screen, "spacenav", SPNAV_SOCKET=str(cap.path)):

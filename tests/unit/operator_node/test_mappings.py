@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from custom_ros_tools.errors import ConfigError, UnknownNameError
-from operator_node.lookup import mapping_class
+from operator_node.lookup import make_mapping
 from operator_node.mappings import MAPPINGS
 from operator_node.mappings.mapping import AxesConfig, Mapping
 
@@ -29,8 +29,7 @@ class DeadZone(Mapping):
 
 
 def made(name: str, **options) -> Mapping:
-    kind = mapping_class(name)
-    return kind(kind.Config.parse(options, "~config"))
+    return make_mapping(name, options)
 
 
 def random_axes(generator: random.Random, count: int = 4) -> list[float]:
@@ -110,4 +109,4 @@ def test_bad_scale_is_refused_with_key_expected_and_got(name, scale, told):
 
 def test_unknown_mapping_is_told_with_the_known_ones():
     with pytest.raises(UnknownNameError, match="did you mean 'isometric'"):
-        mapping_class("isometrik")
+        make_mapping("isometrik", {"axes_idx": [0]})

@@ -5,10 +5,9 @@ import sys
 import rospy
 from sensor_msgs.msg import Joy
 
-from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
-from custom_ros_tools.ros.lifecycle.parameters import private_config
+from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from operator_node.lookup import mapping_class
+from operator_node.lookup import make_mapping
 
 from .operator_node import NAME, OperatorNode
 
@@ -25,11 +24,7 @@ class MappingNode(OperatorNode):
     """
 
     def __init__(self, name: str) -> None:
-        try:
-            kind = mapping_class(name)
-        except ValueError as error:
-            raise ConfigError([Problem("", "", f"mapping '{name}': {error}")]) from error
-        self._mapping = kind(private_config(kind.Config))  # type: ignore[call-arg]
+        self._mapping = make_mapping(name, rospy.get_param("~config", {}))
         super().__init__()
 
     def callback(self, joy: Joy) -> None:
