@@ -9,7 +9,7 @@ from keyboard.msg import Key
 from node_world import Rosout, publishing
 from ros_system import wait_until
 from sensor_msgs.msg import Joy
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, Header
 
 from operator_node.parser import reconstruct_interface_log_msg
 
@@ -40,7 +40,11 @@ def test_axes_and_buttons_follow_the_keys_that_are_held(ros):
             publisher.publish(Key(code=code))
             wait_until(lambda: states(joy)[-1] == (axes, buttons), f"{code} is told")
 
-        press(up, Key.KEY_RIGHT, (0.0, 0.0, 0.0))  # it was held before the node began
+        press(down, Key.KEY_1, (0.0, 0.0, 0.0), (1, 0, 0))
+        up.publish(Key(code=Key.KEY_RIGHT))  # it was held before the node began
+        up.publish(Key(Header(stamp=rospy.Time(5)), Key.KEY_UP, 0))
+        press(up, Key.KEY_1, (0.0, 0.0, 0.0))
+        down.publish(Key(Header(stamp=rospy.Time(4)), Key.KEY_UP, 0))  # it comes after its release
         for _ in range(3):
             press(down, Key.KEY_RIGHT, (1.0, 0.0, 0.0))
         press(down, Key.KEY_LEFT, (0.0, 0.0, 0.0))
@@ -51,6 +55,7 @@ def test_axes_and_buttons_follow_the_keys_that_are_held(ros):
         press(down, Key.KEY_z, (-1.0, 0.0, 1.0), (1, 0, 1))
         press(up, Key.KEY_LEFT, (0.0, 0.0, 1.0), (1, 0, 1))
     wait_until(lambda: states(joy)[-1] == STILL, "the keyboard has gone, and all keys are released")
+    assert all(axes[1] == 0.0 for axes, _ in states(joy)), "a press that comes after its release counts for nothing"
     assert joy.messages[-1].header.frame_id == "keyboard" and joy.stamps_ns == sorted(set(joy.stamps_ns))
 
 
@@ -101,7 +106,7 @@ def test_window_has_each_signal_of_its_duration(ros):
 
 
 def test_window_at_a_rate_gets_empty_by_itself(ros):
-    rospy.set_param("/operator_interface_logger", {"window_duration": 0.3, "hz": 50})
+    rospy.set_param("/operator_interface_logger", {"window_duration": 0.5, "hz": 50})
     ros.start(["rosrun", "operator_node", "operator_interface_logger"])
     windows = ros.listen("operator_node/window", Float64MultiArray)
     with publishing("operator_node/signal", Float64MultiArray) as signal:
@@ -109,4 +114,4 @@ def test_window_at_a_rate_gets_empty_by_itself(ros):
         signal.publish(Float64MultiArray(data=[7.0]))
         wait_until(lambda: windows.messages and not windows.messages[-1].data, "the window is empty")
     sizes = [len(message.data) for message in windows.messages]
-    assert sizes.count(2) > 3 and sizes == sorted(sizes, reverse=True) and sizes.count(0) == 1
+    assert sizes.count(2) > 1 and sizes == sorted(sizes, reverse=True) and sizes.count(0) == 1

@@ -64,8 +64,6 @@ def test_frame_moves_while_a_signal_comes_and_stops_when_it_ceases(ros):
         assert 0.1 < x and frame.transforms[-1].rotation.z > 0.0
         held(signal, [0.0, 0.5, 0.0], lambda: frame.positions[-1][1] > 0.1, "it goes on from there")
         assert frame.positions[-1][0] == x
-    moves = [math.dist(a, b) for a, b in zip(frame.positions, frame.positions[1:])]
-    assert max(moves) <= 0.5 * 0.02 + 1e-9, "no step is longer than v_max dt"
 
 
 def test_it_stops_when_the_operator_node_has_gone_also_without_a_time_out(ros):

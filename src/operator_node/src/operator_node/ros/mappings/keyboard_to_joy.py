@@ -1,5 +1,6 @@
 """`keyboard_to_joy.py`: keys that are held, as axes and buttons."""
 
+import math
 import threading
 import time
 
@@ -19,13 +20,16 @@ from operator_node.ros.watched_input import QUEUE_SIZE, WatchedInput
 
 NAME = "keyboard_to_joy"
 FRAME_ID = "keyboard"
+DISORDER_S = 5.0
+"""How late a press may come; after that, a stamp from before is one of a clock that was set back [s]."""
 
 
 class KeyboardToJoy:
     """Publishes `joy` from `keyboard/keydown` and `keyboard/keyup`, at a rate and whenever a key changes.
 
-    A key is held or not, however often it is said: repeats, and a release without a press, change nothing. When the
-    keyboard has gone, no key is held.
+    A key is held or not, however often it is said: repeats, and a release without a press, change nothing. Topics keep
+    no order among each other, so a press that comes just after its release, by the stamps, counts for nothing. When
+    the keyboard has gone, no key is held.
 
     Raises:
         ConfigError: If `~config` or a parameter is wrong.
@@ -41,6 +45,7 @@ class KeyboardToJoy:
         self._timeout_s = parameters.key_timeout_s
         self._lock = threading.Lock()
         self._pressed_s: dict[int, float] = {}
+        self._released: dict[int, tuple[rospy.Time, float]] = {}
         self._publisher = rospy.Publisher("joy", Joy, queue_size=QUEUE_SIZE, tcp_nodelay=True)
         self._down = WatchedInput("keyboard/keydown", Key, self._press)
         self._up = WatchedInput("keyboard/keyup", Key, self._release)
@@ -48,6 +53,9 @@ class KeyboardToJoy:
 
     def _press(self, key: Key) -> None:
         with self._lock:
+            stamp_then, then_s = self._released.get(key.code, (rospy.Time(), -math.inf))
+            if key.header.stamp < stamp_then and time.monotonic() - then_s < DISORDER_S:
+                return
             is_new = key.code not in self._pressed_s
             self._pressed_s[key.code] = time.monotonic()
             if is_new:
@@ -55,6 +63,7 @@ class KeyboardToJoy:
 
     def _release(self, key: Key) -> None:
         with self._lock:
+            self._released[key.code] = key.header.stamp, time.monotonic()
             if self._pressed_s.pop(key.code, None) is not None:
                 self._publish()
 
