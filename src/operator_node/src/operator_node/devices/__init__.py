@@ -3,5 +3,7 @@
 A user's own one needs no line: `"their_package.module:Class"` serves wherever a name does.
 """
 
-DEVICES: dict[str, str] = {}
+DEVICES: dict[str, str] = {
+    "mvn": "operator_node.devices.mvn:Mvn",
+}
 """Class of each device; imported when it is asked for, so that libraries that others lack do not matter."""
