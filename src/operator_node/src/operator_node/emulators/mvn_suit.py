@@ -56,16 +56,8 @@ class Suit:
 
     def datagrams(self, sample: int, time_s: float) -> list[bytes]:
         """Returns what is sent of a sample at a time [s]."""
-        poses = [self._noisy(time_s + step / self._hz) for step in (-1, 0, 1)]
-        positions, quats = poses[1]
-        times = [positions_of[0] for positions_of in poses]
-        velocity = (times[2] - times[0]) * self._hz / 2.0
-        acceleration = (times[2] - 2.0 * positions + times[0]) * self._hz**2
-        return [
-            datagram
-            for kind in self._kinds
-            for datagram in self._of_kind(kind, sample, time_s, positions, quats, velocity, acceleration)
-        ]
+        positions, quats = self._noisy(time_s)
+        return [datagram for kind in self._kinds for datagram in self._of_kind(kind, sample, time_s, positions, quats)]
 
     def frame(self, sample: int, time_s: float, positions: Array, quats: Array) -> list[bytes]:
         """Returns the datagrams of type 02 of any poses: origins (23 x 3) [m], orientations (23 x 4), x, y, z, w."""
@@ -78,16 +70,7 @@ class Suit:
             quats = multiply(quats, noise.as_quat())
         return positions, quats
 
-    def _of_kind(
-        self,
-        kind: int,
-        sample: int,
-        time_s: float,
-        positions: Array,
-        quats: Array,
-        velocity: Array,
-        acceleration: Array,
-    ) -> list[bytes]:
+    def _of_kind(self, kind: int, sample: int, time_s: float, positions: Array, quats: Array) -> list[bytes]:
         if kind in (12, 13) and sample % INFO_PERIOD:
             return []
         if kind == 1:
@@ -110,6 +93,9 @@ class Suit:
             ]
             return self._split(kind, sample, time_s, items)
         if kind == 21:
+            before, after = (self._moves.pose(time_s + step / self._hz)[0] for step in (-1, 1))
+            velocity = (after - before) * self._hz / 2.0
+            acceleration = (after - 2.0 * positions + before) * self._hz**2
             return self._split(kind, sample, time_s, self._numbered(positions, velocity, acceleration))
         if kind == 22:
             still = np.zeros((len(SEGMENTS), 6))

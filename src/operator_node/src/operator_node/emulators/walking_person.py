@@ -33,8 +33,11 @@ LIFT = 0.06
 """How high it is lifted between [heights]."""
 REACHING_S, REACH_PERIOD_S = 2.5, 5.0
 """How long a reach takes, and after how long the next one begins, with the other hand [s]."""
-SETTLING_S = 1.5
-"""How long the way from the T-pose takes [s]."""
+SETTLING_S, CROUCHING_S = 1.5, 0.8
+"""How long the arms' way from the T-pose takes, and the knees' before the first step [s]."""
+STRIDE_S = 1.2
+BOB = 0.006
+"""How far the pelvis goes up and down [heights]."""
 
 
 class WalkingPerson:
@@ -63,18 +66,21 @@ class WalkingPerson:
         self.t_pose = height_m * np.array([_origin(name) for name in SEGMENTS])
         """Origins of the segments in the T-pose (23 x 3) [m]; all are turned as the world is."""
         self._offsets = np.array([self.t_pose[i] - self.t_pose[max(parent, 0)] for i, parent in enumerate(PARENTS)])
-        self._stride_s = 1.2
-        self._crouch_m = height_m * (0.035 if speed else 0.005)
+        leg = T_POSE["RightUpperLeg"][2] - T_POSE["RightFoot"][2]
+        longest_step = 0.5 * STANCE * STRIDE_S * speed
+        """How far behind the hip a foot is at the end of its stance [heights]."""
+        self._crouch_m = height_m * (leg - (leg**2 - longest_step**2) ** 0.5 + BOB + 0.01)
 
     def pose(self, time_s: float) -> tuple[Array, Array]:
         """Returns origins (23 x 3) [m] and orientations (23 x 4), x, y, z, w, of the segments at a time [s]."""
         walking_s = time_s - self._t_pose_s
         ready = _smooth(walking_s / SETTLING_S)
-        phase = 2.0 * np.pi * walking_s / self._stride_s
+        phase = 2.0 * np.pi * walking_s / STRIDE_S
         striding = ready if self._speed_m_s else 0.0
         way_m = self._way_m(walking_s)
-        pelvis = self._on_path(way_m) + (0.0, 0.0, self.t_pose[0][2] - ready * self._crouch_m)
-        pelvis[2] += striding * 0.008 * self._height_m * np.cos(2.0 * phase)
+        crouch_m = _smooth(walking_s / CROUCHING_S) * self._crouch_m
+        pelvis = self._on_path(way_m) + (0.0, 0.0, self.t_pose[0][2] - crouch_m)
+        pelvis[2] += striding * BOB * self._height_m * np.cos(2.0 * phase)
         facing = Rotation.from_euler("z", way_m / self._radius_m)
         sway = striding * np.sin(phase)
         turns = {"Pelvis": facing * Rotation.from_euler("z", 0.06 * sway)}
@@ -112,7 +118,7 @@ class WalkingPerson:
 
     def _way_m(self, walking_s: float) -> float:
         """Returns how far the person has walked; speed grows smoothly [m]."""
-        walking_s = max(walking_s, 0.0)
+        walking_s = max(walking_s - CROUCHING_S, 0.0)
         return float(self._speed_m_s * (walking_s - SETTLING_S * -np.expm1(-walking_s / SETTLING_S)))
 
     def _on_path(self, way_m: float) -> Array:
@@ -121,7 +127,7 @@ class WalkingPerson:
 
     def _footprint(self, number: float, sign: float, offset: float) -> tuple[Array, float]:
         """Returns where and in which direction a foot stands for one stride [m, rad]."""
-        way_m = self._way_m((number + offset + STANCE / 2.0) * self._stride_s)
+        way_m = self._way_m((number + offset + STANCE / 2.0) * STRIDE_S)
         angle = way_m / self._radius_m
         aside = -sign * self._height_m * T_POSE["RightUpperLeg"][1]
         place = self._on_path(way_m) + aside * np.array((-np.sin(angle), np.cos(angle), 0.0))
@@ -129,7 +135,7 @@ class WalkingPerson:
 
     def _ankle(self, walking_s: float, sign: float, offset: float) -> tuple[Array, float]:
         """Returns place and direction of an ankle [m, rad]."""
-        number, part = divmod(walking_s / self._stride_s - offset, 1.0)
+        number, part = divmod(walking_s / STRIDE_S - offset, 1.0)
         here, direction = self._footprint(number, sign, offset)
         if part < STANCE:
             return here, direction
@@ -147,7 +153,7 @@ class WalkingPerson:
         upper, lower, foot, toe = (INDEX[f"{side}{name}"] for name in ("UpperLeg", "LowerLeg", "Foot", "Toe"))
         thigh_m, shank_m = (float(np.linalg.norm(self._offsets[each])) for each in (lower, foot))
         reach = ankle - hip
-        distance_m = min(float(np.linalg.norm(reach)), 0.9999 * (thigh_m + shank_m))
+        distance_m = min(float(np.linalg.norm(reach)), thigh_m + shank_m)
         down = reach / np.linalg.norm(reach)
         left = np.array((-np.sin(direction_rad), np.cos(direction_rad), 0.0))
         left -= left @ down * down

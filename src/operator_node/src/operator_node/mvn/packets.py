@@ -132,11 +132,10 @@ def _items(kind: int, count: int, payload: bytes) -> tuple[Array, Array]:
     if rest or length - id_count not in lengths:
         raise PacketError("size", f"type {kind:02}, {count} items in {len(payload)} bytes")
     ids = np.frombuffer(payload, ">i4").reshape(count, length)[:, :id_count]
-    values = np.frombuffer(payload, ">f4").reshape(count, length)[:, id_count:].astype(float)
-    largest = np.abs(values).max()
-    if not largest <= FARTHEST:
+    values = np.frombuffer(payload, ">f4").reshape(count, length)[:, id_count:]
+    if not np.abs(values).max() <= FARTHEST:
         raise PacketError("out of range" if np.isfinite(values).all() else "not finite", f"type {kind:02}")
-    return ids, values
+    return ids, values.astype(float)
 
 
 def body_rows(ids: Array) -> NDArray[np.intp]:
