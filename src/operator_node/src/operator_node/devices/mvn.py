@@ -45,7 +45,7 @@ class Mvn(Device):
             ) from None
 
     def read(self, timeout_s: float) -> Reading | None:
-        """Returns the hands at the newest frame, and all that came; zeros when frames have ceased."""
+        """Returns the hands at the newest frame, and all that came; zeros when the frames of person 0 cease."""
         try:
             events = self.receiver.poll(timeout_s)
         except OSError as error:
@@ -53,7 +53,7 @@ class Mvn(Device):
         for event in events:
             if isinstance(event, SegmentFrame) and event.person == 0:
                 self._values = self._hands.axes(event)
-            elif isinstance(event, Silence):
+            elif isinstance(event, Silence) and event.person == 0:
                 self._release()
         return Reading(self._values, (), tuple(events)) if events else None
 

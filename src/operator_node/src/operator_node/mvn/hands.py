@@ -20,7 +20,8 @@ class HandAxes:
     """
 
     def __init__(self) -> None:
-        self._engaged: Array | None = None
+        self._engaged: tuple[Array, Array] | None = None
+        """Where the hands were, and how long the arms were then."""
 
     def release(self) -> None:
         """Has the next frame engage the hands where they are then."""
@@ -28,15 +29,15 @@ class HandAxes:
 
     def axes(self, frame: SegmentFrame) -> tuple[float, ...]:
         """Returns the numbers of `AXES`, each in [-1, 1]; zeros of the frame that engages."""
-        places = self._places(frame)
+        places = _places(frame)
         if self._engaged is None:
-            self._engaged = places
-        return tuple(np.clip(places - self._engaged, -1.0, 1.0).ravel().tolist())
+            lengths = np.linalg.norm(np.diff(frame.positions[_ARMS], axis=1), axis=2).sum(axis=1)
+            self._engaged = places, np.maximum(lengths, SHORTEST_ARM_M)[:, None]
+        before, lengths = self._engaged
+        return tuple(np.clip((places - before) / lengths, -1.0, 1.0).ravel().tolist())
 
-    def _places(self, frame: SegmentFrame) -> Array:
-        """Returns both hands, seen from the pelvis [lengths of the arm]."""
-        arms = frame.positions[_ARMS]
-        lengths = np.linalg.norm(np.diff(arms, axis=1), axis=2).sum(axis=1)
-        ahead = np.tile(about_z(heading_rad(frame.quats_xyzw[0])), (2, 1))
-        places = rotate(inverse(ahead), frame.positions[_HANDS] - frame.positions[0])
-        return np.asarray(places / np.maximum(lengths, SHORTEST_ARM_M)[:, None])
+
+def _places(frame: SegmentFrame) -> Array:
+    """Returns both hands, seen from the pelvis [m]."""
+    ahead = np.tile(about_z(heading_rad(frame.quats_xyzw[0])), (2, 1))
+    return rotate(inverse(ahead), frame.positions[_HANDS] - frame.positions[0])

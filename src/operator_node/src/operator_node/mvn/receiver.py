@@ -39,8 +39,9 @@ class MvnConfig(ConfigModel):
 
 
 class Silence(NamedTuple):
-    """No frame has come for some time [s]; told once."""
+    """No frame of a person has come for some time [s]; told once."""
 
+    person: int
     seconds: float
 
 
@@ -56,8 +57,8 @@ class Receiver:
         self._decoder = StreamDecoder(config.position_scale, bool(config.y_up), config.max_people)
         self._checks: dict[int, FrameChecks] = {}
         self._newest: dict[int, tuple[float, SegmentFrame]] = {}
+        """When the newest frame of each person came, and what it was before calibration; of those who are there."""
         self._socket: socket.socket | None = None
-        self._heard_s: float | None = None
         self._remarks_due_s = 0.0
         self._lock = threading.Lock()
         self._recording: Recording | None = None
@@ -70,7 +71,7 @@ class Receiver:
     @property
     def people(self) -> list[int]:
         """Whose frames come."""
-        return sorted(self._newest)
+        return sorted(self._newest.copy())
 
     @property
     def port(self) -> int:
@@ -102,7 +103,7 @@ class Receiver:
         self._forget()
 
     def poll(self, timeout_s: float) -> list[Any]:
-        """Returns what has come: messages of `stream`, `Finding`s and at most one `Silence`; nothing after a time.
+        """Returns what has come: messages of `stream`, `Finding`s and `Silence`; nothing after a time.
 
         Args:
             timeout_s: How long to wait for it [s].
@@ -111,8 +112,9 @@ class Receiver:
         end_s = time.monotonic() + timeout_s
         while True:
             left_s = max(end_s - time.monotonic(), 0.0)
-            if self._heard_s is not None:
-                left_s = min(left_s, max(self._heard_s + self.config.timeout_s - time.monotonic(), 0.0))
+            if self._newest:
+                oldest_s = min(came_s for came_s, _ in self._newest.values())
+                left_s = min(left_s, max(oldest_s + self.config.timeout_s - time.monotonic(), 0.0))
             select.select([self._socket], [], [], left_s)
             events = self._drain() + self._silence() + self._remarks()
             if events or time.monotonic() >= end_s:
@@ -130,7 +132,6 @@ class Receiver:
             events += self._record(now_s, data)
             message = self._decoder.take(data)
             if isinstance(message, SegmentFrame):
-                self._heard_s = now_s
                 self._newest[message.person] = now_s, message
                 checks = self._checks.setdefault(message.person, FrameChecks())
                 events += _of_person(message.person, checks.take(message, now_s))
@@ -140,16 +141,19 @@ class Receiver:
         return events
 
     def _silence(self) -> list[Silence]:
-        if self._heard_s is None or time.monotonic() - self._heard_s < self.config.timeout_s:
-            return []
-        self._forget()
-        return [Silence(self.config.timeout_s)]
+        last_s = time.monotonic() - self.config.timeout_s
+        gone = [person for person, (came_s, _) in list(self._newest.items()) if came_s <= last_s]
+        for person in gone:
+            del self._newest[person]
+            del self._checks[person]
+        if gone and not self._newest:
+            self._decoder.reset()
+        return [Silence(person, self.config.timeout_s) for person in gone]
 
     def _forget(self) -> None:
-        self._heard_s = None
         self._decoder.reset()
         self._checks.clear()
-        self._newest = {}
+        self._newest.clear()
 
     def _remarks(self) -> list[Finding]:
         now_s = time.monotonic()
@@ -168,7 +172,7 @@ class Receiver:
         Raises:
             InterfaceError: If nobody is there, or somebody stands otherwise; then nothing is changed for them.
         """
-        newest = dict(self._newest)
+        newest = self._newest.copy()
         if not newest:
             raise InterfaceError("nobody is there: no frame has come lately")
         return "; ".join(self.calibration.fit(frame) for _, frame in newest.values())

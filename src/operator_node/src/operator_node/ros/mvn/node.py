@@ -39,6 +39,8 @@ class MvnNode:
         while not rospy.is_shutdown():
             try:
                 self._device.open()
+                config, port = self._device.receiver.config, self._device.receiver.port
+                rospy.loginfo("mvn: listening at %s:%d", config.host, port)
                 while not rospy.is_shutdown():
                     self._pass()
             except DeviceError as error:

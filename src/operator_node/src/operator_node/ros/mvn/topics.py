@@ -67,8 +67,8 @@ class MvnTopics:
 
     def publish(self, events: Iterable[Any]) -> None:
         """Publishes what came, and now and then how the stream is doing; call it ten times a second at least."""
-        stamp = present_stamp()
         for event in events:
+            stamp = present_stamp()
             if isinstance(event, SegmentFrame):
                 self._person(event.person).publish_frame(event, stamp)
             elif isinstance(event, Finding):
@@ -79,7 +79,7 @@ class MvnTopics:
             elif isinstance(event, (JointAngles, CenterOfMass, PersonInfo)):
                 self._person(event.person).publish(event, stamp)
         if self._diagnostics_rate.is_due():
-            self._publish_diagnostics(stamp)
+            self._publish_diagnostics(present_stamp())
         flush_buffered_sockets()
 
     def _person(self, number: int) -> "_Person":
@@ -89,9 +89,10 @@ class MvnTopics:
         return self._people[number]
 
     def _fall_silent(self, silence: Silence) -> None:
-        self._warn("mvn", f"no frame has come for {silence.seconds:g} s; TF and topics wait for the next one")
-        for person in self._people.values():
-            person.vanish()
+        who = f"mvn, person {silence.person}"
+        self._warn(who, f"no frame has come for {silence.seconds:g} s; TF and topics wait for the next one")
+        if silence.person in self._people:
+            self._people[silence.person].vanish()
 
     def _publish_diagnostics(self, stamp: rospy.Time) -> None:
         counts = self._device.counts
