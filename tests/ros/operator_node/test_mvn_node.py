@@ -107,8 +107,8 @@ def test_frames_become_tf_poses_and_joy_until_the_stream_falls_silent(module_ros
     wait_until(lambda: not any(joy.messages[-1].axes), "the hands are let go")
     count = len(poses.messages)
     wait_until(lambda: "no frame has come for 0.3 s" in module_ros.output(module_ros.processes[-1]), "a warning")
-    status = wait_until(lambda: _status(topics, "no frames"), "diagnostics tell")
-    assert status["frames"] == str(count) and status["datagrams used"] == str(count)
+    status = wait_until(lambda: _status(topics, "no frames", frames=str(count)), "diagnostics tell")
+    assert status["datagrams used"] == status["datagrams received"] == str(count)
     assert topics["/mvn/markers"].messages[-1].markers[0].action == 2
 
 
@@ -122,12 +122,13 @@ def _frame(poses, like: SegmentFrame) -> SegmentFrame:
     return like._replace(positions=np.array(positions), quats_xyzw=np.array(quats))
 
 
-def _status(topics, message):
-    """Returns the values of the newest diagnostics if they have a message."""
+def _status(topics, message, frames):
+    """Returns the values of the newest diagnostics if they have a message, and tell of so many frames."""
     for array in topics["/diagnostics"].messages[-1:]:
         for status in array.status:
             if status.hardware_id == "mvn" and status.message.startswith(message):
-                return {each.key: each.value for each in status.values}
+                values = {each.key: each.value for each in status.values}
+                return values if values["frames"] == frames else None
     return None
 
 

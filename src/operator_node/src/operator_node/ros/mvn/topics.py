@@ -109,7 +109,8 @@ class MvnTopics:
             "people": self._device.receiver.people,
             "calibrated": self._device.receiver.calibration.people,
             **{f"name of person {number}": each.name for number, each in self._people.items() if each.name},
-            **{f"datagrams {what}" if what != "frames" else what: count for what, count in sorted(counts.items())},
+            "frames": counts["frames"],
+            **{f"datagrams {what}": count for what, count in sorted(counts.items()) if what != "frames"},
         }
         status.values = [KeyValue(key, str(value)) for key, value in values.items()]
         self._diagnostics.publish(DiagnosticArray(Header(stamp=stamp), [status]))
