@@ -126,7 +126,7 @@ def _status(topics, message, frames):
     """Returns the values of the newest diagnostics if they have a message, and tell of so many frames."""
     for array in topics["/diagnostics"].messages[-1:]:
         for status in array.status:
-            if status.hardware_id == "mvn" and status.message.startswith(message):
+            if status.name.endswith("stream") and status.message.startswith(message):
                 values = {each.key: each.value for each in status.values}
                 return values if values["frames"] == frames else None
     return None
