@@ -48,6 +48,7 @@ class Mvn(Device):
             raise DeviceError(
                 "mvn", f"cannot listen at {config.host}:{config.port}: {error.strerror}{in_use}"
             ) from None
+        logger.info("mvn: listening at %s:%d", config.host, self.receiver.port)
 
     def read(self, timeout_s: float) -> Reading | None:
         """Returns the hands at the newest frame, and all that came; zeros when the frames of person 0 cease."""
