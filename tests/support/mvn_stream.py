@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import socket
 import struct
+from functools import cache
 
 import numpy as np
 
@@ -22,6 +23,7 @@ def suit(person: int = 0, moves: WalkingPerson = WALKER, **options) -> Suit:
     return Suit(person, moves, **{"noise_rad": 0.0, "hz": HZ, **options})
 
 
+@cache
 def truth(sample: int, person: int = 0, moves: WalkingPerson = WALKER) -> SegmentFrame:
     """Returns the frame of a sample without noise."""
     positions, quats = moves.pose(sample / HZ)

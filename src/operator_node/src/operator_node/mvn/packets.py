@@ -54,6 +54,8 @@ REASONS = {
     "text": "its text makes no sense",
     "too many people": "more people than max_people",
 }
+_EXPONENT = 0x7F800000
+"""Bits that infinity and what is no number have."""
 _TIME_CODE = re.compile(rb"\d\d:\d\d:\d\d(\.\d{1,3})?")
 _SMALLEST_NORM = 1e-6
 _LONGEST_NAME = 64
@@ -132,10 +134,13 @@ def _items(kind: int, count: int, payload: bytes) -> tuple[Array, Array]:
     if rest or length - id_count not in lengths:
         raise PacketError("size", f"type {kind:02}, {count} items in {len(payload)} bytes")
     ids = np.frombuffer(payload, ">i4").reshape(count, length)[:, :id_count]
-    values = np.frombuffer(payload, ">f4").reshape(count, length)[:, id_count:]
-    if not np.abs(values).max() <= FARTHEST:
-        raise PacketError("out of range" if np.isfinite(values).all() else "not finite", f"type {kind:02}")
-    return ids, values.astype(float)
+    bits = np.frombuffer(payload, ">u4").reshape(count, length)[:, id_count:]
+    if ((bits & _EXPONENT) == _EXPONENT).any():  # numpy warns of some of them when they are converted
+        raise PacketError("not finite", f"type {kind:02}")
+    values = bits.view(">f4").astype(float)
+    if np.abs(values).max() > FARTHEST:
+        raise PacketError("out of range", f"type {kind:02}")
+    return ids, values
 
 
 def body_rows(ids: Array) -> NDArray[np.intp]:
