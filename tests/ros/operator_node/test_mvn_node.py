@@ -102,7 +102,9 @@ def test_frames_become_tf_poses_and_joy_until_the_stream_falls_silent(module_ros
     for way in ([each.transform for each in transforms], message.poses):
         assert_same(_frame(way, truth(156)), truth(156))
     markers = topics["/mvn/markers"].wait_for(1)[0].markers
-    assert [marker.ns for marker in markers] == ["person 0"] * 2
+    assert {marker.ns for marker in markers} == {"person 0"} and all(marker.frame_locked for marker in markers)
+    (thigh,) = (marker for marker in markers if marker.header.frame_id == "mvn/0/RightUpperLeg")
+    assert thigh.points[1].z == pytest.approx(-0.245 * 1.75, abs=1e-3)
 
     wait_until(lambda: not any(joy.messages[-1].axes), "the hands are let go")
     count = len(poses.messages)

@@ -32,7 +32,7 @@ from rpbi.ros.publishers.topics import FastTopic
 from .markers import PersonMarkers
 from .packed import FramePacker
 
-MARKER_HZ = 30.0
+MARKER_HZ = 2.0
 DIAGNOSTICS_HZ = 1.0
 RECENT_S = 5.0
 """For so long the diagnostics tell a finding [s]."""
@@ -161,7 +161,7 @@ class _Person:
         self._joints = rospy.Publisher(f"{topics}/joint_angles", JointState, queue_size=10)
         self._center = rospy.Publisher(f"{topics}/center_of_mass", PointStamped, queue_size=10)
         self._markers, self._marker_rate = markers, WallRate(MARKER_HZ)
-        self._drawing = PersonMarkers(number, config.parent_frame_id)
+        self._drawing = PersonMarkers(number, topics)
         self._stamp = rospy.Time()
 
     def publish_frame(self, frame: SegmentFrame, stamp: rospy.Time) -> None:
@@ -174,7 +174,7 @@ class _Person:
         for topic in (self._segments, *self._also):
             topic.publish(poses)
         if self._marker_rate.is_due() and self._markers.get_num_connections():
-            self._markers.publish(self._drawing.message(frame, stamp))
+            self._markers.publish(self._drawing.message(frame))
 
     def publish(self, message: Message, stamp: rospy.Time) -> None:
         """Publishes what else came of the person."""
