@@ -87,7 +87,7 @@ def named(fault, seed: int) -> set[str]:
     )
     for number in range(round(SECONDS * HZ) + 10):
         time_s = begin_s + number / HZ
-        positions, quats = sender._noisy(time_s)
+        positions, quats = sender.pose(time_s)
         if number == HALF:
             first = positions, quats
         frame = decoder.take(*sender.frame(number, time_s, *fault(positions, quats, number, first)))

@@ -242,6 +242,14 @@ class TestRecording:
         with pytest.raises(InterfaceError, match="there is nothing in it"):
             next(timed_datagrams(tmp_path / "empty.mvn", loop=True))
 
+    def test_ends_with_the_device(self, mvn, sender, tmp_path):
+        path = tmp_path / "walk.mvn"
+        mvn.receiver.start_recording(path)
+        sender.send(*suit().datagrams(0, 0.0))
+        read_frame(mvn)
+        mvn.close()
+        assert len(list(read_recording(path))) == 1
+
     def test_of_the_device_plays_the_same_frames(self, mvn, sender, tmp_path):
         path = tmp_path / "walk.mvn"
         mvn.receiver.start_recording(path)

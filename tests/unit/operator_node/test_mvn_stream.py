@@ -14,6 +14,7 @@ from operator_node.emulators.mvn_suit import KINDS, BadNetwork
 from operator_node.mvn import packets
 from operator_node.mvn.segments import SEGMENTS, SegmentFrame
 from operator_node.mvn.stream import (
+    LONG_GONE,
     MOST_LATE,
     CenterOfMass,
     JointAngles,
@@ -244,6 +245,14 @@ def test_more_people_than_allowed_are_refused():
     decoder = StreamDecoder(max_people=2)
     assert [bool(decoder.take(by_hand(person=person))) for person in (4, 9, 5, 4)] == [True, True, False, False]
     assert decoder.counts["refused: too many people"] == 1 and decoder.counts["duplicate"] == 1
+
+
+def test_people_who_were_made_up_do_not_keep_out_those_who_come_for_long():
+    decoder = StreamDecoder(max_people=2)
+    for person in (7, 8):
+        decoder.take(*suit(person, kinds=(12,)).datagrams(0, 0.0))
+    taken = [decoder.take(by_hand(sample=sample)) is not None for sample in range(2 * LONG_GONE)]
+    assert taken == [False] * (LONG_GONE - 2) + [True] * (LONG_GONE + 2)
 
 
 @pytest.mark.filterwarnings("error")

@@ -56,14 +56,15 @@ class Suit:
 
     def datagrams(self, sample: int, time_s: float) -> list[bytes]:
         """Returns what is sent of a sample at a time [s]."""
-        positions, quats = self._noisy(time_s)
+        positions, quats = self.pose(time_s)
         return [datagram for kind in self._kinds for datagram in self._of_kind(kind, sample, time_s, positions, quats)]
 
     def frame(self, sample: int, time_s: float, positions: Array, quats: Array) -> list[bytes]:
         """Returns the datagrams of type 02 of any poses: origins (23 x 3) [m], orientations (23 x 4), x, y, z, w."""
         return self._split(2, sample, time_s, self._numbered(positions, quats[:, [3, 0, 1, 2]]))
 
-    def _noisy(self, time_s: float) -> tuple[Array, Array]:
+    def pose(self, time_s: float) -> tuple[Array, Array]:
+        """Returns what its sensors say at a time [s]: origins [m] and orientations, x, y, z, w."""
         positions, quats = self._moves.pose(time_s)
         if self._noise_rad:
             noise = Rotation.from_rotvec(self._random.normal(0.0, self._noise_rad, (len(SEGMENTS), 3)))

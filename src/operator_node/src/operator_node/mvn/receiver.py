@@ -1,5 +1,6 @@
 """Receives a stream of MVN by UDP: decodes, checks, calibrates and records it."""
 
+import contextlib
 import select
 import socket
 import threading
@@ -107,10 +108,12 @@ class Receiver:
         self._socket = receiver
 
     def close(self) -> None:
-        """Listens no more, and forgets who was there."""
+        """Listens no more, forgets who was there, and ends a recording."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
+        with contextlib.suppress(InterfaceError):  # most often there is none
+            self.stop_recording()
         self._forget()
 
     def poll(self, timeout_s: float) -> list[Any]:

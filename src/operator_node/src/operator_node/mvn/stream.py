@@ -18,6 +18,8 @@ MOST_BEHIND = 100
 MOST_LATE = 20
 """So many late datagrams of a message type in a row, and the stream has begun anew too, as a short recording does."""
 MOST_REFUSED = 1000
+LONG_GONE = 500
+"""After so many datagrams of others a person gives way to a new one, if there are too many."""
 LENGTH_TOLERANCE = 0.01
 _COUNTER_RANGE = 2**32
 _METRES_PER_CM = 0.01
@@ -132,7 +134,8 @@ class StreamDecoder:
         self.remarks: dict[str, str] = {}
         self._scale, self._y_up, self._max_people = position_scale, y_up, max_people
         self._groups: dict[tuple[int, int], _Group] = {}
-        self._people: set[int] = set()
+        self._people: dict[int, int] = {}
+        """How many datagrams had been received when each person's last one was."""
         self._frame_samples: dict[int, int] = {}
 
     def reset(self) -> None:
@@ -169,10 +172,20 @@ class StreamDecoder:
         self.refusals[error.reason] = str(error)
 
     def _admit(self, person: int) -> None:
-        if person not in self._people:
-            if len(self._people) >= self._max_people:
+        """Makes room for a person, in the place of one of whom nothing has come for long, if need be."""
+        received = self.counts["received"]
+        if person not in self._people and len(self._people) >= self._max_people:
+            oldest = min(self._people, key=self._people.__getitem__)
+            if received - self._people[oldest] < LONG_GONE:
                 raise PacketError("too many people", f"person {person} beside {sorted(self._people)}")
-            self._people.add(person)
+            self._forget(oldest)
+        self._people[person] = received
+
+    def _forget(self, person: int) -> None:
+        del self._people[person]
+        self._frame_samples.pop(person, None)
+        for key in [key for key in self._groups if key[0] == person]:
+            self._drop(self._groups.pop(key))
 
     def _grouped(self, datagram: Datagram) -> Message | None:
         """Returns the message that a datagram completes."""
