@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import shlex
 import socket
+import subprocess
 
 import numpy as np
+import pytest
 from geometry_msgs.msg import PoseArray
 
 
@@ -27,3 +30,11 @@ def test_a_person_stands_in_a_t_pose_and_then_walks(ros):
         came += 60
         poses.wait_for(came)
     assert 0.7 < where(poses.messages[-1])[2] < 1.0
+
+
+@pytest.mark.parametrize(("loop", "more"), [("true", ["--loop"]), ("false", [])])
+def test_a_recording_is_played(loop, more):
+    command = ["roslaunch", "--args", "mvn_player", "rpbi_examples", "mvn.launch", "source:=player", "headless:=true"]
+    done = subprocess.run([*command, f"loop:={loop}", "file:=/walks/a.mvn"], capture_output=True, text=True)
+    words = shlex.split(done.stdout.strip().splitlines()[-1])
+    assert words[1 : 4 + len(more)] == ["/walks/a.mvn", "--port", "9763", *more], done.stderr
