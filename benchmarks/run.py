@@ -20,7 +20,7 @@ from result import Result, table
 
 BENCHMARKS = (
     *("loop", "many", "load", "camera", "latency", "free_run", "reset", "tables"),
-    *("ik", "ik_nodes", "device", "grasp", "physics"),
+    *("ik", "ik_nodes", "device", "mvn", "grasp", "physics"),
 )
 WHEN_NAMED = ("soak",)
 """Those that take too long to run with the others."""
