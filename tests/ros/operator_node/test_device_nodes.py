@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import pty
 import signal
+import termios
 
 import pytest
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Twist, Vector3
-from ros_system import stop_group, wait_until
+from keyboard.msg import Key
+from ros_system import find_executable, stop_group, wait_until
 from sensor_msgs.msg import Joy, JoyFeedback, JoyFeedbackArray
 
 from operator_node.emulators.spacenavd import SpacenavDaemon
@@ -100,6 +104,26 @@ def test_virtual_gamepad_moves_and_rumbles(ros):
     wait_until(lambda: not any(joy.messages[-1].buttons), "the last message is at rest")
     assert joy.messages[-1].axes == first.axes
     assert "refused" not in ros.output(node)
+
+
+def test_keyboard_by_a_terminal_and_ctrl_c_in_it(ros):
+    """The terminal is as it was afterwards."""
+    ours, theirs = pty.openpty()
+    before = termios.tcgetattr(theirs)
+    joy, down = ros.listen("joy", Joy), ros.listen("keyboard/keydown", Key)
+    options = ["_terminal:=true", "_axes:=[[DOWN, UP]]", "_terminal_hold_s:=30.0"]
+    in_terminal = f'exec "$0" "$@" <{os.ttyname(theirs)}'
+    node = ros.start(["sh", "-c", in_terminal, find_executable("operator_node", "keyboard_node.py"), *options])
+    wait_until(lambda: joy.is_connected and down.is_connected, "it listens")
+    os.write(ours, b"\x1b[A")
+    wait_until(lambda: down.messages and joy.messages[-1].axes == (1.0,), "the key is held")
+    assert down.messages[0].code == Key.KEY_UP
+    os.write(ours, b"\x03")
+    assert node.wait(60.0) == 0
+    wait_until(lambda: joy.messages[-1].axes == (0.0,), "the last message is at rest")
+    assert termios.tcgetattr(theirs) == before
+    for end in (ours, theirs):
+        os.close(end)
 
 
 def test_wrong_options_end_the_node_and_are_named(ros):

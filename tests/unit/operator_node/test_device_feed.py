@@ -209,6 +209,14 @@ def test_what_is_posted_is_done_in_the_feeds_thread_and_may_fail(caplog):
     assert done == [1] and feed.refused == {"it failed in posted: ZeroDivisionError": 1}
 
 
+def test_a_rest_that_makes_no_sense_is_refused_too():
+    device = Tape(at(0), at(0.5))
+    device.at_rest = lambda: at(math.nan)
+    feed, published = played(device)
+    feed.close()
+    assert published[-1] == at(0) and "at rest, axis 'x' is not a finite number" in feed.refused
+
+
 def test_no_reading_that_makes_sense_has_a_problem():
     assert problem_of(at(1.0, -1.0, 1), Tape.axes, Tape.buttons) is None
 

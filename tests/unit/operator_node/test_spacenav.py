@@ -13,6 +13,7 @@ import threading
 
 import pytest
 
+from operator_node import conformance
 from operator_node.conformance import DeviceConformance, Reader
 from operator_node.device import DeviceError
 from operator_node.devices import spacenav
@@ -62,6 +63,42 @@ class TestSpacenav(DeviceConformance):
 
 class TestSpacenavOfProtocol0(TestSpacenav):
     protocol = 0
+
+
+class Reversed(TestSpacenav):
+    """A person who moves it the other way: the suite has to notice."""
+
+    def move(self, axis, share):
+        super().move(axis, -share)
+
+
+class Chattering(TestSpacenav):
+    """A device that goes on saying that it is at rest."""
+
+    def make(self):
+        device = super().make()
+        device.read = lambda timeout_s: device.at_rest()
+        return device
+
+
+@pytest.mark.parametrize(
+    "suite, test, arguments, complaint",
+    [
+        (Reversed(), "test_each_axis_goes_both_ways_and_back", (1.0,), "that axis 'x' is at 1"),
+        (Chattering(), "test_at_rest_it_has_nothing_to_say", (), "goes on saying something"),
+    ],
+)
+def test_the_suite_notices_what_is_wrong(suite, test, arguments, complaint, tmp_path, monkeypatch):
+    suite.path = tmp_path / "spnav.sock"
+    reader = Reader("spacenav", suite.make())
+    try:
+        reader.until(lambda: len(reader.feed.free_axes) == 6, "it is open")
+        monkeypatch.setattr(conformance, "PATIENCE_S", 0.2)
+        with pytest.raises(AssertionError, match=complaint):
+            getattr(suite, test)(reader, *arguments)
+    finally:
+        reader.feed.close()
+        suite.clean_up()
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
+from numbers import Real
 
 from pydantic import Field
 
@@ -178,11 +179,16 @@ class DeviceFeed:
         self._last = None
 
     def _resting(self) -> Reading:
+        device = self._device
         try:
-            return self._device.at_rest()
+            resting = device.at_rest()
+            problem, detail = problem_of(resting, device.axes, device.buttons), ""
         except Exception as error:
-            self._refuse(f"it failed: {type(error).__name__}", cause_of(error))
-            return Reading((0.0,) * len(self._device.axes), (0,) * len(self._device.buttons))
+            problem, detail = f"it failed: {type(error).__name__}", cause_of(error)
+        if problem is None:
+            return resting
+        self._refuse(f"at rest, {problem}", detail)
+        return Reading((0.0,) * len(device.axes), (0,) * len(device.buttons))
 
     def _next(self, timeout_s: float) -> Reading | None:
         """Returns the next reading, and with it those that follow within the coalescing time."""
@@ -222,9 +228,10 @@ class DeviceFeed:
                 self.free_axes.add(index)
         self._free_buttons.update(index for index, value in enumerate(reading.buttons) if value == 0)
         axes = (
-            value if index in self.free_axes else rest for index, (value, rest) in enumerate(zip(reading.axes, resting))
+            float(value if index in self.free_axes else rest)
+            for index, (value, rest) in enumerate(zip(reading.axes, resting))
         )
-        buttons = (value if index in self._free_buttons else 0 for index, value in enumerate(reading.buttons))
+        buttons = (int(value) if index in self._free_buttons else 0 for index, value in enumerate(reading.buttons))
         return reading._replace(axes=tuple(axes), buttons=tuple(buttons))
 
     def _hand_on(self, reading: Reading) -> None:
@@ -264,7 +271,7 @@ def problem_of(reading: Reading, axes: Sequence[str], buttons: Sequence[str]) ->
     if len(reading.buttons) != len(buttons):
         return f"a reading of another number of buttons than the {len(buttons)} of the device"
     for name, value in zip(axes, reading.axes):
-        if not isinstance(value, (float, int)) or not math.isfinite(value):
+        if not isinstance(value, Real) or not math.isfinite(value):
             return f"axis '{name}' is not a finite number"
         if not -1.0 <= value <= 1.0:
             return f"axis '{name}' is outside [-1, 1]"

@@ -1,6 +1,7 @@
 """A small window of a device."""
 
 import contextlib
+import gc
 import math
 import tkinter
 from typing import Any
@@ -37,7 +38,6 @@ class Window:
         self.canvas = tkinter.Canvas(self._root, width=width, height=height, background=BACKGROUND)
         self.canvas.configure(highlightthickness=0)
         self.canvas.pack(fill="both", expand=True)
-        self._timers: dict[int, str] = {}
 
     def bind(self, sequence: str, take: Any) -> None:
         """Has a function take events, named as tkinter names them, wherever in the window they are."""
@@ -73,9 +73,11 @@ class Window:
             raise DeviceClosedError(self._device, "its window was closed")
 
     def close(self) -> None:
-        """Closes the window."""
+        """Closes the window; once."""
         with contextlib.suppress(tkinter.TclError):  # it has gone already
             self._root.destroy()
+        del self._root, self.canvas
+        gc.collect()  # here: Tcl aborts the process if another thread happens to free what it has
 
     def _note_closed(self) -> None:
         self._is_closed = True
