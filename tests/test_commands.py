@@ -84,6 +84,13 @@ PROGRAMS: dict[str, list[str]] = {
 }
 
 
+@pytest.mark.parametrize(("kilobytes", "code"), [(300_000, 1), (500_000, 0)])
+def test_a_limit_of_memory_is_refused_in_one_line_or_does_not_matter(kilobytes, code):
+    done = run(["bash", "-c", f"ulimit -v {kilobytes}; exec {ROOT}/rpbi check {WORLD}"])
+    assert done.returncode == code
+    assert done.stderr == ("memory is limited to 307 MB (ulimit -v); expected at least 500 MB\n" if code else "")
+
+
 @pytest.mark.parametrize("command", PROGRAMS)
 def test_the_page_has_the_options_that_the_program_has(command):
     told = run([*PROGRAMS[command], "--help"]).stdout
