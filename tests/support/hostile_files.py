@@ -336,7 +336,7 @@ BOMBS = (
     "a: " + "[" * 5000,
     "a: !!python/object/apply:os.system [touch canary]",
     "objects: [this.yaml]\ntype: 'this:x'",
-    "sensors: [{type: 'unittest.__main__:x', name: a, hz: 1}]",
+    "sensors: [{type: 'this.other:x', name: a, hz: 1}]",
     f"timeStep: {'9' * 5000}",
     "resetSimulation: {flags: 1180591620717411303424}",
 )
