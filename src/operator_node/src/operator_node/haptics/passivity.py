@@ -1,0 +1,88 @@
+"""Time-domain passivity: the device never gives out more energy than the person has put in."""
+
+from .vectors import ZERO, Vector, dot, norm
+
+
+class PassivityController:
+    """Watches the energy at the handle, and takes from forces what would make it negative.
+
+    Observer: between two samples the device holds the last force, so that the energy which went into it is exactly
+    minus the sum of force held times displacement (J.-H. Ryu, Y. S. Kim and B. Hannaford, "Sampled- and
+    continuous-time passivity and stability of virtual environments", IEEE Trans. Robotics 20(4), 2004).
+
+    Controller: a damper in series, whose gain is what brings the energy that is expected after the next sample back to
+    zero (B. Hannaford and J.-H. Ryu, "Time-domain passivity control of haptic interfaces", IEEE Trans. Robotics and
+    Automation 18(1), 2002). Expected is a displacement of v dt.
+
+    Leak: the displacement is another than v dt, by a dt^2 at most if no hand accelerates the handle by more than a. So
+    one sample may take the energy below zero by F a dt^2 with a largest force F. While it is below zero, only forces
+    pass that brake whatever such a hand does; the energy then does not fall any more. So it is never below
+    `leak_j`, which is -F a dt^2.
+
+    Energy beyond a reserve is forgotten: else a person who stirs against a damper for long could be given it all back
+    at once. What is watched is then less than what there is, so the bound holds all the same.
+
+    Args:
+        max_force_n: The largest force F that is held [N].
+        max_acceleration: a [m/s^2].
+        reserve_j: The largest energy that is remembered [J].
+        period_s: dt, the time between two samples [s].
+
+    Attributes:
+        energy_j: What the person has put in, less what was given back [J].
+        interventions: At how many samples a force was changed.
+        is_on: Whether forces are changed; the observer works in any case.
+        leak_j: The least that the energy can be [J].
+    """
+
+    def __init__(self, max_force_n: float, max_acceleration: float, reserve_j: float, period_s: float) -> None:
+        self.energy_j = 0.0
+        self.interventions = 0
+        self.is_on = True
+        self.leak_j = -max_force_n * max_acceleration * period_s**2
+        self._max_force_n, self._reserve_j = max_force_n, reserve_j
+        self._period_s, self._unforeseen = period_s, max_acceleration * period_s
+        self._held, self._was_cut = ZERO, False
+
+    def reset(self) -> None:
+        """Forgets what the person has put in, but not what was given out: they take hold of the tool anew."""
+        self.energy_j = min(self.energy_j, 0.0)
+
+    def observe(self, displacement: Vector) -> None:
+        """Takes what the handle has moved since the last sample [m]."""
+        given_j = dot(self._held, displacement)
+        if self._was_cut:  # nobody knows at which part of the way
+            given_j = max(given_j, 0.0)
+        self.energy_j = min(self.energy_j - given_j, self._reserve_j)
+        if self._was_cut:
+            self._held, self._was_cut = ZERO, False
+
+    def cut(self) -> None:
+        """Notes that the force was made zero before the next sample."""
+        self._was_cut = True
+
+    def damped(self, force: Vector, velocity: Vector) -> Vector:
+        """Returns a force with the damper that it needs [N], at a velocity [m/s]."""
+        if not self.is_on:
+            return force
+        expected_j = self.energy_j - dot(force, velocity) * self._period_s
+        speed = norm(velocity)
+        if expected_j >= 0.0 or speed == 0.0:
+            return force
+        self.interventions += 1
+        # Above this the limits let nothing of the force itself through
+        brake = min(-expected_j / (speed * self._period_s), 100.0 * self._max_force_n) / speed
+        return force[0] - velocity[0] * brake, force[1] - velocity[1] * brake, force[2] - velocity[2] * brake
+
+    def hold(self, force: Vector, velocity: Vector) -> Vector:
+        """Returns the force that is held until the next sample: that one, or zero.
+
+        Args:
+            force: What limits made of a damped force [N]: the same direction, and not longer.
+            velocity: Of the handle [m/s].
+        """
+        if self.is_on and self.energy_j < 0.0 and dot(force, velocity) + norm(force) * self._unforeseen > 0.0:
+            self.interventions += 1
+            force = ZERO
+        self._held, self._was_cut = force, False
+        return force
