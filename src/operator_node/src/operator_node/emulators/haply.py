@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import contextlib
 import json
 import threading
 import time
 from collections.abc import Callable
 from typing import Any
 
-import websockets
+from websockets.exceptions import ConnectionClosed
+from websockets.legacy.server import serve
 
 from operator_node.haptics.hand import Hand, Press
 from operator_node.haptics.vectors import ZERO, Vector, plus
@@ -67,16 +69,17 @@ class HaplyEmulator:
         """Serves until it is stopped."""
         self._ended = asyncio.Event()
         self._loop = asyncio.get_running_loop()
-        async with websockets.serve(self._serve, "localhost", self.port, ping_interval=None, close_timeout=0.1) as server:
+        async with serve(self._serve, "localhost", self.port, ping_interval=None, close_timeout=0.1) as server:
             self.port = server.sockets[0].getsockname()[1]
             ready()
             await self._ended.wait()
 
     async def _serve(self, connection: Any, path: str = "") -> None:
-        await connection.send(self._mangle(json.dumps(self._message(full=True))))
-        async for message in connection:
-            self._obey(message)
-            await connection.send(self._mangle(json.dumps(self._message())))
+        with contextlib.suppress(ConnectionClosed):
+            await connection.send(self._mangle(json.dumps(self._message(full=True))))
+            async for message in connection:
+                self._obey(message)
+                await connection.send(self._mangle(json.dumps(self._message())))
         self.force = ZERO
 
     def _obey(self, message: str | bytes) -> None:

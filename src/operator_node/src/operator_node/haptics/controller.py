@@ -122,14 +122,14 @@ class HapticController:
     def take_tool(self, way: Vector, now_s: float, delay_s: float = 0.0) -> None:
         """Takes the way of the tool from where it was at the start, in its axes [m]; any thread may call it."""
         if self._config.mode == "coupling":
-            scale = self._config.motion_scale
             x, y, z = turned(way, -self._yaw)
-            own = x / scale[0] if scale[0] else 0.0, y / scale[1] if scale[1] else 0.0, z / scale[2] if scale[2] else 0.0
+            a, b, c = self._config.motion_scale
+            own = x / a if a else 0.0, y / b if b else 0.0, z / c if c else 0.0
             self._tool_way = own
             self.coupling.take(own, now_s, delay_s)
 
     def reset(self) -> None:
-        """Has the target go back to its start, at its speed, and the handle go on from there; any thread may call it."""
+        """Has the target go back to its start, and the handle go on from there; any thread may call it."""
         self._is_reset = True
 
     def lose(self) -> None:
@@ -171,7 +171,7 @@ class HapticController:
     def _drop(self) -> None:
         if self.force != ZERO:
             self.passivity.cut()
-            self._limiter.drop()
+            self._limiter.note(ZERO)
             self.force = ZERO
 
     def _take(self, reading: HapticReading, now_s: float) -> None:
@@ -195,10 +195,8 @@ class HapticController:
             axes = self._config.force_axes
             force = force[0] * axes[0], force[1] * axes[1], force[2] * axes[2]
             force = self._limiter.limited(self.passivity.damped(force, velocity), dt_s)
-        held = self.passivity.hold(force, velocity)
-        if held != force:
-            self._limiter.drop()
-        self.force = held
+        self.force = self.passivity.hold(force, velocity)
+        self._limiter.note(self.force)
         self.snapshot = Snapshot(
             reading,
             self._velocity,

@@ -106,5 +106,3 @@ class HapticDevice(ABC):
     def count(self, fault: str) -> None:
         """Counts what made no sense."""
         self.faults[fault] = self.faults.get(fault, 0) + 1
-
-

@@ -38,6 +38,6 @@ class ForceLimiter:
         self._last = force if length <= most else scaled(force, most / length)
         return self._last
 
-    def drop(self) -> None:
-        """Notes that the force is zero now."""
-        self._last = ZERO
+    def note(self, force: Vector) -> None:
+        """Takes what became of the force afterwards [N]; the next one grows from there."""
+        self._last = force

@@ -1,5 +1,7 @@
 """The loop between a haptic device and its controller: a thread of its own, at 1 kHz."""
 
+import contextlib
+import logging
 import os
 import sys
 import threading
@@ -13,6 +15,7 @@ from .controller import HapticController
 from .device import DeviceEnded, HapticDevice, ReadingError
 from .vectors import ZERO
 
+_log = logging.getLogger(__name__)
 HZ = 1000.0
 RETRY_S = 1.0
 """After so long a device that is not there is tried again [s]."""
@@ -73,23 +76,26 @@ class HapticLoop:
                 self.is_connected, self.trouble = True, ""
                 self._tell("connected")
                 self._exchange()
+                trouble = "stopped"
             except (DeviceEnded, MissingDependency) as error:
-                self._lose(str(error))
+                trouble = str(error)
                 self.has_ended.set()
             except DeviceError as error:
-                self._lose(str(error))
+                trouble = str(error)
+            except Exception as error:  # of a device of somebody else's: people come before tracebacks
+                trouble = f"{type(error).__name__}: {error}"
+                _log.exception("the device failed")
+            self._close()
+            self._lose(trouble)
+            if not self.has_ended.is_set():
                 self._stopping.wait(RETRY_S)
-            finally:
-                self._close()
 
     def _close(self) -> None:
         """Closes the device, with zero force before."""
         self.is_connected = False
         self._controller.lose()
-        try:
+        with contextlib.suppress(Exception):  # it may have gone, or never been there; closing comes next in any case
             self._device.send(ZERO, time.monotonic())
-        except Exception:  # it may have gone, or never been there; closing comes next in any case
-            pass
         self._device.close()
 
     def _lose(self, trouble: str) -> None:

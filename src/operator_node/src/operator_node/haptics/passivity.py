@@ -1,6 +1,6 @@
 """Time-domain passivity: the device never gives out more energy than the person has put in."""
 
-from .vectors import ZERO, Vector, dot, norm
+from .vectors import ZERO, Vector, dot, norm, scaled
 
 
 class PassivityController:
@@ -15,9 +15,8 @@ class PassivityController:
     Automation 18(1), 2002). Expected is a displacement of v dt.
 
     Leak: the displacement is another than v dt, by a dt^2 at most if no hand accelerates the handle by more than a. So
-    one sample may take the energy below zero by F a dt^2 with a largest force F. While it is below zero, only forces
-    pass that brake whatever such a hand does; the energy then does not fall any more. So it is never below
-    `leak_j`, which is -F a dt^2.
+    one sample may take the energy below zero by F a dt^2, with a largest force F: that is the leak. Every force is
+    shortened to what keeps the energy above minus the leak, whatever such a hand does; it is never below `leak_j`.
 
     Energy beyond a reserve is forgotten: else a person who stirs against a damper for long could be given it all back
     at once. What is watched is then less than what there is, so the bound holds all the same.
@@ -75,14 +74,17 @@ class PassivityController:
         return force[0] - velocity[0] * brake, force[1] - velocity[1] * brake, force[2] - velocity[2] * brake
 
     def hold(self, force: Vector, velocity: Vector) -> Vector:
-        """Returns the force that is held until the next sample: that one, or zero.
+        """Returns the force that is held until the next sample: that one, or less of it.
 
         Args:
             force: What limits made of a damped force [N]: the same direction, and not longer.
             velocity: Of the handle [m/s].
         """
-        if self.is_on and self.energy_j < 0.0 and dot(force, velocity) + norm(force) * self._unforeseen > 0.0:
-            self.interventions += 1
-            force = ZERO
+        if self.is_on:
+            left_j = max(self.energy_j - self.leak_j, 0.0)
+            worst_j = (dot(force, velocity) + norm(force) * self._unforeseen) * self._period_s
+            if worst_j > left_j:
+                self.interventions += 1
+                force = scaled(force, left_j / worst_j)
         self._held, self._was_cut = force, False
         return force

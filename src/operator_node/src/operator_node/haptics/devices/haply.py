@@ -17,7 +17,8 @@ from operator_node.haptics.device import HapticConfig, HapticDevice, HapticReadi
 from operator_node.haptics.vectors import ZERO, Vector, minus, norm
 
 try:
-    import websockets
+    from websockets.exceptions import WebSocketException
+    from websockets.legacy.client import connect
 except ImportError as error:
     raise MissingDependency("websockets", "apt-get install python3-websockets") from error
 
@@ -109,19 +110,19 @@ class HaplyDevice(HapticDevice):
     def _run(self) -> None:
         try:
             asyncio.run(self._converse())
-        except (OSError, asyncio.TimeoutError, websockets.WebSocketException) as error:
+        except (TimeoutError, OSError, WebSocketException) as error:
             self._trouble = f"{self.config.url}: {error or 'does not answer'}"
         except ReadingError as error:
             self._trouble = f"{self.config.url}: {error}"
         finally:
+            self._trouble = self._trouble or "closed"
             self._opened.set()
 
     async def _converse(self) -> None:
         """Exchanges forces and states until the device is closed."""
-        connection = await websockets.connect(
+        async with connect(
             self.config.url, open_timeout=PATIENCE_S, ping_interval=None, close_timeout=0.1, max_size=LONGEST_FRAME
-        )
-        async with connection:
+        ) as connection:
             first = await asyncio.wait_for(connection.recv(), PATIENCE_S)
             self._device_id = device_in(first, self.config.device_id)
             self._sent = self._command
@@ -138,7 +139,6 @@ class HaplyDevice(HapticDevice):
                 # Nothing else runs in this thread, and asyncio's own timers are too coarse
                 time.sleep(max(due_s - time.monotonic(), 0.0))
             await connection.send(command_of(self._device_id, ZERO, self.force_key.key))
-        self._trouble = "closed"
 
 
 class ForceKey:

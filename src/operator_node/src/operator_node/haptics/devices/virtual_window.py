@@ -55,7 +55,9 @@ class HandleWindow:
 
     def _draw_room(self) -> None:
         canvas, middle, reach = self._canvas, SIZE / 2, SIZE / 2 - MARGIN
-        canvas.create_oval(middle - reach, middle - reach, middle + reach, middle + reach, fill="#f2f4f7", outline="#9aa")
+        canvas.create_oval(
+            middle - reach, middle - reach, middle + reach, middle + reach, fill="#f2f4f7", outline="#9aa"
+        )
         canvas.create_line(middle, MARGIN, middle, SIZE - MARGIN, fill="#dde")
         canvas.create_line(MARGIN, middle, SIZE - MARGIN, middle, fill="#dde")
         canvas.create_text(middle, 14, text="x: forward", fill="#667")
