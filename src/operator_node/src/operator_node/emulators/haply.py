@@ -70,7 +70,7 @@ class HaplyEmulator:
         self._ended = asyncio.Event()
         self._loop = asyncio.get_running_loop()
         async with serve(self._serve, "localhost", self.port, ping_interval=None, close_timeout=0.1) as server:
-            self.port = server.sockets[0].getsockname()[1]
+            self.port = next(iter(server.sockets)).getsockname()[1]
             ready()
             await self._ended.wait()
 

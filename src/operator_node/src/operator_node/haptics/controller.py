@@ -37,6 +37,9 @@ class ForceFeedbackConfig(ConfigModel):
     )
     passivity: bool = Field(True, description="Whether the passivity controller changes forces.")
     energy_reserve_j: NonNegative = Field(1.0, description="The largest energy that the observer remembers [J].")
+    energy_allowance_j: float = Field(
+        0.0, ge=0.0, le=0.1, description="What may be given out once without having been put in; 0 is strictly passive."
+    )
     clutch_button: Count | None = Field(None, description="Number of the button to hold; without it, always engaged.")
     motion_scale: Vec3 = Field((1.0, 1.0, 1.0), description="Way of the tool for each metre of the handle; 0 holds.")
     yaw_deg: float = Field(0.0, description="By how much the handle's axes are turned about z, seen from the tool's.")
@@ -94,7 +97,11 @@ class HapticController:
         self._config, self._max_force_n = config, device.max_force_n
         self.coupling = Coupling(config.mode, config.stiffness, config.damping, config.force_scale, config.expiry_s)
         self.passivity = PassivityController(
-            device.max_force_n, device.max_acceleration, config.energy_reserve_j, 1.0 / sample_hz
+            device.max_force_n,
+            device.max_acceleration,
+            config.energy_reserve_j,
+            1.0 / sample_hz,
+            config.energy_allowance_j,
         )
         self.passivity.is_on = config.passivity
         self.stiffness_bound = stiffest_n_per_m(device.damping, config.damping, 1.0 / sample_hz)

@@ -19,6 +19,7 @@ _log = logging.getLogger(__name__)
 HZ = 1000.0
 RETRY_S = 1.0
 """After so long a device that is not there is tried again [s]."""
+LONGEST_CLOSE_S = 5.0
 SWITCH_S = 0.0002
 """How long other threads may keep Python to themselves [s]; Python's default is 5 ms."""
 
@@ -56,17 +57,21 @@ class HapticLoop:
         self.samples = 0
         self.lateness_s = 0.0
         self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="haptic loop", daemon=True)
+        self._thread: threading.Thread | None = None
 
     def start(self) -> None:
-        """Begins."""
+        """Begins, also after `stop`."""
         sys.setswitchinterval(SWITCH_S)
+        self._stopping.clear()
+        self._thread = threading.Thread(target=self._run, name="haptic loop", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
         """Sends zero force, closes the device and returns when that is done."""
-        self._stopping.set()
-        self._thread.join(5.0)
+        if self._thread is not None:
+            self._stopping.set()
+            self._thread.join(LONGEST_CLOSE_S)
+            self._thread = None
 
     def _run(self) -> None:
         _prefer_this_thread()

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from custom_ros_tools.schema import FrameId, Hz, Text
+from custom_ros_tools.schema import FrameId, Hz, Switch, Text
 
 from .controller import ForceFeedbackConfig
 
@@ -20,4 +20,5 @@ class HapticNodeConfig(ForceFeedbackConfig):
         None, description="TF frame of the tool: the target begins there; with `mode: coupling` the spring goes to it."
     )
     hz: Hz = Field(250.0, description="How often pose, twist, force and target are published.")
+    start_on_init: Switch = Field(True, description="Whether the device is opened at the start.")
     state_hz: Hz = Field(20.0, description="How often the state is published.")

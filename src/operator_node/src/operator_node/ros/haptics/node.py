@@ -26,8 +26,10 @@ from custom_ros_tools.plugins import find_in_table
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
+from custom_ros_tools.ros.services import ToggleService
 from custom_ros_tools.ros.tf_listener import TfListener
 from custom_ros_tools.ros.transform_messages import position_in, quat_in, transform_message
+from custom_ros_tools.toggle import Toggle
 from operator_node.haptics.controller import HapticController, Snapshot
 from operator_node.haptics.device import HapticDevice
 from operator_node.haptics.devices import HAPTIC_DEVICES
@@ -63,7 +65,7 @@ class HapticNode:
         self._start: tuple[Vector, tuple[float, ...]] | None = None
         self._tool_stamp: rospy.Time | None = None
         self._frame = ""
-        self._rotation: tuple[float, ...] | None = None
+        self._rotation: tuple[float, ...] | None = NO_ROTATION
         self._sent: Snapshot | None = None
         self._samples, self._samples_s = 0, time.monotonic()
         self._buffer = tf2_ros.Buffer(rospy.Duration.from_sec(TF_CACHE_S), debug=False)
@@ -78,7 +80,10 @@ class HapticNode:
                 self.controller.stiffness_bound,
             )
         rospy.on_shutdown(self.loop.stop)
-        self.loop.start()
+        feedback = Toggle("the haptic device", self.loop.start, self.loop.stop)
+        if config.start_on_init:
+            feedback.on()
+        ToggleService("haptics/toggle", feedback.on, feedback.off)
         WallTimer(config.hz, self._publish)
         WallTimer(config.state_hz, self._publish_state)
         WallTimer(LOOK_HZ, self._look_up)
@@ -119,7 +124,7 @@ class HapticNode:
             self._warn("haptics/wrench", f"refused, expected finite numbers, got {f.x:g}, {f.y:g}, {f.z:g}")
             return
         if message.header.frame_id != self._frame:
-            self._frame, self._rotation = message.header.frame_id, None
+            self._frame, self._rotation = message.header.frame_id, None if message.header.frame_id else NO_ROTATION
             self._look_up()
         if (rotation := self._rotation) is not None:
             self.controller.take_wrench(rotated((f.x, f.y, f.z), rotation), now_s, _age_s(message.header.stamp))
@@ -225,7 +230,7 @@ class HapticNode:
                 stiffness_bound=controller.stiffness_bound,
                 delay=delay_s if math.isfinite(delay_s) else -1.0,
                 energy=controller.passivity.energy_j,
-                leak_bound=controller.passivity.leak_j,
+                energy_bound=controller.passivity.floor_j,
                 interventions=controller.passivity.interventions,
                 sample_rate=rate_hz,
                 lateness=lateness_s,
