@@ -8,8 +8,11 @@ import random
 import pytest
 from haptic_rig import DEVICE, DT_S, Rig
 
+from custom_ros_tools.errors import ConfigError
 from operator_node.haptics.device import HapticReading
+from operator_node.haptics.devices.scripted import ScriptedConfig
 from operator_node.haptics.limiter import ForceLimiter
+from operator_node.haptics.node_config import HapticNodeConfig
 
 SILENCE_S = 0.02
 PUSH = (0.0, 0.0, 5.0)
@@ -125,3 +128,19 @@ def test_axes_are_turned_there_and_back():
         rig.tick((0.02, 0.0, 0.0), (0.0, 1.0, 0.0))
     assert rig.controller.snapshot.way == pytest.approx((0.0, rig.hand.position[0], 0.0), abs=1e-6)
     assert rig.controller.force == pytest.approx((1.0, 0.0, 0.0), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("model", "options", "told"),
+    [
+        (HapticNodeConfig, {"expiry_s": 0.5}, "expiry_s"),
+        (HapticNodeConfig, {"way_low": [0.1, 0.0, 0.0]}, "way_low"),
+        (HapticNodeConfig, {"stiffness": -1.0}, "stiffness"),
+        (HapticNodeConfig, {"mode": "force"}, "mode"),
+        (ScriptedConfig, {"depth": 1.0}, "depth"),
+        (ScriptedConfig, {"max_force_n": 0.0}, "max_force_n"),
+    ],
+)
+def test_wrong_options_are_told(model, options, told):
+    with pytest.raises(ConfigError, match=told):
+        model.parse(options, "test")

@@ -66,11 +66,9 @@ class PressReport(NamedTuple):
         return abs(self.felt_n - self.expected_n) / self.expected_n
 
     def __str__(self) -> str:
-        return (
-            f"steady force at a depth of {self.depth_m * 1e3:.1f} mm: {self.measured_n:.2f} N on the tool, "
-            f"by stiffness {self.predicted_n:.2f} N ({100.0 * self.error:.1f} % off); {self.felt_n:.2f} N on the handle, by scale "
-            f"{self.expected_n:.2f} N ({100.0 * self.felt_error:.1f} % off), at most {self.peak_n:.2f} N"
-        )
+        tool = f"{self.measured_n:.2f} N on the tool, by stiffness {self.predicted_n:.2f} N ({self.error:.1%} off)"
+        handle = f"{self.felt_n:.2f} N on the handle, by scale {self.expected_n:.2f} N ({self.felt_error:.1%} off)"
+        return f"steady force at a depth of {self.depth_m * 1e3:.1f} mm: {tool}; {handle}, at most {self.peak_n:.2f} N"
 
 
 class Press:

@@ -8,7 +8,7 @@ from .vectors import ZERO, Vector, minus, norm, plus, scaled
 
 FARTHEST = 3.0
 """Readings beyond this many times the workspace are refused."""
-SLACK_M = 0.002
+SLACK_M = 0.01
 """So far a reading may be from the last one at any speed [m]: noise, and readings that came late."""
 TURN_SLACK = 0.3
 """The same of its orientation [rad]..."""
@@ -18,6 +18,8 @@ MOVED_AFTER = 50
 """After so many readings that lie together elsewhere, the device is there; it is engaged anew then."""
 WINDOW_S = 0.1
 """How long way and velocity are compared [s]."""
+GAP_S = 0.01
+"""Longer without a reading, they are not [s]."""
 LEAST_M = 0.005
 """Below this way in that time they are not [m]."""
 
@@ -120,6 +122,9 @@ class ReadingCheck:
     def _compare(self, way: Vector, velocity: Vector | None, dt_s: float) -> None:
         """Compares the way of a window with the velocity that the device measured."""
         if velocity is None or self.has_moved:
+            return
+        if dt_s > GAP_S:  # what it had in between is not known
+            self._begin_window()
             return
         self._window_s += dt_s
         self._moved, self._claimed = plus(self._moved, way), plus(self._claimed, scaled(velocity, dt_s))

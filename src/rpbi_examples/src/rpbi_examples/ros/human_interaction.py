@@ -14,6 +14,7 @@ from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
 from custom_ros_tools.ros.services import call_service, get_srv_handler
 from custom_ros_tools.tf import TfInterface
+from operator_node.msg import HapticState
 from rpbi_examples.press_report import Press, Sample
 
 SENSOR = "rpbi/kuka_lwr/force_torque_sensor_mount/ft_sensor"
@@ -22,6 +23,8 @@ SAMPLE_HZ = 100.0
 PLOT_S = 0.1
 SHOWN_S = 20.0
 """So much of the past is in the window [s]."""
+LEFT_S = 1.0
+"""So long after the scripted hand has gone, its press is over in any case [s]."""
 LARGEST_ERROR = 0.05
 """How far the steady force may be from what stiffness and depth predict."""
 
@@ -44,6 +47,8 @@ class Watch:
         rospy.Subscriber(SENSOR, WrenchStamped, self._measure, queue_size=1, tcp_nodelay=True)
         rospy.Subscriber("haptics/force", WrenchStamped, self._feel, queue_size=1, tcp_nodelay=True)
         rospy.Subscriber("haptics/pose", PoseStamped, self._move, queue_size=1, tcp_nodelay=True)
+        self._was_connected, self._gone_s = False, float("inf")
+        rospy.Subscriber("haptics/state", HapticState, self._note_state, queue_size=1)
         for toggle in ("ik/setup/kdl/toggle", "ik/solver/kdl/toggle", "haptics/toggle"):
             call_service(toggle, SetBool, True)
         rospy.loginfo("the handle moves the arm up and down; press it on the box")
@@ -75,6 +80,11 @@ class Watch:
     def _move(self, message: PoseStamped) -> None:
         self._handle_z = message.pose.position.z
 
+    def _note_state(self, state: HapticState) -> None:
+        self._was_connected |= state.connected
+        if self._was_connected and not state.connected:
+            self._gone_s = min(self._gone_s, time.monotonic())
+
     def _sample(self) -> None:
         target, tool = (self._tf.get_tf_msg(WORLD, frame) for frame in (TARGET, TOOL))
         if target is None or tool is None or self._over.is_set():
@@ -82,7 +92,7 @@ class Watch:
         target_z, tool_z = target.transform.translation.z, tool.transform.translation.z
         time_s = time.monotonic() - self._start_s
         self._press.add(Sample(time_s, self._handle_z, target_z, tool_z, self._measured_n, self._felt_n))
-        if self._press.is_over:
+        if self._press.is_over or (self._is_scripted and time.monotonic() - self._gone_s > LEFT_S):
             press, self._press = self._press, self._new_press()
             self._finish(press)
 

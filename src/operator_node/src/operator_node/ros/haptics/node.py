@@ -105,6 +105,8 @@ class HapticNode:
         """Waits until the person is done with the device, or ROS shuts down."""
         while not rospy.is_shutdown():
             if self.loop.has_ended.wait(0.1):
+                self._publish_state()  # that it is over
+                time.sleep(0.1)
                 rospy.signal_shutdown(self.loop.trouble)
 
     def _tell(self, line: str) -> None:
