@@ -20,7 +20,7 @@ from rpbi_examples.press_report import Press, Sample
 SENSOR = "rpbi/kuka_lwr/force_torque_sensor_mount/ft_sensor"
 WORLD, TOOL, TARGET = "rpbi/world", "rpbi/kuka_lwr/end_effector_ball", "rpbi/target"
 SAMPLE_HZ = 100.0
-PLOT_S = 0.1
+PLOT_S = 0.25
 SHOWN_S = 20.0
 """So much of the past is in the window [s]."""
 LEFT_S = 1.0

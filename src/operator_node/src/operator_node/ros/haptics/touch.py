@@ -18,8 +18,9 @@ from operator_node.haptics.vectors import ZERO, Vector, minus, scaled
 
 PATIENCE_S = 1.0
 """After so long without a state the driver counts as gone [s]."""
-GOODBYES = 3
-"""So often zero is sent at the end: the driver holds the last force for ever."""
+GOODBYES, GOODBYE_S = 30, 0.01
+"""So often zero is sent at the end, and so far apart: the driver holds the last force for ever, and rospy's own thread
+needs the time to send."""
 
 
 class TouchConfig(HapticConfig):
@@ -109,7 +110,7 @@ class TouchDevice(HapticDevice):
             return
         for _ in range(GOODBYES):
             self._publish(ZERO)
-            time.sleep(0.005)
+            time.sleep(GOODBYE_S)
         for each in (*self._subscribers, self._force):
             each.unregister()
         self._force, self._newest = None, None
