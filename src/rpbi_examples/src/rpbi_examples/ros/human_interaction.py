@@ -23,7 +23,7 @@ SAMPLE_HZ = 100.0
 PLOT_S = 0.25
 SHOWN_S = 20.0
 """So much of the past is in the window [s]."""
-LEFT_S = 1.0
+LEFT_S = 2.0
 """So long after the scripted hand has gone, its press is over in any case [s]."""
 LARGEST_ERROR = 0.05
 """How far the steady force may be from what stiffness and depth predict."""
@@ -47,7 +47,7 @@ class Watch:
         rospy.Subscriber(SENSOR, WrenchStamped, self._measure, queue_size=1, tcp_nodelay=True)
         rospy.Subscriber("haptics/force", WrenchStamped, self._feel, queue_size=1, tcp_nodelay=True)
         rospy.Subscriber("haptics/pose", PoseStamped, self._move, queue_size=1, tcp_nodelay=True)
-        self._was_connected, self._gone_s = False, float("inf")
+        self._connected_s = float("inf")
         rospy.Subscriber("haptics/state", HapticState, self._note_state, queue_size=1)
         for toggle in ("ik/setup/kdl/toggle", "ik/solver/kdl/toggle", "haptics/toggle"):
             call_service(toggle, SetBool, True)
@@ -66,6 +66,7 @@ class Watch:
             pass
         if self._failure:
             raise InterfaceError(self._failure)
+        rospy.signal_shutdown("the press is over")
 
     def _new_press(self) -> Press:
         return Press(*(rospy.get_param(f"~{key}") for key in ("stiffness", "force_scale", "touch_height")))
@@ -81,9 +82,8 @@ class Watch:
         self._handle_z = message.pose.position.z
 
     def _note_state(self, state: HapticState) -> None:
-        self._was_connected |= state.connected
-        if self._was_connected and not state.connected:
-            self._gone_s = min(self._gone_s, time.monotonic())
+        if state.connected:
+            self._connected_s = time.monotonic()
 
     def _sample(self) -> None:
         target, tool = (self._tf.get_tf_msg(WORLD, frame) for frame in (TARGET, TOOL))
@@ -92,7 +92,7 @@ class Watch:
         target_z, tool_z = target.transform.translation.z, tool.transform.translation.z
         time_s = time.monotonic() - self._start_s
         self._press.add(Sample(time_s, self._handle_z, target_z, tool_z, self._measured_n, self._felt_n))
-        if self._press.is_over or (self._is_scripted and time.monotonic() - self._gone_s > LEFT_S):
+        if self._press.is_over or (self._is_scripted and time.monotonic() - self._connected_s > LEFT_S):
             press, self._press = self._press, self._new_press()
             self._finish(press)
 
