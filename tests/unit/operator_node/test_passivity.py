@@ -80,6 +80,16 @@ def test_bound_is_what_the_page_derives():
     assert math.isclose(LEAK_J, 0.002)
 
 
+def test_a_refill_gives_back_no_more_than_its_power():
+    controller = PassivityController(10.0, 200.0, 1.0, 0.001, allowance_j=0.05, refill_w=0.05)
+    given_j = 0.0
+    for _ in range(2000):  # a hand that yields to whatever pushes it
+        force = controller.hold((0.0, 0.0, 10.0), (0.0, 0.0, 0.1))
+        given_j += force[2] * 1e-4
+        controller.observe((0.0, 0.0, 1e-4))
+    assert given_j == pytest.approx(0.05 + 0.002 + 2.0 * 0.05, abs=0.003)
+
+
 def test_colgates_bound():
     assert stiffest_n_per_m(3.0, 1.0, 0.001) == pytest.approx(4000.0)
     assert stiffest_n_per_m(1.0, 2.0, 0.001) == 0.0

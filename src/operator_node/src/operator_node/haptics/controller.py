@@ -40,6 +40,9 @@ class ForceFeedbackConfig(ConfigModel):
     energy_allowance_j: float = Field(
         0.0, ge=0.0, le=0.1, description="What may be given out once without having been put in; 0 is strictly passive."
     )
+    energy_refill_w: float = Field(
+        0.0, ge=0.0, le=0.1, description="How fast that comes back [W]; 0 is strictly passive."
+    )
     clutch_button: Count | None = Field(None, description="Number of the button to hold; without it, always engaged.")
     motion_scale: Vec3 = Field((1.0, 1.0, 1.0), description="Way of the tool for each metre of the handle; 0 holds.")
     yaw_deg: float = Field(0.0, description="By how much the handle's axes are turned about z, seen from the tool's.")
@@ -102,6 +105,7 @@ class HapticController:
             config.energy_reserve_j,
             1.0 / sample_hz,
             config.energy_allowance_j,
+            config.energy_refill_w,
         )
         self.passivity.is_on = config.passivity
         self.stiffness_bound = stiffest_n_per_m(device.damping, config.damping, 1.0 / sample_hz)

@@ -24,6 +24,7 @@ class PassivityController:
 
     Allowance: energy that may be given out beside what was put in, once. Without it a hand at rest cannot be pushed by
     a tool that something else pushes, and a simulator that lags at the first touch is felt weaker until the next.
+    A refill gives it back at a power, so that over a time t no more than floor and refill times t is given out.
 
     Energy beyond a reserve is forgotten: else a person who stirs against a damper for long could be given it all back
     at once. What is watched is then less than what there is, so the bound holds all the same.
@@ -34,6 +35,7 @@ class PassivityController:
         reserve_j: The largest energy that is remembered [J].
         period_s: dt, the time between two samples [s].
         allowance_j: Energy that may be given out without having been put in [J].
+        refill_w: How fast what was given out beyond what was put in is forgotten [W]; 0 is strictly passive.
 
     Attributes:
         energy_j: What the person has put in, less what was given back [J].
@@ -49,12 +51,13 @@ class PassivityController:
         reserve_j: float,
         period_s: float,
         allowance_j: float = 0.0,
+        refill_w: float = 0.0,
     ) -> None:
         self.energy_j = 0.0
         self.interventions = 0
         self.is_on = True
         self.floor_j = -allowance_j - max_force_n * max_acceleration * period_s**2
-        self._allowance_j = allowance_j
+        self._allowance_j, self._refill_j = allowance_j, refill_w * period_s
         self._reserve_j = reserve_j
         self._period_s, self._unforeseen = period_s, max_acceleration * period_s
         self._held, self._was_cut = ZERO, False
@@ -69,6 +72,8 @@ class PassivityController:
         if self._was_cut:  # nobody knows at which part of the way
             given_j = max(given_j, 0.0)
         self.energy_j = min(self.energy_j - given_j, self._reserve_j)
+        if self.energy_j < 0.0:
+            self.energy_j = min(self.energy_j + self._refill_j, 0.0)
         if self._was_cut:
             self._held, self._was_cut = ZERO, False
 
