@@ -92,7 +92,7 @@ def test_unseen_it_goes_on_as_physics_has_it_and_seen_again_it_comes_back_on_a_p
     assert here[0] - start[0] == pytest.approx(SPEED * thrown_s, rel=0.05), "it keeps the velocity that it had"
     last = here
     with caplog.at_level(logging.WARNING):
-        for t in follow(world, lambda _: Pose((0.2, 0.0, 1.7)), 0.5):
+        for _ in follow(world, lambda _: Pose((0.2, 0.0, 1.7)), 0.5):
             assert math.dist(pose(world).position, last) < 5.0 * DT_S, "no faster than max_speed"
             last = pose(world).position
     assert last == pytest.approx((0.2, 0.0, 1.7), abs=1e-6)
