@@ -41,6 +41,10 @@ class PoseTracker:
 
     def __init__(self, smoothing: SmoothingConfig, outliers: OutlierConfig, timeout_s: float) -> None:
         self._smoothing, self._outliers, self._timeout_s = smoothing, outliers, timeout_s
+        self._pose: Pose | None = None
+        self._stamp_s: float | None = None
+        self._left_out: list[tuple[Pose, float]] = []
+        self._filter: OneEuroPose | None = None
         self._forget()
 
     def take(self, pose: Pose, stamp_s: float) -> Pose | None:
@@ -90,7 +94,5 @@ class PoseTracker:
         return None
 
     def _forget(self) -> None:
-        self._pose: Pose | None = None
-        self._stamp_s: float | None = None
-        self._left_out: list[tuple[Pose, float]] = []
+        self._pose, self._stamp_s, self._left_out = None, None, []
         self._filter = OneEuroPose(self._smoothing) if self._smoothing.min_cutoff_hz else None

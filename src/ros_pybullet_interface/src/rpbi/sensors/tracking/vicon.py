@@ -40,9 +40,9 @@ class ViconSensor(BodySensor):
         """Measures the body, and returns what was measured long enough ago; None if it was hidden then."""
         self._delay.take(tick, None if self._occlusion.hides(tick) else self._noise.on(self._pose(tick), tick))
         newest = self._delay.newest(tick)
-        if newest is None or newest[1] is None:
+        seen_at, pose = newest or (tick, None)
+        if pose is None:
             return None
-        seen_at, pose = newest
         return ViconSample(self.name, self.frames[0], pose, (tick - seen_at) * self._dt_ns)
 
     def _pose(self, tick: int) -> Pose:
