@@ -11,8 +11,8 @@ from ros_system import RosSystem, wait_until
 from tf2_msgs.msg import TFMessage
 
 SLOW_S = 60.0
-CARRIED_Z = 0.36
-"""Height of the box on the plate [m]."""
+CARRIED_Z = 0.3
+"""Height at which the box is carried [m]."""
 
 
 @pytest.fixture(scope="module")

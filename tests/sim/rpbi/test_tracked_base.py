@@ -12,6 +12,7 @@ from scripted_session import recorded
 from worlds import FLOOR, box, write_world
 
 from custom_ros_tools.errors import ConfigError
+from rpbi.bodies.visual_shapes import followed_frame
 from rpbi.geometry import Pose, rotation_between
 from rpbi.replay.session import Checkpoint, Recording, Replay
 from rpbi.replay.world_description import WorldDescription, describe
@@ -122,6 +123,10 @@ def test_a_session_that_tracks_and_loses_is_the_same_when_it_is_replayed(build) 
         states.add(Checkpoint(0, world.clock.tick, world.commands.count, world.state_hash()))
     result = Replay(Recording(WorldDescription(description), {0: recorded(world)}, states)).run()
     assert (result.difference, result.left_out, result.agreed) == (None, (), len(states) + 1)
+
+
+def test_its_marker_is_where_it_is_and_not_where_it_was_seen(build) -> None:
+    assert followed_frame(build().bodies["box"]) is None
 
 
 def test_maximal_coordinates_follow_nothing(build) -> None:
