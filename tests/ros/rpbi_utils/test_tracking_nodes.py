@@ -109,12 +109,12 @@ def test_a_tag_before_the_simulated_camera_is_found_and_followed(ros, tmp_path) 
     remaps = [f"image_rect:={images}/image", f"camera_info:={images}/camera_info"]
     ros.start(["rosrun", "rpbi_utils", "apriltag_node.py", *remaps])
     tf, detections = ros.listen("/tf", TFMessage), ros.listen("tag_detections", AprilTagDetectionArray)
-    wait_until(lambda: newest(tf, "found"), "the tag is found")
+    wait_until(lambda: newest(tf, "found") and newest(tf, "tag_7") and detections.messages, "the tag is found")
     parent, found = newest(tf, "found")
     assert parent == "rpbi/world"
     assert found.position == pytest.approx(truth.position, abs=0.004)
     assert math.hypot(*rotation_between(found.quat_xyzw, truth.quat_xyzw)) < 0.03
     assert newest(tf, "tag_7")[0] == "camera"
-    (one,) = detections.messages[-1].detections
+    (one,) = next(message for message in detections.messages if message.detections).detections
     assert (one.id, one.size, one.pose.header.frame_id) == ((7,), (0.1,), "camera")
     assert set(one.pose.pose.covariance) == {0.0}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field, model_validator
 
@@ -68,7 +68,7 @@ class TrackingNodeConfig(ConfigModel):
     timeout_s: Seconds = Field(0.5, description="Without a pose for so long an object is lost: nothing is broadcast.")
     smoothing: SmoothingConfig = Field(SmoothingConfig(), description="How poses are smoothed.")
     outliers: OutlierConfig = Field(OutlierConfig(), description="Which poses are left out.")
-    objects: Annotated[ListOf[TrackedObjectConfig], Field(min_length=1)] = Field(description="The objects.")
+    objects: ListOf[TrackedObjectConfig] = Field(min_length=1, description="The objects.")
 
     @model_validator(mode="after")
     def _names_differ(self) -> TrackingNodeConfig:
@@ -90,7 +90,7 @@ class StandaloneTag(ConfigModel):
 class AprilTagNodeConfig(ConfigModel):
     """Which tags of the family tag36h11 are reported."""
 
-    standalone_tags: Annotated[ListOf[StandaloneTag], Field(min_length=1)] = Field(description="The tags.")
+    standalone_tags: ListOf[StandaloneTag] = Field(min_length=1, description="The tags.")
     publish_tf: Switch = Field(True, description="Whether their poses are on TF too.")
 
     @model_validator(mode="after")

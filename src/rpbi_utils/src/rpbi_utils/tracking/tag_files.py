@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from custom_ros_tools.errors import InterfaceError
+
 from .config import FAMILY_SIZE
 from .tags import CELLS, tag_image
 
@@ -48,9 +50,9 @@ def write_tag(number: int, size: float, folder: Path) -> Path:
     Returns:
         The path of the mesh.
     """
+    picture = np.kron(tag_image(number), np.ones((PIXELS_A_CELL, PIXELS_A_CELL), np.uint8))
     folder.mkdir(parents=True, exist_ok=True)
     name = f"tag36h11_{number}"
-    picture = np.kron(tag_image(number), np.ones((PIXELS_A_CELL, PIXELS_A_CELL), np.uint8))
     Image.fromarray(picture).convert("RGB").save(folder / f"{name}.png")
     half = size / 2.0 * (CELLS + 2) / CELLS
     (folder / f"{name}.mtl").write_text(MTL.format(name=name))
@@ -72,4 +74,7 @@ def main() -> None:
         parser.error(f"id: tag36h11 has ids from 0 to {FAMILY_SIZE - 1}, got {given.id}")
     if not 0.0 < given.size < 1e3:
         parser.error(f"size: expected more than 0 and less than 1000 m, got {given.size:g}")
-    print(write_tag(given.id, given.size, given.folder))
+    try:
+        print(write_tag(given.id, given.size, given.folder))
+    except (InterfaceError, OSError) as error:
+        parser.exit(1, f"{parser.prog}: {error}\n")

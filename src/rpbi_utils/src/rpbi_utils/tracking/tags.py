@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import partial
+from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,11 +13,6 @@ from scipy.spatial.transform import Rotation
 
 from custom_ros_tools.errors import MissingDependency
 from rpbi.geometry import Pose
-
-try:
-    import cv2
-except ImportError as error:
-    raise MissingDependency("OpenCV", "./rpbi setup tags") from error
 
 CELLS = 8
 """Cells along a side of a tag's black square."""
@@ -37,7 +34,15 @@ class DetectedTag(NamedTuple):
     corners: npt.NDArray[np.float64]
 
 
-def _dictionary() -> Any:
+def _opencv() -> Any:
+    """Returns the module; raises MissingDependency if there is none."""
+    try:
+        return import_module("cv2")
+    except ImportError as error:
+        raise MissingDependency("OpenCV", "./rpbi setup tags") from error
+
+
+def _dictionary(cv2: Any) -> Any:
     return cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
 
 
@@ -46,28 +51,34 @@ def tag_image(number: int) -> Image:
 
     OpenCV's tags of this family are upside down.
     """
+    cv2 = _opencv()
     draw = getattr(cv2.aruco, "generateImageMarker", None) or cv2.aruco.drawMarker
-    upright = np.rot90(draw(_dictionary(), number, CELLS), 2)
+    upright = np.rot90(draw(_dictionary(cv2), number, CELLS), 2)
     return np.pad(upright, 1, constant_values=255)
 
 
 class TagDetector:
-    """Finds tags in grey images, corners refined to parts of a pixel."""
+    """Finds tags in grey images, corners refined to parts of a pixel.
+
+    Raises:
+        MissingDependency: If OpenCV is not installed.
+    """
 
     def __init__(self) -> None:
-        aruco = cv2.aruco
-        self._is_new = hasattr(aruco, "ArucoDetector")  # from OpenCV 4.7 on
-        parameters = aruco.DetectorParameters() if self._is_new else aruco.DetectorParameters_create()
+        cv2 = _opencv()
+        aruco, dictionary = cv2.aruco, _dictionary(cv2)
+        is_new = hasattr(aruco, "ArucoDetector")  # from OpenCV 4.7 on
+        parameters = aruco.DetectorParameters() if is_new else aruco.DetectorParameters_create()
         parameters.cornerRefinementMethod = aruco.CORNER_REFINE_APRILTAG
-        self._parameters = parameters
-        self._detector = aruco.ArucoDetector(_dictionary(), parameters) if self._is_new else None
+        self._find = (
+            aruco.ArucoDetector(dictionary, parameters).detectMarkers
+            if is_new
+            else partial(aruco.detectMarkers, dictionary=dictionary, parameters=parameters)
+        )
 
     def detect(self, grey: Image) -> list[DetectedTag]:
         """Returns the tags in an image (rows x columns), each once; what is seen twice is left out."""
-        if self._detector is not None:
-            corners, ids, _ = self._detector.detectMarkers(grey)
-        else:
-            corners, ids, _ = cv2.aruco.detectMarkers(grey, _dictionary(), parameters=self._parameters)
+        corners, ids, _ = self._find(grey)
         numbers = [] if ids is None else ids.ravel().tolist()
         # OpenCV begins with what is the bottom right of the upright tag, and goes clockwise
         found = (
@@ -87,6 +98,7 @@ def tag_pose(tag: DetectedTag, size: float, camera_matrix: npt.NDArray[np.float6
         size: Side of the black square [m].
         camera_matrix: 3 x 3, of a rectified image.
     """
+    cv2 = _opencv()
     half = size / 2.0
     # In the order that SOLVEPNP_IPPE_SQUARE wants: top left, top right, bottom right, bottom left
     square = np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
