@@ -138,7 +138,7 @@ def test_a_tag_that_cannot_be_seen_is_left_out(build, more, keys, caplog) -> Non
 @pytest.mark.parametrize(
     ("keys", "told"),
     [
-        ({"tags": []}, "sensors[0].tags: "),
+        ({"tags": []}, "sensors[0].tags: expected at least one tag"),
         ({"tags": [TAG, TAG]}, "sensors[0].tags[1].id: 7 is the id of another tag of this list"),
         ({"noise_m": -1.0}, "sensors[0].noise_m"),
         ({"occlusion": {"share": 2.0}}, "sensors[0].occlusion.share: must be <= 1, got 2"),

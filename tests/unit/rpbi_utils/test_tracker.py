@@ -104,7 +104,7 @@ OBJECT = {"name": "box", "vicon": "box/box"}
 @pytest.mark.parametrize(
     ("objects", "told"),
     [
-        ([], "objects: "),
+        ([], "objects: expected at least one object"),
         ([{"name": "box"}], "objects[0].vicon: an object is seen by either vicon or april_tag"),
         ([{**OBJECT, "april_tag": 1}], "objects[0].vicon: an object is seen by either"),
         ([{"name": "box", "vicon": "box"}], "objects[0].vicon: expected SUBJECT/SEGMENT, got 'box'"),

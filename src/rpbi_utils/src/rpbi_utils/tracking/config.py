@@ -68,10 +68,12 @@ class TrackingNodeConfig(ConfigModel):
     timeout_s: Seconds = Field(0.5, description="Without a pose for so long an object is lost: nothing is broadcast.")
     smoothing: SmoothingConfig = Field(SmoothingConfig(), description="How poses are smoothed.")
     outliers: OutlierConfig = Field(OutlierConfig(), description="Which poses are left out.")
-    objects: ListOf[TrackedObjectConfig] = Field(min_length=1, description="The objects.")
+    objects: ListOf[TrackedObjectConfig] = Field(description="The objects.")
 
     @model_validator(mode="after")
     def _names_differ(self) -> TrackingNodeConfig:
+        if not self.objects:
+            raise KeyedError("objects", "expected at least one object")
         names = [each.name for each in self.objects]
         for index, name in enumerate(names):
             if name in names[:index]:
@@ -90,11 +92,13 @@ class StandaloneTag(ConfigModel):
 class AprilTagNodeConfig(ConfigModel):
     """Which tags of the family tag36h11 are reported."""
 
-    standalone_tags: ListOf[StandaloneTag] = Field(min_length=1, description="The tags.")
+    standalone_tags: ListOf[StandaloneTag] = Field(description="The tags.")
     publish_tf: Switch = Field(True, description="Whether their poses are on TF too.")
 
     @model_validator(mode="after")
     def _ids_differ(self) -> AprilTagNodeConfig:
+        if not self.standalone_tags:
+            raise KeyedError("standalone_tags", "expected at least one tag")
         ids = [tag.id for tag in self.standalone_tags]
         for index, one in enumerate(ids):
             if one in ids[:index]:

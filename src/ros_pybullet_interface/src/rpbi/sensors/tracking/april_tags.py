@@ -55,7 +55,7 @@ class AprilTagsConfig(TrackingConfig):
     """Which tags a detector knows, and what camera it looks through."""
 
     camera: Name = Field(description="RGB-D camera of the world; its images need not be drawn.")
-    tags: ListOf[TagConfig] = Field(min_length=1, description="The tags that are reported.")
+    tags: ListOf[TagConfig] = Field(description="The tags that are reported.")
     max_angle_deg: Annotated[Degrees, Field(gt=0, lt=90)] = Field(
         75.0, description="A tag is seen up to this angle between its normal and the line of sight."
     )
@@ -66,6 +66,8 @@ class AprilTagsConfig(TrackingConfig):
 
     @model_validator(mode="after")
     def _ids_differ(self) -> AprilTagsConfig:
+        if not self.tags:
+            raise KeyedError("tags", "expected at least one tag")
         ids = [tag.id for tag in self.tags]
         for index, one in enumerate(ids):
             if one in ids[:index]:
