@@ -10,10 +10,10 @@ import numpy as np
 from operator_node.avatar.anthropometry import segment_offsets
 from operator_node.avatar.engagement import Engagement
 from operator_node.avatar.forward import segment_frame
-from operator_node.avatar.retargeting import AvatarPose, Retargeting
 from operator_node.avatar.joints import HINGES
+from operator_node.avatar.retargeting import AvatarPose, Retargeting
 from operator_node.mvn.segments import SegmentFrame
-from rpbi.geometry import Pose
+from rpbi.geometry import Pose, Vector
 from rpbi.samples import ContactsSample, SurfaceSample
 from rpbi.world import World
 
@@ -76,16 +76,18 @@ def run_trial(seed: int, force_limit_n: float = 15.0, speed: float = 0.1) -> Out
 
 
 def _run(world: World, person: Person, dressing: Dressing) -> Outcome:
-    human, retargeting = world.bodies["human"], Retargeting(segment_offsets(AVATAR_HEIGHT_M))
+    human: Any = world.bodies["human"]
+    robot: Any = world.bodies["panda"]
+    retargeting = Retargeting(segment_offsets(AVATAR_HEIGHT_M))
     engagement = Engagement(max_joint_speed=3.0, max_speed=1.0, max_angular_speed=3.0)
     links = {human.link_name(index): index for index in range(-1, len(human.joint_indices))}
     positions = dict(zip((joint.name for joint in human.model.moving), human.joint_positions().values()))
     base = human.base_pose()
     first = np.array([positions[hinge] for hinge in HINGES])
     engagement.begin(AvatarPose(np.array(base.position), np.array(base.quat_xyzw), first))
-    robot: Any = world.bodies["panda"]
     solver = HandSolver(robot.kinematics)
-    forces, corners = MeanForce(), ()
+    forces = MeanForce()
+    corners: tuple[Vector, ...] = ()
     ticks = round(1.0 / (TARGET_HZ * world.clock.dt_s))
     for number in range(round(LONGEST_S * TARGET_HZ)):
         time_s, dt = number / TARGET_HZ, 1.0 / TARGET_HZ

@@ -70,7 +70,8 @@ def _checked(offsets: Array, height_m: float) -> Array:
     lengths = np.linalg.norm(offsets, axis=1)
     for name, parent, length in zip(SEGMENTS, PARENTS, lengths):
         if parent >= 0 and not SHORTEST_M <= length <= height_m:
-            raise ValueError(f"offsets: expected {SHORTEST_M:g} to {height_m:g} m from {SEGMENTS[parent]} to {name}, got {length:g}")
+            between = f"from {SEGMENTS[parent]} to {name}"
+            raise ValueError(f"offsets: expected {SHORTEST_M:g} to {height_m:g} m {between}, got {length:g}")
     return offsets
 
 
@@ -90,7 +91,8 @@ def _joint(joint: HumanJoint, offset: Array) -> Iterator[str]:
         yield f'    <child link="{child}"/>'
         yield f'    <origin xyz="{_text(np.zeros(3) if number else offset)}" rpy="0 0 0"/>'
         yield f'    <axis xyz="{" ".join("1" if axis == each else "0" for each in "xyz")}"/>'
-        yield f'    <limit lower="{_number(low)}" upper="{_number(high)}" effort="{joint.effort:g}" velocity="{MAX_SPEED:g}"/>'
+        limits = f'lower="{_number(low)}" upper="{_number(high)}" effort="{joint.effort:g}" velocity="{MAX_SPEED:g}"'
+        yield f"    <limit {limits}/>"
         yield "  </joint>"
 
 

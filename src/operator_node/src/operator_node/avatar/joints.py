@@ -1,8 +1,8 @@
 """The joints between the segments: their names, the order of their axes, and how far people can move them.
 
 Each is three hinges one after the other, with small links between them. The middle axis is one about which the joint
-moves little, since a chain of three hinges cannot turn freely where its middle one is at 90 deg. Only shoulders get near
-that, with the arm held sideways and the forearm straight up or down.
+moves little, since three hinges cannot turn freely where the middle one is at 90 deg. Only shoulders get near that,
+with the arm held sideways and the forearm straight up or down.
 """
 
 import math
@@ -42,8 +42,8 @@ class HumanJoint(NamedTuple):
     @property
     def hinges(self) -> tuple[str, str, str]:
         """Names of the hinges from parent to child, such as `jRightElbow_rotz`."""
-        first, second, third = self.order
-        return f"{self.name}_rot{first}", f"{self.name}_rot{second}", f"{self.name}_rot{third}"
+        first, second, third = (f"{self.name}_rot{axis}" for axis in self.order)
+        return first, second, third
 
     @property
     def limits(self) -> tuple[Range, Range, Range]:

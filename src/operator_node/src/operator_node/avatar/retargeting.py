@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from operator_node.mvn.segments import SEGMENTS, SegmentFrame
+from operator_node.mvn.segments import SegmentFrame
 
 from .anthropometry import Array, leg_length, measured_offsets
-from .joints import AXES, HINGES, JOINTS, LOWER, PARENTS, UPPER
+from .joints import AXES, JOINTS, LOWER, PARENTS, UPPER
 
 NEAR_SINGULAR = 1e-3
 """Cosine of the middle hinge below which the first one stays where it is; that turns the link by at most 0.06 deg."""
@@ -92,7 +92,8 @@ class Retargeting:
         """Takes the person's size and place from the first frame."""
         ratio = self._leg / max(leg_length(measured_offsets(frame)), 1e-9)
         if not LEG_RATIOS[0] <= ratio <= LEG_RATIOS[1]:
-            raise ValueError(f"expected legs of {self._leg / 5:.2g} to {self._leg * 5:.2g} m, got {self._leg / ratio:.2g} m")
+            least, most = (self._leg / each for each in reversed(LEG_RATIOS))
+            raise ValueError(f"expected legs of {least:.2g} to {most:.2g} m, got {self._leg / ratio:.2g} m")
         self._scale = ratio
         if self._place is not None:
             turn = self._place.yaw - math.atan2(pelvis[1, 0], pelvis[0, 0])
@@ -179,6 +180,3 @@ def _quat(matrix: Array) -> Array:
     )
     row = parts[int(np.argmax(np.diagonal(parts)))]
     return np.asarray(row / np.linalg.norm(row))
-
-
-assert len(SEGMENTS) == len(JOINTS) + 1 and len(HINGES) == 3 * len(JOINTS)
