@@ -21,7 +21,7 @@ from result import Result, table
 BENCHMARKS = (
     *("loop", "many", "load", "camera", "latency", "free_run", "reset", "tables", "ik", "ik_nodes", "grasp", "physics"),
 )
-WHEN_NAMED = ("soak",)
+WHEN_NAMED = ("dressing", "soak")
 """Those that take too long to run with the others."""
 FIND_RENDERER = """
 from rpbi.render.camera import Intrinsics

@@ -40,6 +40,10 @@ ROBOT_BASE = Pose((0.3, -0.85, 0.7))
 """Where the robot stands, as in `panda.yaml`."""
 LARGEST_TURN_RAD = 0.3
 """Joints that would have to turn farther for the next target stay where they are."""
+TARGET_HZ = 50
+"""Targets a second."""
+HELD_OUT_M = 0.25
+"""So near the start of the cuff is the place before the hand of one who holds out the arm [m]."""
 ARM_SEGMENTS = ("RightShoulder", "RightUpperArm", "RightForeArm", "RightHand")
 
 
@@ -97,6 +101,11 @@ class Dressing:
         self._cuff = np.array(CUFF)
 
     @property
+    def has_begun(self) -> bool:
+        """Whether the cuff is led already."""
+        return self._left_m is not None
+
+    @property
     def is_done(self) -> bool:
         """Whether the cuff is led no further."""
         return self._left_m == 0.0
@@ -121,6 +130,11 @@ class Dressing:
         start = math.dist(way[0], way[1])  # up to there the cuff comes to be in line with the forearm
         ahead = _along(way, min(max(done, start) + BLEND_M, length)) - _along(way, max(done - BLEND_M, start))
         return _hand(self._cuff, ahead / np.linalg.norm(ahead))
+
+
+def is_held_out(arm: ArmPosition) -> bool:
+    """Returns whether an arm is held out to the cuff."""
+    return math.dist(_way(arm)[1], CUFF) < HELD_OUT_M
 
 
 class HandSolver:

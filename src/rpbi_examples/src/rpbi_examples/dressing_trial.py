@@ -2,80 +2,49 @@
 
 from __future__ import annotations
 
-import math
+import argparse
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from operator_node.avatar.anthropometry import segment_offsets
 from operator_node.avatar.engagement import Engagement
-from operator_node.avatar.forward import segment_frame
 from operator_node.avatar.joints import HINGES
 from operator_node.avatar.retargeting import AvatarPose, Retargeting
-from operator_node.mvn.segments import SegmentFrame
+from operator_node.emulators.arm_held_out import RAISING_S, ArmHeldOut
 from rpbi.geometry import Pose, Vector
 from rpbi.samples import ContactsSample, SurfaceSample
 from rpbi.world import World
 
-from .dressing import ARM_SEGMENTS, ArmPosition, Dressing, HandSolver, MeanForce, Outcome, outcome
+from .dressing import ARM_SEGMENTS, TARGET_HZ, ArmPosition, Dressing, HandSolver, MeanForce, Outcome, outcome
 
 WORLD = "{rpbi_examples}/configs/telepresence/config.yaml"
 AVATAR_HEIGHT_M = 1.75
 HEIGHTS_M = (1.60, 1.90)
-SWAY_RAD, SWAY_HZ = 0.02, 0.4
-"""Nobody holds an arm quite still."""
-HELD_OUT_S = 3.0
-"""Time in which the person raises the arm [s]."""
-TARGET_HZ = 50
+"""Of the people."""
+FORCE_LIMIT_N, SPEED = 15.0, 0.1
 LONGEST_S = 30.0
 
 
-class Person:
-    """A person who raises an arm and holds it out; how tall they are and how they hold it is random.
-
-    Args:
-        seed: Of what is random.
-    """
-
-    def __init__(self, seed: int) -> None:
-        random = np.random.default_rng(seed)
-        self._height_m = random.uniform(*HEIGHTS_M)
-        self._offsets = segment_offsets(self._height_m)
-        self._held = np.radians((random.uniform(-8, 8), random.uniform(74, 86), random.uniform(5, 25)))
-        self._phase = random.uniform(0.0, 2.0 * math.pi)
-
-    def frame(self, time_s: float) -> SegmentFrame:
-        """Returns the segments at a time [s]."""
-        raised = min(time_s / HELD_OUT_S, 1.0)
-        raised = raised * raised * (3.0 - 2.0 * raised)
-        up, ahead, elbow = self._held
-        sway = SWAY_RAD * math.sin(2.0 * math.pi * SWAY_HZ * time_s + self._phase)
-        hinges = {
-            "jLeftShoulder_rotx": -1.3,
-            "jRightShoulder_rotx": (1.0 - raised) * 1.3 + raised * up + sway,
-            "jRightShoulder_rotz": raised * ahead + sway,
-            "jRightElbow_rotz": raised * elbow,
-        }
-        hips = np.array((0.0, 0.0, 0.53 * self._height_m))
-        return segment_frame(self._offsets, hips, np.array((0.0, 0.0, 0.0, 1.0)), hinges)
-
-
-def run_trial(seed: int, force_limit_n: float = 15.0, speed: float = 0.1) -> Outcome:
+def run_trial(seed: int, force_limit_n: float = FORCE_LIMIT_N, speed: float = SPEED) -> Outcome:
     """Runs the example as fast as it goes and returns what became of it.
 
     Args:
-        seed: Of the person.
+        seed: Of the person: how tall they are, and how they hold the arm.
         force_limit_n: Force on the arm above which the cuff goes back [N].
         speed: Of the cuff [m/s].
     """
     world = World.from_file(WORLD)
     try:
-        return _run(world, Person(seed), Dressing(force_limit_n, speed))
+        height_m = np.random.default_rng((seed, 1)).uniform(*HEIGHTS_M)
+        return _run(world, ArmHeldOut(height_m, seed), Dressing(force_limit_n, speed))
     finally:
         world.close()
 
 
-def _run(world: World, person: Person, dressing: Dressing) -> Outcome:
+def _run(world: World, person: ArmHeldOut, dressing: Dressing) -> Outcome:
     human: Any = world.bodies["human"]
     robot: Any = world.bodies["panda"]
     retargeting = Retargeting(segment_offsets(AVATAR_HEIGHT_M))
@@ -104,7 +73,7 @@ def _run(world: World, person: Person, dressing: Dressing) -> Outcome:
                     force_n = forces.add(world.clock.time_s, force_on_arm(sample))
                 elif isinstance(sample, SurfaceSample):
                     corners = sample.corners
-        if time_s >= HELD_OUT_S:
+        if time_s >= RAISING_S:
             target = dressing.target(arm, force_n, dt)
             if (found := solver.solve(target, tuple(robot.joint_positions().values()))) is not None:
                 world.put("panda/target", found)
@@ -116,3 +85,22 @@ def _run(world: World, person: Person, dressing: Dressing) -> Outcome:
 def force_on_arm(sample: ContactsSample) -> np.ndarray:
     """Returns the sum of forces on the arm [N]."""
     return np.sum([(0.0, 0.0, 0.0), *(p.force for p in sample.points if p.link in ARM_SEGMENTS)], axis=0)
+
+
+def main() -> int:
+    """Runs the command; returns 1 if somebody is not dressed."""
+    parser = argparse.ArgumentParser(description="Dresses people of chance, as fast as it goes and without ROS.")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0], metavar="N", help="one for each person, default 0")
+    parser.add_argument("--force-limit", type=float, default=FORCE_LIMIT_N, metavar="N", help="on the arm [N]")
+    parser.add_argument("--speed", type=float, default=SPEED, help="of the sleeve [m/s]")
+    parser.add_argument("--out", type=Path, help="file for the outcomes, as JSON")
+    arguments = parser.parse_args()
+    outcomes = {}
+    for seed in arguments.seeds:
+        outcomes[seed] = found = run_trial(seed, arguments.force_limit, arguments.speed)
+        words = "past the elbow" if found.is_dressed else "NOT past the elbow"
+        print(f"seed {seed}: {words} ({found.past_elbow_m:.3f} m), peak force {found.peak_force_n:.2f} N", flush=True)
+    if arguments.out:
+        figures = {seed: {**found._asdict(), "is_dressed": found.is_dressed} for seed, found in outcomes.items()}
+        arguments.out.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+    return 0 if all(found.is_dressed for found in outcomes.values()) else 1
