@@ -1,4 +1,4 @@
-"""Whether a sleeve is drawn past the elbow of people of chance, what their arm feels, and how long retargeting takes."""
+"""Whether a sleeve is drawn past people's elbows, what their arms feel, and how long retargeting takes."""
 
 from __future__ import annotations
 

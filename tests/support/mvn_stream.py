@@ -1,0 +1,49 @@
+"""Streams of MVN for tests."""
+
+from __future__ import annotations
+
+import socket
+
+import numpy as np
+
+from operator_node.emulators.mvn_suit import Suit
+from operator_node.emulators.walking_person import WalkingPerson
+from operator_node.mvn.segments import SegmentFrame
+
+HZ = 60.0
+T_POSE = WalkingPerson(1.7, t_pose_s=1e9)
+"""Somebody who stays in the T-pose."""
+WALKER = WalkingPerson(1.75, t_pose_s=0.0)
+
+
+def suit(person: int = 0, moves: WalkingPerson = WALKER, **options) -> Suit:
+    return Suit(person, moves, **{"noise_rad": 0.0, "hz": HZ, **options})
+
+
+def truth(sample: int, person: int = 0, moves: WalkingPerson = WALKER) -> SegmentFrame:
+    """Returns the frame of a sample without noise."""
+    positions, quats = moves.pose(sample / HZ)
+    return SegmentFrame(person, sample, round(1000.0 * sample / HZ), positions, quats)
+
+
+def assert_same(frame: SegmentFrame, expected: SegmentFrame, tolerance: float = 1e-6) -> None:
+    """Compares frames; q and -q are one orientation."""
+    assert frame[:3] == expected[:3]
+    np.testing.assert_allclose(frame.positions, expected.positions, atol=tolerance)
+    cosines = np.abs(np.einsum("ij,ij->i", frame.quats_xyzw, expected.quats_xyzw))
+    np.testing.assert_allclose(cosines, 1.0, atol=tolerance)
+
+
+class Sender:
+    """Sends datagrams to a port of this computer."""
+
+    def __init__(self, port: int) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.connect(("127.0.0.1", port))
+
+    def send(self, *datagrams: bytes) -> None:
+        for data in datagrams:
+            self._socket.send(data)
+
+    def close(self) -> None:
+        self._socket.close()
