@@ -11,9 +11,10 @@ from custom_ros_tools.config import replace_package
 from operator_node.avatar.anthropometry import MASS_PERCENT, leg_length, measured_offsets, segment_offsets
 from operator_node.avatar.forward import segment_frame
 from operator_node.avatar.human_urdf import human_urdf
-from operator_node.avatar.joints import HINGES, JOINTS, LOWER, PARENTS, UPPER
+from operator_node.avatar.joints import HINGES, JOINTS, LOWER, UPPER
 from operator_node.avatar.urdf_offsets import urdf_offsets
 from operator_node.mvn.segments import SEGMENTS
+from operator_node.mvn.skeleton import PARENTS
 
 LEVEL = np.array((0.0, 0.0, 0.0, 1.0))
 
@@ -38,7 +39,7 @@ def test_hips_shoulders_and_neck_are_where_the_tables_have_them(height_m):
 def test_every_segment_but_the_pelvis_has_a_joint_and_left_mirrors_right():
     assert [joint.child for joint in JOINTS] == list(SEGMENTS[1:])
     assert len(set(HINGES)) == len(HINGES) == 66
-    assert all(parent < child for child, parent in enumerate(PARENTS))
+    assert [joint.parent for joint in JOINTS] == [SEGMENTS[parent] for parent in PARENTS[1:]]
     assert (LOWER < 0.0).all() and (UPPER > 0.0).all() and (UPPER - LOWER < 2 * np.pi).all()
     limits = dict(zip(HINGES, zip(LOWER, UPPER)))
     for hinge, (low, high) in limits.items():

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from operator_node.mvn.segments import SEGMENTS, SegmentFrame
-
-from .joints import PARENTS
+from operator_node.mvn.skeleton import PARENTS
 
 Array = NDArray[np.float64]
 

@@ -4,9 +4,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from operator_node.mvn.segments import SegmentFrame
+from operator_node.mvn.skeleton import PARENTS
 
 from .anthropometry import Array
-from .joints import HINGES, JOINTS, PARENTS
+from .joints import HINGES, JOINTS
 
 
 def segment_frame(offsets: Array, position: Array, quat_xyzw: Array, hinges: dict[str, float]) -> SegmentFrame:

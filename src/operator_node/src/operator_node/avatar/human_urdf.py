@@ -6,10 +6,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from operator_node.mvn.segments import SEGMENTS
+from operator_node.mvn.skeleton import PARENTS
 
 from . import anthropometry as table
 from .anthropometry import Array
-from .joints import JOINTS, PARENTS, HumanJoint
+from .joints import JOINTS, HumanJoint
 
 HEIGHTS_M, MASSES_KG = (0.5, 2.5), (3.0, 300.0)
 """People are within these."""

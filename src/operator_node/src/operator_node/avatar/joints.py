@@ -101,7 +101,5 @@ About axes that the tables do not name, joints give way a little. Efforts are of
 """
 HINGES: tuple[str, ...] = tuple(hinge for joint in JOINTS for hinge in joint.hinges)
 """The 66 hinges: three for each joint, in the order of `JOINTS`."""
-PARENTS: tuple[int, ...] = (-1, *(SEGMENTS.index(joint.parent) for joint in JOINTS))
-"""Index of each segment's parent; the pelvis has none, which is -1."""
 LOWER, UPPER = np.array([limits for joint in JOINTS for limits in joint.limits]).T
 """Limits of the hinges (66) [rad]."""

@@ -6,9 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from operator_node.mvn.segments import SegmentFrame
+from operator_node.mvn.skeleton import PARENTS
 
 from .anthropometry import Array, leg_length, measured_offsets
-from .joints import AXES, JOINTS, LOWER, PARENTS, UPPER
+from .joints import AXES, JOINTS, LOWER, UPPER
 
 NEAR_SINGULAR = 1e-3
 """Cosine of the middle hinge below which the first one stays where it is; that turns the link by at most 0.06 deg."""

@@ -20,8 +20,9 @@ from operator_node.avatar.parameters import AvatarParameters
 from operator_node.avatar.retargeting import AvatarPose, Place, Retargeting
 from operator_node.avatar.urdf_offsets import urdf_offsets
 from operator_node.mvn.segments import SegmentFrame
+from operator_node.ros.stamps import stamp
 
-from .messages import frame_in, stamp_now
+from .messages import frame_in
 
 SEGMENTS_TOPIC = "mvn/segments"
 LOOKS_HZ = 20.0
@@ -100,17 +101,17 @@ class AvatarNode:
         self._begins = False
 
     def _publish(self, pose: AvatarPose) -> None:
-        stamp = stamp_now()
-        if stamp <= self._last_stamp:
+        now = stamp()
+        if now <= self._last_stamp:
             return  # simulated time stands still
-        self._last_stamp = stamp
+        self._last_stamp = now
         target = JointState(name=HINGES, position=pose.hinges.tolist())
-        target.header.stamp = stamp
+        target.header.stamp = now
         self._targets.publish(target)
         base = self._tf.pack_tf_msg(
             self._config.parent_frame_id, self._config.base_frame_id, pose.position, pose.quat_xyzw
         )
-        base.header.stamp = stamp
+        base.header.stamp = now
         self._tf.tf_broadcaster.sendTransform(base)
 
     def _look(self) -> None:

@@ -1,9 +1,6 @@
 """Segments of a person as message, and the other way round."""
 
-import time
-
 import numpy as np
-import rospy
 from geometry_msgs.msg import PoseArray
 
 from operator_node.mvn.segments import SEGMENTS, SegmentFrame
@@ -35,8 +32,3 @@ def frame_in(message: PoseArray) -> SegmentFrame:
         index = int(np.argmax(wrong))
         raise ValueError(f"{SEGMENTS[index]}: expected a quaternion of length 1, got {norms[index]:g}")
     return SegmentFrame(0, message.header.seq, 0, rows[:, :3], rows[:, 3:] / norms[:, None])
-
-
-def stamp_now() -> rospy.Time:
-    """Returns ROS time, or wall time as long as simulated time has not begun."""
-    return rospy.Time.now() or rospy.Time.from_sec(time.time())
