@@ -32,6 +32,8 @@ BLEND_M = 0.05
 """Over so much of its way to either side of the elbow the cuff turns [m]."""
 MEAN_S = 0.1
 """Contact forces of soft bodies are rough: their mean over this time counts [s]."""
+SETTLING_S = 0.5
+"""For so long the cuff is held at the end of its way [s]."""
 LARGEST_STEP_M = 0.02
 """The hand is led there from wherever it is, by so much for each target at most."""
 ROBOT, HAND_LINK = "franka_panda/panda.urdf", "panda_grasptarget"
@@ -98,6 +100,7 @@ class Dressing:
     def __init__(self, force_limit_n: float, speed: float) -> None:
         self._limit_n, self._speed = force_limit_n, speed
         self._left_m: float | None = None
+        self._rested_s = 0.0
         self._cuff = np.array(CUFF)
 
     @property
@@ -107,8 +110,8 @@ class Dressing:
 
     @property
     def is_done(self) -> bool:
-        """Whether the cuff is led no further."""
-        return self._left_m == 0.0
+        """Whether the cuff is led no further, and has had time to get there."""
+        return self._rested_s >= SETTLING_S
 
     def target(self, arm: ArmPosition, force_n: float, dt: float) -> HandTarget:
         """Returns where the robot's hand is to be.
@@ -124,6 +127,7 @@ class Dressing:
             self._left_m = length
         speed = self._speed * max(-1.0, 1.0 - force_n / self._limit_n)
         self._left_m = min(max(self._left_m - speed * dt, 0.0), length)
+        self._rested_s = 0.0 if self._left_m else self._rested_s + dt
         done = length - self._left_m
         step = _along(way, done) - self._cuff
         self._cuff = self._cuff + step * min(1.0, LARGEST_STEP_M / max(float(np.linalg.norm(step)), 1e-12))

@@ -70,15 +70,17 @@ class AvatarNode:
                 self._warn(rospy.resolve_name(SEGMENTS_TOPIC), f"message refused: {error}")
 
     def _follow(self, frame: SegmentFrame) -> None:
-        now_s = time.monotonic()
+        now = stamp()
+        if now <= self._last_stamp:
+            return  # simulated time stands still
         if self._begins or self._retargeting is None:
             self._begin(frame)
         assert self._retargeting is not None
         target = self._retargeting.pose(frame)
         if self._holds:
             rospy.loginfo("the avatar follows %s", rospy.resolve_name(SEGMENTS_TOPIC))
-        self._publish(self._engagement.step(target, now_s - self._last_s))
-        self._last_s, self._holds = now_s, False
+        self._publish(self._engagement.step(target, (now - self._last_stamp).to_sec()), now)
+        self._last_stamp, self._last_s, self._holds = now, time.monotonic(), False
 
     def _begin(self, frame: SegmentFrame) -> None:
         """Begins where the avatar is, with a person of any size.
@@ -100,11 +102,7 @@ class AvatarNode:
         self._engagement.begin(AvatarPose(position, quat, self._hinges))
         self._begins = False
 
-    def _publish(self, pose: AvatarPose) -> None:
-        now = stamp()
-        if now <= self._last_stamp:
-            return  # simulated time stands still
-        self._last_stamp = now
+    def _publish(self, pose: AvatarPose, now: rospy.Time) -> None:
         target = JointState(name=HINGES, position=pose.hinges.tolist())
         target.header.stamp = now
         self._targets.publish(target)
