@@ -25,6 +25,8 @@ from operator_node.ros.stamps import stamp
 from .messages import frame_in
 
 SEGMENTS_TOPIC = "mvn/segments"
+START_PATIENCE_S = 5.0
+"""After so long without joint states, it is said that the avatar waits for them [s]."""
 LOOKS_HZ = 20.0
 """How often to look whether segments have ceased."""
 
@@ -46,7 +48,7 @@ class AvatarNode:
         self._hinges: np.ndarray | None = None
         """Where the avatar's hinges are as the simulator says; None as long as that is not known."""
         self._begins, self._last_s, self._holds = True, 0.0, True
-        self._last_stamp = rospy.Time()
+        self._began_s, self._last_stamp = time.monotonic(), rospy.Time()
         self._states = f"rpbi/{config.robot_name}/joint_states"
         self._targets = rospy.Publisher(f"{self._states}/target", JointState, queue_size=1, tcp_nodelay=True)
         rospy.Subscriber(self._states, JointState, self._take_state, queue_size=1)
@@ -73,6 +75,8 @@ class AvatarNode:
         now = stamp()
         if now <= self._last_stamp:
             return  # simulated time stands still
+        if self._hinges is None and time.monotonic() - self._began_s < START_PATIENCE_S:
+            return
         if self._begins or self._retargeting is None:
             self._begin(frame)
         assert self._retargeting is not None
