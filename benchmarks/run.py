@@ -19,8 +19,8 @@ from typing import Any
 from result import Result, table
 
 BENCHMARKS = (
-    *("loop", "many", "load", "camera", "latency", "free_run", "reset", "tables", "ik", "ik_nodes", "grasp", "physics"),
-    "mvn",
+    *("loop", "many", "load", "camera", "latency", "free_run", "reset", "tables"),
+    *("ik", "ik_nodes", "device", "mvn", "grasp", "physics"),
 )
 WHEN_NAMED = ("dressing", "soak")
 """Those that take too long to run with the others."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import random
 import socket
+import struct
 
 import numpy as np
 
@@ -47,3 +49,22 @@ class Sender:
 
     def close(self) -> None:
         self._socket.close()
+
+
+def broken_datagram(generator: random.Random, data: bytearray) -> bytes:
+    """Returns garbage, or a datagram that was cut, made longer, or has other numbers or bytes."""
+    what = generator.randrange(6)
+    if what == 0:
+        return generator.randbytes(generator.randrange(1500))
+    if what == 1:
+        return bytes(data[: generator.randrange(len(data))])
+    if what == 2:
+        return bytes(data) + generator.randbytes(generator.randrange(1, 100))
+    if what == 3:
+        at = generator.randrange(len(data) // 4) * 4
+        data[at : at + 4] = struct.pack(">f", generator.choice([float("nan"), float("inf"), 3e38, -1e30, 1e-45, 0.0]))
+        return bytes(data)
+    for _ in range(generator.randrange(1, 6)):
+        at = generator.randrange(24 if what == 4 else len(data))
+        data[at] = generator.randrange(256)
+    return bytes(data)

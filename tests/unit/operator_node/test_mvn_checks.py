@@ -93,7 +93,7 @@ def named(fault, seed: int) -> set[str]:
         frame = decoder.take(*sender.frame(number, time_s, *fault(positions, quats, number, first)))
         if isinstance(frame, SegmentFrame):
             said |= {message for _, message in checks.take(frame, number / HZ)}
-        said |= set(decoder.remarks.values())
+        said |= {*decoder.remarks.values(), *decoder.refusals.values()}
     return said
 
 

@@ -13,7 +13,6 @@ from custom_ros_tools.errors import InterfaceError
 from operator_node.device import DeviceError
 from operator_node.devices.mvn import Mvn
 from operator_node.mvn.calibration import Calibration
-from operator_node.mvn.checks import Finding
 from operator_node.mvn.hands import AXES, HandAxes
 from operator_node.mvn.player import timed_datagrams
 from operator_node.mvn.receiver import MvnConfig, Silence
@@ -97,11 +96,10 @@ def test_closed_and_opened_again_it_goes_on(mvn, sender):
 
 def test_what_is_refused_is_told_with_its_reason(mvn, sender):
     sender.send(b"", b"hello", b"MXTP05" + bytes(100))
-    found = {}
-    while len(found) < 2:
-        reading = mvn.read(SOON_S)
-        found |= {event.subject: event.message for event in reading.events if isinstance(event, Finding)}
-    assert found["datagrams refused: type 05"].startswith("Unity's format")
+    refused = []
+    while len(refused) < 3:
+        refused += mvn.read(SOON_S).refused
+    assert [reason.partition(":")[0] for reason in refused] == ["shorter than a header"] * 2 + ["Unity's format"]
     assert mvn.counts["refused: too short"] == 2
 
 

@@ -9,7 +9,7 @@ from collections import defaultdict
 
 import numpy as np
 import pytest
-from mvn_stream import HZ, T_POSE, WALKER, assert_same, suit, truth
+from mvn_stream import HZ, T_POSE, WALKER, assert_same, broken_datagram, suit, truth
 
 from operator_node.emulators.mvn_suit import KINDS, BadNetwork
 from operator_node.mvn import packets
@@ -237,7 +237,7 @@ def test_what_cannot_be_used_is_refused_with_its_reason(reason):
     decoder = StreamDecoder()
     assert decoder.take(BROKEN[reason]) is None
     assert decoder.counts[f"refused: {reason}"] == 1
-    assert packets.REASONS[reason] in decoder.remarks[f"datagrams refused: {reason}"]
+    assert packets.REASONS[reason] in decoder.refusals[reason] and [*decoder.refused] == [reason]
     assert isinstance(decoder.take(by_hand(sample=8)), SegmentFrame)
 
 
@@ -253,7 +253,7 @@ def test_broken_datagrams_raise_nothing_and_let_nothing_through_that_is_not_fini
     good = [data for n in (0, 60) for data in suit(kinds=KINDS, items=9).datagrams(n, n / HZ)]
     decoder, messages = StreamDecoder(max_people=4), 0
     for number in range(FUZZED):
-        message = decoder.take(_broken(generator, bytearray(generator.choice(good))))
+        message = decoder.take(broken_datagram(generator, bytearray(generator.choice(good))))
         messages += message is not None
         for part in message or ():
             assert not isinstance(part, np.ndarray) or np.isfinite(part).all(), (number, message)
@@ -264,21 +264,3 @@ def test_broken_datagrams_raise_nothing_and_let_nothing_through_that_is_not_fini
     refused = {key for key in decoder.counts if key.startswith("refused: ")}
     assert messages > 0 and len(refused) >= 8, decoder.counts
     assert {key.removeprefix("refused: ") for key in refused} <= set(packets.REASONS)
-
-
-def _broken(generator: random.Random, data: bytearray) -> bytes:
-    what = generator.randrange(6)
-    if what == 0:
-        return generator.randbytes(generator.randrange(1500))
-    if what == 1:
-        return bytes(data[: generator.randrange(len(data))])
-    if what == 2:
-        return bytes(data) + generator.randbytes(generator.randrange(1, 100))
-    if what == 3:
-        at = generator.randrange(len(data) // 4) * 4
-        data[at : at + 4] = struct.pack(">f", generator.choice([float("nan"), float("inf"), 3e38, -1e30, 1e-45, 0.0]))
-        return bytes(data)
-    for _ in range(generator.randrange(1, 6)):
-        at = generator.randrange(24 if what == 4 else len(data))
-        data[at] = generator.randrange(256)
-    return bytes(data)

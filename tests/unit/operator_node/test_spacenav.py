@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
+import math
 import os
 import random
+import socket
 import struct
+import threading
 
 import pytest
 
@@ -165,6 +169,56 @@ def test_another_protocol_is_hung_up_on_and_tried_again(daemon):
     assert "protocol" in reader.feed.problem and sum(reader.feed.refused.values()) >= 8
     reader.until(lambda: reader.feed.problem is None, "it is open again")
     reader.feed.close()
+
+
+def hostile_bytes(generator: random.Random) -> bytes:
+    """Returns what a broken daemon may send: noise, or packets that are almost right."""
+    if generator.random() < 0.3:
+        return generator.randbytes(generator.randint(0, 400))
+    packets = bytearray()
+    for _ in range(generator.randint(1, 30)):
+        size = generator.choice((1, 10, 1000, 2**31))
+        kind = generator.choice((*range(9), spacenav.GET_BUTTONS, generator.randint(-(2**31), 2**31 - 1)))
+        packets += struct.pack("=8i", kind, *(generator.randint(-size, size - 1) for _ in range(7)))
+    return bytes(packets[: len(packets) - generator.choice((0, 0, 0, 5))])
+
+
+def test_whatever_is_sent_readings_make_sense_and_refusals_have_reasons(tmp_path):
+    """From the first word on; `SPACENAV_FUZZ` is how many connections to try."""
+    generator = random.Random(3)
+    path = str(tmp_path / "spnav.sock")
+    listener = socket.socket(socket.AF_UNIX)
+    listener.bind(path)
+    listener.listen()
+
+    def serve() -> None:
+        for _ in range(connections):
+            client, _ = listener.accept()
+            with client:
+                client.recv(4)
+                if generator.random() < 0.5:
+                    client.sendall(struct.pack("=i", spacenav.PROTOCOL_TAG | 1))
+                with contextlib.suppress(OSError):  # the client has seen enough
+                    client.sendall(hostile_bytes(generator))
+            done.append(1)
+
+    connections, done = int(os.environ.get("SPACENAV_FUZZ", 300)), []
+    server = threading.Thread(target=serve)
+    server.start()
+    reader = Reader("spacenav", make_device("spacenav", {"socket": path, "full_scale": 1.0}))
+    while len(done) < connections:
+        reader.feed._open_at_s = -math.inf  # without the second between two tries
+        reader.feed.step(0.01)  # in which the reader checks every reading
+    server.join()
+    reader.feed.close()
+    listener.close()
+    assert reader.is_at_rest
+    assert reader.feed.refused.keys() <= {
+        "a motion beyond 32767",
+        "a button outside 0 to 63",
+        "a packet of an unknown type",
+    }
+    assert len(reader.feed.refused) == 3 and any(any(reading.axes) for reading in reader.readings)
 
 
 def test_socket_is_found_as_libspnav_finds_it(monkeypatch, tmp_path):

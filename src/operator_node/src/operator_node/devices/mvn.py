@@ -1,12 +1,16 @@
 """Motion capture by Xsens MVN; the hands of the first person are its axes."""
 
 import errno
+import logging
 from collections import Counter
 
 from operator_node.device import Device, DeviceError, Reading
 from operator_node.mvn.hands import AXES, HandAxes
-from operator_node.mvn.receiver import MvnConfig, Receiver, Silence
+from operator_node.mvn.packets import REASONS
+from operator_node.mvn.receiver import MvnConfig, Receiver, Refused, Silence
 from operator_node.mvn.segments import SegmentFrame
+
+logger = logging.getLogger(__name__)
 
 
 class Mvn(Device):
@@ -14,7 +18,8 @@ class Mvn(Device):
 
     Its axes are how far the right and the left hand of person 0 are forward, left and up from where they were in the
     first frame, in lengths of the arm, seen from the pelvis. After silence they count anew from the next frame. Its
-    events are those of `Receiver.poll`.
+    events are those of `Receiver.poll`. It is there as soon as it listens, whether anybody sends or not: a stream that
+    ceases is a `Silence` and a reading at rest, and goes on with the first frame that comes.
     """
 
     Config = MvnConfig
@@ -43,9 +48,12 @@ class Mvn(Device):
             raise DeviceError(
                 "mvn", f"cannot listen at {config.host}:{config.port}: {error.strerror}{in_use}"
             ) from None
+        logger.info("mvn: listening at %s:%d", config.host, self.receiver.port)
 
     def read(self, timeout_s: float) -> Reading | None:
         """Returns the hands at the newest frame, and all that came; zeros when the frames of person 0 cease."""
+        if not self.receiver.port:
+            raise DeviceError("mvn", "it is closed")
         try:
             events = self.receiver.poll(timeout_s)
         except OSError as error:
@@ -55,7 +63,10 @@ class Mvn(Device):
                 self._values = self._hands.axes(event)
             elif isinstance(event, Silence) and event.person == 0:
                 self._release()
-        return Reading(self._values, (), tuple(events)) if events else None
+        if not events:
+            return None
+        refused = tuple(REASONS[event.reason] for event in events if isinstance(event, Refused))
+        return Reading(self._values, (), tuple(event for event in events if not isinstance(event, Refused)), refused)
 
     def close(self) -> None:
         """Listens no more."""

@@ -45,6 +45,12 @@ class Silence(NamedTuple):
     seconds: float
 
 
+class Refused(NamedTuple):
+    """A datagram was refused; the reason is one of `packets.REASONS`."""
+
+    reason: str
+
+
 class Receiver:
     """A socket, and what is made of the datagrams that it receives.
 
@@ -67,6 +73,11 @@ class Receiver:
     def counts(self) -> Counter[str]:
         """What became of the datagrams, see `StreamDecoder`."""
         return self._decoder.counts
+
+    @property
+    def refusals(self) -> dict[str, str]:
+        """What was the matter with the newest datagram that was refused, by reason."""
+        return self._decoder.refusals
 
     @property
     def people(self) -> list[int]:
@@ -103,7 +114,7 @@ class Receiver:
         self._forget()
 
     def poll(self, timeout_s: float) -> list[Any]:
-        """Returns what has come: messages of `stream`, `Finding`s and `Silence`; nothing after a time.
+        """Returns what has come: messages, `Finding`s, `Refused` and `Silence`; nothing after a time.
 
         Args:
             timeout_s: How long to wait for it [s].
@@ -138,6 +149,8 @@ class Receiver:
                 message = self.calibration.apply(message)
             if message is not None:
                 events.append(message)
+        events += map(Refused, self._decoder.refused)
+        self._decoder.refused.clear()
         return events
 
     def _silence(self) -> list[Silence]:

@@ -1,6 +1,6 @@
 """From datagrams of MVN to frames of people: grouped by person and sample, in metres, z up."""
 
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -17,6 +17,7 @@ MOST_BEHIND = 100
 """A datagram that is so many samples behind is late; further behind, the stream has begun anew."""
 MOST_LATE = 20
 """So many late datagrams of a message type in a row, and the stream has begun anew too, as a short recording does."""
+MOST_REFUSED = 1000
 LENGTH_TOLERANCE = 0.01
 _COUNTER_RANGE = 2**32
 _METRES_PER_CM = 0.01
@@ -119,11 +120,15 @@ class StreamDecoder:
             message was dropped), `ignored` (type 01 beside type 02) or `refused: REASON`, or waits for the rest of its
             message. Beside those, `frames` is how many `SegmentFrame`s were given, and `skipped` how many samples were
             passed over by those; they were lost, came late, or MVN streams at a lower rate than it measures.
-        remarks: What is odd, and why datagrams were refused last, by subject; it may be emptied at any time.
+        refused: Reason of each datagram that was refused, of `packets.REASONS`, the newest of them; may be emptied.
+        refusals: What was the matter with the newest one of each reason.
+        remarks: What is odd, by subject; may be emptied.
     """
 
     def __init__(self, position_scale: float = 1.0, y_up: bool = False, max_people: int = 8) -> None:
         self.counts: Counter[str] = Counter()
+        self.refused: deque[str] = deque(maxlen=MOST_REFUSED)
+        self.refusals: dict[str, str] = {}
         self.remarks: dict[str, str] = {}
         self._scale, self._y_up, self._max_people = position_scale, y_up, max_people
         self._groups: dict[tuple[int, int], _Group] = {}
@@ -160,7 +165,8 @@ class StreamDecoder:
 
     def _refuse(self, error: PacketError, count: int) -> None:
         self.counts[f"refused: {error.reason}"] += count
-        self.remarks[f"datagrams refused: {error.reason}"] = str(error)
+        self.refused.extend([error.reason] * count)
+        self.refusals[error.reason] = str(error)
 
     def _admit(self, person: int) -> None:
         if person not in self._people:

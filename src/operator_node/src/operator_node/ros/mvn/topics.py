@@ -1,6 +1,5 @@
 """Frames of people, and what else MVN streams, as topics and TF."""
 
-from collections.abc import Iterable
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -17,14 +16,16 @@ from visualization_msgs.msg import MarkerArray
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
-from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallRate
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallRate, WallTimer
 from custom_ros_tools.ros.services import ToggleService
+from operator_node.device import Reading
 from operator_node.devices.mvn import Mvn
 from operator_node.mvn.checks import Finding
 from operator_node.mvn.node_config import MvnTopicsConfig
 from operator_node.mvn.receiver import Silence
 from operator_node.mvn.segments import SegmentFrame
 from operator_node.mvn.stream import CenterOfMass, JointAngles, Message, PersonInfo
+from operator_node.ros.devices.topics import DeviceTopics
 from operator_node.ros.stamps import stamp as present_stamp
 from rpbi.ros.publishers.topics import FastTopic
 
@@ -37,18 +38,18 @@ RECENT_S = 5.0
 """For so long the diagnostics tell a finding [s]."""
 
 
-class MvnTopics:
+class MvnTopics(DeviceTopics):
     """Publishes what the device MVN says, and serves calibration and recording.
-
-    Args:
-        device: The device.
 
     Raises:
         ConfigError: If a parameter is wrong.
     """
 
-    def __init__(self, device: Mvn) -> None:
-        self._device = device
+    device: Mvn
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self._receiver = self.device.receiver
         self._config = private_parameters(MvnTopicsConfig)
         self._warn = ThrottledWarning()
         self._tf = FastTopic("/tf", TFMessage)
@@ -56,7 +57,6 @@ class MvnTopics:
         self._people: dict[int, _Person] = {}
         self._markers = rospy.Publisher("mvn/markers", MarkerArray, queue_size=2)
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
-        self._diagnostics_rate = WallRate(DIAGNOSTICS_HZ)
         self._frames_before = 0
         self._found: dict[str, tuple[rospy.Time, str]] = {}
         self._services = [
@@ -64,10 +64,11 @@ class MvnTopics:
             rospy.Service("mvn/clear_calibration", Trigger, self._clear_calibration),
             ToggleService("mvn/record", self._start_recording, self._stop_recording),
         ]
+        WallTimer(DIAGNOSTICS_HZ, self._diagnose)
 
-    def publish(self, events: Iterable[Any]) -> None:
-        """Publishes what came, and now and then how the stream is doing; call it ten times a second at least."""
-        for event in events:
+    def publish(self, reading: Reading, stamp: rospy.Time) -> None:
+        """Publishes what came, each frame with a stamp of its own."""
+        for event in reading.events:
             stamp = present_stamp()
             if isinstance(event, SegmentFrame):
                 self._person(event.person).publish_frame(event, stamp)
@@ -78,8 +79,6 @@ class MvnTopics:
                 self._fall_silent(event)
             elif isinstance(event, (JointAngles, CenterOfMass, PersonInfo)):
                 self._person(event.person).publish(event, stamp)
-        if self._diagnostics_rate.is_due():
-            self._publish_diagnostics(present_stamp())
         flush_buffered_sockets()
 
     def _person(self, number: int) -> "_Person":
@@ -94,22 +93,23 @@ class MvnTopics:
         if silence.person in self._people:
             self._people[silence.person].vanish()
 
-    def _publish_diagnostics(self, stamp: rospy.Time) -> None:
-        counts = self._device.counts
+    def _diagnose(self) -> None:
+        stamp, counts = present_stamp(), self._receiver.counts.copy()
         frames, self._frames_before = counts["frames"] - self._frames_before, counts["frames"]
-        recent = {name: text for name, (when, text) in self._found.items() if (stamp - when).to_sec() < RECENT_S}
+        recent = {name: text for name, (when, text) in self._found.copy().items() if (stamp - when).to_sec() < RECENT_S}
         status = DiagnosticStatus(name=f"{rospy.get_name()}: stream", hardware_id="mvn", level=DiagnosticStatus.OK)
         status.message = f"{frames} frames a second"
-        if not self._device.receiver.people:
+        if not self._receiver.people:
             status.level, status.message = DiagnosticStatus.STALE, "no frames"
         elif recent:
             status.level = DiagnosticStatus.WARN
             status.message = "; ".join(f"{name}: {text}" for name, text in sorted(recent.items()))
         values: dict[str, object] = {
-            "people": self._device.receiver.people,
-            "calibrated": self._device.receiver.calibration.people,
-            **{f"name of person {number}": each.name for number, each in self._people.items() if each.name},
+            "people": self._receiver.people,
+            "calibrated": self._receiver.calibration.people,
+            **{f"name of person {number}": each.name for number, each in self._people.copy().items() if each.name},
             "frames": counts["frames"],
+            **{f"last refused, {reason}": text for reason, text in sorted(self._receiver.refusals.copy().items())},
             **{f"datagrams {what}": count for what, count in sorted(counts.items()) if what != "frames"},
         }
         status.values = [KeyValue(key, str(value)) for key, value in values.items()]
@@ -120,27 +120,27 @@ class MvnTopics:
     def _calibrate(self, _: Any) -> TriggerResponse:
         """Takes the pose in which everybody stands as a T-pose."""
         try:
-            return TriggerResponse(True, self._device.receiver.calibrate())
+            return TriggerResponse(True, self._receiver.calibrate())
         except InterfaceError as error:
             return TriggerResponse(False, str(error))
 
     def _clear_calibration(self, _: Any) -> TriggerResponse:
         """Forgets the calibration."""
-        self._device.receiver.calibration.clear()
+        self._receiver.calibration.clear()
         return TriggerResponse(True, "orientations are as they come")
 
     def _start_recording(self) -> tuple[bool, str]:
         name = datetime.now().strftime("mvn_%Y-%m-%d_%H-%M-%S.mvn")
         path = Path(self._config.recording_folder).expanduser() / name
         try:
-            self._device.receiver.start_recording(path)
+            self._receiver.start_recording(path)
         except InterfaceError as error:
             return False, str(error)
         return True, f"recording into {path}"
 
     def _stop_recording(self) -> tuple[bool, str]:
         try:
-            path, count = self._device.receiver.stop_recording()
+            path, count = self._receiver.stop_recording()
         except InterfaceError as error:
             return False, str(error)
         return True, f"{path} has {count} datagrams"
