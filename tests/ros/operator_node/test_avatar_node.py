@@ -18,6 +18,7 @@ from worlds import box
 from custom_ros_tools.ros.tf_interface import TfInterface
 from operator_node.avatar.anthropometry import segment_offsets
 from operator_node.avatar.forward import segment_frame
+from operator_node.avatar.urdf_offsets import urdf_offsets
 from operator_node.msg import SegmentForces
 from operator_node.mvn.segments import SEGMENTS
 
@@ -52,7 +53,7 @@ def avatar(module_ros, tmp_path_factory):
     hand_x, arm_y, arm_z = 0.0, -(0.129 + 0.186 + 0.073) * HEIGHT_M, 0.93 + (0.818 - 0.53) * HEIGHT_M
     load = box("load", (0.03, 0.03, 0.03), baseMass=LOAD_KG, basePosition=[hand_x, arm_y, arm_z + 0.07])
     load["changeDynamics"] = {"lateralFriction": 1.0}
-    ros.simulator(main_config(tmp_path_factory.mktemp("world"), robots=(HUMAN,), dynamic=(load,), timeStep=0.002))
+    ros.simulator(main_config(tmp_path_factory.mktemp("world"), robots=(HUMAN,), dynamic=(load,), timeStep=0.004))
     ros.avatar_log = ros.start(["rosrun", "operator_node", "avatar_node.py", "_max_joint_speed:=4.0"])
     ros.start(["rosrun", "operator_node", "segment_forces_node.py"])
     with publishing("/mvn/segments", PoseArray) as publisher:
@@ -129,9 +130,17 @@ def test_what_makes_no_sense_is_refused_and_named(avatar):
     follow(avatar, {}, (0.0, 0.0, 0.93), lambda: targets.messages, "it follows what makes sense")
 
 
-def test_the_command_prints_a_body_and_refuses_a_giant(ros_master):
+def test_the_command_measures_who_is_in_the_suit(avatar):
+    """Somebody of 1.75 m, whatever height the command is told."""
     program = find_executable("operator_node", "human_urdf.py")
-    done = subprocess.run([program, "--height", "1.6", "--mass", "55"], capture_output=True, text=True, timeout=60)
-    assert done.returncode == 0 and "A person of 1.6 m and 55 kg" in done.stdout
-    done = subprocess.run([program, "--height", "16"], capture_output=True, text=True, timeout=60)
-    assert done.returncode == 1 and done.stderr == "human_urdf: height: expected 0.5 to 2.5 m, got 16\n"
+    command = [program, "--height", "1.8", "--mass", "55", "--measure", "/mvn/segments"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+
+    def has_ended() -> bool:
+        avatar.send(message({}))
+        return process.poll() is not None
+
+    wait_until(has_ended, "it has measured")
+    printed, _ = process.communicate()
+    assert process.returncode == 0 and "A person of 1.8 m and 55 kg" in printed
+    assert urdf_offsets("printed", printed) == pytest.approx(segment_offsets(HEIGHT_M), abs=1e-5)

@@ -36,7 +36,7 @@ def sleeve_at(cuff: np.ndarray) -> np.ndarray:
 
 def test_a_person_of_chance_is_dressed():
     """Faster than people would like, so that the test is short; `./rpbi bench dressing` has 20 of them."""
-    found = run_trial(0, speed=0.25)
+    found = run_trial(0, speed=0.3)
     assert found.is_dressed and found.past_elbow_m == pytest.approx(0.1, abs=0.02)
     assert 0.0 < found.peak_force_n < FORCE_LIMIT_N
 

@@ -20,7 +20,6 @@ from operator_node.avatar.parameters import AvatarParameters
 from operator_node.avatar.retargeting import AvatarPose, Place, Retargeting
 from operator_node.avatar.urdf_offsets import urdf_offsets
 from operator_node.mvn.segments import SegmentFrame
-from operator_node.ros.stamps import stamp
 
 from .messages import frame_in
 
@@ -72,9 +71,9 @@ class AvatarNode:
                 self._warn(rospy.resolve_name(SEGMENTS_TOPIC), f"message refused: {error}")
 
     def _follow(self, frame: SegmentFrame) -> None:
-        now = stamp()
+        now = rospy.Time.now()
         if now <= self._last_stamp:
-            return  # simulated time stands still
+            return  # simulated time stands still, or has not begun: TF with wall time would hide all that comes later
         if self._hinges is None and time.monotonic() - self._began_s < START_PATIENCE_S:
             return
         if self._begins or self._retargeting is None:
