@@ -95,6 +95,8 @@ def main() -> int:
     parser.add_argument("--speed", type=float, default=SPEED, help="of the sleeve [m/s]")
     parser.add_argument("--out", type=Path, help="file for the outcomes, as JSON")
     arguments = parser.parse_args()
+    if not (arguments.force_limit > 0.0 and arguments.speed > 0.0):
+        parser.error("--force-limit and --speed: expected numbers above 0")
     outcomes = {}
     for seed in arguments.seeds:
         outcomes[seed] = found = run_trial(seed, arguments.force_limit, arguments.speed)
