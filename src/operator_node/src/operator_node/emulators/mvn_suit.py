@@ -1,5 +1,6 @@
 """`mvn_emulator.py`: streams people who walk and reach, as MVN's network streamer does."""
 
+import argparse
 import random
 import struct
 import sys
@@ -15,6 +16,7 @@ from operator_node.mvn.segments import SEGMENTS
 from operator_node.mvn.sender import send, sender_arguments, without_ros_arguments
 from operator_node.mvn.skeleton import BONES, inverse, multiply
 
+from .arm_held_out import ArmHeldOut
 from .walking_person import WalkingPerson
 
 KINDS = (1, 2, 12, 13, 20, 21, 22, 24, 25)
@@ -43,7 +45,7 @@ class Suit:
     def __init__(
         self,
         person: int,
-        moves: WalkingPerson,
+        moves: WalkingPerson | ArmHeldOut,
         kinds: Sequence[int] = (2,),
         items: int = 255,
         noise_rad: float = NOISE_RAD,
@@ -196,6 +198,7 @@ def main() -> int:
     parser.add_argument("--people", type=int, default=1, help="how many, 1 to 8")
     parser.add_argument("--height", type=float, default=1.75, help="how tall the first one is [m], 1 to 2.5")
     parser.add_argument("--speed", type=float, default=0.4, help="how fast they walk [heights/s], 0 to 0.6; 0 stands")
+    parser.add_argument("--arm-held-out", action="store_true", help="they stand and hold out the right arm instead")
     parser.add_argument("--no-reach", action="store_true", help="arms do not reach")
     parser.add_argument(
         "--t-pose", type=float, default=3.0, metavar="S", help="for how long they stand in a T-pose first"
@@ -218,13 +221,7 @@ def main() -> int:
     suits = [
         Suit(
             person,
-            WalkingPerson(
-                options.height * (1.0 - 0.03 * person),
-                options.speed,
-                t_pose_s=options.t_pose,
-                start=(0.0, -APART_M * person),
-                reach=not options.no_reach,
-            ),
+            _person(options, person),
             options.kinds,
             options.items,
             hz=options.hz,
@@ -250,6 +247,14 @@ def main() -> int:
     done = ", ".join(f"{count} {what}" for what, count in sorted(network.done.items()))
     print(f"datagrams: {done or 'none'}", flush=True)
     return 0
+
+
+def _person(options: argparse.Namespace, number: int) -> WalkingPerson | ArmHeldOut:
+    """Returns one of the people; each stands beside the last and is a little smaller."""
+    height_m, start = options.height * (1.0 - 0.03 * number), (0.0, -APART_M * number)
+    if options.arm_held_out:
+        return ArmHeldOut(height_m, options.seed, start, options.t_pose)
+    return WalkingPerson(height_m, options.speed, t_pose_s=options.t_pose, start=start, reach=not options.no_reach)
 
 
 def _until(seconds: float, samples: Iterator[tuple[float, list[bytes]]]) -> Iterator[tuple[float, list[bytes]]]:
