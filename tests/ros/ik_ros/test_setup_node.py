@@ -30,7 +30,8 @@ def target(ros):
     def send(pose: Pose = TARGET) -> None:
         broadcaster.sendTransform(transform("foot", "target", pose, rospy.Time.from_sec(rospy.get_time())))
 
-    return send
+    yield send
+    broadcaster.pub_tf.unregister()
 
 
 def hear(problems, target, condition, what):

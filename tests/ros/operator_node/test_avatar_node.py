@@ -15,7 +15,6 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from worlds import box
 
-from custom_ros_tools.ros.tf_interface import TfInterface
 from operator_node.avatar.anthropometry import segment_offsets
 from operator_node.avatar.forward import segment_frame
 from operator_node.avatar.urdf_offsets import urdf_offsets
@@ -85,15 +84,14 @@ def test_what_it_carries_is_felt_by_its_forearm(avatar):
     assert not any(others)
 
 
-def test_the_avatar_does_what_the_person_does_and_never_jumps(avatar):
+def test_the_avatar_does_what_the_person_does_and_never_jumps(avatar, own_tf):
     states = avatar.listen("rpbi/human/joint_states", JointState)
     targets = avatar.listen("rpbi/human/joint_states/target", JointState)
-    tf = TfInterface()
     place = (0.3, 0.2, 0.93)
 
     def is_there() -> bool:
         position = dict(zip(states.messages[-1].name, states.messages[-1].position)) if states.messages else {}
-        base, _ = tf.get_tf("rpbi/world", "rpbi/human/Pelvis")
+        base, _ = own_tf.get_tf("rpbi/world", "rpbi/human/Pelvis")
         near = base is not None and math.dist(base, place) < 1e-3
         return near and abs(position.get(HINGE, 9.0) - 1.2) < 2e-3
 

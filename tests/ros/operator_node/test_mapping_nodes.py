@@ -97,13 +97,14 @@ class TestScaleNode:
     def test_message_that_cannot_be_mapped_is_refused_and_ends_the_signal(self, ros, joy, signals):
         rosout = Rosout(ros)
         told = "/joy: message refused: expected at least 2 axes (axes_idx has 1), got 1"
-        for round_number, axes in enumerate(([1.0], [1.0, math.nan]), 1):
+        for axes in ([1.0], [1.0, math.nan]):
             send(joy, signals, [0.0, 1.0], (0.5, 0.0))
+            before = zeros(signals)  # the end of the last test's signal may have come here
             for _ in range(20):
                 joy.publish(Joy(axes=axes))
-            wait_until(lambda: zeros(signals) == round_number, "the signal ends")  # noqa: B023 (it waits here)
+            wait_until(lambda: zeros(signals) > before, "the signal ends")  # noqa: B023 (it waits here)
         rosout.wait_for([told])
-        assert zeros(signals) == 2 and all(math.isfinite(value) for each in data(signals) for value in each)
+        assert zeros(signals) == before + 1 and all(math.isfinite(value) for each in data(signals) for value in each)
         assert [log.msg for log in rosout.logs("message refused")] == [told], "one warning in 5 s, of 40 messages"
 
 

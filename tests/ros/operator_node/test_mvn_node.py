@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import deque
 from io import BytesIO
 
 import genpy
@@ -125,12 +126,11 @@ def _frame(poses, like: SegmentFrame) -> SegmentFrame:
 
 
 def _status(topics, message, frames):
-    """Returns the values of the newest diagnostics if they have a message, and tell of so many frames."""
-    for array in topics["/diagnostics"].messages[-1:]:
-        for status in array.status:
-            if status.name.endswith("stream") and status.message.startswith(message):
-                values = {each.key: each.value for each in status.values}
-                return values if values["frames"] == frames else None
+    """Returns the values of the newest diagnostics of the stream if they have a message, and tell of so many frames."""
+    told = (each for array in topics["/diagnostics"].messages for each in array.status if each.name.endswith("stream"))
+    for status in deque(told, maxlen=1):
+        values = {each.key: each.value for each in status.values}
+        return values if status.message.startswith(message) and values["frames"] == frames else None
     return None
 
 

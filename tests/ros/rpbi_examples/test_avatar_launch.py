@@ -8,19 +8,17 @@ import socket
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
 
-from custom_ros_tools.ros.tf_interface import TfInterface
 
-
-def test_the_avatar_walks(ros):
+def test_the_avatar_walks(ros, own_tf):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     ros.start(["roslaunch", "rpbi_examples", "avatar.launch", "headless:=true", f"port:={port}"])
-    states, tf = ros.listen("rpbi/human/joint_states", JointState), TfInterface()
+    states = ros.listen("rpbi/human/joint_states", JointState)
     bends: list[float] = []
 
     def walks() -> bool:
-        position, _ = tf.get_tf("rpbi/world", "rpbi/human/Pelvis")
+        position, _ = own_tf.get_tf("rpbi/world", "rpbi/human/Pelvis")
         if position is None or not states.messages:
             return False
         newest = dict(zip(states.messages[-1].name, states.messages[-1].position))

@@ -26,6 +26,7 @@ from operator_node.mvn.receiver import Silence
 from operator_node.mvn.segments import SegmentFrame
 from operator_node.mvn.stream import CenterOfMass, JointAngles, Message, PersonInfo
 from operator_node.ros.devices.topics import DeviceTopics
+from operator_node.ros.stamps import has_begun
 from operator_node.ros.stamps import stamp as present_stamp
 from rpbi.ros.publishers.topics import FastTopic
 
@@ -71,6 +72,8 @@ class MvnTopics(DeviceTopics):
         for event in reading.events:
             stamp = present_stamp()
             if isinstance(event, SegmentFrame):
+                if not has_begun():
+                    continue
                 self._person(event.person).publish_frame(event, stamp)
             elif isinstance(event, Finding):
                 self._found[event.subject] = stamp, event.message
