@@ -2,6 +2,7 @@
 
 import threading
 import time
+from collections import deque
 from pathlib import Path
 
 import rospy
@@ -21,6 +22,8 @@ SENSOR = "rpbi/kuka_lwr/force_torque_sensor_mount/ft_sensor"
 WORLD, TOOL, TARGET = "rpbi/world", "rpbi/kuka_lwr/end_effector_ball", "rpbi/target"
 SAMPLE_HZ = 100.0
 PLOT_S = 0.25
+KEPT_FORCES = 250
+"""Half a second of the sensor."""
 SHOWN_S = 20.0
 """So much of the past is in the window [s]."""
 LEFT_S = 2.0
@@ -36,7 +39,8 @@ class Watch:
         self._folder = Path(rospy.get_param("~working_directory", "."), rospy.get_param("~output", "."))
         self._is_scripted = rospy.get_param("~device", "") == "scripted"
         self._press = self._new_press()
-        self._measured_n = self._felt_n = self._handle_z = 0.0
+        self._measured: deque[tuple[float, float]] = deque(maxlen=KEPT_FORCES)
+        self._felt_n = self._handle_z = 0.0
         self._start_s = time.monotonic()
         self._over = threading.Event()
         self._failure = ""
@@ -72,8 +76,9 @@ class Watch:
         return Press(*(rospy.get_param(f"~{key}") for key in ("stiffness", "force_scale", "touch_height")))
 
     def _measure(self, message: WrenchStamped) -> None:
-        self._measured_n = -message.wrench.force.z  # the sensor's z axis points down
-        self._reading.publish(Float64(self._measured_n))
+        measured_n = -message.wrench.force.z  # the sensor's z axis points down
+        self._measured.append((message.header.stamp.to_sec(), measured_n))
+        self._reading.publish(Float64(measured_n))
 
     def _feel(self, message: WrenchStamped) -> None:
         self._felt_n = message.wrench.force.z
@@ -87,11 +92,14 @@ class Watch:
 
     def _sample(self) -> None:
         target, tool = (self._tf.get_tf_msg(WORLD, frame) for frame in (TARGET, TOOL))
-        if target is None or tool is None or self._over.is_set():
+        if target is None or tool is None or not self._measured or self._over.is_set():
             return
+        tool_s = tool.header.stamp.to_sec()
+        # of the moment of the tool's pose: on a busy machine the newest of either may be of another one
+        measured_n = min(self._measured.copy(), key=lambda each: abs(each[0] - tool_s))[1]
         target_z, tool_z = target.transform.translation.z, tool.transform.translation.z
         time_s = time.monotonic() - self._start_s
-        self._press.add(Sample(time_s, self._handle_z, target_z, tool_z, self._measured_n, self._felt_n))
+        self._press.add(Sample(time_s, self._handle_z, target_z, tool_z, measured_n, self._felt_n))
         if self._press.is_over or (self._is_scripted and time.monotonic() - self._connected_s > LEFT_S):
             press, self._press = self._press, self._new_press()
             self._finish(press)
