@@ -21,7 +21,7 @@ from operator_node.haptics.controller import ForceFeedbackConfig, HapticControll
 from operator_node.haptics.coupling import Mode
 from operator_node.haptics.device import HapticConfig, HapticReading
 from operator_node.haptics.hand import Hand
-from operator_node.haptics.vectors import Vector
+from rpbi.geometry import Vector
 
 SET_UPS = "PASSIVITY_SET_UPS"
 """Environment variable: how many random set-ups to try in place of 1,000."""

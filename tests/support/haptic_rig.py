@@ -7,7 +7,8 @@ from collections.abc import Callable
 from operator_node.haptics.controller import ForceFeedbackConfig, HapticController
 from operator_node.haptics.device import HapticConfig, HapticReading
 from operator_node.haptics.hand import Hand
-from operator_node.haptics.vectors import ZERO, Vector
+from operator_node.haptics.vectors import ZERO
+from rpbi.geometry import Vector
 
 DT_S = 0.001
 DEVICE = HapticConfig(max_force_n=10.0, workspace_m=0.1)

@@ -142,7 +142,7 @@ def test_mapping_of_another_package_and_a_node_that_ends_leaves_a_zero_signal(ro
 def test_operator_node_of_a_user_in_the_manner_of_the_release(ros, signals):
     rosout = Rosout(ros)
     rospy.set_param("/operator_node", {"config": {"gain": 2.0}, "start_on_init": True})
-    node = ros.start_program("dead_zone.py")
+    node = ros.start_program("polar_node.py")
     with publishing("joy", Joy) as joy:
         send(joy, signals, [0.0, 0.5], (1.0, math.pi / 2.0))
         joy.publish(Joy(axes=[0.0, 0.5], buttons=[1]))

@@ -11,21 +11,7 @@ import pytest
 from custom_ros_tools.errors import ConfigError, UnknownNameError
 from operator_node.lookup import make_mapping
 from operator_node.mappings import MAPPINGS
-from operator_node.mappings.mapping import AxesConfig, Mapping
-
-
-class DeadZone(Mapping):
-    """A mapping of another package: one axis, 0 near its middle."""
-
-    Config = AxesConfig
-    size = 1
-
-    def __init__(self, config: AxesConfig) -> None:
-        self._config = config
-
-    def map(self, axes):
-        (axis,) = self._config.pick(axes)
-        return (axis if abs(axis) > 0.1 else 0.0,)
+from operator_node.mappings.mapping import Mapping
 
 
 def made(name: str, **options) -> Mapping:
@@ -55,7 +41,7 @@ def test_isometric_is_scale_times_min_n_1_over_n_times_the_axes():
     assert math.hypot(*made("scale", axes_idx=[1, 0, 2], scale=0.4).map([1.0, 1.0, -1.0])) > 0.6, "scale is otherwise"
 
 
-@pytest.mark.parametrize("name", [*MAPPINGS, f"{__name__}:DeadZone"])
+@pytest.mark.parametrize("name", [*MAPPINGS, "dead_zone:DeadZone"])
 class TestEveryMapping:
     def test_axes_at_rest_are_a_zero_signal_of_its_size(self, name):
         mapping = made(name, axes_idx=[1])

@@ -15,7 +15,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.legacy.server import serve
 
 from operator_node.haptics.hand import Hand, Press
-from operator_node.haptics.vectors import ZERO, Vector, plus
+from operator_node.haptics.vectors import ZERO
+from rpbi.geometry import Vector, plus
 
 DEVICE_ID = "04BA"
 CONTINUED_S = 0.02

@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 
-from .vectors import ZERO, Vector, minus, norm, plus, scaled
+from rpbi.geometry import Vector, minus, plus, scaled
+
+from .vectors import ZERO, norm
 
 
 class Clutch:
@@ -66,7 +68,7 @@ class Target:
         wanted = self.limited((way[0] * self._scale[0], way[1] * self._scale[1], way[2] * self._scale[2]))
         left = minus(wanted, self.way)
         far, most = norm(left), self._max_speed * dt_s
-        self.way = wanted if far <= most else plus(self.way, scaled(left, most / far))
+        self.way = wanted if far <= most else plus(self.way, scaled(most / far, left))
         return self.way
 
     def limited(self, way: Vector) -> Vector:

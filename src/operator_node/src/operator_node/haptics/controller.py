@@ -8,6 +8,7 @@ from typing import NamedTuple
 from pydantic import Field, model_validator
 
 from custom_ros_tools.schema import ConfigModel, Count, KeyedError, NonNegative, Positive, Vec3
+from rpbi.geometry import Vector, minus, plus, scaled
 
 from .clutch import Clutch, Target
 from .coupling import Coupling, Mode, stiffest_n_per_m
@@ -15,7 +16,7 @@ from .device import HapticConfig, HapticReading, ReadingError
 from .limiter import ForceLimiter
 from .passivity import PassivityController
 from .readings import ReadingCheck
-from .vectors import ZERO, Vector, minus, plus, scaled, turned
+from .vectors import ZERO, turned
 
 SILENCE_S = 0.02
 """So long after anybody falls silent there is no force any more [s]."""
@@ -196,7 +197,7 @@ class HapticController:
             self._velocity = ZERO
             dt_s = self._period_s
         self.passivity.observe(step)
-        velocity = ZERO if was_away else scaled(step, 1.0 / dt_s)  # as the passivity controller expects it
+        velocity = ZERO if was_away else scaled(1.0 / dt_s, step)  # as the passivity controller expects it
         self._velocity = reading.velocity if reading.velocity is not None else self._smoothed(velocity, dt_s)
         self._position, self._seen_s = position, now_s
         self._engage(position, reading.buttons, now_s)
@@ -231,4 +232,4 @@ class HapticController:
 
     def _smoothed(self, velocity: Vector, dt_s: float) -> Vector:
         share = dt_s / (SMOOTHING_S + dt_s)
-        return plus(scaled(self._velocity, 1.0 - share), scaled(velocity, share))
+        return plus(scaled(1.0 - share, self._velocity), scaled(share, velocity))

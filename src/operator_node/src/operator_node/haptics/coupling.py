@@ -2,7 +2,9 @@
 
 from typing import Literal, NamedTuple
 
-from .vectors import ZERO, Vector, minus, scaled
+from rpbi.geometry import Vector, minus, scaled
+
+from .vectors import ZERO
 
 Mode = Literal["wrench", "coupling"]
 
@@ -64,7 +66,7 @@ class Coupling:
         """Takes what the simulator says, finite and in the axes of the device; another thread may call it."""
         last, rate = self._last, ZERO
         if self._mode == "coupling" and last is not None and last.arrived_s < now_s < last.arrived_s + self._expiry_s:
-            rate = scaled(minus(value, last.value), 1.0 / (now_s - last.arrived_s))
+            rate = scaled(1.0 / (now_s - last.arrived_s), minus(value, last.value))
         self._last = ToolSample(value, rate, now_s, delay_s)
 
     def forget(self) -> None:

@@ -7,10 +7,7 @@ from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, NonNegative, Positive, PositiveMetres
 from operator_node.device import DeviceError
-
-from .vectors import Vector
-
-Quaternion = tuple[float, float, float, float]
+from rpbi.geometry import Quaternion, Vector
 
 
 class HapticReading(NamedTuple):

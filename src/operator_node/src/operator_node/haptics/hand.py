@@ -2,7 +2,9 @@
 
 from typing import NamedTuple
 
-from .vectors import ZERO, Vector, minus, scaled, within
+from rpbi.geometry import Vector, minus, scaled
+
+from .vectors import ZERO, within
 
 
 class Hand:
@@ -39,7 +41,7 @@ class Hand:
             dt_s: For how long [s].
         """
         pull = within(
-            minus(scaled(minus(wanted, self.position), self._stiffness), scaled(self.velocity, self._damping)),
+            minus(scaled(self._stiffness, minus(wanted, self.position)), scaled(self._damping, self.velocity)),
             self._max_force_n,
         )
         k = dt_s / self._mass

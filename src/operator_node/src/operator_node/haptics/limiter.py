@@ -2,7 +2,9 @@
 
 import math
 
-from .vectors import ZERO, Vector, dot, norm, scaled
+from rpbi.geometry import Vector, dot, scaled
+
+from .vectors import ZERO, norm
 
 
 class ForceLimiter:
@@ -35,7 +37,7 @@ class ForceLimiter:
             return ZERO
         before = max(dot(self._last, force) / length, 0.0)
         most = min(self._max_force_n, before + self._slew * dt_s)
-        self._last = force if length <= most else scaled(force, most / length)
+        self._last = force if length <= most else scaled(most / length, force)
         return self._last
 
     def note(self, force: Vector) -> None:

@@ -1,6 +1,8 @@
 """Time-domain passivity: the device never gives out more energy than the person has put in."""
 
-from .vectors import ZERO, Vector, dot, norm, scaled
+from rpbi.geometry import Vector, dot, scaled
+
+from .vectors import ZERO, norm
 
 MOST_DAMPING = 30.0
 """Largest gain of the controller's damper [N s/m]."""
@@ -105,6 +107,6 @@ class PassivityController:
             worst_j = (dot(force, velocity) + norm(force) * self._unforeseen) * self._period_s
             if worst_j > left_j:
                 self.interventions += 1
-                force = scaled(force, left_j / worst_j)
+                force = scaled(left_j / worst_j, force)
         self._held, self._was_cut = force, False
         return force

@@ -3,8 +3,10 @@
 import itertools
 import math
 
-from .device import HapticConfig, HapticReading, Quaternion, ReadingError
-from .vectors import ZERO, Vector, minus, norm, plus, scaled
+from rpbi.geometry import Quaternion, Vector, minus, plus, scaled
+
+from .device import HapticConfig, HapticReading, ReadingError
+from .vectors import ZERO, norm
 
 FARTHEST = 3.0
 """Readings beyond this many times the workspace are refused."""
@@ -127,7 +129,7 @@ class ReadingCheck:
             self._begin_window()
             return
         self._window_s += dt_s
-        self._moved, self._claimed = plus(self._moved, way), plus(self._claimed, scaled(velocity, dt_s))
+        self._moved, self._claimed = plus(self._moved, way), plus(self._claimed, scaled(dt_s, velocity))
         if self._window_s < WINDOW_S:
             return
         moved, claimed = self._moved, self._claimed
@@ -158,7 +160,7 @@ def _likely(moved: Vector, claimed: Vector) -> str:
 
 
 def _in_mm(way: Vector) -> str:
-    return "({:.0f}, {:.0f}, {:.0f}) mm".format(*scaled(way, 1e3))
+    return "({:.0f}, {:.0f}, {:.0f}) mm".format(*scaled(1e3, way))
 
 
 def _angle(a: Quaternion, b: Quaternion) -> float:

@@ -4,7 +4,8 @@ import time
 
 from operator_node.haptics.device import HapticDevice, HapticReading
 from operator_node.haptics.hand import Hand
-from operator_node.haptics.vectors import ZERO, Vector
+from operator_node.haptics.vectors import ZERO
+from rpbi.geometry import Vector
 
 STEP_S = 0.001
 LONGEST_S = 0.05

@@ -13,8 +13,9 @@ from pydantic import Field
 from custom_ros_tools.errors import MissingDependency
 from custom_ros_tools.schema import Positive, PositiveMetres, Text, Vec3
 from operator_node.device import DeviceError
-from operator_node.haptics.device import HapticConfig, HapticDevice, HapticReading, Quaternion, ReadingError
-from operator_node.haptics.vectors import ZERO, Vector, minus, norm
+from operator_node.haptics.device import HapticConfig, HapticDevice, HapticReading, ReadingError
+from operator_node.haptics.vectors import ZERO, norm
+from rpbi.geometry import Quaternion, Vector, minus
 
 try:
     from websockets.exceptions import WebSocketException

@@ -7,7 +7,7 @@ from pydantic import Field
 from custom_ros_tools.schema import Count, Metres, NonNegative, Positive, PositiveMetres
 from operator_node.haptics.device import DeviceEnded, HapticConfig, HapticReading
 from operator_node.haptics.hand import Hand, Press
-from operator_node.haptics.vectors import Vector
+from rpbi.geometry import Vector
 
 from .emulated import EmulatedDevice
 

@@ -13,7 +13,8 @@ from pydantic import Field
 from custom_ros_tools.schema import Positive, PositiveMetres
 from operator_node.device import DeviceError
 from operator_node.haptics.device import DeviceEnded, HapticConfig, HapticReading
-from operator_node.haptics.vectors import ZERO, Vector, within
+from operator_node.haptics.vectors import ZERO, within
+from rpbi.geometry import Vector
 
 from .emulated import EmulatedDevice
 

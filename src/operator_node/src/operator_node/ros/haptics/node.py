@@ -35,8 +35,9 @@ from operator_node.haptics.device import HapticDevice
 from operator_node.haptics.devices import HAPTIC_DEVICES
 from operator_node.haptics.loop import HZ, HapticLoop
 from operator_node.haptics.node_config import HapticNodeConfig
-from operator_node.haptics.vectors import ZERO, Vector, minus, plus, rotated
+from operator_node.haptics.vectors import ZERO
 from operator_node.msg import HapticState
+from rpbi.geometry import Vector, minus, plus, rotated
 
 QUEUE_SIZE = 10
 TOOL_HZ = 500.0
@@ -65,7 +66,7 @@ class HapticNode:
         self._start: tuple[Vector, tuple[float, ...]] | None = None
         self._tool_stamp: rospy.Time | None = None
         self._frame = ""
-        self._rotation: tuple[float, ...] | None = NO_ROTATION
+        self._rotation: tuple[float, float, float, float] | None = NO_ROTATION
         self._sent: Snapshot | None = None
         self._samples, self._samples_s = 0, time.monotonic()
         self._buffer = tf2_ros.Buffer(rospy.Duration.from_sec(TF_CACHE_S), debug=False)
@@ -129,7 +130,7 @@ class HapticNode:
             self._frame, self._rotation = message.header.frame_id, None if message.header.frame_id else NO_ROTATION
             self._look_up()
         if (rotation := self._rotation) is not None:
-            self.controller.take_wrench(rotated((f.x, f.y, f.z), rotation), now_s, _age_s(message.header.stamp))
+            self.controller.take_wrench(rotated(rotation, (f.x, f.y, f.z)), now_s, _age_s(message.header.stamp))
 
     def _look_up(self) -> None:
         """Asks TF how the frame of the force is turned."""
@@ -138,7 +139,8 @@ class HapticNode:
             return
         try:
             found = self._buffer.lookup_transform(self._config.parent_frame_id, frame, rospy.Time(0))
-            self._rotation = tuple(quat_in(found.transform).tolist())
+            x, y, z, w = quat_in(found.transform).tolist()
+            self._rotation = x, y, z, w
         except (tf2_ros.TransformException, ValueError) as error:
             self._warn("haptics/wrench", f"refused, since its frame '{frame}' is not known: {error}")
 

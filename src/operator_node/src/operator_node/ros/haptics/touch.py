@@ -14,7 +14,8 @@ from tf2_msgs.msg import TFMessage
 from custom_ros_tools.schema import Hz, Name, Positive, PositiveMetres, Text, Vec3
 from operator_node.device import DeviceError
 from operator_node.haptics.device import HapticConfig, HapticDevice, HapticReading, ReadingError
-from operator_node.haptics.vectors import ZERO, Vector, minus, scaled
+from operator_node.haptics.vectors import ZERO
+from rpbi.geometry import Vector, minus, scaled
 
 PATIENCE_S = 1.0
 """After so long without a state the driver counts as gone [s]."""
@@ -135,8 +136,8 @@ class TouchDevice(HapticDevice):
         """Takes a state in axes x right, y forward, z up."""
         p, v, q = message.pose.position, message.velocity, message.pose.orientation
         unit_m = self.config.metres_per_unit
-        x, y, z = minus(scaled((p.x, p.y, p.z), unit_m), self.config.centre)
-        self._put((y, -x, z), scaled((v.y, -v.x, v.z), unit_m), (q.y, -q.x, q.z, q.w))
+        x, y, z = minus(scaled(unit_m, (p.x, p.y, p.z)), self.config.centre)
+        self._put((y, -x, z), scaled(unit_m, (v.y, -v.x, v.z)), (q.y, -q.x, q.z, q.w))
 
     def _take_buttons(self, message: OmniButtonEvent) -> None:
         self._buttons = int(bool(message.grey_button)), int(bool(message.white_button))

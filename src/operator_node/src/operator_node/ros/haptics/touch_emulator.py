@@ -12,7 +12,8 @@ from tf2_msgs.msg import TFMessage
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
 from operator_node.haptics.hand import Hand, Press
-from operator_node.haptics.vectors import ZERO, Vector
+from operator_node.haptics.vectors import ZERO
+from rpbi.geometry import Vector
 
 STEP_S = 0.001
 
