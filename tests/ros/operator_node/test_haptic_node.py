@@ -62,7 +62,9 @@ def test_haply_moves_a_frame_and_is_sent_forces_that_end_when_the_simulator_stop
     )
     twist, tf = ros.listen("/haptics/twist", TwistStamped), ros.listen("/tf", TFMessage)
     options = {"url": f"ws://localhost:{haply.port}"}
-    _, state = start_haptic_node(ros, "haply", options, target_frame_id="target", energy_allowance_j=0.1)
+    _, state = start_haptic_node(
+        ros, "haply", options, target_frame_id="target", energy_allowance_j=0.1, energy_refill_w=0.1
+    )
     wrenches = Wrenches(ros, 2.0)
     wait_until(lambda: max(map(abs, haply.force)) > 1.0, "the hand feels the force, by the key that the service knows")
     wait_until(lambda: min(each.pose.position.z for each in pose.wait_for()) < -0.02, "the handle goes down")
@@ -113,7 +115,7 @@ def test_touch_is_sent_zero_when_the_simulator_stops_and_when_the_node_ends(ros)
     rospy.set_param("/touch_emulator", {"depth": 0.03})
     ros.start(["rosrun", "operator_node", "touch_emulator.py"])
     felt = ros.listen("/phantom/felt", Vector3)
-    process, state = start_haptic_node(ros, "touch", {}, energy_allowance_j=0.1)
+    process, state = start_haptic_node(ros, "touch", {}, energy_allowance_j=0.1, energy_refill_w=0.1)
     joy = ros.listen("/joy", Joy)
     wrenches = Wrenches(ros, 2.0)
     wait_until(lambda: felt.messages and felt.messages[-1].z > 1.0, "the hand feels the force")
@@ -162,7 +164,7 @@ def is_open(device: TouchDevice) -> bool:
 
 def test_switched_off_there_is_no_device_and_wrong_forces_are_refused(ros):
     options = {"depth_m": 0.02, "wait_s": 30.0}
-    process, state = start_haptic_node(ros, "scripted", options, energy_allowance_j=0.1)
+    process, state = start_haptic_node(ros, "scripted", options, energy_allowance_j=0.1, energy_refill_w=0.1)
     force = ros.listen("/haptics/force", WrenchStamped)
     with publishing("/haptics/wrench", WrenchStamped) as wrench:
         bad = WrenchStamped()

@@ -12,18 +12,17 @@ from mvn_stream import HZ, T_POSE, WALKER, assert_same, broken_datagram, suit, t
 
 from operator_node.emulators.mvn_suit import KINDS, BadNetwork
 from operator_node.mvn import packets
-from operator_node.mvn.segments import SEGMENTS, SegmentFrame
-from operator_node.mvn.stream import (
-    LONG_GONE,
-    MOST_LATE,
+from operator_node.mvn.segments import (
+    SEGMENTS,
     CenterOfMass,
     JointAngles,
     Motion,
     PersonInfo,
-    StreamDecoder,
+    SegmentFrame,
     TimeCode,
     TPose,
 )
+from operator_node.mvn.stream import LONG_GONE, MOST_LATE, StreamDecoder
 
 FUZZED = 100_000
 """How many broken datagrams are tried."""

@@ -3,8 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any, cast
 
-from custom_ros_tools.errors import ConfigError, Problem
-from custom_ros_tools.plugins import find_in_table
+from custom_ros_tools.plugins import configured_class
 from custom_ros_tools.schema import ConfigModel
 
 from .device import Device
@@ -24,7 +23,7 @@ def device_class(name: str) -> type[Device]:
         MissingDependency: If it needs a library that is not installed.
         ConfigError: If another package has no such class, or its module cannot be imported.
     """
-    return cast(type[Device], _find(name, Device, DEVICES, "device"))
+    return cast(type[Device], configured_class(name, Device, DEVICES, "device"))
 
 
 def make_device(name: str, data: Mapping[str, Any], file: str = "~") -> Device:
@@ -47,13 +46,6 @@ def make_device(name: str, data: Mapping[str, Any], file: str = "~") -> Device:
 
 def make_mapping(name: str, data: Mapping[str, Any], file: str = "~config") -> AxesMapping:
     """Makes a mapping; for the arguments and what it raises see `make_device`, with the table `MAPPINGS`."""
-    kind = cast(type[AxesMapping], _find(name, AxesMapping, MAPPINGS, "mapping"))
+    kind = cast(type[AxesMapping], configured_class(name, AxesMapping, MAPPINGS, "mapping"))
     make = cast(Callable[[ConfigModel], AxesMapping], kind)
     return make(kind.Config.parse(data, file))
-
-
-def _find(name: str, base: type, table: Mapping[str, str], kind: str) -> Any:
-    try:
-        return find_in_table(name, base, table, kind)
-    except ValueError as error:
-        raise ConfigError([Problem("", "", f"{kind} '{name}': {error}")]) from error

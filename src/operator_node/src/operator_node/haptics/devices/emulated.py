@@ -1,6 +1,7 @@
 """What devices without hardware share: a hand on a handle, which the force moves as well."""
 
 import time
+from abc import abstractmethod
 
 from operator_node.haptics.device import HapticDevice, HapticReading
 from operator_node.haptics.hand import Hand
@@ -18,9 +19,9 @@ class EmulatedDevice(HapticDevice):
     hand: Hand
     buttons: tuple[int, ...] = ()
 
+    @abstractmethod
     def wanted(self, time_s: float) -> Vector:
         """Returns where the hand wants the handle, some time after `open` [m]."""
-        raise NotImplementedError
 
     def open(self) -> None:
         """Takes hold of the handle, at rest in the middle."""

@@ -23,8 +23,7 @@ from operator_node.devices.mvn import Mvn
 from operator_node.mvn.checks import Finding
 from operator_node.mvn.node_config import MvnTopicsConfig
 from operator_node.mvn.receiver import Silence
-from operator_node.mvn.segments import SegmentFrame
-from operator_node.mvn.stream import CenterOfMass, JointAngles, Message, PersonInfo
+from operator_node.mvn.segments import CenterOfMass, JointAngles, Message, PersonInfo, SegmentFrame
 from operator_node.ros.devices.topics import DeviceTopics
 from operator_node.ros.stamps import has_begun
 from operator_node.ros.stamps import stamp as present_stamp

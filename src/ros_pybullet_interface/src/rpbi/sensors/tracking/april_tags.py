@@ -22,7 +22,7 @@ from custom_ros_tools.schema import (
     Text,
     optional,
 )
-from rpbi.geometry import Pose, Vector, dot, minus, rotated
+from rpbi.geometry import Pose, Vector, dot, plus, rotated
 from rpbi.samples import AprilTagsSample, SeenTag
 from rpbi.sensors.rgbd import RgbdSensor
 from rpbi.sensors.sensor import BodySensor, SensedWorld
@@ -170,5 +170,4 @@ class AprilTagsSensor(BodySensor):
 def _corners(pose: Pose, size: float) -> list[Vector]:
     half = size / 2.0
     square: tuple[Vector, ...] = ((-half, -half, 0.0), (half, -half, 0.0), (half, half, 0.0), (-half, half, 0.0))
-    origin = minus((0.0, 0.0, 0.0), pose.position)
-    return [minus(rotated(pose.quat_xyzw, corner), origin) for corner in square]
+    return [plus(pose.position, rotated(pose.quat_xyzw, corner)) for corner in square]
