@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import os
 from collections.abc import Generator
 from pathlib import Path
@@ -19,6 +20,25 @@ QUICK_FOLDERS = ("unit", "sim")
 
 EXTRA_OF = {"pinocchio": "ik", "daqp": "ik", "casadi": "mpc", "cv2": "tags"}
 """Extra that has a module."""
+
+
+STUCK_S = 700.0
+"""After so long a test that its time-out cannot end, since it is stuck outside of Python, ends its worker [s]."""
+STDERR = pytest.StashKey[int]()
+"""Where the stacks of a stuck worker go."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Keeps a way out to the terminal that no test captures."""
+    config.stash[STDERR] = os.dup(2)
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, None, None]:
+    """Has a run that is stuck end with where, instead of never."""
+    faulthandler.dump_traceback_later(STUCK_S, exit=True, file=item.config.stash[STDERR])
+    yield
+    faulthandler.cancel_dump_traceback_later()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
