@@ -11,9 +11,10 @@ from omni_msgs.msg import OmniButtonEvent, OmniFeedback, OmniState
 from pydantic import Field
 from tf2_msgs.msg import TFMessage
 
+from custom_ros_tools.ros.lifecycle.run_node import init_node
 from custom_ros_tools.schema import Hz, Name, Positive, PositiveMetres, Text, Vec3
 from operator_node.device import DeviceError
-from operator_node.haptics.device import HapticConfig, HapticDevice, HapticReading, ReadingError
+from operator_node.haptics.device import DeviceEnded, HapticConfig, HapticDevice, HapticReading, ReadingError
 from operator_node.haptics.vectors import ZERO
 from rpbi.geometry import Vector, minus, scaled
 
@@ -22,6 +23,9 @@ PATIENCE_S = 1.0
 GOODBYES, GOODBYE_S = 30, 0.01
 """So often zero is sent at the end, and so far apart: the driver holds the last force for ever, and rospy's own thread
 needs the time to send."""
+
+LONGEST_LEAVE_S = 2.0
+ENDED = "its ROS node was shut down"
 
 
 class TouchConfig(HapticConfig):
@@ -40,7 +44,11 @@ class TouchConfig(HapticConfig):
 
 
 class TouchDevice(HapticDevice):
-    """States and forces are topics; the newest state counts."""
+    """States and forces are topics; the newest state counts.
+
+    It makes the process that it is in a ROS node, if that is none yet. So it is the loop's process that speaks with the
+    driver, and sends it zero, also when the haptic node has gone.
+    """
 
     Config = TouchConfig
     config: TouchConfig
@@ -53,13 +61,21 @@ class TouchDevice(HapticDevice):
         self._velocity: Vector | None = None
         self._seen_s = self._sent_s = 0.0
         self._force: rospy.Publisher | None = None
+        self._is_leaving, self._closed = False, threading.Event()
+        self._closed.set()
 
     def open(self) -> None:
         """Subscribes, and waits for the first state.
 
         Raises:
             DeviceError: If none comes.
+            DeviceEnded: If ROS has shut the node down.
         """
+        if rospy.is_shutdown():
+            raise DeviceEnded("touch", ENDED)
+        if not rospy.core.is_initialized():
+            init_node("haptic_device", {"operator_node"}, ros_time=False)
+            rospy.on_shutdown(self._leave)
         name = self.config.name
         if self.config.driver == "omni":
             self._subscribers = [
@@ -73,6 +89,7 @@ class TouchDevice(HapticDevice):
                 rospy.Subscriber(f"{name}/twist", TwistStamped, self._take_twist, queue_size=1, tcp_nodelay=True),
             ]
             self._force = rospy.Publisher(f"{name}/cmd_force", Wrench, queue_size=1, tcp_nodelay=True)
+        self._closed.clear()
         self._seen_s = opened_s = time.monotonic()
         while self._newest is None:
             if time.monotonic() - opened_s > PATIENCE_S or rospy.is_shutdown():
@@ -85,8 +102,11 @@ class TouchDevice(HapticDevice):
 
         Raises:
             DeviceError: If none has come for long.
+            DeviceEnded: If ROS shuts the node down.
             ReadingError: If it is not made of finite numbers.
         """
+        if self._is_leaving:
+            raise DeviceEnded("touch", ENDED)
         with self._lock:
             reading, self._newest = self._newest, None
         if reading is None:
@@ -115,6 +135,12 @@ class TouchDevice(HapticDevice):
         for each in (*self._subscribers, self._force):
             each.unregister()
         self._force, self._newest = None, None
+        self._closed.set()
+
+    def _leave(self) -> None:
+        """Has zero sent before ROS shuts the node down."""
+        self._is_leaving = True
+        self._closed.wait(LONGEST_LEAVE_S)
 
     def _publish(self, force: Vector) -> None:
         assert self._force is not None
