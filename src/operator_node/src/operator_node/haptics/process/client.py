@@ -18,6 +18,8 @@ from .link import Link
 from .messages import Orders, Report, Setup, Told
 
 _log = logging.getLogger(__name__)
+SAY_S = 0.02
+"""So often the loop is told something, be it the same again: it notices by that when the node stands still [s]."""
 LONGEST_CLOSE_S = 5.0
 STABLE_AFTER_S = 10.0
 MOST_FAILURES = 3
@@ -43,6 +45,8 @@ class LoopClient:
 
     def __init__(self, setup: Setup, take: Callable[[Report], None], arguments: Sequence[str] = ()) -> None:
         self._setup, self._take, self._arguments = setup, take, arguments
+        self._device = setup.device(setup.options)  # never opened here
+        self._device.silence()
         self.report, self.failure = Report(), ""
         self.ended = threading.Event()
         self._orders, self._lock = setup.orders, threading.Lock()
@@ -85,11 +89,6 @@ class LoopClient:
         with self._lock:
             self._send(self._orders._replace(tool=Told(way, time.monotonic(), delay_s)))
 
-    def say_again(self) -> None:
-        """Says what is known, so that the loop knows that the node lives; call it often."""
-        with self._lock:
-            self._send(self._orders)
-
     def close(self) -> None:
         """Ends the process, with zero force before."""
         self.stop()
@@ -103,7 +102,7 @@ class LoopClient:
             self._process.wait()
 
     def _send(self, orders: Orders) -> None:
-        self._orders = orders
+        self._orders, self._said_s = orders, time.monotonic()
         self._link.send(orders)
 
     def _start(self) -> None:
@@ -117,7 +116,7 @@ class LoopClient:
                 start_new_session=True,
                 env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
             )
-        self._started_s = time.monotonic()
+        self._started_s = self._said_s = time.monotonic()
         self._link = Link(ours)
         self._link.send(self._setup._replace(orders=self._orders))
 
@@ -125,13 +124,17 @@ class LoopClient:
         """Hands reports on, and starts the process again when it has ended, until the client is closed."""
         failures = 0
         while True:
-            self._link.wait()
+            self._link.wait(SAY_S)
+            if time.monotonic() - self._said_s > SAY_S:
+                with self._lock:
+                    self._send(self._orders)
             for report in self._link.receive():
                 self._hand_on(report)
             if not self._link.is_closed:
                 continue
             if self._is_closing:
                 return
+            self._device.silence()
             code = self._process.wait()
             how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
             trouble = f"the process of its loop ended with {how}"

@@ -16,7 +16,7 @@ from rpbi.geometry import Pose, Quaternion, minus, rotated
 TOOL_HZ = 500.0
 """How often TF is asked for the tool."""
 LOOK_HZ = 50.0
-"""How often TF is asked how the sensor is turned, and the loop is told that the node lives."""
+"""How often TF is asked how the sensor is turned."""
 TF_CACHE_S = 2.0
 NO_ROTATION: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
@@ -55,7 +55,6 @@ class ToolFeed:
             self._loop.take_wrench(rotated(rotation, (f.x, f.y, f.z)), _age_s(message.header.stamp))
 
     def _look(self) -> None:
-        self._loop.say_again()
         if self.start is None and (found := self._tool()) is not None:
             self.start, _ = found
         self._look_up_sensor()

@@ -82,13 +82,12 @@ class TouchDevice(HapticDevice):
                 rospy.Subscriber(f"{name}/state", OmniState, self._take_state, queue_size=1, tcp_nodelay=True),
                 rospy.Subscriber(f"{name}/button", OmniButtonEvent, self._take_buttons, queue_size=10),
             ]
-            self._force = rospy.Publisher(f"{name}/force_feedback", OmniFeedback, queue_size=1, tcp_nodelay=True)
         else:
             self._subscribers = [
                 rospy.Subscriber("/tf", TFMessage, self._take_tf, queue_size=100, tcp_nodelay=True),
                 rospy.Subscriber(f"{name}/twist", TwistStamped, self._take_twist, queue_size=1, tcp_nodelay=True),
             ]
-            self._force = rospy.Publisher(f"{name}/cmd_force", Wrench, queue_size=1, tcp_nodelay=True)
+        self._force = self._publisher()
         self._closed.clear()
         self._seen_s = opened_s = time.monotonic()
         while self._newest is None:
@@ -129,13 +128,29 @@ class TouchDevice(HapticDevice):
         """Sends zero, and lets the topics be."""
         if self._force is None:
             return
-        for _ in range(GOODBYES):
-            self._publish(ZERO)
-            time.sleep(GOODBYE_S)
+        self._send_zeros()
         for each in (*self._subscribers, self._force):
             each.unregister()
         self._force, self._newest = None, None
         self._closed.set()
+
+    def silence(self) -> None:
+        """Sends zero, by a publisher that is there from the first time on and so has found the driver by the next."""
+        if self._force is None:
+            self._force = self._publisher()
+        self._send_zeros()
+
+    def _publisher(self) -> rospy.Publisher:
+        if self.config.driver == "omni":
+            topic, kind = "force_feedback", OmniFeedback
+        else:
+            topic, kind = "cmd_force", Wrench
+        return rospy.Publisher(f"{self.config.name}/{topic}", kind, queue_size=1, tcp_nodelay=True)
+
+    def _send_zeros(self) -> None:
+        for _ in range(GOODBYES):
+            self._publish(ZERO)
+            time.sleep(GOODBYE_S)
 
     def _leave(self) -> None:
         """Has zero sent before ROS shuts the node down."""
