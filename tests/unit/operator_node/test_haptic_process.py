@@ -9,10 +9,9 @@ import socket
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
-from ros_system import SUPPORT, support_on_path, wait_until
+from ros_system import SUPPORT, is_running, support_on_path, wait_until
 from writing_hand import forces_in, setup_of
 
 from operator_node.haptics.process import client as client_module
@@ -21,13 +20,6 @@ from operator_node.haptics.process.link import Link
 from operator_node.haptics.process.messages import Report
 
 SILENCE_S = 0.02
-
-
-def is_running(process_id: int) -> bool:
-    try:
-        return Path(f"/proc/{process_id}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
 
 
 def way(report: Report) -> float:
