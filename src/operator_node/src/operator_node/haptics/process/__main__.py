@@ -14,6 +14,9 @@ from operator_node.haptics.loop import HZ, HapticLoop
 from .link import Link
 from .messages import Setup
 
+SWITCH_S = 0.0002
+"""How long a device's own threads may keep Python to themselves [s]; Python's default is 5 ms."""
+
 
 def main() -> None:
     """Runs the loop until the node has gone, or has closed the link."""
@@ -25,6 +28,7 @@ def main() -> None:
     setup: Setup | None = next(link.receive(), None)
     if setup is None:
         return
+    sys.setswitchinterval(SWITCH_S)
     device = setup.device(setup.options)
     controller = HapticController(setup.config, setup.options, HZ, setup.way)
     gc.collect()

@@ -61,6 +61,14 @@ class LoopClient:
         """Id of the loop's process."""
         return self._process.pid
 
+    @property
+    def is_real_time(self) -> bool:
+        """Whether the process has real-time scheduling, which a system may refuse."""
+        try:
+            return os.sched_getscheduler(self.process_id) == os.SCHED_FIFO
+        except ProcessLookupError:
+            return False
+
     def start(self) -> None:
         """Has the device opened, and again when it has gone."""
         with self._lock:

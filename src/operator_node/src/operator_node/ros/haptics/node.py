@@ -80,7 +80,8 @@ class HapticNode:
         last, self._last, name = self._last, report, self._config.device
         if report.trouble != last.trouble:
             if report.is_connected:
-                rospy.loginfo("%s: connected", name)
+                but = "" if self.loop.is_real_time else ", but its loop has no real-time priority (ulimit -r is 0)"
+                rospy.loginfo("%s: connected%s", name, but)
             else:
                 rospy.logwarn("%s: %s; the force is zero", name, report.trouble.removeprefix(f"{name}: "))
         if report.fault:
