@@ -69,6 +69,14 @@ def stop_group(process: subprocess.Popen, timeout_s: float = 60.0) -> int:
         raise TimeoutError(f"{process.args} did not end on Ctrl-C") from None
 
 
+def is_running(process_id: int) -> bool:
+    """Tells whether there is such a process, and it has not ended."""
+    try:
+        return Path(f"/proc/{process_id}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
 class Listener:
     """Keeps the messages of a topic with the wall time of their arrival [s]."""
 

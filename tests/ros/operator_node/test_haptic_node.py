@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 import os
 import signal
+import subprocess
 import time
 
 import pytest
 import rospy
 from geometry_msgs.msg import PoseStamped, TwistStamped, Vector3, WrenchStamped
 from node_world import publishing
-from ros_system import RosSystem, wait_until
+from omni_msgs.msg import OmniFeedback
+from ros_system import RosSystem, is_running, wait_until
 from sensor_msgs.msg import Joy
 from std_srvs.srv import SetBool, Trigger
 from tf2_msgs.msg import TFMessage
@@ -112,6 +114,11 @@ def test_a_haply_that_hangs_up_is_back_by_itself_and_nothing_jumps(ros):
         there.stop()
 
 
+def loop_of(node: subprocess.Popen) -> int:
+    """Returns the id of the process in which the loop of a haptic node runs."""
+    return int(subprocess.check_output(["pgrep", "-P", str(node.pid), "-f", "operator_node.haptics.process"]))
+
+
 def test_touch_is_sent_zero_when_the_simulator_stops_and_when_the_node_ends(ros):
     """The driver holds the last force for ever, so that silence on our side would not do."""
     rospy.set_param("/touch_emulator", {"depth": 0.03})
@@ -130,6 +137,30 @@ def test_touch_is_sent_zero_when_the_simulator_stops_and_when_the_node_ends(ros)
     os.killpg(process.pid, signal.SIGINT)
     wait_until(lambda: process.poll() is not None, "the node ends")
     wait_until(lambda: felt.messages[-1].z == 0.0, "with zero")
+
+
+def test_touch_is_sent_zero_by_the_node_when_the_loop_is_killed_and_by_the_loop_when_the_node_is(ros):
+    rospy.set_param("/touch_emulator", {"depth": 0.03})
+    ros.start(["rosrun", "operator_node", "touch_emulator.py"])
+    felt, sent = ros.listen("/phantom/felt", Vector3), ros.listen("/phantom/force_feedback", OmniFeedback)
+    process, state = start_haptic_node(ros, "touch", {}, energy_allowance_j=0.1, energy_refill_w=0.1)
+    wait_until(lambda: "/haptic_node_device" in senders(sent.messages), "the loop is a node of its own")
+    before = len(sent.messages)
+    os.kill(loop_of(process), signal.SIGKILL)
+    wait_until(lambda: "/haptic_node" in senders(sent.messages[before:]), "the node sends in its stead")
+    wait_until(lambda: any("SIGKILL" in each.message and not each.connected for each in state.messages), "it is told")
+    wait_until(lambda: state.messages[-1].connected, "it is back by itself")
+    assert "touch: the process of its loop ended with signal SIGKILL, and is started again" in ros.output(process)
+    Wrenches(ros, 2.0)
+    wait_until(lambda: felt.messages[-1].z > 1.0, "the hand feels the force")
+    loop = loop_of(process)
+    os.killpg(process.pid, signal.SIGKILL)
+    wait_until(lambda: not is_running(loop), "the loop ends by itself")
+    wait_until(lambda: felt.messages[-1].z == 0.0, "with zero")
+
+
+def senders(messages: list[OmniFeedback]) -> set[str]:
+    return {each._connection_header["callerid"] for each in messages}
 
 
 def test_touch_by_the_papers_own_driver(ros):

@@ -9,6 +9,7 @@ import pytest
 from haptic_rig import DEVICE, DT_S, Rig
 
 from custom_ros_tools.errors import ConfigError
+from operator_node.haptics.controller import ForceFeedbackConfig, HapticController
 from operator_node.haptics.device import HapticReading
 from operator_node.haptics.devices.scripted import ScriptedConfig
 from operator_node.haptics.limiter import ForceLimiter
@@ -128,6 +129,15 @@ def test_axes_are_turned_there_and_back():
         rig.tick((0.02, 0.0, 0.0), (0.0, 1.0, 0.0))
     assert rig.controller.snapshot.way == pytest.approx((0.0, rig.hand.position[0], 0.0), abs=1e-6)
     assert rig.controller.force == pytest.approx((1.0, 0.0, 0.0), abs=1e-3)
+
+
+def test_a_controller_goes_on_from_where_another_got_to():
+    way = (0.02, 0.03, -0.04)
+    config = ForceFeedbackConfig(yaw_deg=90.0, motion_scale=(2.0, 0.5, 1.0))
+    controller = HapticController(config, DEVICE, 1.0 / DT_S, way)
+    for tick in range(100):
+        controller.tick(tick * DT_S, HapticReading((0.01, 0.0, 0.0)))
+    assert controller.snapshot.way == pytest.approx(way)
 
 
 @pytest.mark.parametrize(

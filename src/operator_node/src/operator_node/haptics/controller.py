@@ -69,6 +69,7 @@ class Snapshot(NamedTuple):
         way: Way of the target since the start, in the axes of the tool [m].
         force: What is sent to the device, in its axes [N].
         is_engaged: Whether handle and tool are coupled.
+        time_s: When the sample was read, by the monotonic clock [s].
     """
 
     reading: HapticReading
@@ -77,6 +78,7 @@ class Snapshot(NamedTuple):
     way: Vector
     force: Vector
     is_engaged: bool
+    time_s: float
 
 
 class HapticController:
@@ -88,6 +90,7 @@ class HapticController:
         config: What the person is to move and feel.
         device: What is known of the device.
         sample_hz: How often the device is read [Hz].
+        way: Where the target is, seen from its start, in the axes of the tool [m].
 
     Attributes:
         force: What is sent to the device now [N].
@@ -97,7 +100,7 @@ class HapticController:
         stiffness_bound: Up to this stiffness a wall is passive by itself [N/m].
     """
 
-    def __init__(self, config: ForceFeedbackConfig, device: HapticConfig, sample_hz: float) -> None:
+    def __init__(self, config: ForceFeedbackConfig, device: HapticConfig, sample_hz: float, way: Vector = ZERO) -> None:
         self._config, self._max_force_n = config, device.max_force_n
         self.coupling = Coupling(config.mode, config.stiffness, config.damping, config.force_scale, config.expiry_s)
         self.passivity = PassivityController(
@@ -115,6 +118,8 @@ class HapticController:
         self._clutch = Clutch(config.clutch_button)
         self._target = Target(config.motion_scale, config.way_low, config.way_high, config.max_target_speed)
         self._yaw = math.radians(config.yaw_deg)
+        self._target.way = way
+        self._clutch.set_way(self._handle_way(way))
         self._period_s = 1.0 / sample_hz
         self.force: Vector = ZERO
         self.fault = ""
@@ -127,21 +132,18 @@ class HapticController:
         self._is_reset = False
 
     def take_wrench(self, force: Vector, now_s: float, delay_s: float = 0.0) -> None:
-        """Takes the force on the tool, in its axes [N], finite; any thread may call it."""
+        """Takes the force on the tool, in its axes [N], finite."""
         if self._config.mode == "wrench":
             self.coupling.take(turned(force, -self._yaw), now_s, delay_s)
 
     def take_tool(self, way: Vector, now_s: float, delay_s: float = 0.0) -> None:
-        """Takes the way of the tool from where it was at the start, in its axes [m]; any thread may call it."""
+        """Takes the way of the tool from where it was at the start, in its axes [m]."""
         if self._config.mode == "coupling":
-            x, y, z = turned(way, -self._yaw)
-            a, b, c = self._config.motion_scale
-            own = x / a if a else 0.0, y / b if b else 0.0, z / c if c else 0.0
-            self._tool_way = own
-            self.coupling.take(own, now_s, delay_s)
+            self._tool_way = self._handle_way(way)
+            self.coupling.take(self._tool_way, now_s, delay_s)
 
     def reset(self) -> None:
-        """Has the target go back to its start, and the handle go on from there; any thread may call it."""
+        """Has the target go back to its start, and the handle go on from there."""
         self._is_reset = True
 
     def lose(self) -> None:
@@ -216,7 +218,13 @@ class HapticController:
             self._target.follow(turned(self._clutch.way, self._yaw), dt_s),
             self.force,
             self._clutch.engaged,
+            now_s,
         )
+
+    def _handle_way(self, way: Vector) -> Vector:
+        """Returns the way of the handle that leads to a way of the tool, 0 along axes that are held."""
+        x, y, z = (part / scale if scale else 0.0 for part, scale in zip(way, self._config.motion_scale))
+        return turned((x, y, z), -self._yaw)
 
     def _engage(self, position: Vector, buttons: tuple[int, ...], now_s: float) -> None:
         if self._is_reset:

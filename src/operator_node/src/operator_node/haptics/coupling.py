@@ -63,7 +63,7 @@ class Coupling:
         self._last: ToolSample | None = None
 
     def take(self, value: Vector, now_s: float, delay_s: float = 0.0) -> None:
-        """Takes what the simulator says, finite and in the axes of the device; another thread may call it."""
+        """Takes what the simulator says, finite and in the axes of the device."""
         last, rate = self._last, ZERO
         if self._mode == "coupling" and last is not None and last.arrived_s < now_s < last.arrived_s + self._expiry_s:
             rate = scaled(1.0 / (now_s - last.arrived_s), minus(value, last.value))

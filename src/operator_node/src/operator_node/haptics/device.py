@@ -49,7 +49,7 @@ class HapticConfig(ConfigModel):
 
 
 class HapticDevice(ABC):
-    """A haptic device, opened, read, sent forces and closed by one thread: that of the loop.
+    """A haptic device, opened, read, sent forces and closed by one thread: that of the loop, in a process of its own.
 
     It says only what the hardware says, in the axes of `HapticReading`. Checks, limits, retrying and zeros when
     something falls silent are up to the loop; a device itself lets no force outlive its expiry, as far as the hardware
@@ -99,6 +99,12 @@ class HapticDevice(ABC):
     @abstractmethod
     def close(self) -> None:
         """Lets go of the device, with zero force if that can be sent; it may be called at any time, and twice."""
+
+    def silence(self) -> None:  # noqa: B027 (most hardware ends forces by itself)
+        """Sends zero, for an instance that is not open, in the node's process: at first, and when the loop's has died.
+
+        It is for devices that would hold the last force for ever.
+        """
 
     def count(self, fault: str) -> None:
         """Counts what made no sense."""

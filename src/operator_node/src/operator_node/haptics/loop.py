@@ -1,27 +1,32 @@
-"""The loop between a haptic device and its controller: a thread of its own, at 1 kHz."""
+"""The loop between a haptic device and its controller, at 1 kHz, in a process that does nothing else.
+
+Python runs one thread at a time: beside those of a ROS node a tick would wait for whichever of them has the lock, and
+on a busy machine for the moment when that one is given a processor.
+"""
 
 import contextlib
 import logging
 import os
-import sys
-import threading
 import time
-from collections.abc import Callable
+from typing import Any
 
 from custom_ros_tools.errors import MissingDependency
 from operator_node.device import DeviceError
 
 from .controller import HapticController
 from .device import DeviceEnded, HapticDevice, ReadingError
+from .node_config import HapticNodeConfig
+from .process.link import Link
+from .process.messages import Orders, Report
 from .vectors import ZERO
 
 _log = logging.getLogger(__name__)
 HZ = 1000.0
 RETRY_S = 1.0
 """After so long a device that is not there is tried again [s]."""
-LONGEST_CLOSE_S = 5.0
-SWITCH_S = 0.0002
-"""How long other threads may keep Python to themselves [s]; Python's default is 5 ms."""
+NODE_SILENCE_S = 0.2
+"""After so long without a word from the node the handle moves nothing, and is engaged anew afterwards [s]. Forces end
+before that, since what the tool says comes from the node too."""
 
 
 class HapticLoop:
@@ -31,109 +36,133 @@ class HapticLoop:
     again when it is back.
 
     Args:
-        device: The device; it belongs to the loop's thread from now on.
+        device: The device; it belongs to the loop from now on.
         controller: What turns readings into forces.
-        expiry_s: How long a force counts when the loop falls silent [s].
-        tell: Called in the loop's thread with one line when the device comes, goes or ends.
-
-    Attributes:
-        is_connected: Whether the device is open.
-        trouble: Why it is not; empty if it is.
-        has_ended: Set when the person is done with the device, or a library is missing.
-        samples: How many readings there were.
-        lateness_s: The latest that a tick was; whoever reads it may set it to 0 [s].
+        config: How long a force counts when the loop falls silent, and how often is reported.
+        link: To the node.
+        orders: What the node wants so far.
     """
 
     def __init__(
         self,
         device: HapticDevice,
         controller: HapticController,
-        expiry_s: float,
-        tell: Callable[[str], None] = lambda _: None,
+        config: HapticNodeConfig,
+        link: Link,
+        orders: Orders = Orders(),  # noqa: B008 (a tuple)
     ) -> None:
-        self._device, self._controller, self._expiry_s, self._tell = device, controller, expiry_s, tell
-        self.is_connected, self.trouble = False, "not opened yet"
-        self.has_ended = threading.Event()
-        self.samples = 0
-        self.lateness_s = 0.0
-        self._stopping = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._device, self._controller, self._link, self._orders = device, controller, link, orders
+        self._expiry_s, self._report_s = config.expiry_s, 1.0 / config.hz
+        self._report = Report()
+        self._heard_s = self._reported_s = self._retry_at_s = time.monotonic()
+        self._samples, self._lateness_s = 0, 0.0
 
-    def start(self) -> None:
-        """Begins, also after `stop`."""
-        sys.setswitchinterval(SWITCH_S)
-        self._stopping.clear()
-        self._thread = threading.Thread(target=self._run, name="haptic loop", daemon=True)
-        self._thread.start()
+    def run(self) -> None:
+        """Has the device open while the node wants it, until the node has gone."""
+        _prefer_this_process()
+        while not self._link.is_closed:
+            self._listen()
+            if self._orders.switched != self._report.obeyed:
+                self._retry_at_s = 0.0
+                self._tell(obeyed=self._orders.switched)
+            self._tell_when_due()
+            if self._orders.is_on and not self._report.has_ended and time.monotonic() >= self._retry_at_s:
+                self._use_device()
+                self._retry_at_s = time.monotonic() + RETRY_S
+            else:
+                self._link.wait(self._report_s)
 
-    def stop(self) -> None:
-        """Sends zero force, closes the device and returns when that is done."""
-        if self._thread is not None:
-            self._stopping.set()
-            self._thread.join(LONGEST_CLOSE_S)
-            self._thread = None
-
-    def _run(self) -> None:
-        _prefer_this_thread()
-        while not self._stopping.is_set() and not self.has_ended.is_set():
-            try:
-                self._device.open()
-                self.is_connected, self.trouble = True, ""
-                self._tell("connected")
-                self._exchange()
-                trouble = "stopped"
-            except (DeviceEnded, MissingDependency) as error:
-                trouble = str(error)
-                self.has_ended.set()
-            except DeviceError as error:
-                trouble = str(error)
-            except Exception as error:  # of a device of somebody else's: people come before tracebacks
-                trouble = f"{type(error).__name__}: {error}"
-                _log.exception("the device failed")
-            self._close()
-            self._lose(trouble)
-            if not self.has_ended.is_set():
-                self._stopping.wait(RETRY_S)
-
-    def _close(self) -> None:
-        """Closes the device, with zero force before."""
-        self.is_connected = False
+    def _use_device(self) -> None:
+        """Has the device open until it goes, or the node wants otherwise."""
+        has_ended = False
+        try:
+            self._device.open()
+            self._tell(is_connected=True, trouble="")
+            self._exchange()
+            trouble = "stopped"
+        except (DeviceEnded, MissingDependency) as error:
+            trouble, has_ended = str(error), True
+        except DeviceError as error:
+            trouble = str(error)
+        except Exception as error:  # of a device of somebody else's: people come before tracebacks
+            trouble = f"{type(error).__name__}: {error}"
+            _log.exception("the device failed")
         self._controller.lose()
         with contextlib.suppress(Exception):  # it may have gone, or never been there; closing comes next in any case
             self._device.send(ZERO, time.monotonic())
         self._device.close()
-
-    def _lose(self, trouble: str) -> None:
-        if trouble != self.trouble:
-            self.trouble = trouble
-            self._tell(trouble)
+        self._tell(is_connected=False, trouble=trouble, has_ended=has_ended)
 
     def _exchange(self) -> None:
-        """Ticks until the loop is stopped or the device goes."""
+        """Ticks until the device goes, or the node wants otherwise."""
         device, controller, period_s = self._device, self._controller, 1.0 / HZ
         due_s = time.monotonic()
-        while not self._stopping.is_set():
+        while self._orders.switched == self._report.obeyed and not self._link.is_closed:
             now_s = time.monotonic()
+            self._listen()
             try:
                 reading = device.read()
             except ReadingError as error:
                 controller.refuse(error)
                 reading = None
             if reading is not None:
-                self.samples += 1
+                self._samples += 1
+            if now_s - self._heard_s > NODE_SILENCE_S:
+                reading = None
             device.send(controller.tick(now_s, reading), now_s + self._expiry_s)
+            self._tell_when_due()
             due_s += period_s
             left_s = due_s - time.monotonic()
             if left_s > 0.0:
                 time.sleep(left_s)
-                self.lateness_s = max(self.lateness_s, time.monotonic() - due_s)
+                self._lateness_s = max(self._lateness_s, time.monotonic() - due_s)
             else:
-                self.lateness_s = max(self.lateness_s, -left_s)
+                self._lateness_s = max(self._lateness_s, -left_s)
                 due_s -= left_s
 
+    def _listen(self) -> None:
+        """Takes what the node has said since the last time."""
+        orders, before, controller = self._link.newest(), self._orders, self._controller
+        if orders is None:
+            return
+        self._orders, self._heard_s = orders, time.monotonic()
+        if orders.resets != before.resets:
+            controller.reset()
+        if orders.wrench is not None and orders.wrench != before.wrench:
+            controller.take_wrench(*orders.wrench)
+        if orders.tool is not None and orders.tool != before.tool:
+            controller.take_tool(*orders.tool)
 
-def _prefer_this_thread() -> None:
-    """Asks for real-time scheduling of this thread; without the right to, it goes on as it is."""
+    def _tell_when_due(self) -> None:
+        if time.monotonic() - self._reported_s >= self._report_s:
+            self._tell()
+
+    def _tell(self, **changed: Any) -> None:
+        """Reports to the node how things are."""
+        controller, now_s = self._controller, time.monotonic()
+        faults = {**controller.faults, **self._device.faults}
+        if controller.not_finite:
+            faults["force not finite"] = controller.not_finite
+        self._reported_s = max(self._reported_s + self._report_s, now_s - self._report_s)
+        self._report = self._report._replace(
+            samples=self._samples,
+            lateness_s=self._lateness_s,
+            force=controller.force,
+            snapshot=controller.snapshot,
+            delay_s=controller.coupling.delay_s(now_s),
+            fault=controller.fault,
+            faults=faults,
+            energy_j=controller.passivity.energy_j,
+            energy_bound_j=controller.passivity.floor_j,
+            interventions=controller.passivity.interventions,
+            **changed,
+        )
+        if self._link.send(self._report):
+            self._lateness_s = 0.0
+
+
+def _prefer_this_process() -> None:
+    """Asks for real-time scheduling; without the right to, it goes on as it is."""
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
     except OSError:

@@ -3,6 +3,7 @@
 It is started with the number of a socket, the radius of the workspace [m] and the largest force [N].
 """
 
+import os
 import socket
 import struct
 import sys
@@ -142,6 +143,7 @@ class HandleWindow:
 def main() -> None:
     """Runs the program."""
     number, radius_m, max_force_n = sys.argv[1:]
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # not before all others, as the loop is
     HandleWindow(socket.socket(fileno=int(number)), float(radius_m), float(max_force_n)).run()
 
 

@@ -11,9 +11,10 @@ from omni_msgs.msg import OmniButtonEvent, OmniFeedback, OmniState
 from pydantic import Field
 from tf2_msgs.msg import TFMessage
 
+from custom_ros_tools.ros.lifecycle.run_node import init_node
 from custom_ros_tools.schema import Hz, Name, Positive, PositiveMetres, Text, Vec3
 from operator_node.device import DeviceError
-from operator_node.haptics.device import HapticConfig, HapticDevice, HapticReading, ReadingError
+from operator_node.haptics.device import DeviceEnded, HapticConfig, HapticDevice, HapticReading, ReadingError
 from operator_node.haptics.vectors import ZERO
 from rpbi.geometry import Vector, minus, scaled
 
@@ -22,6 +23,9 @@ PATIENCE_S = 1.0
 GOODBYES, GOODBYE_S = 30, 0.01
 """So often zero is sent at the end, and so far apart: the driver holds the last force for ever, and rospy's own thread
 needs the time to send."""
+
+LONGEST_LEAVE_S = 2.0
+ENDED = "its ROS node was shut down"
 
 
 class TouchConfig(HapticConfig):
@@ -40,7 +44,11 @@ class TouchConfig(HapticConfig):
 
 
 class TouchDevice(HapticDevice):
-    """States and forces are topics; the newest state counts."""
+    """States and forces are topics; the newest state counts.
+
+    It makes the process that it is in a ROS node, if that is none yet. So it is the loop's process that speaks with the
+    driver, and sends it zero, also when the haptic node has gone.
+    """
 
     Config = TouchConfig
     config: TouchConfig
@@ -53,26 +61,34 @@ class TouchDevice(HapticDevice):
         self._velocity: Vector | None = None
         self._seen_s = self._sent_s = 0.0
         self._force: rospy.Publisher | None = None
+        self._is_leaving, self._closed = False, threading.Event()
+        self._closed.set()
 
     def open(self) -> None:
         """Subscribes, and waits for the first state.
 
         Raises:
             DeviceError: If none comes.
+            DeviceEnded: If ROS has shut the node down.
         """
+        if rospy.is_shutdown():
+            raise DeviceEnded("touch", ENDED)
+        if not rospy.core.is_initialized():
+            init_node("haptic_device", {"operator_node"}, ros_time=False)
+            rospy.on_shutdown(self._leave)
         name = self.config.name
         if self.config.driver == "omni":
             self._subscribers = [
                 rospy.Subscriber(f"{name}/state", OmniState, self._take_state, queue_size=1, tcp_nodelay=True),
                 rospy.Subscriber(f"{name}/button", OmniButtonEvent, self._take_buttons, queue_size=10),
             ]
-            self._force = rospy.Publisher(f"{name}/force_feedback", OmniFeedback, queue_size=1, tcp_nodelay=True)
         else:
             self._subscribers = [
                 rospy.Subscriber("/tf", TFMessage, self._take_tf, queue_size=100, tcp_nodelay=True),
                 rospy.Subscriber(f"{name}/twist", TwistStamped, self._take_twist, queue_size=1, tcp_nodelay=True),
             ]
-            self._force = rospy.Publisher(f"{name}/cmd_force", Wrench, queue_size=1, tcp_nodelay=True)
+        self._force = self._publisher()
+        self._closed.clear()
         self._seen_s = opened_s = time.monotonic()
         while self._newest is None:
             if time.monotonic() - opened_s > PATIENCE_S or rospy.is_shutdown():
@@ -85,8 +101,11 @@ class TouchDevice(HapticDevice):
 
         Raises:
             DeviceError: If none has come for long.
+            DeviceEnded: If ROS shuts the node down.
             ReadingError: If it is not made of finite numbers.
         """
+        if self._is_leaving:
+            raise DeviceEnded("touch", ENDED)
         with self._lock:
             reading, self._newest = self._newest, None
         if reading is None:
@@ -109,12 +128,34 @@ class TouchDevice(HapticDevice):
         """Sends zero, and lets the topics be."""
         if self._force is None:
             return
-        for _ in range(GOODBYES):
-            self._publish(ZERO)
-            time.sleep(GOODBYE_S)
+        self._send_zeros()
         for each in (*self._subscribers, self._force):
             each.unregister()
         self._force, self._newest = None, None
+        self._closed.set()
+
+    def silence(self) -> None:
+        """Sends zero, by a publisher that is there from the first time on and so has found the driver by the next."""
+        if self._force is None:
+            self._force = self._publisher()
+        self._send_zeros()
+
+    def _publisher(self) -> rospy.Publisher:
+        if self.config.driver == "omni":
+            topic, kind = "force_feedback", OmniFeedback
+        else:
+            topic, kind = "cmd_force", Wrench
+        return rospy.Publisher(f"{self.config.name}/{topic}", kind, queue_size=1, tcp_nodelay=True)
+
+    def _send_zeros(self) -> None:
+        for _ in range(GOODBYES):
+            self._publish(ZERO)
+            time.sleep(GOODBYE_S)
+
+    def _leave(self) -> None:
+        """Has zero sent before ROS shuts the node down."""
+        self._is_leaving = True
+        self._closed.wait(LONGEST_LEAVE_S)
 
     def _publish(self, force: Vector) -> None:
         assert self._force is not None
