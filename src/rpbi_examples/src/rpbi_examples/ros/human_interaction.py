@@ -24,6 +24,8 @@ SAMPLE_HZ = 100.0
 PLOT_S = 0.25
 KEPT_FORCES = 250
 """Half a second of the sensor."""
+LARGEST_SHIFT_S = 0.005
+"""So far apart force and pose of a sample may be in time [s]."""
 SHOWN_S = 20.0
 """So much of the past is in the window [s]."""
 LEFT_S = 2.0
@@ -41,6 +43,7 @@ class Watch:
         self._press = self._new_press()
         self._measured: deque[tuple[float, float]] = deque(maxlen=KEPT_FORCES)
         self._felt_n = self._handle_z = 0.0
+        self._sampled_s = 0.0
         self._start_s = time.monotonic()
         self._over = threading.Event()
         self._failure = ""
@@ -91,24 +94,34 @@ class Watch:
             self._connected_s = time.monotonic()
 
     def _sample(self) -> None:
-        target, tool = (self._tf.get_tf_msg(WORLD, frame) for frame in (TARGET, TOOL))
-        if target is None or tool is None or not self._measured or self._over.is_set():
+        if self._over.is_set():
             return
-        tool_s = tool.header.stamp.to_sec()
-        # of the moment of the tool's pose: on a busy machine the newest of either may be of another one
-        measured_n = min(self._measured.copy(), key=lambda each: abs(each[0] - tool_s))[1]
-        target_z, tool_z = target.transform.translation.z, tool.transform.translation.z
-        time_s = time.monotonic() - self._start_s
-        self._press.add(Sample(time_s, self._handle_z, target_z, tool_z, measured_n, self._felt_n))
+        sample = self._present()
+        if sample is not None:
+            self._press.add(sample)
         if self._press.is_over or (self._is_scripted and time.monotonic() - self._connected_s > LEFT_S):
             press, self._press = self._press, self._new_press()
             self._finish(press)
+
+    def _present(self) -> Sample | None:
+        """Returns what there is, None if that is not known, or nothing has changed: then the simulator stands still."""
+        target, tool = (self._tf.get_tf_msg(WORLD, frame) for frame in (TARGET, TOOL))
+        if target is None or tool is None or not self._measured:
+            return None
+        tool_s = tool.header.stamp.to_sec()
+        # of the moment of the tool's pose: on a busy machine the newest of either may be of another one
+        stamp_s, measured_n = min(self._measured.copy(), key=lambda each: abs(each[0] - tool_s))
+        if tool_s == self._sampled_s or abs(stamp_s - tool_s) > LARGEST_SHIFT_S:
+            return None
+        self._sampled_s = tool_s
+        target_z, tool_z = target.transform.translation.z, tool.transform.translation.z
+        return Sample(time.monotonic() - self._start_s, self._handle_z, target_z, tool_z, measured_n, self._felt_n)
 
     def _finish(self, press: Press) -> None:
         press.write_table(self._folder / "human_interaction.csv")
         press.write_figure(self._folder / "human_interaction.png")
         report = press.report()
-        told = "pressed too shortly to tell how strongly" if report is None else str(report)
+        told = "pressed too shortly or unsteadily to tell how strongly" if report is None else str(report)
         rospy.loginfo("%s; see human_interaction.png and .csv in %s", told, self._folder.resolve())
         if report is not None and report.felt_error > LARGEST_ERROR:
             rospy.logwarn(
