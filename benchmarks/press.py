@@ -31,7 +31,8 @@ def run(quick: bool) -> list[Result]:
             output = press(ros, seed, ros.folder)
         found = STEADY.search(output)
         if not found:
-            print(f"{seed:>4}  no steady force:\n{output}", file=sys.stderr)
+            said = [line for line in output.splitlines() if "[FATAL]" in line or "Error" in line]
+            print(f"{seed:>4}  no steady force: {'; '.join(said) or output}", file=sys.stderr, flush=True)
             continue
         depth_mm, steady_n, predicted_n, felt_n, scaled_n = map(float, found.groups())
         errors.append(abs(steady_n - predicted_n) / predicted_n)
