@@ -77,7 +77,7 @@ def test_joy_is_repeated_with_new_stamps_until_input_ceases(ros):
         message.header.frame_id, message.header.stamp = "stick", rospy.Time(12)
         device.publish(message)
         out.wait_for(10)
-        device.publish(Joy(axes=[math.nan, 0.1], buttons=[1]))
+        device.publish(Joy(message.header, [math.nan, 0.1], [1]))
         wait_until(lambda: states(out)[-1] == ((0.0, 0.0), (0,)), "what is not finite ends it")
         device.publish(message)
         wait_until(lambda: states(out)[-1] == ((0.5, -1.0), (1,)), "what makes sense counts again")
