@@ -10,9 +10,10 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from functools import cache
+from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
-from xmlrpc.client import ServerProxy
+from xmlrpc.client import ServerProxy, Transport
 
 import rosgraph
 import roslib.packages
@@ -77,6 +78,15 @@ def is_running(process_id: int) -> bool:
         return False
 
 
+class LimitedTransport(Transport):
+    """Gives a node some time to answer; one that hangs counts as one that is not there."""
+
+    def make_connection(self, host: Any) -> HTTPConnection:
+        connection = super().make_connection(host)
+        connection.timeout = 20.0
+        return connection
+
+
 class Listener:
     """Keeps the messages of a topic with the wall time of their arrival [s]."""
 
@@ -106,7 +116,7 @@ class Listener:
         publishers = dict(master.getSystemState()[0]).get(self.topic, [])
 
         def sends_to_us(node: str) -> bool:
-            _, _, connections = ServerProxy(master.lookupNode(node)).getBusInfo(name)
+            _, _, connections = ServerProxy(master.lookupNode(node), LimitedTransport()).getBusInfo(name)
             return any((to, topic) == (name, self.topic) for _, to, _, _, topic, *_ in connections)
 
         return bool(publishers) and all(map(sends_to_us, publishers))

@@ -11,6 +11,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from PIL import ImageGrab
+from tries import tries
+
+PATIENCE_S = 60.0
 
 
 class Window(NamedTuple):
@@ -59,7 +62,8 @@ class Screen:
     def windows(self) -> list[Window]:
         """Returns all windows, those inside of others too."""
         line = re.compile(r'0x\w+ (?:"(.*)"|\(has no name\)): \(.*\) +(\d+)x(\d+)\S+ +\+(-?\d+)\+(-?\d+)')
-        while True:
+        found = []
+        for _ in tries("the screen tells its windows"):
             try:
                 found = line.findall(self.run("xwininfo", "-root", "-tree"))
                 break
@@ -68,11 +72,20 @@ class Screen:
         return [Window(title, int(x), int(y), int(w), int(h)) for title, w, h, x, y in found]
 
     def run(self, *command: str) -> str:
-        """Runs a program that talks to the screen and returns what it printed."""
+        """Runs a program that talks to the screen and returns what it printed.
+
+        Raises:
+            subprocess.TimeoutExpired: If it does not end, as one that waits for a window that does not come.
+        """
         environment = {**os.environ, **self.environment}
-        return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+        options = {"capture_output": True, "text": True, "check": True, "timeout": PATIENCE_S}
+        return subprocess.run(command, env=environment, **options).stdout
 
     def close(self) -> None:
         """Ends the server."""
         self._server.terminate()
-        self._server.wait()
+        try:
+            self._server.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self._server.kill()
+            self._server.wait()

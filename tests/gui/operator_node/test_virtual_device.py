@@ -74,6 +74,29 @@ def test_mouse_moves_the_handle_and_the_force_is_an_arrow(screen, device):
     wait_until(closed, "the device says that its window was closed")
 
 
+def test_a_handle_that_returns_goes_back_when_it_is_let_go(screen, monkeypatch):
+    monkeypatch.setenv("DISPLAY", screen.environment["DISPLAY"])
+    device = VirtualDevice(VirtualConfig(returns=True))
+    device.open()
+    try:
+        window = wait_until(lambda: find_window(screen), "the window is open")
+
+        def height() -> float:
+            reading = device.read()
+            return 0.0 if reading is None else reading.position[2]
+
+        x, y = window.x + MIDDLE_PX, window.y + MIDDLE_PX
+        screen.run("xdotool", "mousemove", str(x), str(y), "mousedown", "3", "mousemove", str(x), str(y - 60))
+        wait_until(lambda: height() > 0.025, "it is lifted")
+        screen.run("xdotool", "mouseup", "3")
+        wait_until(lambda: (r := device.read()) and abs(r.position[2]) < 1e-3, "it is back")
+        screen.run("xdotool", "click", "--repeat", "9", "4")
+        wait_until(lambda: height() > 0.01, "the wheel lifts it")
+        wait_until(lambda: (r := device.read()) and abs(r.position[2]) < 1e-3, "and lets it down")
+    finally:
+        device.close()
+
+
 def test_without_a_screen_it_says_so(monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     with pytest.raises(DeviceError, match="DISPLAY is not set"):

@@ -125,3 +125,13 @@ def test_6d_mouse_moves_the_arm(example, screen, follows, tmp_path):
         wait_until(lambda: cap.clients, "it is connected")
         follows(UP, lambda: cap.move(0, 300, 0), lambda: cap.move(0, 0, 0))
     cap.close()
+
+
+@all_devices
+def test_virtual_haptic_device_moves_the_arm(example, screen, follows):
+    with device(example, screen, "virtual"):
+        screen.run("xdotool", "search", "--sync", "--name", "Virtual haptic device", "windowraise")
+        for button, right, down, direction in (("1", 60, 0, RIGHT), ("1", 0, 60, -AWAY), ("3", 0, -60, UP)):
+            middle = ("search", "--name", "Virtual haptic device", "mousemove", "--window", "%1", "210", "210")
+            screen.run("xdotool", *middle, "mousedown", button, "mousemove_relative", "--", str(right), str(down))
+            follows(direction, nothing, lambda: screen.run("xdotool", "mouseup", button))  # noqa: B023 (called here)

@@ -77,9 +77,14 @@ def test_joy_is_repeated_with_new_stamps_until_input_ceases(ros):
         message.header.frame_id, message.header.stamp = "stick", rospy.Time(12)
         device.publish(message)
         out.wait_for(10)
+        device.publish(Joy(message.header, [math.nan, 0.1], [1]))
+        wait_until(lambda: states(out)[-1] == ((0.0, 0.0), (0,)), "what is not finite ends it")
+        device.publish(message)
+        wait_until(lambda: states(out)[-1] == ((0.5, -1.0), (1,)), "what makes sense counts again")
+        assert all(math.isfinite(sum(axes)) for axes, _ in states(out))
     wait_until(lambda: states(out)[-1] == ((0.0, 0.0), (0,)), "the device has gone")
-    assert states(out) == [((0.5, -1.0), (1,)), ((0.0, 0.0), (0,))]
-    assert [each.axes for each in out.messages].count((0.0, 0.0)) == 1
+    assert states(out) == [((0.5, -1.0), (1,)), ((0.0, 0.0), (0,))] * 2
+    assert [each.axes for each in out.messages].count((0.0, 0.0)) == 2, "one for each"
     assert out.stamps_ns == sorted(set(out.stamps_ns)) and out.stamps_ns[0] > 12e9
     assert {each.header.frame_id for each in out.messages} == {"stick"}
 

@@ -130,11 +130,11 @@ def test_bad_configuration_ends_the_node_with_what_is_wrong(ros):
 
 
 def test_mapping_of_another_package_and_a_node_that_ends_leaves_a_zero_signal(ros, signals):
-    node = start(ros, "mapping_node.py", "dead_zone:DeadZone", config={"axes_idx": [0]})
+    node = start(ros, "mapping_node.py", "cubed:Cubed", config={"axes_idx": [0]})
     assert switch(ros, True)[0]
     with publishing("joy", Joy) as joy:
-        send(joy, signals, [0.05], (0.0,))
-        send(joy, signals, [0.5], (0.5,))
+        send(joy, signals, [0.0], (0.0,))
+        send(joy, signals, [0.5], (0.125,))
         assert stop_group(node) == 0
         wait_until(lambda: zeros(signals) == 2, "it says zero")
 

@@ -8,6 +8,7 @@ import threading
 import pytest
 import rospy
 from ros_system import wait_until
+from tries import tries
 from worlds import write_world
 
 from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
@@ -47,8 +48,10 @@ def test_none_of_many_newcomers_at_once_is_lost(world, publisher):
     try:
         for thread in threads:
             thread.start()
-        while any(thread.is_alive() for thread in threads):
+        for _ in tries("all have come"):
             publisher.spin()
+            if not any(thread.is_alive() for thread in threads):
+                break
     finally:
         sys.setswitchinterval(interval_s)
     publisher.spin()
@@ -60,7 +63,7 @@ def test_who_was_slow_gets_the_rest_though_nothing_new_comes(world, publisher):
     got = set()
 
     def take(message):
-        reads.wait()
+        reads.wait(60.0)
         got.update(range(message.first, message.first + len(message.commands)))
 
     subscriber = rospy.Subscriber("/rpbi/commands", WorldCommands, take)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from xmlrpc.client import ServerProxy
 
 from node_world import main_config
-from ros_system import wait_until
+from ros_system import LimitedTransport, wait_until
 from worlds import FLOOR, iiwa
 
 from rpbi.ros.cameras.topics import camera_topics
@@ -88,7 +88,7 @@ def test_everybody_is_found_again_and_connections_last(ros, tmp_path, second_mas
 
 def _connected(master, topic):
     """Returns the connections to who listens to a topic of the simulator, as (number, node)."""
-    _, _, connections = ServerProxy(master.api.lookupNode(NODE)).getBusInfo("/tests")
+    _, _, connections = ServerProxy(master.api.lookupNode(NODE), LimitedTransport()).getBusInfo("/tests")
     return [(number, other) for number, other, way, _, name, *_ in connections if name == topic and way == "o"]
 
 

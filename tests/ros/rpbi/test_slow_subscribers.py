@@ -68,7 +68,7 @@ def test_who_was_slow_gets_the_rest_though_nothing_more_is_published(ros, tmp_pa
     reads, stamps, sizes = threading.Event(), [], []
 
     def take(message):
-        reads.wait()
+        reads.wait(60.0)
         stamps.append(message.header.stamp)
         sizes.append(len(message.points))
 

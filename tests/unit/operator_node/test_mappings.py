@@ -41,7 +41,16 @@ def test_isometric_is_scale_times_min_n_1_over_n_times_the_axes():
     assert math.hypot(*made("scale", axes_idx=[1, 0, 2], scale=0.4).map([1.0, 1.0, -1.0])) > 0.6, "scale is otherwise"
 
 
-@pytest.mark.parametrize("name", [*MAPPINGS, "dead_zone:DeadZone"])
+@pytest.mark.parametrize("name", MAPPINGS)
+def test_what_is_within_the_dead_zone_is_nothing_and_it_rises_to_the_same_end(name):
+    mapping = made(name, axes_idx=[1], dead_zone=0.2)
+    axes = (-1.0, -0.6, -0.2, -0.1, 0.0, 0.2, 0.21, 1.0)
+    assert [mapping.map([1.0, axis])[0] for axis in axes] == pytest.approx([-1.0, -0.5, 0, 0, 0, 0, 0.0125, 1.0])
+    with pytest.raises(ConfigError, match="dead_zone"):
+        made(name, axes_idx=[1], dead_zone=1.0)
+
+
+@pytest.mark.parametrize("name", [*MAPPINGS, "cubed:Cubed"])
 class TestEveryMapping:
     def test_axes_at_rest_are_a_zero_signal_of_its_size(self, name):
         mapping = made(name, axes_idx=[1])

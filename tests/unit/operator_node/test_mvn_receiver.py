@@ -8,6 +8,7 @@ import time
 import numpy as np
 import pytest
 from mvn_stream import HZ, T_POSE, WALKER, Sender, assert_same, suit, truth
+from tries import tries
 
 from custom_ros_tools.errors import InterfaceError
 from operator_node.device import DeviceError
@@ -41,7 +42,7 @@ def sender(mvn):
 
 def read_frame(device):
     """Returns the reading with the next frame, and the frame."""
-    while True:
+    for _ in tries("a frame comes"):
         reading = device.read(SOON_S)
         assert reading is not None, "no frame came"
         for event in reading.events:
@@ -97,8 +98,10 @@ def test_closed_and_opened_again_it_goes_on(mvn, sender):
 def test_what_is_refused_is_told_with_its_reason(mvn, sender):
     sender.send(b"", b"hello", b"MXTP05" + bytes(100))
     refused = []
-    while len(refused) < 3:
+    for _ in tries("all three are refused"):
         refused += mvn.read(SOON_S).refused
+        if len(refused) >= 3:
+            break
     assert [reason.partition(":")[0] for reason in refused] == ["shorter than a header"] * 2 + ["Unity's format"]
     assert mvn.counts["refused: too short"] == 2
 
@@ -259,8 +262,10 @@ class TestRecording:
             sender.send(*suit().datagrams(sample, sample / HZ))
             read_frame(mvn)
         sender.send(b"garbage")  # is kept as well: what came is what is played
-        while not mvn.counts["refused: too short"]:
+        for _ in tries("garbage is refused"):
             mvn.read(0.01)
+            if mvn.counts["refused: too short"]:
+                break
         assert mvn.receiver.stop_recording() == (path, 6)
         with pytest.raises(InterfaceError, match="nothing is being recorded"):
             mvn.receiver.stop_recording()
@@ -270,8 +275,10 @@ class TestRecording:
         recorded_s = [at for at, _ in read_recording(path)][-1]
         assert time.monotonic() - begin_s >= 2.0 * recorded_s
         frames: list[SegmentFrame] = []
-        while len(frames) < 5:
+        for _ in tries("all frames come"):
             frames += [event for event in mvn.read(SOON_S).events if isinstance(event, SegmentFrame)]
+            if len(frames) >= 5:
+                break
         for sample, frame in enumerate(frames):
             assert_same(frame, truth(sample, moves=WALKER))
 

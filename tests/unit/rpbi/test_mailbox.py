@@ -3,6 +3,7 @@
 import threading
 
 import pytest
+from tries import tries
 
 from rpbi.engine.mailbox import ClosedError, Mailbox
 
@@ -29,7 +30,7 @@ def test_a_request_is_made_by_whoever_runs_requests():
     assert not future.done()
     runner = threading.Thread(target=mailbox.run_requests)
     runner.start()
-    runner.join()
+    runner.join(60.0)
     assert future.result(0) == runner.ident
 
 
@@ -83,8 +84,10 @@ def test_many_threads_lose_no_request_and_keep_the_newest_value():
     threads = [threading.Thread(target=ask, args=(number,)) for number in range(4)]
     for thread in threads:
         thread.start()
-    while any(thread.is_alive() for thread in threads):
+    for _ in tries("all have asked"):
         mailbox.run_requests()
+        if not any(thread.is_alive() for thread in threads):
+            break
     mailbox.run_requests()
     assert len(made) == 4 * count
     taken = mailbox.take()

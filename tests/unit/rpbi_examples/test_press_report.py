@@ -41,6 +41,12 @@ def test_a_tool_that_never_touches_is_not_over():
     assert not press.is_over and press.report() is None
 
 
+def test_force_is_not_looked_at_where_the_simulator_stood_still():
+    press = pressed(0.01)
+    press.samples = [each for each in press.samples if each.time_s % 0.3 < 0.2]
+    assert press.report() is None
+
+
 def test_table_and_figure(tmp_path):
     press = pressed(0.01)
     press.write_table(tmp_path / "press.csv")

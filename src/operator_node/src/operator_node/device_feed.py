@@ -24,6 +24,12 @@ AT_REST = 0.1
 """So near its value at rest, an axis counts as let go."""
 MOST_READINGS = 1000
 """Readings that are put together into one at most, so that a device that never falls silent is heard all the same."""
+MOST_REASONS, OTHER_REASONS = 100, "other reasons"
+"""So many reasons are told apart: those of a device of somebody else's may have numbers in them."""
+MOST_POSTED = 1000
+"""Of what waits for a device that does not answer, the newest counts."""
+HELD_S = 5.0
+"""What has not been at rest for so long since the device was opened is warned of [s]."""
 logger = logging.getLogger(__name__)
 
 
@@ -43,7 +49,7 @@ class DeviceFeed:
 
     A device that is not there is looked for once a second. The first reading after it was found is one at rest, and
     each axis and button stays at rest until it has been there: what is held while a node starts, or a plug is put in,
-    moves nothing. When the device goes or is closed, the last reading is at rest, too.
+    moves nothing; `held` names it. When the device goes or is closed, the last reading is at rest, too.
 
     Readings that make no sense are counted, and the last good one counts on. Whatever a device raises, nothing but
     what is said at `step` gets out.
@@ -61,6 +67,7 @@ class DeviceFeed:
         published: Count of readings handed on.
         refused: Count of readings that were not, by reason.
         free_axes: Indices of the axes that have been at rest since the device was opened.
+        held: Names of axes and buttons that have not.
     """
 
     def __init__(self, name: str, device: Device, config: FeedConfig, publish: Callable[[Reading], None]) -> None:
@@ -70,13 +77,15 @@ class DeviceFeed:
         self._name, self._device, self._config, self._publish = name, device, config, publish
         self._last: Reading | None = None
         self.free_axes: set[int] = set()
+        self.held: tuple[str, ...] = ()
         self._free_buttons: set[int] = set()
+        self._held_warning_due_s = math.inf
         self._buttons: tuple[int, ...] = ()
         """As the device has them."""
         self._open_at_s = self._repeat_at_s = -math.inf
         self._is_absent = False
         self._warned_s: dict[str, float] = {}
-        self._posted: deque[Callable[[], None]] = deque()
+        self._posted: deque[Callable[[], None]] = deque(maxlen=MOST_POSTED)
         self._pause = threading.Event()
 
     def run(self, is_over: Callable[[], bool], period_s: float = 0.02) -> None:
@@ -104,7 +113,7 @@ class DeviceFeed:
             DeviceClosedError: If the person has closed the device; there was a last reading.
             MissingDependency: If the device needs a library that is not installed.
         """
-        while self._posted:
+        for _ in range(len(self._posted)):
             self._guarded(self._posted.popleft(), "posted")
         now_s = time.monotonic()
         if self.problem is not None:
@@ -128,6 +137,9 @@ class DeviceFeed:
             self._take(reading)
         if self._last is not None and time.monotonic() >= self._repeat_at_s:
             self._hand_on(self._last)
+        if self.held and time.monotonic() >= self._held_warning_due_s:
+            self._held_warning_due_s = math.inf
+            logger.warning("%s: %s", self._name, held_text(self.held))
 
     def post(self, action: Callable[[], None]) -> None:
         """Has the feed's thread do something with the device before its next reading; any thread may call this."""
@@ -160,6 +172,7 @@ class DeviceFeed:
         self.problem, self._is_absent = None, False
         self.free_axes.clear()
         self._free_buttons.clear()
+        self.held, self._held_warning_due_s = (), time.monotonic() + HELD_S
         self._last = None
         self._hand_on(self._resting())
 
@@ -176,7 +189,7 @@ class DeviceFeed:
         resting = self._resting()
         self._guarded(self._device.close, "close")
         self._hand_on(resting)
-        self._last = None
+        self._last, self.held = None, ()
 
     def _resting(self) -> Reading:
         device = self._device
@@ -192,7 +205,7 @@ class DeviceFeed:
 
     def _next(self, timeout_s: float) -> Reading | None:
         """Returns the next reading, and with it those that follow within the coalescing time."""
-        first = self._device.read(timeout_s)
+        first = self._read(timeout_s)
         if first is None or first.buttons != self._buttons:
             return first
         end_s = time.monotonic() + self._config.coalesce_interval
@@ -201,20 +214,31 @@ class DeviceFeed:
             left_s = end_s - time.monotonic()
             if left_s <= 0.0 or reading.buttons != first.buttons or events or refused:
                 break
-            newer = self._device.read(left_s)
+            newer = self._read(left_s)
             if newer is not None:
                 reading = newer
                 events += newer.events
                 refused += newer.refused
         return reading._replace(events=tuple(events), refused=tuple(refused))
 
+    def _read(self, timeout_s: float) -> Reading | None:
+        """Returns what the device says, None if that is nothing, or no reading at all."""
+        said = self._device.read(timeout_s)
+        if said is None:
+            return None
+        try:
+            return Reading(*map(tuple, said))
+        except TypeError:
+            self._refuse("it says what is no reading", f"got {said!r:.100}")
+            return None
+
     def _take(self, reading: Reading) -> None:
         for reason in reading.refused:
-            self._refuse(reason)
+            self._refuse(str(reason))
         self._buttons = reading.buttons
         problem = problem_of(reading, self._device.axes, self._device.buttons)
         if problem is not None:
-            self._refuse(problem)
+            self._refuse(problem, f"got axes {reading.axes}, buttons {reading.buttons}")
             return
         reading = self._from_rest(reading)
         if self._last is None or reading.events or reading[:2] != self._last[:2]:
@@ -232,6 +256,10 @@ class DeviceFeed:
             for index, (value, rest) in enumerate(zip(reading.axes, resting))
         )
         buttons = (int(value) if index in self._free_buttons else 0 for index, value in enumerate(reading.buttons))
+        parts = (("axis", self._device.axes, self.free_axes), ("button", self._device.buttons, self._free_buttons))
+        self.held = tuple(
+            f"{kind} '{name}'" for kind, names, free in parts for index, name in enumerate(names) if index not in free
+        )
         return reading._replace(axes=tuple(axes), buttons=tuple(buttons))
 
     def _hand_on(self, reading: Reading) -> None:
@@ -242,11 +270,13 @@ class DeviceFeed:
         self._publish(reading)
 
     def _refuse(self, reason: str, detail: str = "") -> None:
+        if reason not in self.refused and len(self.refused) >= MOST_REASONS:
+            reason, detail = OTHER_REASONS, f"{reason}; {detail}"
         self.refused[reason] += 1
         now_s = time.monotonic()
         if now_s - self._warned_s.get(reason, -math.inf) >= WARNING_PERIOD_S:
             self._warned_s[reason] = now_s
-            text = f"{reason} ({detail})" if detail else reason
+            text = f"{reason} ({detail:.300})" if detail else reason
             logger.warning("%s: refused: %s; %d so far", self._name, text, self.refused[reason])
 
     def _guarded(self, action: Callable[[], None], what: str) -> None:
@@ -254,6 +284,11 @@ class DeviceFeed:
             action()
         except Exception as error:
             self._refuse(f"it failed in {what}: {type(error).__name__}", cause_of(error))
+
+
+def held_text(held: Sequence[str]) -> str:
+    """Returns what to say of axes and buttons that have not been at rest since the device was opened."""
+    return f"{', '.join(held)} not at rest since it was opened; let go: until then it counts as if it were"
 
 
 def problem_of(reading: Reading, axes: Sequence[str], buttons: Sequence[str]) -> str | None:
@@ -271,11 +306,11 @@ def problem_of(reading: Reading, axes: Sequence[str], buttons: Sequence[str]) ->
     if len(reading.buttons) != len(buttons):
         return f"a reading of another number of buttons than the {len(buttons)} of the device"
     for name, value in zip(axes, reading.axes):
-        if not isinstance(value, Real) or not math.isfinite(value):
+        if not isinstance(value, Real) or value != value or abs(value) == math.inf:
             return f"axis '{name}' is not a finite number"
         if not -1.0 <= value <= 1.0:
             return f"axis '{name}' is outside [-1, 1]"
     for name, value in zip(buttons, reading.buttons):
-        if value not in (0, 1):
+        if not isinstance(value, Real) or value not in (0, 1):
             return f"button '{name}' is neither 0 nor 1"
     return None

@@ -14,6 +14,8 @@ RELEASED_S = 0.5
 """A press is over when the tool has not touched for so long [s]."""
 STEADY_S = 0.3
 """How long the force is looked at where it is steadiest [s]."""
+LONGEST_GAP_S = 0.05
+"""Without a sample for longer, the simulator stood still, and nothing tells how steady the force was [s]."""
 
 
 class Sample(NamedTuple):
@@ -105,10 +107,14 @@ class Press:
         deepest_m = max(map(self._depth_m, touching))
         windows, first = [], 0
         for last, sample in enumerate(touching):
+            if last and sample.time_s - touching[last - 1].time_s > LONGEST_GAP_S:
+                first = last
             while sample.time_s - touching[first].time_s > STEADY_S:
                 first += 1
-            if first and min(self._depth_m(each) for each in touching[first : last + 1]) > 0.5 * deepest_m:
-                windows.append(touching[first : last + 1])
+            window = touching[first : last + 1]
+            is_whole = sample.time_s - window[0].time_s > STEADY_S - LONGEST_GAP_S
+            if is_whole and min(map(self._depth_m, window)) > 0.5 * deepest_m:
+                windows.append(window)
         if not windows:
             return None
         steady = min(windows, key=_unsteadiness)

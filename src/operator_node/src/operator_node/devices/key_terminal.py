@@ -97,4 +97,4 @@ class KeyTerminal:
     def close(self) -> None:
         """Leaves the terminal as it was."""
         with contextlib.suppress(termios.error):
-            termios.tcsetattr(self._file, termios.TCSADRAIN, self._settings)
+            termios.tcsetattr(self._file, termios.TCSANOW, self._settings)  # it does not wait for output

@@ -196,6 +196,8 @@ class Spacenav(Device):
         self._refused_in_a_row = 0
         kind = packet[0]
         if kind == MOTION:
+            if max(map(abs, packet[1:7])) > self.config.full_scale:
+                self._refused.append("a motion beyond full_scale, which is cut off there")
             x, y, z, rx, ry, rz = (max(-1.0, min(1.0, each / self.config.full_scale)) for each in packet[1:7])
             self._motion = (z, -x + 0.0, y, rz, -rx + 0.0, ry)
             self._static_at_s = time.monotonic() + POLL_S * self.config.static_count_threshold

@@ -9,6 +9,7 @@ import json
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from typing import Any
 
 from websockets.exceptions import ConnectionClosed
@@ -22,6 +23,8 @@ DEVICE_ID = "04BA"
 CONTINUED_S = 0.02
 """A force is felt until the next message, at most for so long [s]."""
 STEP_S = 0.001
+PATIENCE_S = 20.0
+"""Beginning and ending take so long at most [s]."""
 
 
 class HaplyEmulator:
@@ -53,17 +56,28 @@ class HaplyEmulator:
         self._loop: asyncio.AbstractEventLoop | None = None
 
     def start(self) -> None:
-        """Serves in a thread of its own, until `stop`."""
-        ready = threading.Event()
-        self._thread = threading.Thread(target=lambda: asyncio.run(self.serve(ready.set)), daemon=True)
+        """Serves in a thread of its own, until `stop`.
+
+        Raises:
+            OSError: If it cannot listen, for instance because another program does on that port.
+        """
+        ready: Future[None] = Future()
+
+        def serve() -> None:
+            try:
+                asyncio.run(self.serve(lambda: ready.set_result(None)))
+            except OSError as error:
+                ready.set_exception(error)
+
+        self._thread = threading.Thread(target=serve, daemon=True)
         self._thread.start()
-        ready.wait()
+        ready.result(PATIENCE_S)
 
     def stop(self) -> None:
         """Hangs up, and serves no more."""
         if self._loop is not None:
             self._loop.call_soon_threadsafe(self._ended.set)
-            self._thread.join()
+            self._thread.join(PATIENCE_S)
             self._loop = None
 
     async def serve(self, ready: Callable[[], None] = lambda: None) -> None:

@@ -38,6 +38,8 @@ CONTINUED = 0x10000
 REFUSED = -1
 PERIOD_S = 0.01
 HOLD_S = 1.0
+PATIENCE_S = 5.0
+"""A client that has not read what it was sent for so long is dropped [s]."""
 
 
 class Client:
@@ -107,7 +109,7 @@ class SpacenavDaemon:
     def close(self) -> None:
         """Ends all connections."""
         os.write(self._wake_writer, b".")
-        self._thread.join()
+        self._thread.join(2.0 * PATIENCE_S)
         for client in self._clients:
             client.socket.close()
         self._listener.close()
@@ -126,17 +128,20 @@ class SpacenavDaemon:
                     if number in clients:
                         self._hear(clients[number])
                     else:
-                        self._clients.append(Client(self._listener.accept()[0]))
+                        connection = self._listener.accept()[0]
+                        connection.settimeout(PATIENCE_S)
+                        self._clients.append(Client(connection))
 
     def _hear(self, client: Client) -> None:
         received = b""
         with contextlib.suppress(OSError):
             received = client.socket.recv(4096)
         if not received:
-            self._drop(client)
+            client.socket.close()
+            self._clients.remove(client)
             return
         client.received += received
-        while client in self._clients and self._answer(client):
+        while self._answer(client):
             pass
 
     def _answer(self, client: Client) -> bool:
@@ -188,8 +193,9 @@ class SpacenavDaemon:
             self._drop(client)
 
     def _drop(self, client: Client) -> None:
-        client.socket.close()
-        self._clients = [each for each in self._clients if each is not client]
+        """Hangs up; the thread that serves, which may be waiting for the client, closes the connection then."""
+        with contextlib.suppress(OSError):
+            client.socket.shutdown(socket.SHUT_RDWR)
 
 
 def main() -> None:

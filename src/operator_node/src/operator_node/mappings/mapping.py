@@ -1,5 +1,6 @@
 """What every mapping is."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar
@@ -16,8 +17,12 @@ class AxesConfig(ConfigModel):
         min_length=1, description="Numbers of axes, from 0 on, in the order of the signal; one may come twice."
     )
 
+    dead_zone: float = Field(
+        0.0, ge=0.0, lt=1.0, description="How far an axis goes before it counts; from there it rises to 1 at its end."
+    )
+
     def pick(self, axes: Sequence[float]) -> list[float]:
-        """Returns the axes that count.
+        """Returns the axes that count, beyond their dead zone.
 
         Raises:
             ValueError: If there are too few.
@@ -25,7 +30,11 @@ class AxesConfig(ConfigModel):
         largest = max(self.axes_idx)
         if largest >= len(axes):
             raise ValueError(f"expected at least {largest + 1} axes (axes_idx has {largest}), got {len(axes)}")
-        return [axes[index] for index in self.axes_idx]
+        return [self._beyond(axes[index]) for index in self.axes_idx]
+
+    def _beyond(self, axis: float) -> float:
+        zone = self.dead_zone
+        return math.copysign(max(abs(axis) - zone, 0.0) / (1.0 - zone), axis) if zone else axis
 
 
 class Mapping(ABC):

@@ -6,6 +6,7 @@ from collections import deque
 from pathlib import Path
 
 import rospy
+import tf2_ros
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty, SetBool
@@ -22,8 +23,8 @@ SENSOR = "rpbi/kuka_lwr/force_torque_sensor_mount/ft_sensor"
 WORLD, TOOL, TARGET = "rpbi/world", "rpbi/kuka_lwr/end_effector_ball", "rpbi/target"
 SAMPLE_HZ = 100.0
 PLOT_S = 0.25
-KEPT_FORCES = 250
-"""Half a second of the sensor."""
+KEPT = 1000
+"""So many forces and poses wait on a busy machine until all that belongs to a moment is there."""
 SHOWN_S = 20.0
 """So much of the past is in the window [s]."""
 LEFT_S = 2.0
@@ -39,18 +40,21 @@ class Watch:
         self._folder = Path(rospy.get_param("~working_directory", "."), rospy.get_param("~output", "."))
         self._is_scripted = rospy.get_param("~device", "") == "scripted"
         self._press = self._new_press()
-        self._measured: deque[tuple[float, float]] = deque(maxlen=KEPT_FORCES)
-        self._felt_n = self._handle_z = 0.0
-        self._start_s = time.monotonic()
+        self._measured: deque[tuple[rospy.Time, float]] = deque(maxlen=KEPT)
+        """What is not in a sample yet."""
+        self._felt_n: deque[tuple[float, float]] = deque(maxlen=KEPT)
+        self._handle_z: deque[tuple[float, float]] = deque(maxlen=KEPT)
+        self._newest_s = 0.0
+        self._start_s: float | None = None
         self._over = threading.Event()
         self._failure = ""
         self._tf = TfInterface()
         # what it reads while it touches nothing is the weight of the tool
         get_srv_handler(SENSOR, Empty)()
         self._reading = rospy.Publisher("ft_reading", Float64, queue_size=10)
-        rospy.Subscriber(SENSOR, WrenchStamped, self._measure, queue_size=1, tcp_nodelay=True)
-        rospy.Subscriber("haptics/force", WrenchStamped, self._feel, queue_size=1, tcp_nodelay=True)
-        rospy.Subscriber("haptics/pose", PoseStamped, self._move, queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber(SENSOR, WrenchStamped, self._measure, queue_size=KEPT, tcp_nodelay=True)
+        rospy.Subscriber("haptics/force", WrenchStamped, self._feel, queue_size=KEPT, tcp_nodelay=True)
+        rospy.Subscriber("haptics/pose", PoseStamped, self._move, queue_size=KEPT, tcp_nodelay=True)
         self._connected_s = float("inf")
         rospy.Subscriber("haptics/state", HapticState, self._note_state, queue_size=1)
         for toggle in ("ik/setup/kdl/toggle", "ik/solver/kdl/toggle", "haptics/toggle"):
@@ -77,38 +81,51 @@ class Watch:
 
     def _measure(self, message: WrenchStamped) -> None:
         measured_n = -message.wrench.force.z  # the sensor's z axis points down
-        self._measured.append((message.header.stamp.to_sec(), measured_n))
+        stamp_s = message.header.stamp.to_sec()
+        if not 0.0 <= stamp_s - self._newest_s < 1.0 / SAMPLE_HZ:
+            self._newest_s = stamp_s
+            self._measured.append((message.header.stamp, measured_n))
         self._reading.publish(Float64(measured_n))
 
     def _feel(self, message: WrenchStamped) -> None:
-        self._felt_n = message.wrench.force.z
+        self._felt_n.append((message.header.stamp.to_sec(), message.wrench.force.z))
 
     def _move(self, message: PoseStamped) -> None:
-        self._handle_z = message.pose.position.z
+        self._handle_z.append((message.header.stamp.to_sec(), message.pose.position.z))
 
     def _note_state(self, state: HapticState) -> None:
         if state.connected:
             self._connected_s = time.monotonic()
 
     def _sample(self) -> None:
-        target, tool = (self._tf.get_tf_msg(WORLD, frame) for frame in (TARGET, TOOL))
-        if target is None or tool is None or not self._measured or self._over.is_set():
-            return
-        tool_s = tool.header.stamp.to_sec()
-        # of the moment of the tool's pose: on a busy machine the newest of either may be of another one
-        measured_n = min(self._measured.copy(), key=lambda each: abs(each[0] - tool_s))[1]
-        target_z, tool_z = target.transform.translation.z, tool.transform.translation.z
-        time_s = time.monotonic() - self._start_s
-        self._press.add(Sample(time_s, self._handle_z, target_z, tool_z, measured_n, self._felt_n))
-        if self._press.is_over or (self._is_scripted and time.monotonic() - self._connected_s > LEFT_S):
-            press, self._press = self._press, self._new_press()
-            self._finish(press)
+        """Adds what was at each moment of which all is known by now: on a busy machine some of it comes late."""
+        buffer = self._tf.tf_buffer
+        while self._measured and not self._over.is_set():
+            stamp, measured_n = self._measured[0]
+            try:
+                if stamp > buffer.get_latest_common_time(WORLD, TOOL):
+                    break
+                tool_z = buffer.lookup_transform(WORLD, TOOL, stamp).transform.translation.z
+                target_z = buffer.lookup_transform(WORLD, TARGET, rospy.Time(0)).transform.translation.z
+            except tf2_ros.TransformException:  # it is from before TF began
+                self._measured.popleft()
+                continue
+            self._measured.popleft()
+            stamp_s = stamp.to_sec()
+            self._start_s = stamp_s if self._start_s is None else self._start_s
+            handle_z, felt_n = _value_at(self._handle_z, stamp_s), _value_at(self._felt_n, stamp_s)
+            self._press.add(Sample(stamp_s - self._start_s, handle_z, target_z, tool_z, measured_n, felt_n))
+            if self._press.is_over:
+                self._finish()
+        if self._is_scripted and time.monotonic() - self._connected_s > LEFT_S and not self._over.is_set():
+            self._finish()
 
-    def _finish(self, press: Press) -> None:
+    def _finish(self) -> None:
+        press, self._press = self._press, self._new_press()
         press.write_table(self._folder / "human_interaction.csv")
         press.write_figure(self._folder / "human_interaction.png")
         report = press.report()
-        told = "pressed too shortly to tell how strongly" if report is None else str(report)
+        told = "pressed too shortly or unsteadily to tell how strongly" if report is None else str(report)
         rospy.loginfo("%s; see human_interaction.png and .csv in %s", told, self._folder.resolve())
         if report is not None and report.felt_error > LARGEST_ERROR:
             rospy.logwarn(
@@ -130,6 +147,11 @@ class Watch:
             recent.draw(figure)
             plt.pause(PLOT_S)
         plt.close(figure)
+
+
+def _value_at(values: deque[tuple[float, float]], time_s: float) -> float:
+    """Returns the value that was the newest one at a time; 0 if there was none."""
+    return next((value for stamp_s, value in reversed(values.copy()) if stamp_s <= time_s), 0.0)
 
 
 def main() -> None:

@@ -73,6 +73,7 @@ class HaplyDevice(HapticDevice):
         self._thread = threading.Thread(target=self._run, name="haply", daemon=True)
         self._thread.start()
         self._opened.wait(3.0 * PATIENCE_S)
+        self._came_s = time.monotonic()
         if self._trouble or not self._opened.is_set():
             self.close()
             raise DeviceError("haply", self._trouble or f"{self.config.url} does not answer")
@@ -88,7 +89,10 @@ class HaplyDevice(HapticDevice):
         if frame is None:
             if self._trouble:
                 raise DeviceError("haply", self._trouble)
+            if time.monotonic() - self._came_s > 2.0 * PATIENCE_S:  # it takes nothing: sending waits for ever
+                raise DeviceError("haply", f"{self.config.url}: it takes no forces any more")
             return None
+        self._came_s = time.monotonic()
         state = state_in(frame, self._device_id)
         force, _ = self._sent
         if not self.force_key.judge(force, state.force):
@@ -116,6 +120,8 @@ class HaplyDevice(HapticDevice):
             self._trouble = f"{self.config.url}: {error or 'does not answer'}"
         except ReadingError as error:
             self._trouble = f"{self.config.url}: {error}"
+        except Exception as error:  # whatever the service says; nobody would hear of it from this thread
+            self._trouble = f"{self.config.url}: {type(error).__name__}: {error}"
         finally:
             self._trouble = self._trouble or "closed"
             self._opened.set()

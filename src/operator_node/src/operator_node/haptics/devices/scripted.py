@@ -22,6 +22,7 @@ class ScriptedConfig(HapticConfig):
     workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")
     seed: Count = Field(0, description="Of what differs from press to press.")
     depth_m: Metres = Field(0.04, description="How far down the hand goes; some 15 % more or less by the seed.")
+    hold_s: Positive = Field(1.2, description="How long it stays below [s]; some 15 % more or less by the seed.")
     wait_s: NonNegative = Field(0.5, description="How long it stays above, before and after [s].")
 
 
@@ -34,7 +35,7 @@ class ScriptedDevice(EmulatedDevice):
         super().__init__(config)
         draw = random.Random(config.seed)
         some = [draw.uniform(1.0 - SPREAD, 1.0 + SPREAD) for _ in range(5)]
-        self._press = Press(config.depth_m * some[0], config.wait_s, 1.2 * some[1], 1.2 * some[2])
+        self._press = Press(config.depth_m * some[0], config.wait_s, 1.2 * some[1], config.hold_s * some[2])
         self._hand = Hand(0.3 * some[3], 400.0 * some[4])
 
     def make_hand(self) -> Hand:

@@ -10,7 +10,7 @@ import time
 
 from pydantic import Field
 
-from custom_ros_tools.schema import Positive, PositiveMetres
+from custom_ros_tools.schema import Positive, PositiveMetres, Switch
 from operator_node.device import DeviceError
 from operator_node.haptics.device import DeviceEnded, HapticConfig, HapticReading
 from operator_node.haptics.vectors import ZERO, within
@@ -31,6 +31,9 @@ class VirtualConfig(HapticConfig):
 
     max_force_n: Positive = Field(10.0, description="The largest force that it is sent [N].")
     workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")
+    returns: Switch = Field(
+        False, description="Whether the handle goes back to the middle when it is let go, for speeds rather than ways."
+    )
 
 
 class VirtualDevice(EmulatedDevice):
@@ -40,6 +43,7 @@ class VirtualDevice(EmulatedDevice):
     """
 
     Config = VirtualConfig
+    config: VirtualConfig
 
     def __init__(self, config: VirtualConfig) -> None:
         super().__init__(config)
@@ -59,10 +63,10 @@ class VirtualDevice(EmulatedDevice):
         ours.setblocking(False)
         config = self.config
         program = "operator_node.haptics.devices.virtual_window"
-        numbers = [str(number) for number in (theirs.fileno(), config.workspace_m, config.max_force_n)]
+        options = (theirs.fileno(), config.workspace_m, config.max_force_n, int(config.returns))
         with theirs:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", program, *numbers], pass_fds=(theirs.fileno(),), start_new_session=True
+                [sys.executable, "-m", program, *map(str, options)], pass_fds=(theirs.fileno(),), start_new_session=True
             )
         self._socket, self._mouse, self._received = ours, ZERO, b""
         super().open()

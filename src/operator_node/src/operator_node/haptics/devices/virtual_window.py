@@ -1,6 +1,7 @@
 """The window of the virtual haptic device, a program: a mouse moves a handle, an arrow is the force.
 
-It is started with the number of a socket, the radius of the workspace [m] and the largest force [N].
+It is started with the number of a socket, the radius of the workspace [m], the largest force [N], and 1 if the handle
+goes back to the middle when it is let go, else 0.
 """
 
 import os
@@ -15,6 +16,8 @@ SIZE, BAR, MARGIN = 420, 90, 30
 WHEEL_PARTS = 50
 """So many notches of the wheel are the radius of the workspace."""
 PERIOD_MS = 16
+WHEEL_RETURN_MS = 300
+"""So long after the last notch of the wheel a handle that goes back does so."""
 TEXT = "drag: x, y    wheel or right button: z    space: button"
 
 
@@ -25,10 +28,12 @@ class HandleWindow:
         connection: To the device.
         radius_m: Of the workspace [m].
         max_force_n: Drawn as half of the workspace [N].
+        returns: Whether the handle goes back to the middle when it is let go.
     """
 
-    def __init__(self, connection: socket.socket, radius_m: float, max_force_n: float) -> None:
+    def __init__(self, connection: socket.socket, radius_m: float, max_force_n: float, returns: bool) -> None:
         self._connection, self._radius_m, self._max_force_n = connection, radius_m, max_force_n
+        self._returns, self._is_told = returns, True
         connection.setblocking(False)
         self._mouse = [0.0, 0.0, 0.0]
         self._button, self._last = 0.0, (0, 0)
@@ -44,10 +49,14 @@ class HandleWindow:
             self._canvas.bind(f"<Button-{number}>", self._press)
         self._canvas.bind("<B1-Motion>", lambda event: self._drag(event, "xy"))
         self._canvas.bind("<B3-Motion>", lambda event: self._drag(event, "z"))
-        self._canvas.bind("<Button-4>", lambda _: self._lift(radius_m / WHEEL_PARTS))
-        self._canvas.bind("<Button-5>", lambda _: self._lift(-radius_m / WHEEL_PARTS))
+        self._canvas.bind("<ButtonRelease-1>", lambda _: self._let_go(0, 1))
+        self._canvas.bind("<ButtonRelease-3>", lambda _: self._let_go(2))
+        self._canvas.bind("<Button-4>", lambda _: self._turn(1))
+        self._canvas.bind("<Button-5>", lambda _: self._turn(-1))
+        self._wheel_return: str | None = None
         root.bind("<KeyPress-space>", lambda _: self._hold(1.0))
         root.bind("<KeyRelease-space>", lambda _: self._hold(0.0))
+        root.bind("<FocusOut>", lambda _: self._hold(0.0))  # that the key goes up is told to another window then
         root.after(PERIOD_MS, self._update)
 
     def run(self) -> None:
@@ -87,6 +96,18 @@ class HandleWindow:
             self._mouse[1] = self._inside(self._mouse[1] - right)
             self._tell()
 
+    def _turn(self, notches: int) -> None:
+        self._lift(notches * self._radius_m / WHEEL_PARTS)
+        if self._wheel_return is not None:
+            self._root.after_cancel(self._wheel_return)
+        self._wheel_return = self._root.after(WHEEL_RETURN_MS, self._let_go, 2)
+
+    def _let_go(self, *axes: int) -> None:
+        if self._returns:
+            for axis in axes:
+                self._mouse[axis] = 0.0
+            self._tell()
+
     def _lift(self, up_m: float) -> None:
         self._mouse[2] = self._inside(self._mouse[2] + up_m)
         self._tell()
@@ -101,8 +122,9 @@ class HandleWindow:
     def _tell(self) -> None:
         try:
             self._connection.send(FROM_WINDOW.pack(*self._mouse, self._button))
+            self._is_told = True
         except BlockingIOError:
-            return
+            self._is_told = False  # the device is busy; it is told with the next update, and be it that a hand lets go
         except OSError:
             self._root.destroy()
 
@@ -122,6 +144,8 @@ class HandleWindow:
             self._draw(*TO_WINDOW.unpack(self._received[whole - TO_WINDOW.size : whole]))
             self._received = self._received[whole:]
         self._root.after(PERIOD_MS, self._update)
+        if not self._is_told:
+            self._tell()
 
     def _draw(self, x: float, y: float, z: float, fx: float, fy: float, fz: float) -> None:
         canvas, middle, scale = self._canvas, SIZE / 2, self._scale
@@ -142,9 +166,9 @@ class HandleWindow:
 
 def main() -> None:
     """Runs the program."""
-    number, radius_m, max_force_n = sys.argv[1:]
+    number, radius_m, max_force_n, returns = sys.argv[1:]
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # not before all others, as the loop is
-    HandleWindow(socket.socket(fileno=int(number)), float(radius_m), float(max_force_n)).run()
+    HandleWindow(socket.socket(fileno=int(number)), float(radius_m), float(max_force_n), returns == "1").run()
 
 
 if __name__ == "__main__":

@@ -57,21 +57,27 @@ class AvatarNode:
 
     def _take_state(self, message: JointState) -> None:
         positions = dict(zip(message.name, message.position))
-        if all(hinge in positions for hinge in HINGES):
-            self._hinges = np.array([positions[hinge] for hinge in HINGES])
+        hinges = [positions.get(hinge) for hinge in HINGES]
+        if None in hinges:
+            reason = f"it lacks the joint '{HINGES[hinges.index(None)]}' of a person"
+        elif not np.isfinite(numbers := np.array(hinges, dtype=float)).all():
+            reason = "a position is not finite"
         else:
-            missing = next(hinge for hinge in HINGES if hinge not in positions)
-            self._warn(rospy.resolve_name(self._states), f"message refused: it lacks the joint '{missing}' of a person")
+            self._hinges = numbers
+            return
+        self._warn(rospy.resolve_name(self._states), f"message refused: {reason}")
 
     def _take(self, message: PoseArray) -> None:
         with self._lock:
             try:
                 self._follow(frame_in(message))
-            except (ValueError, InterfaceError) as error:
+            except (ValueError, InterfaceError, OSError) as error:  # the last one of a ROS master that has gone
                 self._warn(rospy.resolve_name(SEGMENTS_TOPIC), f"message refused: {error}")
 
     def _follow(self, frame: SegmentFrame) -> None:
         now = rospy.Time.now()
+        if now < self._last_stamp:  # the simulation has begun anew
+            self._begins, self._last_stamp = True, rospy.Time()
         if now <= self._last_stamp:
             return  # simulated time stands still, or has not begun: TF with wall time would hide all that comes later
         if self._hinges is None and time.monotonic() - self._began_s < START_PATIENCE_S:

@@ -3,6 +3,7 @@
 import argparse
 import sys
 
+import rosgraph
 import rospy
 from geometry_msgs.msg import PoseArray
 
@@ -24,6 +25,8 @@ def main() -> int:
     offsets = None
     try:
         if arguments.measure:
+            if not rosgraph.is_master_online():
+                raise ValueError(f"there is no ROS master at {rosgraph.get_master_uri()}: is roscore running?")
             rospy.init_node("human_urdf", anonymous=True)
             offsets = measured_offsets(frame_in(rospy.wait_for_message(arguments.measure, PoseArray, PATIENCE_S)))
         print(human_urdf(arguments.height, arguments.mass, offsets), end="")

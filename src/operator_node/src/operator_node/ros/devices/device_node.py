@@ -16,7 +16,7 @@ from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
 from custom_ros_tools.schema import ConfigModel, Positive, Text
 from operator_node.device import Device, Reading
-from operator_node.device_feed import DeviceFeed, FeedConfig
+from operator_node.device_feed import DeviceFeed, FeedConfig, held_text
 from operator_node.lookup import device_class, make_device
 from operator_node.ros.stamps import stamp
 
@@ -103,9 +103,10 @@ class DeviceNode:
 
     def _diagnose(self) -> None:
         feed = self._feed
-        problem, refused = feed.problem, dict(feed.refused)
-        level = DiagnosticStatus.ERROR if problem else DiagnosticStatus.WARN if refused else DiagnosticStatus.OK
-        message = problem or ("some of what it says is refused" if refused else "it is there")
+        problem, refused, held = feed.problem, dict(feed.refused), feed.held
+        level = DiagnosticStatus.ERROR if problem else DiagnosticStatus.WARN if refused or held else DiagnosticStatus.OK
+        remarks = ["some of what it says is refused"] * bool(refused) + [held_text(held)] * bool(held)
+        message = problem or "; ".join(remarks) or "it is there"
         status = DiagnosticStatus(
             name=f"{rospy.get_name()}: {self._name}", hardware_id=self._name, level=level, message=message
         )

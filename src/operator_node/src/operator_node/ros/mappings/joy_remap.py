@@ -1,6 +1,7 @@
 """`joy_remap`: a device that tells changes only, at a steady rate."""
 
 import copy
+import math
 import threading
 
 import rospy
@@ -8,7 +9,7 @@ from sensor_msgs.msg import Joy
 
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
 from operator_node.node_configs import JoyRemapParameters
 from operator_node.ros.stamps import stamp
 from operator_node.ros.watched_input import QUEUE_SIZE, WatchedInput
@@ -19,7 +20,7 @@ NAME = "joy_remap"
 class JoyRemap:
     """Repeats the newest message of `joy_in` on `joy_out` with the present time, from the first one on.
 
-    When input ceases, one message of zeros follows, and then nothing until input comes again.
+    When input ceases, or is not finite, one message of zeros follows, and then nothing until input comes again.
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -29,20 +30,28 @@ class JoyRemap:
         parameters = private_parameters(JoyRemapParameters)
         self._lock = threading.Lock()
         self._joy: Joy | None = None
+        self._is_refused = False
+        self._warn = ThrottledWarning()
         self._publisher = rospy.Publisher("joy_out", Joy, queue_size=QUEUE_SIZE, tcp_nodelay=True)
         self._input = WatchedInput("joy_in", Joy, self._take, parameters.input_timeout_s)
         WallTimer(parameters.hz, self._publish)
 
     def _take(self, joy: Joy) -> None:
+        is_refused = not all(map(math.isfinite, joy.axes))
+        if is_refused:
+            axes = ", ".join(f"{value:g}" for value in joy.axes)
+            self._warn(self._input.topic, f"message refused, and all is zero: axes must be finite, got {axes}")
         with self._lock:
-            self._joy = joy
+            self._is_refused = is_refused
+            if self._joy is not None or not is_refused:
+                self._joy = joy
 
     def _publish(self) -> None:
         with self._lock:
             if self._joy is None:
                 return
             message = copy.copy(self._joy)
-            if self._input.has_ceased("axes and buttons are zero"):
+            if self._is_refused or self._input.has_ceased("axes and buttons are zero"):
                 message.axes, message.buttons = [0.0] * len(message.axes), [0] * len(message.buttons)
                 self._joy = None
             message.header = copy.copy(message.header)

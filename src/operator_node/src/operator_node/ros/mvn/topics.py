@@ -1,5 +1,6 @@
 """Frames of people, and what else MVN streams, as topics and TF."""
 
+import time
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -58,7 +59,7 @@ class MvnTopics(DeviceTopics):
         self._markers = rospy.Publisher("mvn/markers", MarkerArray, queue_size=2)
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
         self._frames_before = 0
-        self._found: dict[str, tuple[rospy.Time, str]] = {}
+        self._found: dict[str, tuple[float, str]] = {}
         self._services = [
             rospy.Service("mvn/calibrate", Trigger, self._calibrate),
             rospy.Service("mvn/clear_calibration", Trigger, self._clear_calibration),
@@ -75,7 +76,7 @@ class MvnTopics(DeviceTopics):
                     continue
                 self._person(event.person).publish_frame(event, stamp)
             elif isinstance(event, Finding):
-                self._found[event.subject] = stamp, event.message
+                self._found[event.subject] = time.monotonic(), event.message
                 self._warn(f"mvn, {event.subject}", event.message)
             elif isinstance(event, Silence):
                 self._fall_silent(event)
@@ -98,7 +99,8 @@ class MvnTopics(DeviceTopics):
     def _diagnose(self) -> None:
         stamp, counts = present_stamp(), self._receiver.counts.copy()
         frames, self._frames_before = counts["frames"] - self._frames_before, counts["frames"]
-        recent = {name: text for name, (when, text) in self._found.copy().items() if (stamp - when).to_sec() < RECENT_S}
+        since_s = time.monotonic() - RECENT_S
+        recent = {name: text for name, (when_s, text) in self._found.copy().items() if when_s > since_s}
         status = DiagnosticStatus(name=f"{rospy.get_name()}: stream", hardware_id="mvn", level=DiagnosticStatus.OK)
         status.message = f"{frames} frames a second"
         if not self._receiver.people:

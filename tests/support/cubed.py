@@ -3,8 +3,8 @@
 from operator_node.mappings.mapping import AxesConfig, Mapping
 
 
-class DeadZone(Mapping):
-    """One axis, which is 0 near its middle."""
+class Cubed(Mapping):
+    """One axis, finer near its middle."""
 
     Config = AxesConfig
     size = 1
@@ -15,4 +15,4 @@ class DeadZone(Mapping):
     def map(self, axes):
         """Returns the signal."""
         (axis,) = self._config.pick(axes)
-        return (axis if abs(axis) > 0.1 else 0.0,)
+        return (axis**3,)
