@@ -217,8 +217,8 @@ def test_limits_of_robots_can_be_changed_joint_by_joint(robot: str) -> None:
         ({"joint_limits": {"panda_joint9": {}}}, "~config: joint_limits.panda_joint9: unknown joint"),
         ({"joint_limits": {"panda_joint1": {"velocity": -1.0}}}, "~config.joint_limits: .*velocity: must be > 0"),
         ({"joint_limits": {"panda_joint1": {"upper": -3.0}}}, "joints.panda_joint1.upper: must be above lower"),
-        ({"joints": [{"joint": "A1"}]}, r"~config: joints\[0\].joint: unknown joint 'A1'"),
-        ({"joints": [{"joint": "panda_joint1"}] * 2}, "'panda_joint1' is the name of another joint"),
+        ({"driver": {"joints": [{"joint": "A1"}]}}, r"~config: driver.joints\[0\].joint: unknown joint 'A1'"),
+        ({"driver": {"joint_names": ["panda_joint1"]}}, "~config: driver.joint_names: expected all of"),
         ({"command_hz": 0.0}, "command_hz: must be > 0"),
     ],
 )

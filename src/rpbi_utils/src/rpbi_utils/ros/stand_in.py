@@ -37,7 +37,7 @@ class StandIn:
     def __init__(self) -> None:
         self._config = private_config(StandInConfig)
         self._limits = self._config.load_limits()
-        conversions = [each.conversion() for each in self._config.joints]
+        conversions = [each.conversion() for each in self._config.driver.joints]
         self._to_driver, self._to_simulator = conversions, [each.inverse() for each in conversions]
         names = {each.joint: each.name for each in conversions}
         self._driver_names = {name: names.get(name, name) for name in self._limits}

@@ -9,14 +9,13 @@ from pydantic import Field, model_validator
 
 from custom_ros_tools.config import load_config, replace_package
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
-from custom_ros_tools.node_configs import RemapConfig, RemappedJoint
+from custom_ros_tools.node_configs import RemapConfig
 from custom_ros_tools.schema import (
     ConfigModel,
     Count,
     Fraction,
     Hz,
     KeyedError,
-    ListOf,
     Name,
     NonNegative,
     Positive,
@@ -73,7 +72,9 @@ class StandInConfig(ConfigModel):
     robot: Name = Field(description="The robot in the simulator beside it, `rpbi/NAME`.")
     limits: Text = Field(description=f"Whose limits it has: {', '.join(ROBOTS)}, or a YAML file of such limits.")
     joint_limits: dict[Text, dict[Text, Any]] = Field({}, description="Limits that differ from those, by joint.")
-    joints: ListOf[RemappedJoint] = Field((), description="Joints that the driver names or counts otherwise.")
+    driver: RemapConfig = Field(
+        RemapConfig(), description="Names, units and order of its joints, as the nodes that remap to it have them."
+    )
     command_hz: Hz = Field(100.0, description="Cycle of the controller: commands come one a cycle.")
     rate_tolerance: Annotated[Fraction, Field(gt=0)] = Field(
         0.3, description="Share by which the rate of commands over one second may differ."
@@ -83,13 +84,8 @@ class StandInConfig(ConfigModel):
     command_delay_s: NoNegativeTime = Field(0.0, description="How long a command takes to reach the motors.")
     noise: NoiseConfig = Field(NoiseConfig(), description="Of the states that it publishes.")
 
-    @model_validator(mode="after")
-    def _joints_differ_in_name(self) -> StandInConfig:
-        RemapConfig(joints=self.joints)
-        return self
-
     def load_limits(self) -> dict[str, JointLimits]:
-        """Returns the limits of each joint, in the order of the file, by its name in the simulator.
+        """Returns the limits of each joint, by its name in the simulator, in the order of the driver.
 
         Raises:
             ConfigError: If they cannot be read or are wrong; it has everything that is.
@@ -108,11 +104,15 @@ class StandInConfig(ConfigModel):
                 joints[joint] = {**joints[joint], **changes}
         with_changes = " with ~config.joint_limits" if self.joint_limits else ""
         limits = RobotLimits.parse(data, f"{replace_package(file)}{with_changes}").joints
-        for index, each in enumerate(self.joints):
+        for index, each in enumerate(self.driver.joints):
             if each.joint not in limits:
                 what = str(UnknownNameError("joint", each.joint, limits))
-                raise ConfigError([Problem("~config", f"joints[{index}].joint", what)])
-        return limits
+                raise ConfigError([Problem("~config", f"driver.joints[{index}].joint", what)])
+        order = limits if self.driver.joint_names is None else self.driver.joint_names
+        if sorted(order) != sorted(limits):
+            what = f"expected all of {', '.join(limits)}, got {', '.join(order)}"
+            raise ConfigError([Problem("~config", "driver.joint_names", what)])
+        return {joint: limits[joint] for joint in order}
 
 
 class RobotLimits(ConfigModel):
