@@ -149,7 +149,9 @@ def test_it_is_not_switched_on_while_the_robot_is_elsewhere(ros, start):
     stays_off = "remapping stays off: "
     missing = "no joint states came on /robot/joint_states within 2 s"
     assert toggle(ros, True) == (False, f"{stays_off}{missing}")
-    states, robot = (rospy.Publisher(name, JointState, queue_size=1, latch=True) for name in ("joint_states", near["topic"]))
+    states, robot = (
+        rospy.Publisher(name, JointState, queue_size=1, latch=True) for name in ("joint_states", near["topic"])
+    )
     states.publish(STATE)
     robot.publish(JointState(name=["b", "A1"], position=[2.05, 60.0]))
     assert toggle(ros, True) == (True, "remapping is on")

@@ -148,13 +148,22 @@ def test_who_is_outside_may_only_come_back() -> None:
 
 
 def test_motors_at_their_torque_and_joints_left_behind_are_reflexes() -> None:
-    for effort, behind, check in ((86.0, 0.19, None), (-87.0, 0.0, "torque"), (0.0, 0.21, "following_error")):
-        robot = controller()
-        robot.command(0.0, HOME)
-        robot.cycle(0.0, HOME, NO_EFFORT)
-        robot.cycle(DT_S, HOME + np.array([behind, *[0.0] * 6]), (effort, *[0.0] * 6))
+    for cycles, effort, behind, check in (
+        (60, 86.0, 0.19, None),
+        (50, -87.0, 0.0, None),
+        (51, -87.0, 0.0, "torque"),
+        (1, 0.0, 0.21, "following_error"),
+    ):
+        robot = controller(torque_time_s=0.0495)
+        for i in range(cycles):
+            robot.command(i * DT_S, HOME)
+            robot.cycle(i * DT_S, HOME + np.array([behind, *[0.0] * 6]), (effort, *[0.0] * 6))
         assert (robot.reflex and robot.reflex.check) == check
         assert (robot.reflex and robot.reflex.joint) in (None, "panda_joint1")
+    robot = controller()
+    for i in range(200):  # a motor that is at its limit now and then
+        robot.cycle(i * DT_S, HOME, (87.0 if i % 10 else 0.0, *[0.0] * 6))
+        assert robot.reflex is None
 
 
 def test_commands_may_end_at_rest_but_neither_in_a_motion_nor_come_at_another_rate() -> None:

@@ -81,6 +81,7 @@ class StandInConfig(ConfigModel):
     )
     timeout_s: Seconds = Field(0.1, description="Without a command for so long while it moves it stops.")
     start_tolerance: PositiveAngle = Field(0.02, description="How far from where it stands the first command may be.")
+    torque_time_s: NoNegativeTime = Field(0.05, description="How long a motor may give all that it may.")
     command_delay_s: NoNegativeTime = Field(0.0, description="How long a command takes to reach the motors.")
     noise: NoiseConfig = Field(NoiseConfig(), description="Of the states that it publishes.")
 

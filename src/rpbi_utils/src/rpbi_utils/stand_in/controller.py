@@ -95,6 +95,7 @@ class RobotController:
         self._waiting: deque[tuple[float, _Motion]] = deque()
         self._arrivals_s: deque[float] = deque()
         self._last_cycle_s: float | None = None
+        self._saturated_s: list[float | None] = [None] * len(self._names)
 
     @property
     def is_braking(self) -> bool:
@@ -146,7 +147,7 @@ class RobotController:
         """
         last_s, self._last_cycle_s = self._last_cycle_s, now_s
         if self.mode is not Mode.REFLEX:
-            wrong = self._overloaded(position, effort) or self._silent(now_s)
+            wrong = self._overloaded(now_s, effort) or self._left_behind(position) or self._silent(now_s)
             if wrong is not None:
                 self._stop(wrong)
         if self.mode is Mode.REFLEX:
@@ -172,6 +173,7 @@ class RobotController:
         self.mode = Mode.IDLE
         self.counters.recoveries += 1
         self.counters.peaks = Counters().peaks
+        self._saturated_s = [None] * len(self._names)
         self._motion = self._sent = self._at_rest(position)
         return None
 
@@ -216,7 +218,9 @@ class RobotController:
         for name, limits, start, end in zip(self._names, self._limits, last, motion.position):
             step = 3.0 * limits.velocity * self._cycle_s if limits.step is None else limits.step
             if abs(end - start) > step:
-                return Reflex("discontinuity", name, end - start, step, f"jumps by {end - start:.3g}, at most {step:.3g}")
+                return Reflex(
+                    "discontinuity", name, end - start, step, f"jumps by {end - start:.3g}, at most {step:.3g}"
+                )
         wrong = self._beyond_limits(motion.position, last)
         if wrong is not None:
             return wrong
@@ -240,10 +244,20 @@ class RobotController:
                 return Reflex("position", name, value, limit, f"position {value:.4g}, limit {limit:g}")
         return None
 
-    def _overloaded(self, position: Sequence[float], effort: Sequence[float]) -> Reflex | None:
-        for name, limits, torque in zip(self._names, self._limits, effort):
-            if abs(torque) >= EFFORT_SHARE * limits.torque:
-                return Reflex("torque", name, torque, limits.torque, f"torque {torque:.4g}, limit {limits.torque:g}")
+    def _overloaded(self, now_s: float, effort: Sequence[float]) -> Reflex | None:
+        """Returns which motor has given all that it may for too long."""
+        wrong = None
+        for i, (name, limits, torque) in enumerate(zip(self._names, self._limits, effort)):
+            if abs(torque) < EFFORT_SHARE * limits.torque:
+                self._saturated_s[i] = None
+                continue
+            since_s = self._saturated_s[i] = now_s if self._saturated_s[i] is None else self._saturated_s[i]
+            if now_s - since_s >= self._config.torque_time_s:
+                what = f"torque {torque:.4g}, limit {limits.torque:g}"
+                wrong = wrong or Reflex("torque", name, torque, limits.torque, what)
+        return wrong
+
+    def _left_behind(self, position: Sequence[float]) -> Reflex | None:
         for name, limits, wanted, is_at in zip(self._names, self._limits, self._sent.position, position):
             if abs(wanted - is_at) > limits.following_error:
                 what = f"is {wanted - is_at:.3g} behind, at most {limits.following_error:g}"
