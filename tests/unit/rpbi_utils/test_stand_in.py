@@ -94,6 +94,7 @@ def test_the_first_command_that_breaks_a_limit_stops_it_and_none_before() -> Non
         assert at == expected
         if at is not None:
             assert robot.reflex is not None and robot.reflex.check in broken[at]
+            assert robot.reflex.check == "discontinuity" or "discontinuity" not in broken[at]
             assert abs(robot.reflex.value) > abs(robot.reflex.limit) or robot.reflex.check == "position"
             assert (robot.counters.commands, robot.counters.ignored) == (at, len(path) - at - 1)
         seen.add(robot.reflex.check if robot.reflex else "none")
@@ -139,12 +140,21 @@ def test_a_reflex_brakes_as_hard_as_it_may_and_needs_to_be_recovered() -> None:
 
 
 def test_who_is_outside_may_only_come_back() -> None:
-    outside = HOME.copy()
-    outside[5] = UPPER[5] + 0.1
-    back = smooth(100, -0.05, 2.0, outside)
-    assert run(controller(outside), back)[0] is None
-    at, _ = run(controller(outside), 2.0 * outside - back)
-    assert at == 1
+    for edge, way in ((UPPER, 0.1), (LOWER, -0.1)):
+        outside = HOME.copy()
+        outside[5] = edge[5] + way
+        back = smooth(100, -0.5 * way, 2.0, outside)
+        assert run(controller(outside), back)[0] is None
+        at, _ = run(controller(outside), 2.0 * outside - back)
+        assert at == 1
+
+
+def test_commands_on_their_way_are_lost_in_a_reflex() -> None:
+    robot = controller(command_delay_s=0.01)
+    robot.command(0.0, HOME + 0.01)
+    robot.refuse_command("a joint is missing")
+    assert robot.cycle(0.001, HOME, NO_EFFORT) is None and robot.recover(HOME) is None
+    assert robot.cycle(1.0, HOME, NO_EFFORT) is None and robot.set_point == tuple(HOME)
 
 
 def test_motors_at_their_torque_and_joints_left_behind_are_reflexes() -> None:
