@@ -95,7 +95,7 @@ class RobotController:
         self._waiting: deque[tuple[float, _Motion]] = deque()
         self._arrivals_s: deque[float] = deque()
         self._last_cycle_s: float | None = None
-        self._saturated_s: list[float | None] = [None] * len(self._names)
+        self._saturated_s: dict[str, float] = {}
 
     @property
     def is_braking(self) -> bool:
@@ -173,7 +173,7 @@ class RobotController:
         self.mode = Mode.IDLE
         self.counters.recoveries += 1
         self.counters.peaks = Counters().peaks
-        self._saturated_s = [None] * len(self._names)
+        self._saturated_s.clear()
         self._motion = self._sent = self._at_rest(position)
         return None
 
@@ -247,12 +247,11 @@ class RobotController:
     def _overloaded(self, now_s: float, effort: Sequence[float]) -> Reflex | None:
         """Returns which motor has given all that it may for too long."""
         wrong = None
-        for i, (name, limits, torque) in enumerate(zip(self._names, self._limits, effort)):
+        for name, limits, torque in zip(self._names, self._limits, effort):
             if abs(torque) < EFFORT_SHARE * limits.torque:
-                self._saturated_s[i] = None
+                self._saturated_s.pop(name, None)
                 continue
-            since_s = self._saturated_s[i] = now_s if self._saturated_s[i] is None else self._saturated_s[i]
-            if now_s - since_s >= self._config.torque_time_s:
+            if now_s - self._saturated_s.setdefault(name, now_s) >= self._config.torque_time_s:
                 what = f"torque {torque:.4g}, limit {limits.torque:g}"
                 wrong = wrong or Reflex("torque", name, torque, limits.torque, what)
         return wrong
