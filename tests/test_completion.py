@@ -56,7 +56,8 @@ def test_a_tab_offers_all_commands(terminal):
 
 
 def test_arguments_of_a_launch_file_are_offered(terminal):
-    expected = {"drag:=", "gui:=", "headless:=", "ik:=", "ik_hz:=", "real_time_factor:=", "rviz:=", "use_sim_time:="}
+    solver, windows = {"drag:=", "ik:=", "ik_hz:="}, {"gui:=", "headless:=", "rviz:="}
+    expected = solver | windows | {"real_robot:=", "real_time_factor:=", "stand_in:=", "use_sim_time:="}
     assert terminal.offered("./rpbi launch kuka_lwr_ik_example \t") == expected
 
 

@@ -142,6 +142,29 @@ def test_faulty_joint_state_does_not_pass(ros, start):
     assert {message.name[0] for message in passed.messages} == {"a"} and passed.messages[0].position == (1.0, 2.0, 3.0)
 
 
+def test_it_is_not_switched_on_while_the_robot_is_elsewhere(ros, start):
+    joints = [{"joint": "a", "rename": "A1", "unit": "deg"}]
+    near = {"topic": "robot/joint_states", "tolerance": 0.1}
+    start(ARRAY_NODE, config={"joint_names": ["b", "a"], "joints": joints, "start_within": near})
+    stays_off = "remapping stays off: "
+    missing = "no joint states came on /robot/joint_states within 2 s"
+    assert toggle(ros, True) == (False, f"{stays_off}{missing}")
+    states, robot = (
+        rospy.Publisher(name, JointState, queue_size=1, latch=True) for name in ("joint_states", near["topic"])
+    )
+    states.publish(STATE)
+    robot.publish(JointState(name=["b", "A1"], position=[2.05, 60.0]))
+    assert toggle(ros, True) == (True, "remapping is on")
+    toggle(ros, False)
+    robot.publish(JointState(name=["b", "A1"], position=[2.05, 70.0]))
+    where = "joint 'a' of the robot is at 1.222 and would be commanded to 1: expected them within 0.1"
+    assert toggle(ros, True) == (False, f"{stays_off}{where}")
+    robot.publish(JointState(name=["b"], position=[2.05]))
+    assert "no values for joint 'A1'" in toggle(ros, True)[1]
+    states.unregister()
+    robot.unregister()
+
+
 def test_names_and_units_of_a_driver_there_and_back(ros, start):
     """Both nodes on one topic: the second undoes what the first does, and numbers are in the driver's units."""
     joints = [{"joint": "a", "rename": "A1", "unit": "deg", "sign": -1, "offset": 90.0}]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from .joint_values import JointConversion
 from .marker_config import MarkerConfig
-from .schema import ConfigModel, Hz, KeyedError, ListOf, Switch, Text
+from .schema import ConfigModel, Hz, KeyedError, ListOf, Positive, Switch, Text, Unit, optional
 
 PER_SI_UNIT = {"rad": 1.0, "deg": 180.0 / math.pi, "m": 1.0, "mm": 1000.0}
 """How many of a unit one rad or m is."""
@@ -44,6 +44,15 @@ class RemappedJoint(ConfigModel):
         return JointConversion(self.joint, self.rename or self.joint, self.sign, PER_SI_UNIT[self.unit], self.offset)
 
 
+class StartWithin(ConfigModel):
+    """What must be near before anything is handed on, so that no robot jumps when that is switched on."""
+
+    topic: Text = Field(description="Joint states of the robot that is commanded, named and counted as commands are.")
+    tolerance: Annotated[Positive, Unit("rad or m")] = Field(
+        0.05, description="How far a joint of it may be from where the first command would have it."
+    )
+
+
 class RemapConfig(ConfigModel):
     """Which joints of a joint state are handed on, and how they are named and counted there."""
 
@@ -52,6 +61,7 @@ class RemapConfig(ConfigModel):
     )
     joints: ListOf[RemappedJoint] = Field((), description="Joints that the driver names or counts otherwise.")
     inverse: Switch = Field(False, description="Whether `joints` is undone: from the driver to the simulator.")
+    start_within: StartWithin | None = optional("What must be near for it to be switched on.")
 
     @model_validator(mode="after")
     def _joints_differ_in_name(self) -> RemapConfig:

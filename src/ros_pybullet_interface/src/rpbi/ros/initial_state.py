@@ -12,9 +12,6 @@ from rpbi.bodies.robots.robot_config import RobotConfig
 from rpbi.config.loading import LoadedWorld
 from rpbi.urdf.document import UrdfDocument
 
-TIMEOUT_S = 5.0
-"""How long to wait for joint states [s] of wall time."""
-
 
 def start_where_robots_are(loaded: LoadedWorld) -> LoadedWorld:
     """Returns a world whose robots start where the joint states that they ask for say.
@@ -44,11 +41,11 @@ def with_initial_state(config: BodyConfig, file: str) -> BodyConfig:
     """
     if not isinstance(config, RobotConfig) or config.initial_joint_state_topic is None:
         return config
-    topic = rospy.resolve_name(config.initial_joint_state_topic)
+    topic, timeout_s = rospy.resolve_name(config.initial_joint_state_topic), config.initial_joint_state_timeout_s
     try:
-        message = rospy.wait_for_message(topic, JointState, TIMEOUT_S)
+        message = rospy.wait_for_message(topic, JointState, timeout_s)
     except rospy.ROSException:
-        raise _problem(file, f"no joint states came on {topic} within {TIMEOUT_S:g} s") from None
+        raise _problem(file, f"no joint states came on {topic} within {timeout_s:g} s") from None
     if len(message.name) != len(message.position):
         counts = f"{len(message.name)} names, {len(message.position)} positions"
         raise _problem(file, f"expected a position for each name on {topic}, got {counts}")

@@ -23,13 +23,16 @@ TO_FLOAT_ARRAY = "remap_joint_state_to_floatarray"
 TO_JOINT_STATE = "remap_joint_state_to_joint_state"
 QUEUE_SIZE = 100
 """Messages kept while the machine is busy: 0.1 s of joint states at 1 kHz."""
+START_WAIT_S = 2.0
+"""How long to wait for each of the joint states that must be near each other at the start [s]."""
 
 
 class RemapNode:
     """Publishes what it makes of joint states while it is switched on; off, it does not even listen.
 
     It has the service `remap_joint_state/toggle` and the same under the name of its executable. `convert` makes what is
-    published; it raises InterfaceError or ValueError for a message that must be refused.
+    published; it raises InterfaceError or ValueError for a message that must be refused. `config` may say what must be
+    near for it to be switched on.
     """
 
     def __init__(
@@ -39,19 +42,30 @@ class RemapNode:
         target: str,
         target_type: type,
         convert: Callable[[JointState], Any],
+        config: RemapConfig,
         start_on_init: bool,
     ) -> None:
-        self._source, self._convert = rospy.resolve_name(source), convert
+        self._source, self._convert, self._config = rospy.resolve_name(source), convert, config
         self._warn = ThrottledWarning()
         self._publisher = rospy.Publisher(target, target_type, queue_size=QUEUE_SIZE, tcp_nodelay=True)
         self._subscriber: rospy.Subscriber | None = None
-        remapping = Toggle("remapping", self._listen, self._listen_no_more)
+        self._remapping = Toggle("remapping", self._listen, self._listen_no_more)
         if start_on_init:
-            remapping.on()
+            is_on, message = self._switch_on()
+            if not is_on:
+                rospy.logwarn(message)
         for name in {"remap_joint_state/toggle", f"{executable}/toggle"}:
-            ToggleService(name, remapping.on, remapping.off)
+            ToggleService(name, self._switch_on, self._remapping.off)
+
+    def _switch_on(self) -> tuple[bool, str]:
+        try:
+            return self._remapping.on()
+        except (InterfaceError, ValueError) as error:
+            return False, f"remapping stays off: {error}"
 
     def _listen(self) -> None:
+        if self._config.start_within is not None:
+            _check_start(self._config, self._source)
         self._subscriber = rospy.Subscriber(
             self._source, JointState, self._take, queue_size=QUEUE_SIZE, tcp_nodelay=True
         )
@@ -67,6 +81,32 @@ class RemapNode:
             self._warn(self._source, f"message refused: {error}")
             return
         self._publisher.publish(converted)
+
+
+def _check_start(config: RemapConfig, source: str) -> None:
+    """Waits for what would be commanded and for where the robot is.
+
+    Raises:
+        InterfaceError: If they are too far apart, lack joints or do not come.
+        ValueError: If one of the messages is no joint state.
+    """
+    assert config.start_within is not None
+    measured = _one_state(config.start_within.topic).converted([each.inverse() for each in config.conversions()])
+    joints = measured.names if config.joint_names is None else config.joint_names
+    wanted, is_at = (values.in_order(joints).position for values in (_one_state(source), measured))
+    tolerance = config.start_within.tolerance
+    for joint, goal, position in zip(joints, wanted, is_at, strict=True):
+        if abs(goal - position) > tolerance:
+            where = f"joint '{joint}' of the robot is at {position:.4g} and would be commanded to {goal:.4g}"
+            raise InterfaceError(f"{where}: expected them within {tolerance:g}")
+
+
+def _one_state(topic: str) -> JointValues:
+    try:
+        return values_in(rospy.wait_for_message(topic, JointState, START_WAIT_S))
+    except rospy.ROSException:
+        name = rospy.resolve_name(topic)
+        raise InterfaceError(f"no joint states came on {name} within {START_WAIT_S:g} s") from None
 
 
 def _float_array_node() -> RemapNode:
@@ -88,7 +128,7 @@ def _float_array_node() -> RemapNode:
         return Float64MultiArray(data=data)
 
     topics = "joint_states", "joint_states/floatarray"
-    return RemapNode(TO_FLOAT_ARRAY, *topics, Float64MultiArray, numbers, start_on_init)
+    return RemapNode(TO_FLOAT_ARRAY, *topics, Float64MultiArray, numbers, config, start_on_init)
 
 
 def _joint_state_node() -> RemapNode:
@@ -108,7 +148,8 @@ def _joint_state_node() -> RemapNode:
             values = values.in_order(config.joint_names)
         return joint_state(values.converted(conversions), message.header)
 
-    return RemapNode(TO_JOINT_STATE, "joint_states/from", "joint_states/to", JointState, remapped, start_on_init)
+    topics = "joint_states/from", "joint_states/to"
+    return RemapNode(TO_JOINT_STATE, *topics, JointState, remapped, config, start_on_init)
 
 
 def _parameters(model: type[Config]) -> tuple[Config, bool]:

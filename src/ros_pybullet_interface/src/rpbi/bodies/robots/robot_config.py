@@ -77,8 +77,9 @@ class RobotConfig(BodyConfig):
         True, description="Whether start positions of revolute joints are in degrees, else in radians."
     )
     initial_joint_state_topic: str | None = Field(
-        None, description="Joint states, for instance of the real robot, to start at instead; waited for 5 s."
+        None, description="Joint states, for instance of the real robot, to start at instead."
     )
+    initial_joint_state_timeout_s: Seconds = Field(5.0, description="How long they are waited for, of wall time.")
     move_to_initial_joint_state_on_startup: Switch = Field(
         False, description="Accepted without effect: a robot starts there and its motors hold it."
     )

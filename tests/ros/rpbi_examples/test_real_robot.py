@@ -1,0 +1,74 @@
+"""`real_robot:=true`: a second simulator is the real robot, with the limits and reflexes of its controller."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+import rospy
+from node_world import publishing
+from ros_system import RosSystem, wait_until
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import Trigger
+
+from ros_pybullet_interface.srv import ResetJointState
+from rpbi_utils.msg import DriverState
+
+JOINT = "lwr_arm_0_joint"
+
+
+def test_the_real_robot_follows_the_simulated_one_and_a_jump_stops_it_until_it_is_recovered(ros: RosSystem) -> None:
+    """Its driver counts in degrees, names joints A1 to A7, and takes joint states or bare numbers."""
+    ros.start(["roslaunch", "rpbi_examples", "run_kuka.launch", "real_robot:=true", "headless:=true"])
+    state = ros.listen("/stand_in/driver_state", DriverState)
+    target, real = (ros.listen(f"/{name}/joint_states", JointState) for name in ("rpbi/kuka_lwr", "stand_in"))
+    shown = ros.listen("/rpbi/real/joint_states/target", JointState)
+
+    def comes(what: str, holds: Callable[[DriverState], bool]) -> DriverState:
+        wait_until(lambda: holds(state.messages[-1]), what)
+        return next(message for message in reversed(state.messages) if holds(message))
+
+    def stands_at() -> float:
+        return math.radians(real.messages[-1].position[0])
+
+    def move(position: float) -> None:
+        goal = JointState(name=[JOINT], position=[position])
+        assert ros.call("/rpbi/kuka_lwr/move_to_joint_state", ResetJointState, goal, 0.5).success
+        wait_until(lambda: abs(stands_at() - position) < 0.005, f"the real robot is at {position} rad")
+
+    comes("it follows", lambda message: message.mode == DriverState.MOVE)
+    assert real.messages[0].name == [f"A{i}" for i in range(1, 8)]
+    begin = dict(zip(target.messages[0].name, target.messages[0].position))
+    assert begin["lwr_arm_3_joint"] == pytest.approx(math.radians(real.messages[0].position[3]), abs=0.003)
+    move(0.15)
+    (last,) = state.messages[-1:]
+    assert (last.mode, last.reflexes, last.ignored) == (DriverState.MOVE, 0, 0), last.message
+    assert 0.1 < last.peak_velocity < 1.0 and 0.0 < last.peak_acceleration < 1.0
+    assert dict(zip(shown.messages[-1].name, shown.messages[-1].position))[JOINT] == pytest.approx(0.15, abs=0.005)
+
+    with publishing("/stand_in/joint_group_position_controller/command", Float64MultiArray) as commands:
+        commands.publish(Float64MultiArray(data=[math.degrees(0.4), *real.messages[-1].position[1:]]))
+        stopped = comes("it stops", lambda message: message.mode == DriverState.REFLEX and not message.braking)
+    assert (stopped.reflex, stopped.joint, stopped.reflexes) == ("discontinuity", "A1", 1)
+    assert stopped.value == pytest.approx(0.25, abs=0.005) and stopped.value > stopped.limit > 0.0
+    comes("commands are ignored", lambda message: message.ignored > stopped.ignored + 20)
+    goal = JointState(name=[JOINT], position=[0.1])
+    assert ros.call("/rpbi/kuka_lwr/move_to_joint_state", ResetJointState, goal, 0.5).success
+    assert stands_at() == pytest.approx(0.15, abs=0.005), "it stands where it stopped"
+
+    def recover() -> tuple[bool, str]:
+        answer = rospy.ServiceProxy("/stand_in/recover", Trigger)()
+        return answer.success, answer.message
+
+    assert recover() == (True, "recovered: commands begin where the robot stands")
+    again = comes("it refuses to begin elsewhere", lambda message: message.reflex == "start_position")
+    assert again.value == pytest.approx(-0.05, abs=0.005)
+    goal.position = [0.15]
+    assert ros.call("/rpbi/kuka_lwr/move_to_joint_state", ResetJointState, goal, 0.5).success
+    assert recover()[0]
+    comes("it follows again", lambda message: message.mode == DriverState.MOVE and message.recoveries == 2)
+    move(0.0)
+    assert state.messages[-1].reflexes == 2
+    assert recover() == (False, "there is no reflex to recover from")
