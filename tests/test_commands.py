@@ -107,7 +107,10 @@ PROGRAMS: dict[str, list[str]] = {
     "check": [find_executable("ros_pybullet_interface", "check_world.py")],
     "replay": [find_executable("rpbi_utils", "replay")],
     "bench": [sys.executable, str(ROOT / "benchmarks")],
-    **{name: [find_executable("rpbi_utils", "world"), name] for name in ("list", "spawn", "remove", "move", "send")},
+    **{
+        name: [find_executable("rpbi_utils", "world"), name]
+        for name in ("list", "spawn", "remove", "move", "send", "attach", "detach", "gravity")
+    },
 }
 
 
