@@ -130,7 +130,7 @@ def test_a_box_hangs_on_the_arm_until_it_is_detached_and_rises_where_gravity_poi
         "'hung' is attached to 'arm/lbr_iiwa_link_7'",
     )
     code, text = say("move hung 1 1 2")
-    assert code == 1 and "attached" in text
+    assert code == 1 and "held by attachment 'hung'" in text
     assert say("detach hung")[0] == 0
     assert say("detach hung")[0] == 1
     wait_until(lambda: position(ros, "hung")[2] < 0.2, "it has fallen")
@@ -162,7 +162,6 @@ def test_a_box_hangs_on_the_arm_until_it_is_detached_and_rises_where_gravity_poi
         ("send arm a:=1 --push 1 0 0", "send: expected --drive, --push or targets of joints, got a:=1 as well"),
         ("attach amr floor", "attach: "),
         ("detach nothing", "detach: "),
-        ("gravity 0 0 -inf", "gravity: expected a number, got -inf"),
         ("send floor --push 1 0 0", "send: 'floor/link0' is static, no force moves it"),
     ],
 )

@@ -113,7 +113,8 @@ def _parser() -> argparse.ArgumentParser:
     detach.add_argument("names", nargs="+", metavar="NAME")
 
     gravity = add("gravity", _gravity, "Changes gravity, until the next reset.")
-    gravity.add_argument("gravity", nargs=3, type=number, metavar=("X", "Y", "Z"), help="[m/s^2]")
+    for axis in "xyz":
+        gravity.add_argument(axis, type=number, metavar=axis.upper(), help="[m/s^2]")
     return parser
 
 
@@ -233,7 +234,7 @@ def _detach(simulator: RunningSimulator, arguments: argparse.Namespace) -> str:
 
 
 def _gravity(simulator: RunningSimulator, arguments: argparse.Namespace) -> str:
-    return str(simulator.call("rpbi/set_gravity", SetGravity, Vector3(*arguments.gravity)).message)
+    return str(simulator.call("rpbi/set_gravity", SetGravity, Vector3(arguments.x, arguments.y, arguments.z)).message)
 
 
 # --- What they are made of
