@@ -59,7 +59,7 @@ def _require_screen() -> None:
     display = x11.XOpenDisplay(None)
     if display is None:
         raise PhysicsError(
-            f"connect.connection_mode: a window needs a screen, and none answers at DISPLAY '{os.getenv('DISPLAY', '')}': "
-            "write DIRECT, or run it under xvfb-run, with a screen that nobody sees"
+            "connect.connection_mode: a window needs a screen, and none answers at DISPLAY "
+            f"'{os.getenv('DISPLAY', '')}': write DIRECT, or run it under xvfb-run, with a screen that nobody sees"
         )
     x11.XCloseDisplay(ctypes.c_void_p(display))
