@@ -103,7 +103,7 @@ def test_check_says_nothing_but_its_own(tmp_path):
 
 
 def test_a_sourced_workspace_takes_the_place_of_our_examples_but_not_of_the_simulator(tmp_path):
-    """Files of launch files are found by CMAKE_PREFIX_PATH, those in YAML by ROS_PACKAGE_PATH: both tell the same one."""
+    """Files of launch files are found by CMAKE_PREFIX_PATH, those in YAML by ROS_PACKAGE_PATH: of the same package."""
     package = tmp_path / "src/rpbi_examples"
     (package / "configs").mkdir(parents=True)
     (package / "package.xml").write_text(
