@@ -2,6 +2,8 @@
 
 import ctypes
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from typing import Any
 
@@ -25,10 +27,9 @@ class Client:
     """
 
     def __init__(self, mode: int = pybullet.DIRECT, **options: Any) -> None:
-        if mode != pybullet.DIRECT:
-            _require_screen()
         try:
-            self.client_id: int = pybullet.connect(mode, **(options if mode != pybullet.DIRECT else {}))
+            with nullcontext() if mode == pybullet.DIRECT else _screen():
+                self.client_id: int = pybullet.connect(mode, **(options if mode != pybullet.DIRECT else {}))
         except pybullet.error as error:
             raise PhysicsError(f"PyBullet did not connect: {error}") from error
         self.has_window = mode != pybullet.DIRECT
@@ -49,8 +50,15 @@ class Client:
         return value
 
 
-def _require_screen() -> None:
-    """Raises an error where no screen answers: PyBullet would end the process there, with words of its own alone."""
+@contextmanager
+def _screen() -> Iterator[None]:
+    """Holds a connection to the screen: without one, PyBullet would end the process, with words of its own alone.
+
+    It is held until PyBullet has its own, for a virtual screen starts anew when the last connection goes.
+
+    Raises:
+        PhysicsError: If no screen answers.
+    """
     try:
         x11 = ctypes.CDLL("libX11.so.6")
     except OSError as error:
@@ -62,4 +70,7 @@ def _require_screen() -> None:
             "connect.connection_mode: a window needs a screen, and none answers at DISPLAY "
             f"'{os.getenv('DISPLAY', '')}': write DIRECT, or run it under xvfb-run, with a screen that nobody sees"
         )
-    x11.XCloseDisplay(ctypes.c_void_p(display))
+    try:
+        yield
+    finally:
+        x11.XCloseDisplay(ctypes.c_void_p(display))
