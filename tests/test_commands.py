@@ -31,8 +31,8 @@ def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "rpbi"
 
 
-def run(command: list[str | Path]) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command, capture_output=True, text=True, timeout=60.0)
+def run(command: list[str | Path], **sourced: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command, capture_output=True, text=True, timeout=60.0, env=os.environ | sourced)
 
 
 @pytest.mark.parametrize("command", SECTIONS)
@@ -102,12 +102,35 @@ def test_check_says_nothing_but_its_own(tmp_path):
     assert done.stdout.startswith(f"{world}: fine; ")
 
 
+def test_a_sourced_workspace_takes_the_place_of_our_examples_but_not_of_the_simulator(tmp_path):
+    """Files of launch files are found by CMAKE_PREFIX_PATH, those in YAML by ROS_PACKAGE_PATH: of the same package."""
+    package = tmp_path / "src/rpbi_examples"
+    (package / "configs").mkdir(parents=True)
+    (package / "package.xml").write_text(
+        "<package><name>rpbi_examples</name><version>1.0.0</version><description>theirs</description>"
+        "<maintainer email='nobody@example.com'>nobody</maintainer><license>none</license></package>"
+    )
+    (package / "configs/floor.yaml").write_text("theirs: 1")
+    (tmp_path / "devel/share").mkdir(parents=True)
+    (tmp_path / "devel/.catkin").write_text(str(tmp_path / "src"))
+    launch = tmp_path / "their.launch"
+    launch.write_text('<launch><rosparam file="$(find rpbi_examples)/configs/floor.yaml"/></launch>')
+    sourced = {"CMAKE_PREFIX_PATH": str(tmp_path / "devel"), "ROS_PACKAGE_PATH": str(tmp_path / "src")}
+    asked = [ROOT / "rpbi", "launch", launch, "--dump-params"]
+    assert run(asked, **sourced).stdout.strip() == "/theirs: 1"
+    (tmp_path / "devel/share/ros_pybullet_interface").mkdir()
+    assert "name: floor" in run(asked, **sourced).stdout, "another simulator is not taken for ours"
+
+
 PROGRAMS: dict[str, list[str]] = {
     "demo": [find_executable("rpbi_examples", "demo.py")],
     "check": [find_executable("ros_pybullet_interface", "check_world.py")],
     "replay": [find_executable("rpbi_utils", "replay")],
     "bench": [sys.executable, str(ROOT / "benchmarks")],
-    **{name: [find_executable("rpbi_utils", "world"), name] for name in ("list", "spawn", "remove", "move", "send")},
+    **{
+        name: [find_executable("rpbi_utils", "world"), name]
+        for name in ("list", "spawn", "remove", "move", "send", "attach", "detach", "gravity")
+    },
 }
 
 

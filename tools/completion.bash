@@ -37,7 +37,8 @@ _rpbi_words() {
     setup) (cd "$root" && printf '%s\n' requirements-*.txt) | sed 's/requirements-\(.*\)\.txt/\1/' ;;
     bench) sed -n "/^BENCHMARKS/,/^)/p; /^WHEN_NAMED/p" "$root/benchmarks/run.py" | grep -oE '"[a-z_]+"' | tr -d '"' ;;
     spawn) [[ $last != --type ]] || printf '%s\n' visual collision dynamic robot urdf soft camera ;;
-    remove) _rpbi_objects "$root" ;;
+    remove | detach) _rpbi_objects "$root" ;; # an attachment is called as what it holds
+    attach) [[ ${6-} ]] || _rpbi_objects "$root" ;;
     move | send) [[ $first ]] || _rpbi_objects "$root" ;;
   esac
 }

@@ -1,4 +1,4 @@
-"""`./rpbi list`, `spawn`, `remove`, `move` and `send`, in a running world."""
+"""`./rpbi list` and the other commands of a running world, up to `gravity`."""
 
 from __future__ import annotations
 
@@ -122,6 +122,27 @@ def test_targets_and_velocities_are_sent(ros):
     wait_until(lambda: position(ros, "mobile")[0] > x + 0.1, "it has driven")
 
 
+def test_a_box_hangs_on_the_arm_until_it_is_detached_and_rises_where_gravity_points_up(ros, say):
+    file = ros.write_yaml("hung.yaml", box("hung", base_state_hz=50))
+    assert say("spawn", file, "--at", "1", "1", "0.5")[0] == 0
+    assert say("attach hung arm/lbr_iiwa_link_7 --max-force 500") == (
+        0,
+        "'hung' is attached to 'arm/lbr_iiwa_link_7'",
+    )
+    code, text = say("move hung 1 1 2")
+    assert code == 1 and "held by attachment 'hung'" in text
+    assert say("detach hung")[0] == 0
+    assert say("detach hung")[0] == 1
+    wait_until(lambda: position(ros, "hung")[2] < 0.2, "it has fallen")
+    code, text = say("gravity 0 0 1.62")
+    assert code == 0 and "1.62" in text
+    wait_until(lambda: position(ros, "hung")[2] > 0.3, "it rises")
+    assert say("gravity 0 0 -9.81")[0] == 0
+    assert say("attach hung floor --name stand --ball") == (0, "'hung' is attached to 'floor'")
+    assert say("detach stand")[0] == 0
+    assert say("remove hung")[0] == 0
+
+
 @pytest.mark.parametrize(
     ("line", "told"),
     [
@@ -139,6 +160,8 @@ def test_targets_and_velocities_are_sent(ros):
         ("send arm", "send: expected JOINT:=VALUE ...; the joints of 'arm' are lbr_iiwa_joint_1,"),
         ("send arm --drive 1 0 0", "send: 'arm' is of type robot, expected a robot with planar_base"),
         ("send arm a:=1 --push 1 0 0", "send: expected --drive, --push or targets of joints, got a:=1 as well"),
+        ("attach amr floor", "attach: "),
+        ("detach nothing", "detach: "),
         ("send floor --push 1 0 0", "send: 'floor/link0' is static, no force moves it"),
     ],
 )

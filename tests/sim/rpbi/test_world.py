@@ -186,6 +186,12 @@ def test_a_taken_name_is_refused(build):
     assert list(world.bodies) == ["ball"]
 
 
+def test_a_window_without_a_screen_is_refused_and_ends_nothing(build, monkeypatch):
+    monkeypatch.setenv("DISPLAY", ":4711")
+    with pytest.raises(PhysicsError, match="connect.connection_mode: .* none answers at DISPLAY ':4711': write DIRECT"):
+        build(connect={"connection_mode": "GUI"})
+
+
 def test_removing_what_is_not_there_names_what_is(build):
     world = build(dynamic=(ball(),))
     with pytest.raises(UnknownNameError, match="ball"):

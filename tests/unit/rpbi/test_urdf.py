@@ -40,6 +40,15 @@ def test_a_folder_beside_or_above_stands_in_for_a_package_as_for_pybullet(tmp_pa
     assert meshes(description_for_ros(path)) == [f"file://{tmp_path}/meshes/a.obj"]
 
 
+def test_meshes_of_a_package_that_another_of_its_name_hides_are_those_near_the_urdf(tmp_path):
+    path = tmp_path / "rpbi_examples/robots/own.urdf"
+    path.parent.mkdir(parents=True)
+    (path.parent / "own.obj").write_text("")
+    path.write_text(f"<robot name='own'>{mesh('package://rpbi_examples/robots/own.obj')}</robot>")
+    assert meshes(Path(resolve_meshes(str(path))).read_text()) == [str(path.parent / "own.obj")]
+    assert meshes(description_for_ros(str(path))) == [f"file://{path.parent}/own.obj"]
+
+
 def test_a_mesh_of_an_unknown_package_is_named(tmp_path):
     with pytest.raises(ConfigError, match="package://nope/a.obj: unknown ROS package 'nope'"):
         resolve_meshes(urdf(tmp_path, mesh("package://nope/a.obj")))

@@ -1,5 +1,9 @@
 """One connection to PyBullet."""
 
+import ctypes
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from typing import Any
 
@@ -19,12 +23,13 @@ class Client:
         options: Further arguments of `pybullet.connect`, for other modes than DIRECT, which takes none.
 
     Raises:
-        PhysicsError: If PyBullet does not connect.
+        PhysicsError: If PyBullet does not connect, or a window is asked for and no screen answers.
     """
 
     def __init__(self, mode: int = pybullet.DIRECT, **options: Any) -> None:
         try:
-            self.client_id: int = pybullet.connect(mode, **(options if mode != pybullet.DIRECT else {}))
+            with nullcontext() if mode == pybullet.DIRECT else _screen():
+                self.client_id: int = pybullet.connect(mode, **(options if mode != pybullet.DIRECT else {}))
         except pybullet.error as error:
             raise PhysicsError(f"PyBullet did not connect: {error}") from error
         self.has_window = mode != pybullet.DIRECT
@@ -35,7 +40,7 @@ class Client:
         self.sub_steps = 0
         """Parts that each step of its world is divided into, as told when that was set; 0 is one."""
         if self.client_id < 0:
-            raise PhysicsError("PyBullet did not connect (GUI mode needs a screen: is DISPLAY set?)")
+            raise PhysicsError("PyBullet did not connect")
 
     def __getattr__(self, name: str) -> Any:
         value = getattr(pybullet, name)
@@ -43,3 +48,29 @@ class Client:
             value = partial(value, physicsClientId=self.client_id)
         setattr(self, name, value)
         return value
+
+
+@contextmanager
+def _screen() -> Iterator[None]:
+    """Holds a connection to the screen: without one, PyBullet would end the process, with words of its own alone.
+
+    It is held until PyBullet has its own, for a virtual screen starts anew when the last connection goes.
+
+    Raises:
+        PhysicsError: If no screen answers.
+    """
+    try:
+        x11 = ctypes.CDLL("libX11.so.6")
+    except OSError as error:
+        raise PhysicsError(f"a window of PyBullet needs X11: {error}") from error
+    x11.XOpenDisplay.restype = ctypes.c_void_p
+    display = x11.XOpenDisplay(None)
+    if display is None:
+        raise PhysicsError(
+            "connect.connection_mode: a window needs a screen, and none answers at DISPLAY "
+            f"'{os.getenv('DISPLAY', '')}': write DIRECT, or run it under xvfb-run, with a screen that nobody sees"
+        )
+    try:
+        yield
+    finally:
+        x11.XCloseDisplay(ctypes.c_void_p(display))

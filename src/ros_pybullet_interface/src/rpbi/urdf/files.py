@@ -86,10 +86,14 @@ def description_for_ros(path: str) -> str:
 
     def address(match: re.Match[str]) -> str:
         mesh = _with_two_slashes(match["path"])
-        if "://" in mesh and not _is_of_unknown_package(mesh):
-            return f"{match['before']}{match['quote']}{mesh}{match['quote']}"
-        file = mesh_file(mesh, source) if _is_of_unknown_package(mesh) else source.parent / mesh
-        return f"{match['before']}{match['quote']}file://{file.resolve()}{match['quote']}"
+        if "://" not in mesh:
+            file: Path | None = source.parent / mesh
+        elif _is_of_unknown_package(mesh):
+            file = mesh_file(mesh, source)
+        else:
+            file = None if _is_in_its_package(mesh) else _near(mesh, source)
+        said = mesh if file is None else f"file://{file.resolve()}"
+        return f"{match['before']}{match['quote']}{said}{match['quote']}"
 
     return _FILENAME.sub(address, _read(source))
 
@@ -101,18 +105,17 @@ def mesh_file(mesh: str, source: Path) -> Path:
         ConfigError: If it belongs to an unknown package or does not exist.
     """
     mesh = _with_two_slashes(mesh)
-    if _is_of_unknown_package(mesh):
-        # PyBullet takes package://FOLDER/FILE for a folder beside the URDF or above it, and its own robots use that.
-        found = beside_or_above(mesh.removeprefix(PACKAGE), source.resolve())
-        if found is not None:
-            return found
     try:
         file = source.parent / replace_package(mesh)
+        problems = [] if file.is_file() else [Problem(str(source), mesh, f"no such file: {file}")]
     except ConfigError as error:
-        raise ConfigError([Problem(str(source), mesh, problem.message) for problem in error.problems]) from None
-    if not file.is_file():
-        raise ConfigError([Problem(str(source), mesh, f"no such file: {file}")])
-    return file
+        problems = [Problem(str(source), mesh, problem.message) for problem in error.problems]
+    if not problems:
+        return file
+    found = _near(mesh, source)
+    if found is None:
+        raise ConfigError(problems)
+    return found
 
 
 def beside_or_above(name: str, source: Path) -> Path | None:
@@ -124,6 +127,19 @@ def beside_or_above(name: str, source: Path) -> Path | None:
 def _with_two_slashes(mesh: str) -> str:
     """Returns what a URDF says of a mesh with `package://PACKAGE` for `package:///PACKAGE`, which some URDFs have."""
     return f"{PACKAGE}{mesh.removeprefix(PACKAGE).lstrip('/')}" if mesh.startswith(PACKAGE) else mesh
+
+
+def _near(mesh: str, source: Path) -> Path | None:
+    """Returns the file of a `package://` mesh that no package has, but a folder beside the URDF or above it.
+
+    PyBullet looks there, its own robots use that. And where the package of a URDF is hidden by another of its name, its
+    meshes are there still.
+    """
+    return beside_or_above(mesh.removeprefix(PACKAGE), source.resolve()) if mesh.startswith(PACKAGE) else None
+
+
+def _is_in_its_package(mesh: str) -> bool:
+    return not mesh.startswith(PACKAGE) or Path(replace_package(mesh)).is_file()
 
 
 def _is_of_unknown_package(mesh: str) -> bool:

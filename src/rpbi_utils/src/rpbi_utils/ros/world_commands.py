@@ -1,4 +1,4 @@
-"""The commands `list`, `spawn`, `remove`, `move` and `send`: the running world by plain command lines."""
+"""The commands from `list` to `gravity`: the running world by plain command lines."""
 
 import argparse
 import math
@@ -20,8 +20,16 @@ from std_srvs.srv import Trigger
 from custom_ros_tools.config import config_to_str, load_config
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
 from custom_ros_tools.transforms import quat_of
-from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem, PybulletObject
-from ros_pybullet_interface.srv import AddPybulletObject, ApplyWrench, ResetEffState, ResetJointState, RobotInfo
+from ros_pybullet_interface.msg import Attachment, CalculateInverseKinematicsProblem, PybulletObject
+from ros_pybullet_interface.srv import (
+    AddPybulletObject,
+    ApplyWrench,
+    Attach,
+    ResetEffState,
+    ResetJointState,
+    RobotInfo,
+    SetGravity,
+)
 from rpbi.config.asset_files import find_file
 from rpbi.config.object_entry import FILE
 
@@ -93,6 +101,20 @@ def _parser() -> argparse.ArgumentParser:
     what.add_argument("--drive", nargs=3, type=number, metavar=("VX", "VY", "TURN"), help="[m/s, m/s, rad/s]")
     what.add_argument("--push", nargs=3, type=number, metavar=("FX", "FY", "FZ"), help="[N], in the world's axes")
     send.add_argument("--for", dest="duration_s", type=number, default=1.0, metavar="S", help="how long [s]")
+
+    attach = add("attach", _attach, "Holds one thing to another, until it is detached or breaks off.")
+    attach.add_argument("child", metavar="CHILD", help="what is held: an object, or a link as OBJECT/LINK")
+    attach.add_argument("parent", metavar="PARENT", help="what holds it, likewise")
+    attach.add_argument("--name", help="by which it is detached; without it, the child's")
+    attach.add_argument("--ball", action="store_true", help="the position alone is held")
+    attach.add_argument("--max-force", type=number, default=0.0, metavar="N", help="beyond it, it breaks off [N]")
+
+    detach = add("detach", _detach, "Lets go of what was attached.")
+    detach.add_argument("names", nargs="+", metavar="NAME")
+
+    gravity = add("gravity", _gravity, "Changes gravity, until the next reset.")
+    for axis in "xyz":
+        gravity.add_argument(axis, type=number, metavar=axis.upper(), help="[m/s^2]")
     return parser
 
 
@@ -194,6 +216,25 @@ def _send(simulator: RunningSimulator, arguments: argparse.Namespace) -> str:
         return f"sent for {duration_s:g} s"
     _publish(simulator, topic, JointState(name=names, position=values))
     return "sent"
+
+
+def _attach(simulator: RunningSimulator, arguments: argparse.Namespace) -> str:
+    attachment = Attachment(
+        name=arguments.name or arguments.child.partition("/")[0],
+        parent=arguments.parent,
+        child=arguments.child,
+        kind="ball" if arguments.ball else "fixed",
+        max_force=arguments.max_force,
+    )
+    return str(simulator.call("rpbi/attach", Attach, attachment).message)
+
+
+def _detach(simulator: RunningSimulator, arguments: argparse.Namespace) -> str:
+    return "\n".join(simulator.call("rpbi/detach", SetString, name).message for name in arguments.names)
+
+
+def _gravity(simulator: RunningSimulator, arguments: argparse.Namespace) -> str:
+    return str(simulator.call("rpbi/set_gravity", SetGravity, Vector3(arguments.x, arguments.y, arguments.z)).message)
 
 
 # --- What they are made of
