@@ -41,6 +41,7 @@ class HandlePublisher:
     def __init__(self, config: HapticNodeConfig, workspace_m: float) -> None:
         self._config, self._workspace_m = config, workspace_m
         self._sent: Snapshot | None = None
+        self._stamp: rospy.Time | None = None
         self._pose = _publisher("haptics/pose", PoseStamped)
         self._twist = _publisher("haptics/twist", TwistStamped)
         self._force = _publisher("haptics/force", WrenchStamped)
@@ -64,7 +65,9 @@ class HandlePublisher:
         self._twist.publish(twist)
         axes = [min(max(each / self._workspace_m, -1.0), 1.0) for each in snapshot.deviation]
         self._joy.publish(Joy(header, axes, reading.buttons))
-        self._broadcast(header, snapshot, start)
+        if header.stamp != self._stamp:  # else ROS time stands still, and TF takes no second transform of one moment
+            self._stamp = header.stamp
+            self._broadcast(header, snapshot, start)
 
     def _broadcast(self, header: Header, snapshot: Snapshot, start: geometry.Pose | None) -> None:
         config, transforms = self._config, []
