@@ -1,0 +1,178 @@
+"""The robot that is guarded: its joints, and where its links are."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
+from custom_ros_tools.transforms import quat_of
+from rpbi.geometry import Vector
+from rpbi.urdf.document import UrdfDocument, UrdfJoint
+
+
+class LinkPoses(NamedTuple):
+    """Where a link is in k configurations.
+
+    Attributes:
+        rotation: k x 3 x 3, or 1 x 3 x 3 if it is the same in all.
+        position: k x 3, or 1 x 3 [m].
+    """
+
+    rotation: np.ndarray
+    position: np.ndarray
+
+
+class GuardedRobot:
+    """The joints of a robot that commands move, in the order in which they are checked, and its kinematics.
+
+    Joints that are not guarded stand at 0, or at the limit that is nearest to it; those that mimic others follow.
+
+    Args:
+        urdf_path: Its description.
+        joint_names: The n joints that are guarded; without any all that move by themselves.
+
+    Attributes:
+        urdf_path: Its description.
+        document: The same, read.
+        joint_names: The n joints.
+        joints: What the description says of them.
+        links: Names of all links.
+
+    Raises:
+        ConfigError: If the description cannot be read or a joint makes no sense.
+        UnknownNameError: If a joint is not known or does not move by itself.
+    """
+
+    def __init__(self, urdf_path: str, joint_names: Sequence[str] = ()) -> None:
+        self.urdf_path = urdf_path
+        self.document = document = UrdfDocument(urdf_path, not_xml="expected well-formed XML")
+        try:
+            self._all = document.joints
+        except ValueError as error:
+            raise ConfigError([Problem(urdf_path, "", str(error))]) from None
+        self._root = document.root_link()
+        movable = [name for name, joint in self._all.items() if joint.is_moving and joint.mimic is None]
+        for name in joint_names:
+            if name not in movable:
+                raise UnknownNameError("joint that moves by itself", name, movable)
+        self.joint_names = tuple(joint_names) or tuple(movable)
+        if not self.joint_names:
+            raise ConfigError([Problem(urdf_path, "", "expected a joint that moves, got none")])
+        self.joints = [self._all[name] for name in self.joint_names]
+        self.links = document.links
+        self._above = {joint.child: joint for joint in self._all.values()}
+        self._index = {name: i for i, name in enumerate(self.joint_names)}
+        self._turns = {joint.name: _Turn(joint) for joint in self._all.values()}
+
+    def check_link(self, name: str) -> str:
+        """Returns the name of a link.
+
+        Raises:
+            UnknownNameError: If there is no such link.
+        """
+        if name not in self.links:
+            raise UnknownNameError("link", name, self.links)
+        return name
+
+    def chain(self, link: str) -> list[UrdfJoint]:
+        """Returns the joints from the root to a link."""
+        joints = []
+        while link != self._root:
+            joints.append(self._above[link])
+            link = joints[-1].parent
+        return joints[::-1]
+
+    def poses(self, q: np.ndarray, links: Sequence[str]) -> dict[str, LinkPoses]:
+        """Returns where links are in the root, in k configurations.
+
+        Args:
+            q: k x n positions [rad or m].
+            links: Names of links.
+        """
+        found = {self._root: LinkPoses(np.eye(3)[None], np.zeros((1, 3)))}
+        for link in links:
+            for joint in self.chain(link):
+                if joint.child not in found:
+                    parent = found[joint.parent]
+                    rotation, shift = self._turns[joint.name].at(self._positions(joint, q))
+                    position = parent.position + (parent.rotation @ shift[..., None])[..., 0]
+                    found[joint.child] = LinkPoses(parent.rotation @ rotation, position)
+        return {link: found[link] for link in links}
+
+    def still(self, joint: UrdfJoint) -> float:
+        """Returns where a joint stands that is not guarded [rad or m]."""
+        return min(max(0.0, joint.lower), joint.upper)
+
+    def positions_of_all(self, q: np.ndarray) -> dict[str, float]:
+        """Returns the positions of all joints that move, in one configuration of n positions [rad or m]."""
+        moving = [joint for joint in self._all.values() if joint.is_moving]
+        return {joint.name: float(self._positions(joint, q[None])[0]) for joint in moving}
+
+    def _positions(self, joint: UrdfJoint, q: np.ndarray) -> np.ndarray:
+        """Returns k positions of any joint; 1 if it is the same in all."""
+        if joint.mimic is not None:
+            leader = self._all[joint.mimic.joint]
+            return joint.mimic.multiplier * self._positions(leader, q) + joint.mimic.offset
+        if joint.name in self._index:
+            return q[:, self._index[joint.name]]
+        return np.array([self.still(joint)])
+
+    def reach(self, link: str, radius_m: float, other: str) -> np.ndarray:
+        """Returns how far, at most, each of n joints moves any point of a link in another link, for 1 rad or m each.
+
+        Args:
+            link: The link.
+            radius_m: How far its shape goes from its origin [m].
+            other: The other link; what both hang on does not move one in the other.
+        """
+        still = {joint.name for joint in self.chain(other)}
+        reach, beyond = np.zeros(len(self.joint_names)), radius_m
+        for joint in reversed(self.chain(link)):
+            if joint.name in still:
+                break
+            i = self._driver(joint)
+            if i is not None:
+                factor = abs(joint.mimic.multiplier) if joint.mimic else 1.0
+                reach[i] += factor * (beyond if joint.is_revolute else 1.0)
+            travel = 0.0 if joint.is_revolute or not joint.is_moving else max(abs(joint.lower), abs(joint.upper))
+            beyond += math.hypot(*joint.xyz) + travel
+        return reach
+
+    def _driver(self, joint: UrdfJoint) -> int | None:
+        if not joint.is_moving:
+            return None
+        return self._index.get(joint.mimic.joint if joint.mimic else joint.name)
+
+
+class _Turn:
+    """What a joint does to what hangs on it, after Rodrigues: R = R0 (1 + sin q K + (1 - cos q) K^2)."""
+
+    def __init__(self, joint: UrdfJoint) -> None:
+        self._fixed, self._shift = _matrix(joint.rpy), np.array(joint.xyz)
+        self._joint = joint
+        x, y, z = joint.axis
+        cross = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+        self._sine, self._versine = self._fixed @ cross, self._fixed @ cross @ cross
+        self._way = self._fixed @ np.array(joint.axis)
+
+    def at(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Returns rotations, k x 3 x 3, and shifts, k x 3, at k positions."""
+        if not self._joint.is_moving:
+            return self._fixed[None], self._shift[None]
+        if not self._joint.is_revolute:
+            return self._fixed[None], self._shift + position[:, None] * self._way
+        sine, versine = np.sin(position)[:, None, None], (1.0 - np.cos(position))[:, None, None]
+        return self._fixed + sine * self._sine + versine * self._versine, self._shift[None]
+
+
+def _matrix(rpy: Vector) -> np.ndarray:
+    x, y, z, w = quat_of(rpy)
+    return np.array(
+        (
+            (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+            (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+            (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+        )
+    )
