@@ -19,7 +19,21 @@ from typing import Any
 from result import Result, table
 
 BENCHMARKS = (
-    *("loop", "many", "load", "camera", "latency", "free_run", "reset", "tables", "ik", "ik_nodes", "grasp", "physics"),
+    *(
+        "loop",
+        "many",
+        "load",
+        "camera",
+        "latency",
+        "free_run",
+        "reset",
+        "tables",
+        "ik",
+        "ik_nodes",
+        "grasp",
+        "guard",
+        "physics",
+    ),
 )
 WHEN_NAMED = ("soak",)
 """Those that take too long to run with the others."""

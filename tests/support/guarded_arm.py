@@ -17,7 +17,8 @@ KUKA = str(Path(__file__).resolve().parents[2] / "src/rpbi_examples/robots/kuka_
 HOME = (0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0)
 PERIOD_S = 0.01
 LIMITS = {"velocity": 1.0, "acceleration": 8.0, "jerk": 200.0}
-SLIDER = """<robot name="slider"><link name="base"/><link name="cart"/><link name="hand"/>
+SLIDER = """<robot name="slider"><link name="base"/><link name="cart"/><link name="hand"/><link name="tool"/>
+  <joint name="mount" type="fixed"><parent link="hand"/><child link="tool"/></joint>
   <joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
     <limit lower="-1" upper="1" effort="1" velocity="2"/></joint>
   <joint name="turn" type="revolute"><parent link="cart"/><child link="hand"/><origin xyz="0 0 0.5"/><axis xyz="0 1 0"/>

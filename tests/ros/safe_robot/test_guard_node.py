@@ -115,7 +115,7 @@ def test_commands_of_a_burst_go_out_a_period_apart(ros, start, target, listen):
 def test_joints_in_another_order_are_taken_by_name_and_numbers_come_in_the_robots_order(ros, start, target, listen):
     start(publish_as_joint_state=False)
     numbers = listen("joint_states/command", Float64MultiArray)
-    target(0.3, -0.2, name=["turn", "slide"])
+    target(7.0, 0.3, -0.2, name=["mount", "turn", "slide"])  # that of the mount is fixed
     assert numbers.wait_for()[0].data == (-0.2, 0.3)
 
 

@@ -60,6 +60,8 @@ class Guard:
         file: Where the configuration comes from, for messages.
 
     Attributes:
+        config: What it guards and how.
+        robot: The robot.
         joint_names: The n joints.
         limits: Their limits.
         checks: The checks that are made.
@@ -70,7 +72,7 @@ class Guard:
     """
 
     def __init__(self, config: GuardConfig, robot: GuardedRobot, file: str = "~") -> None:
-        self.config, self._robot = config, robot
+        self.config, self.robot = config, robot
         self.joint_names = robot.joint_names
         self.limits = JointLimits.of(robot, config.limits, file)
         self.checks: Sequence[Check] = make_checks(config.checks, robot, self.limits, file)
@@ -138,7 +140,7 @@ class Guard:
         """Returns what is wrong while no target comes; if anything is, it halts."""
         if self.is_halted or self._is_first or self._state is None:
             return None
-        motion = Motion(self._robot, self._state, self._state.position, self.config.period_s)
+        motion = Motion(self.robot, self._state, self._state.position, self.config.period_s)
         for check in self.checks:
             if check.watches and (violation := check.check(motion, situation)):
                 self.halt()
@@ -181,7 +183,7 @@ class Guard:
             subject = f"joint '{self.joint_names[i]}'"
             unit = "of distance to where the robot is"
             return Violation("start", subject, float(distance[i]), self.config.start_tolerance, unit)
-        slow = Motion(self._robot, State.at_rest(there), position, SLOW_S)
+        slow = Motion(self.robot, State.at_rest(there), position, SLOW_S)
         for check in self.checks:
             if violation := check.check(slow, situation):
                 return violation
@@ -204,7 +206,7 @@ class Guard:
         position = np.array(command)
         state = self._state.then(position, period_s)
         brake = self._braking.plan(state.velocity, state.acceleration)
-        motion = Motion(self._robot, self._state, position, period_s, brake)
+        motion = Motion(self.robot, self._state, position, period_s, brake)
         for check in self.checks:
             if violation := check.check(motion, situation):
                 return violation

@@ -39,6 +39,7 @@ class GuardedRobot:
         joint_names: The n joints.
         joints: What the description says of them.
         links: Names of all links.
+        still: Names of the joints that do not move, which joint states may have too.
 
     Raises:
         ConfigError: If the description cannot be read or a joint makes no sense.
@@ -62,6 +63,7 @@ class GuardedRobot:
             raise ConfigError([Problem(urdf_path, "", "expected a joint that moves, got none")])
         self.joints = [self._all[name] for name in self.joint_names]
         self.links = document.links
+        self.still = frozenset(name for name, joint in self._all.items() if joint.type == "fixed")
         self._above = {joint.child: joint for joint in self._all.values()}
         self._index = {name: i for i, name in enumerate(self.joint_names)}
         self._turns = {joint.name: _Turn(joint) for joint in self._all.values()}
@@ -101,10 +103,6 @@ class GuardedRobot:
                     found[joint.child] = LinkPoses(parent.rotation @ rotation, position)
         return {link: found[link] for link in links}
 
-    def still(self, joint: UrdfJoint) -> float:
-        """Returns where a joint stands that is not guarded [rad or m]."""
-        return min(max(0.0, joint.lower), joint.upper)
-
     def positions_of_all(self, q: np.ndarray) -> dict[str, float]:
         """Returns the positions of all joints that move, in one configuration of n positions [rad or m]."""
         moving = [joint for joint in self._all.values() if joint.is_moving]
@@ -117,7 +115,7 @@ class GuardedRobot:
             return joint.mimic.multiplier * self._positions(leader, q) + joint.mimic.offset
         if joint.name in self._index:
             return q[:, self._index[joint.name]]
-        return np.array([self.still(joint)])
+        return np.array([min(max(0.0, joint.lower), joint.upper)])
 
     def reach(self, link: str, radius_m: float, other: str) -> np.ndarray:
         """Returns how far, at most, each of n joints moves any point of a link in another link, for 1 rad or m each.

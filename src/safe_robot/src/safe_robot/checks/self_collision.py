@@ -69,8 +69,9 @@ class SelfCollision(Check):
 
     def _near(self, motion: Motion) -> np.ndarray:
         """Returns which pairs might come too near, by how far they were apart somewhere and how far they move."""
-        moved = np.abs(motion.position[:, None] - self._known_at)  # k x pairs x n
-        nearest = self._known_m - np.einsum("kpn,pn->kp", moved, self._reach).max(axis=0)
+        path = np.abs(np.diff(motion.position, axis=0)).sum(axis=0)
+        moved = np.abs(motion.position[0] - self._known_at) + path  # pairs x n
+        nearest = self._known_m - (moved * self._reach).sum(axis=1)
         return ~(nearest > self.config.margin_m + ROUNDING_M)
 
     def _nearer(self, motion: Motion, indices: list[int]) -> Violation | None:

@@ -54,7 +54,10 @@ class GuardNode:
         self._target_topic = rospy.resolve_name("joint_states/target")
         self._as_joint_state = as_joint_state
         self._command = rospy.Publisher(
-            "joint_states/command", JointState if as_joint_state else Float64MultiArray, queue_size=1, tcp_nodelay=True
+            "joint_states/command",
+            JointState if as_joint_state else Float64MultiArray,
+            queue_size=QUEUE_SIZE,  # a command that is left out would make the next one a jump
+            tcp_nodelay=True,
         )
         self._status = rospy.Publisher("robot_safety/status", Status, queue_size=QUEUE_SIZE, latch=True)
         self._violation = rospy.Publisher("robot_safety/violation", ViolationMessage, queue_size=QUEUE_SIZE, latch=True)
@@ -112,8 +115,8 @@ class GuardNode:
         """
         values, names = values_in(message), self._guard.joint_names
         ordered = values.in_order(names)
-        if more := [name for name in values.names if name not in names]:
-            raise ValueError(f"expected the guarded joints only, got '{more[0]}' too")
+        if more := {*values.names}.difference(names, self._guard.robot.still):
+            raise ValueError(f"expected the guarded joints only, got '{min(more)}' too")
         if not values.position:
             raise ValueError("expected positions, got none")
         if values.effort:
@@ -216,6 +219,7 @@ def _guard_of_parameters() -> tuple[Guard, bool]:
     """Returns the guard that private parameters and `robot_description` tell of, and whether it sends joint states."""
     node = rospy.get_name()
     given: dict[str, Any] = dict(rospy.get_param("~", {}))
+    given.pop(DESCRIPTION, None)
     output = OutputConfig.parse({key: given.pop(key) for key in OutputConfig.model_fields if key in given}, node)
     path = _description_file()
     config = GuardConfig.parse(legacy.translated(given, list(GuardedRobot(path).joint_names), node), node)
