@@ -62,6 +62,15 @@ def test_before_a_limit_of_position_only_speeds_that_can_be_braked_pass(tmp_path
     assert 0.9 < targets[first][0] < 1.0
 
 
+def test_what_cannot_be_braked_is_not_safe_whatever_the_checks_say(tmp_path):
+    off = {"active": False}
+    guard = guard_of(slider(tmp_path), checks={"joint_acceleration": off, "joint_jerk": off})
+    decide(guard, (0.0, 0.0))
+    decision = decide(guard, (0.0, 0.005))
+    assert decision.command is None and decision.is_halted
+    assert decision.violation[:2] == ("braking", "joint 'turn'") and decision.violation.is_while_braking
+
+
 @pytest.mark.parametrize("bad", [(math.nan, 0.0), (0.0, math.inf), (0.0,), (0.0, 0.0, 0.0), ()])
 def test_targets_that_are_no_targets_are_refused(tmp_path, bad):
     guard = guard_of(slider(tmp_path))
