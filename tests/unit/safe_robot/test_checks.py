@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from guarded_arm import HOME, KUKA, LIMITS, slider
+from guarded_arm import HOME, KUKA, LIMITS, folding, slider
 
 from custom_ros_tools.errors import ConfigError
 from rpbi.kinematics import Kinematics
+from safe_robot.braking import Brake
 from safe_robot.check import Situation
 from safe_robot.checks import CHECKS
 from safe_robot.conformance import CheckConformance
@@ -169,12 +170,39 @@ def test_a_link_outside_its_box_may_only_move_inwards(tmp_path):
     assert check.check(Motion(robot, start, np.array((0.71, 0.0)), 0.01), Situation()) is not None
 
 
-def test_a_joint_outside_its_limits_may_only_move_inwards(tmp_path):
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_joint_stays_in_its_limits_and_outside_them_may_only_move_inwards(tmp_path, side):
     robot = slider(tmp_path)
     check = check_of("joint_position", robot)
-    start = State.at_rest(np.array((1.2, 0.0)))
-    assert check.check(Motion(robot, start, np.array((1.19, 0.0)), 0.01), Situation()) is None
-    assert check.check(Motion(robot, start, np.array((1.21, 0.0)), 0.01), Situation()) is not None
+    for before, after, is_safe in ((0.99, 1.0, True), (0.99, 1.01, False), (1.2, 1.19, True), (1.2, 1.21, False)):
+        start = State.at_rest(np.array((side * before, 0.0)))
+        violation = check.check(Motion(robot, start, np.array((side * after, 0.0)), 0.01), Situation())
+        assert (violation is None) == is_safe, (before, after)
+        assert is_safe or (violation.value, violation.limit) == (side * after, side)
+
+
+@pytest.mark.parametrize("name", ["joint_velocity", "joint_acceleration", "joint_jerk"])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_both_ways_have_limits(tmp_path, name, side):
+    robot = slider(tmp_path)
+    check = check_of(name, robot, LIMITS)
+    start = State.at_rest(np.zeros(2))
+    for step, is_safe in ((1e-5, True), (0.02, False)):
+        violation = check.check(Motion(robot, start, np.array((0.0, side * step)), 0.01), Situation())
+        assert (violation is None) == is_safe
+    assert violation.subject == "joint 'turn'" and violation.value > violation.limit
+
+
+def test_the_middle_of_a_braking_is_tried_too(tmp_path):
+    """Command and end are free, and the way between them goes through the base."""
+    robot = folding(tmp_path)
+    check = check_of("self_collision", robot)
+    there_and_back = np.sin(np.linspace(0.0, np.pi, 100))[:, None] * (0.0, 1.0)
+    brake = Brake(there_and_back, *(np.zeros((100, 2)),) * 3)
+    q = np.array((0.0, 2.0))
+    assert check.check(Motion(robot, State.at_rest(q), q, 0.01), Situation()) is None
+    violation = check.check(Motion(robot, State.at_rest(q), q, 0.01, brake), Situation())
+    assert violation is not None and violation.is_while_braking
 
 
 def test_links_that_are_too_near_may_only_move_apart():
