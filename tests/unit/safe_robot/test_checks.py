@@ -162,12 +162,14 @@ def test_a_link_box_reaches_where_the_link_is(tmp_path):
     assert violation.value == pytest.approx(0.5001)
 
 
-def test_a_link_outside_its_box_may_only_move_inwards(tmp_path):
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_link_outside_its_box_may_only_move_inwards(tmp_path, side):
     robot = slider(tmp_path)
     check = check_of("link_box", robot, boxes={"hand": {"x": [-0.5, 0.5]}})
-    start = State.at_rest(np.array((0.7, 0.0)))
-    assert check.check(Motion(robot, start, np.array((0.69, 0.0)), 0.01), Situation()) is None
-    assert check.check(Motion(robot, start, np.array((0.71, 0.0)), 0.01), Situation()) is not None
+    start = State.at_rest(np.array((side * 0.7, 0.0)))
+    for after, is_safe in ((0.69, True), (0.71, False)):
+        violation = check.check(Motion(robot, start, np.array((side * after, 0.0)), 0.01), Situation())
+        assert (violation is None) == is_safe
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
