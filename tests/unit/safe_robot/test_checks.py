@@ -162,6 +162,16 @@ def test_a_link_box_reaches_where_the_link_is(tmp_path):
     assert violation.value == pytest.approx(0.5001)
 
 
+def test_the_speed_of_a_link_is_that_of_its_origin(tmp_path):
+    robot = slider(tmp_path)
+    check = check_of("link_velocity", robot, links={"hand": 0.25})
+    for speed, is_safe in ((0.249, True), (0.251, False)):
+        motion = Motion(robot, State.at_rest(np.zeros(2)), np.array((0.01 * speed, 0.0)), 0.01)
+        violation = check.check(motion, Situation())
+        assert (violation is None) == is_safe
+    assert violation.value == pytest.approx(0.251) and violation.limit == 0.25
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_link_outside_its_box_may_only_move_inwards(tmp_path, side):
     robot = slider(tmp_path)
