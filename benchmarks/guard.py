@@ -31,7 +31,7 @@ def run(quick: bool) -> list[Result]:
     """Returns how long safe targets take, and those that `limit` has to replace."""
     count = QUICK_DECISIONS if quick else DECISIONS
     safe = _durations_ms("reject", count, 0.3)
-    unsafe = _durations_ms("limit", count // 10, 3.0)
+    unsafe = _durations_ms("limit", QUICK_DECISIONS, 3.0)
     return [
         Result("guard", "safe target, all checks, median", float(np.median(safe)), "ms"),
         Result("guard", "safe target, all checks, p99", float(np.percentile(safe, 99)), "ms", target=Target(1.0)),
