@@ -19,23 +19,10 @@ from typing import Any
 from result import Result, table
 
 BENCHMARKS = (
-    *(
-        "loop",
-        "many",
-        "load",
-        "camera",
-        "latency",
-        "free_run",
-        "reset",
-        "tables",
-        "ik",
-        "ik_nodes",
-        "grasp",
-        "guard",
-        "physics",
-    ),
+    *("loop", "many", "load", "camera", "latency", "free_run", "reset", "tables"),
+    *("ik", "ik_nodes", "device", "mvn", "grasp", "guard", "physics"),
 )
-WHEN_NAMED = ("soak",)
+WHEN_NAMED = ("dressing", "haptics", "passivity", "soak")
 """Those that take too long to run with the others."""
 FIND_RENDERER = """
 from rpbi.render.camera import Intrinsics

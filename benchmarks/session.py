@@ -26,6 +26,7 @@ CLOUD = "/rpbi/camera/pointcloud"
 TYPES = {"joint_states": "sensor_msgs/JointState", "image": "sensor_msgs/Image", "clock": "rosgraph_msgs/Clock"}
 TYPES |= {"pointcloud": "sensor_msgs/PointCloud2"}
 TYPES |= {"diagnostics": "diagnostic_msgs/DiagnosticArray", "tf": "tf2_msgs/TFMessage"}
+TYPES |= {"segments": "geometry_msgs/PoseArray"}
 START_TIMEOUT_S = 60.0
 CAMERA_POSE = "-0.32 -2.05 2.2 -0.346 0 -2.22".split()  # x y z [m], yaw pitch roll [rad]: the example's view
 

@@ -20,6 +20,8 @@ from careful_master import path_with  # noqa: E402
 from ros_system import RosSystem, stop_group, wait_until  # noqa: E402
 from second_master import SecondMaster  # noqa: E402
 
+from custom_ros_tools.ros.tf_interface import TfInterface  # noqa: E402
+
 pytest_plugins = ("work_plan", "run_report")
 os.environ["PATH"] = path_with(WORKPLACE.folder / "bin")
 
@@ -77,6 +79,15 @@ def module_ros(ros_master: str, tmp_path_factory: pytest.TempPathFactory) -> Ite
         yield system
     finally:
         system.close()
+
+
+@pytest.fixture
+def own_tf(ros: RosSystem) -> Iterator[TfInterface]:
+    """TF of the tests' own process; what it left open on /tf would be there for all tests to come."""
+    interface = TfInterface()
+    yield interface
+    interface._listener.unregister()
+    interface.tf_broadcaster.pub_tf.unregister()
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -65,6 +66,32 @@ def test_a_checkout_in_a_folder_with_spaces_is_refused_at_once(bare):
     assert done.stderr.endswith(" take no path with spaces. Move it.\n") and done.stderr.count("\n") == 1
 
 
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root may install packages without being asked")
+def test_the_first_set_up_without_a_network_says_what_it_waits_for_and_gives_up(tmp_path):
+    """The only server of packages takes connections and never answers, as behind many a firewall."""
+    checkout = tmp_path / "checkout"
+    checkout.mkdir()
+    shutil.copy(ROOT / "rpbi", checkout)
+    (checkout / "apt-packages.txt").write_text("package-that-nobody-has\n")
+    for folder in ("lists/partial", "cache/archives/partial"):
+        (tmp_path / folder).mkdir(parents=True)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        site = f"http://127.0.0.1:{server.getsockname()[1]}/debian"
+        (tmp_path / "sources.list").write_text(f"deb {site} bookworm main\ndeb {site} bookworm-updates main\n")
+        (tmp_path / "apt.conf").write_text(
+            f'Dir::State::lists "{tmp_path}/lists"; Dir::Cache "{tmp_path}/cache";'
+            f'Dir::Etc::sourcelist "{tmp_path}/sources.list"; Dir::Etc::sourceparts "{tmp_path}/none";'
+        )
+        environment = {**os.environ, "APT_CONFIG": str(tmp_path / "apt.conf")}
+        command = [checkout / "rpbi", "setup"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60.0, env=environment)
+    assert done.returncode == 1
+    first, waiting, *_ = done.stderr.splitlines()
+    assert first.startswith("==> Installing 1 Debian packages and what they need (log: ")
+    assert re.match(rf"    1\d s  Asking for {site}/", waiting), done.stderr
+    assert "    | No server of Debian packages answers.\n    What to do: check the network" in done.stderr
+
+
 def test_check_says_nothing_but_its_own(tmp_path):
     """PyBullet tells of its build when it is imported; a world's folder may have spaces."""
     folder = tmp_path / "my worlds"
@@ -82,6 +109,13 @@ PROGRAMS: dict[str, list[str]] = {
     "bench": [sys.executable, str(ROOT / "benchmarks")],
     **{name: [find_executable("rpbi_utils", "world"), name] for name in ("list", "spawn", "remove", "move", "send")},
 }
+
+
+@pytest.mark.parametrize(("kilobytes", "code"), [(300_000, 1), (500_000, 0)])
+def test_a_limit_of_memory_is_refused_in_one_line_or_does_not_matter(kilobytes, code):
+    done = run(["bash", "-c", f"ulimit -v {kilobytes}; exec {ROOT}/rpbi check {WORLD}"])
+    assert done.returncode == code
+    assert done.stderr == ("memory is limited to 307 MB (ulimit -v); expected at least 500 MB\n" if code else "")
 
 
 @pytest.mark.parametrize("command", PROGRAMS)

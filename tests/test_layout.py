@@ -79,6 +79,7 @@ DOCUMENTED = {
     "custom_ros_tools.robot",
     "custom_ros_tools.ros_comm",
     "custom_ros_tools.tf",
+    "operator_node.node",
     "rpbi.ros_node",
     "rpbi_utils",
 }

@@ -1,6 +1,7 @@
 """Broken and hostile files, made of good ones by a seed, and what becomes of who reads them.
 
-Each file is read in a process of its own, a fork of this one, so that a crash is seen and costs little.
+Each file is read in a process of its own, a fork of this one, so that a crash is seen and costs little. Worlds are read
+by the program behind `./rpbi check`, and by the simulator node, which needs a ROS master.
 """
 
 from __future__ import annotations
@@ -23,16 +24,20 @@ import genpy
 import pybullet
 import pybullet_data
 import rosbag
+import rospy
 import yaml
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from worlds import FLOOR, ball, iiwa, write_world
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.lifecycle.run_node import run_node
 from ros_pybullet_interface.msg import SimulationState, WorldCommand, WorldCommands
 from rpbi.config.loading import load_world
 from rpbi.replay.recorded_values import to_text
 from rpbi.replay.world_description import describe
+from rpbi.ros.node import SimulatorNode
+from rpbi.ros.reference import check
 from rpbi.world import World
 from rpbi_utils import bag_to_dataframes, topic_report
 from rpbi_utils.ros import replay
@@ -83,12 +88,24 @@ class Outcome(NamedTuple):
 
 
 class Hostile(NamedTuple):
-    """A hostile file: its kind and seed, the file, and what reads it; that raises an InterfaceError for a refusal."""
+    """A hostile file.
+
+    Attributes:
+        kind: What it was.
+        seed: By which it was spoilt.
+        path: The file.
+        readers: What reads it, by name, the first without ROS; a refusal is an InterfaceError, or an exit with 1.
+    """
 
     kind: str
     seed: int
     path: Path
-    read: Callable[[], object]
+    readers: dict[str, Callable[[], object]]
+
+    @property
+    def canary(self) -> Path:
+        """The file that is there if code in the hostile one was run."""
+        return self.path.parent / "canary"
 
 
 def outcome_of(read: Callable[[], object], canary: Path | None = None) -> Outcome:
@@ -143,6 +160,8 @@ def _read_and_exit(read: Callable[[], object], saying: int) -> None:
     except InterfaceError as error:
         os.write(saying, str(error)[:4000].encode())
         code = 1
+    except SystemExit as end:
+        code = {None: 0, 0: 0, 1: 1}.get(end.code, code)
     except BaseException:
         os.write(saying, traceback.format_exc()[-4000:].encode())
     finally:
@@ -258,15 +277,15 @@ def spoil_bytes(random: random.Random, data: bytes, least: int = 0) -> bytes:
 # --- Files of each kind
 
 
-def _urdf(random: random.Random, folder: Path) -> tuple[Path, Callable[[], object]]:
+def _urdf(random: random.Random, folder: Path) -> tuple[Path, dict[str, Callable[[], object]]]:
     source = DATA / random.choice(URDFS)
     text = re.sub(r'filename="(?!package)', f'filename="{source.parent}/', source.read_text())
     path = folder / "robot.urdf"
     path.write_text(spoil_text(random, text), errors="replace")
-    return path, lambda: _run_world(_world_with(folder, urdfs={"name": "it", "loadURDF": {"fileName": str(path)}}))
+    return path, _readers(_world_with(folder, urdfs={"name": "it", "loadURDF": {"fileName": str(path)}}))
 
 
-def _mesh(random: random.Random, folder: Path) -> tuple[Path, Callable[[], object]]:
+def _mesh(random: random.Random, folder: Path) -> tuple[Path, dict[str, Callable[[], object]]]:
     source = DATA / random.choice(MESHES)
     path = folder / f"mesh{source.suffix}"
     data = source.read_bytes()
@@ -277,22 +296,22 @@ def _mesh(random: random.Random, folder: Path) -> tuple[Path, Callable[[], objec
     if source.name == "cloth_z_up.obj":
         soft = {"name": "it", "loadSoftBody": {"fileName": str(path), "useMassSpring": True}}
         world = write_world(folder, soft=(soft,), resetSimulation={"flags": "RESET_USE_DEFORMABLE_WORLD"})
-        return path, lambda: _run_world(world)
+        return path, _readers(world)
     shape = {"shapeType": "GEOM_MESH", "fileName": str(path)}
     if random.randrange(2):
-        return path, lambda: _run_world(_world_with(folder, dynamic={**ball("it"), **_shapes(shape)}))
+        return path, _readers(_world_with(folder, dynamic={**ball("it"), **_shapes(shape)}))
     urdf = folder / "robot.urdf"
     geometry = f'<geometry><mesh filename="{path}"/></geometry>'
     parts = f"<visual>{geometry}</visual><collision>{geometry}</collision>"
     urdf.write_text(f'<robot name="r"><link name="l">{parts}</link></robot>')
-    return path, lambda: _run_world(_world_with(folder, urdfs={"name": "it", "loadURDF": {"fileName": str(urdf)}}))
+    return path, _readers(_world_with(folder, urdfs={"name": "it", "loadURDF": {"fileName": str(urdf)}}))
 
 
 def _shapes(shape: dict[str, str]) -> dict[str, object]:
     return {"createVisualShape": shape, "createCollisionShape": shape}
 
 
-def _yaml(random: random.Random, folder: Path) -> tuple[Path, Callable[[], object]]:
+def _yaml(random: random.Random, folder: Path) -> tuple[Path, dict[str, Callable[[], object]]]:
     camera = {"name": "eye", "object_tf": {"tf_id": "eye"}}
     arm = iiwa(enabled_joint_force_torque_sensors=["lbr_iiwa_joint_7"], joint_trajectory_controller={}, contacts={})
     world = Path(
@@ -305,7 +324,7 @@ def _yaml(random: random.Random, folder: Path) -> tuple[Path, Callable[[], objec
     if random.randrange(12) == 0:
         text += "\n" + random.choice(BOMBS)
     path.write_text(text, errors="replace")
-    return path, lambda: _run_world(str(world))
+    return path, _readers(str(world))
 
 
 _LADDER = "\n".join(f"k{turn}: &a{turn} {{<<: [*a{turn - 1}, *a{turn - 1}], x{turn}: 1}}" for turn in range(1, 30))
@@ -317,14 +336,14 @@ BOMBS = (
     "a: " + "[" * 5000,
     "a: !!python/object/apply:os.system [touch canary]",
     "objects: [this.yaml]\ntype: 'this:x'",
-    "sensors: [{type: 'unittest.__main__:x', name: a, hz: 1}]",
+    "sensors: [{type: 'this.other:x', name: a, hz: 1}]",
     f"timeStep: {'9' * 5000}",
     "resetSimulation: {flags: 1180591620717411303424}",
 )
 """YAML that takes far more than it is long, or names what nobody should load."""
 
 
-def _bag(random: random.Random, folder: Path) -> tuple[Path, Callable[[], object]]:
+def _bag(random: random.Random, folder: Path) -> tuple[Path, dict[str, Callable[[], object]]]:
     path, canary = folder / "session.bag", folder / "canary"
     what = random.randrange(5)
     if what == 0:
@@ -337,7 +356,7 @@ def _bag(random: random.Random, folder: Path) -> tuple[Path, Callable[[], object
     else:
         write_session(path, folder)
         path.write_bytes(spoil_bytes(random, path.read_bytes(), least=13))
-    return path, lambda: _read_bag(path)
+    return path, {"tools": lambda: _read_bag(path)}
 
 
 REPLACED = (
@@ -413,11 +432,31 @@ def _world_with(folder: Path, **objects: dict[str, object]) -> str:
     return write_world(folder, **{section: (config,) for section, config in objects.items()})
 
 
-def _run_world(path: str) -> None:
-    """Does what `check` does, and takes a few steps."""
-    with contextlib.closing(World(load_world(path), connection_mode=pybullet.DIRECT)) as world:
+def _readers(world: str) -> dict[str, Callable[[], object]]:
+    return {"check": lambda: _check(world), "node": lambda: _run_node(world)}
+
+
+def _check(world: str) -> None:
+    sys.argv = ["check", world]
+    check.main()
+
+
+class _ShortRun(SimulatorNode):
+    """The simulator node for a few ticks."""
+
+    def run(self) -> None:
+        self._simulation.stop()
         for _ in range(TICKS):
-            world.step()
+            self._simulation.step()
+        rospy.signal_shutdown("all ticks are done")
+        super().run()
+
+
+def _run_node(world: str) -> None:
+    name = f"node_{os.getpid()}"
+    sys.argv = [name, f"_config_file:={world}"]
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    run_node(name, _ShortRun, _ShortRun.run, ros_time=False, loggers=["rpbi"])
 
 
 _MAKERS = {"urdf": _urdf, "mesh": _mesh, "yaml": _yaml, "bag": _bag}

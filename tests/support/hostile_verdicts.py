@@ -1,7 +1,7 @@
-"""Makes hostile files in a folder, reads each, and prints kind, seed, verdict and what was said, a line of JSON each.
+"""Makes hostile files in a folder, reads each, and prints kind, seed, reader, verdict and what was said, as JSON lines.
 
-Arguments: the folder, the first seed, how many of each kind, and the kinds; `controls` are files that must not be fine
-with who reads them without care.
+Arguments: `alone`, or `node` if the simulator node is to read them too, which needs a ROS master; the folder, the first
+seed, how many of each kind, and the kinds. `controls` are files that must not be fine with who reads them without care.
 """
 
 from __future__ import annotations
@@ -22,22 +22,23 @@ TWO_PARENTS = "".join(
 
 def main() -> None:
     """Prints the verdicts."""
-    folder, first, count, *kinds = sys.argv[1:]
+    who, folder, first, count, *kinds = sys.argv[1:]
     for kind in kinds:
         if kind == "controls":
             _print_controls(Path(folder))
             continue
         for hostile in hostile_files(kind, range(int(first), int(first) + int(count)), Path(folder)):
-            outcome = outcome_of(hostile.read, hostile.path.parent / "canary")
-            print(json.dumps([kind, hostile.seed, outcome.verdict, outcome.text]), flush=True)
+            for name, read in hostile.readers.items():
+                if name != "node" or who == "node":
+                    print(json.dumps([kind, hostile.seed, name, *outcome_of(read, hostile.canary)]), flush=True)
 
 
 def _print_controls(folder: Path) -> None:
     urdf, bag, canary = folder / "control.urdf", folder / "control.bag", folder / "canary"
     urdf.write_text(TWO_ROOTS.format(TWO_PARENTS))
-    print(json.dumps(["urdf", 0, *outcome_of(lambda: _load(urdf))]))
+    print(json.dumps(["urdf", 0, "PyBullet", *outcome_of(lambda: _load(urdf))]))
     write_session(bag, folder, definition_code=str(canary))
-    print(json.dumps(["bag", 0, *outcome_of(lambda: _read(bag), canary)]))
+    print(json.dumps(["bag", 0, "rosbag", *outcome_of(lambda: _read(bag), canary)]))
 
 
 def _load(urdf: Path) -> None:

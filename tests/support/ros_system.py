@@ -31,12 +31,15 @@ def support_on_path() -> dict[str, str]:
 
 
 def wait_until(condition: Callable[[], Any], what: str, timeout_s: float = 120.0, every_s: float = 0.02) -> Any:
-    """Waits until a condition holds and returns its value; errors of a master that is not up yet count as no."""
+    """Waits until a condition holds and returns its value.
+
+    Errors of a master that is not up yet count as no, and so does asking for the last of no messages.
+    """
     end_s = time.monotonic() + timeout_s
     while True:
         try:
             value = condition()
-        except (OSError, rosgraph.MasterException, rospy.ROSException):
+        except (OSError, IndexError, rosgraph.MasterException, rospy.ROSException):
             value = None
         if value:
             return value

@@ -142,6 +142,27 @@ def test_faulty_joint_state_does_not_pass(ros, start):
     assert {message.name[0] for message in passed.messages} == {"a"} and passed.messages[0].position == (1.0, 2.0, 3.0)
 
 
+def test_names_and_units_of_a_driver_there_and_back(ros, start):
+    """Both nodes on one topic: the second undoes what the first does, and numbers are in the driver's units."""
+    joints = [{"joint": "a", "rename": "A1", "unit": "deg", "sign": -1, "offset": 90.0}]
+    start("remap_joint_state", config={"joint_names": ["c", "a"], "joints": joints}, start_on_init=True)
+    back = ["joint_states:=joint_states/to", "remap_joint_state/toggle:=back/toggle"]
+    start(
+        ARRAY_NODE,
+        *back,
+        toggle="back/toggle",
+        config={"joint_names": ["c", "A1"], "joints": joints, "inverse": True},
+        start_on_init=True,
+    )
+    there, numbers = ros.listen("joint_states/to", JointState), ros.listen("joint_states/floatarray", Float64MultiArray)
+    with publishing("joint_states/from", JointState) as states:
+        repeat(states, STATE, lambda: there.messages and numbers.messages, "both have something")
+    assert there.messages[0].name == ["c", "A1"]
+    assert there.messages[0].position == pytest.approx((3.0, 90.0 - math.degrees(1.0)))
+    assert there.messages[0].velocity == pytest.approx((6.0, -math.degrees(4.0)))
+    assert numbers.messages[0].data == pytest.approx((3.0, 1.0), rel=1e-14)
+
+
 LAUNCH = """
 <launch>
   <node pkg="custom_ros_tools" type="remap_joint_state" name="to_arm" ns="arm">
@@ -176,6 +197,7 @@ def test_roslaunch_names_and_remaps_everything(ros, tmp_path):
         (ARRAY_NODE, {"config": "a"}, "~config: expected a mapping of keys to values, got str"),
         (ARRAY_NODE, {"config": "a", "start_on_init": "on"}, f"/{ARRAY_NODE}: start_on_init: expected true or false"),
         (ARRAY_NODE, {"start_on_init": "on"}, f"/{ARRAY_NODE}: start_on_init: expected true or false, got text 'on'"),
+        ("remap_joint_state", {"config": {"joints": [{"joint": "a", "sign": 0}]}}, "~config: joints[0].sign: must be"),
         ("remap_joint_state", {"start_on_init": 2}, "start_on_init: expected true or false, got 2"),
     ],
 )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -21,13 +20,10 @@ MATRIX = np.array([[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 2], [0, 0, 0, 1.0]])
 
 
 @pytest.fixture
-def tf(ros) -> Iterator[TfInterface]:
+def tf(own_tf) -> TfInterface:
     """The tests' TF."""
-    interface = TfInterface()
-    wait_until(lambda: interface.tf_broadcaster.pub_tf.get_num_connections(), "it hears itself")
-    yield interface
-    interface._listener.unregister()
-    interface.tf_broadcaster.pub_tf.unregister()
+    wait_until(lambda: own_tf.tf_broadcaster.pub_tf.get_num_connections(), "it hears itself")
+    return own_tf
 
 
 @pytest.mark.quick

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 import rosgraph
@@ -10,7 +12,9 @@ from ros_system import wait_until
 from tf2_msgs.msg import TFMessage
 
 TIP, TARGET, FIGURE = "rpbi/kuka_lwr/end_effector_ball", "rpbi/figure_eight", "rpbi/figure_eight_base"
-SOLVERS = ("kdl", "pybullet", "trac_ik", "tasks", "global", "trajectory")  # the last one plans the figure as a whole
+SOLVERS = ("kdl", "trac_ik", "tasks", "trajectory")  # the last one plans the figure as a whole
+if os.environ.get("IK_EXAMPLE_SOLVERS") == "all":
+    SOLVERS += ("pybullet", "global")  # some 15 s each; they differ from kdl in nothing that the launch file does
 SPAN_M = 0.35
 """The figure is 0.4 m from end to end."""
 NEAR_M = 0.01
@@ -45,7 +49,7 @@ def test_arm_tracks_the_figure(ros, solver):
         found = places()
         return found and min(np.ptp(each[:, 1]) if len(each) else 0.0 for each in found) > SPAN_M and found
 
-    target, tip = wait_until(drawn, "target and tip move from end to end", 120.0, every_s=0.2)
+    target, tip = wait_until(drawn, "target and tip move from end to end", 120.0, every_s=1.0)
     off_m = np.linalg.norm(tip[:, None] - target[None], axis=-1).min(axis=1)
     assert np.median(off_m) < NEAR_M
     assert rosgraph.Master("/tests").lookupService(f"/ik/solver/{solver}/solve")

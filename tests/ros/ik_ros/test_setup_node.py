@@ -14,7 +14,6 @@ from ros_system import wait_until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import SetBool
-from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit
 
 from custom_ros_tools.ros.tf_listener import TfListener
 from ik_ros.msg import IKProblem
@@ -31,7 +30,8 @@ def target(ros):
     def send(pose: Pose = TARGET) -> None:
         broadcaster.sendTransform(transform("foot", "target", pose, rospy.Time.from_sec(rospy.get_time())))
 
-    return send
+    yield send
+    broadcaster.pub_tf.unregister()
 
 
 def hear(problems, target, condition, what):
@@ -241,33 +241,3 @@ def test_simulated_robot_is_asked_itself(ros, target):
             return math.dist((p.x, p.y, p.z), (0.5, 0.1, 0.6)) < 5e-3
 
         wait_until(is_there, "the arm goes to the target")
-
-
-def test_frame_that_is_dragged_in_rviz_is_broadcast_where_the_handles_are(ros):
-    parameters = {"parent_frame_id": "foot", "child_frame_id": "dragged", "position": [0.1, 0.2, 0.3]}
-    rospy.set_param("/interactive_target_node", parameters)
-    ros.start(["rosrun", "ik_ros", "interactive_target_node.py", "__name:=interactive_target_node"])
-    shown = ros.listen("ik_target/update_full", InteractiveMarkerInit).wait_for()[-1].markers[0]
-    assert (shown.header.frame_id, shown.name, len(shown.controls)) == ("foot", "dragged", 6)
-    buffer = tf2_ros.Buffer(debug=False)
-    TfListener(buffer)
-
-    def position():
-        try:
-            p = buffer.lookup_transform("foot", "dragged", rospy.Time(0)).transform.translation
-        except tf2_ros.TransformException:
-            return None
-        return p.x, p.y, p.z
-
-    wait_until(lambda: position() == (0.1, 0.2, 0.3), "it is where the parameters say")
-    with publishing("ik_target/feedback", InteractiveMarkerFeedback) as mouse:
-
-        def drag(pose):
-            feedback = InteractiveMarkerFeedback(
-                client_id="test", marker_name="dragged", event_type=InteractiveMarkerFeedback.POSE_UPDATE, pose=pose
-            )
-            feedback.header.frame_id = "foot"
-            mouse.publish(feedback)
-
-        drag(Pose(Point(math.nan, 0, 0), Quaternion(0, 0, 0, 1)))
-        wait_until(lambda: drag(TARGET) or position() == (0.3, -0.2, 0.5), "it follows the mouse")

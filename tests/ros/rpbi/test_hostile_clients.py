@@ -11,7 +11,6 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import pytest
 import rosgraph
@@ -32,7 +31,7 @@ from ros_pybullet_interface.msg import PybulletObject
 
 NODE = "/ros_pybullet_interface"
 CALLS, MESSAGES = 400, 100
-FILES_EACH = 6
+FILES_EACH = 4
 LONGEST_ANSWER_S = 60.0
 FLOATS = (math.nan, math.inf, -math.inf, -1.0, 0.0, 0.5, 1e300, -1e300, 1e-300)
 BOMB = "k0: &a0 {y: 1}\n" + "\n".join(f"k{n}: &a{n} {{<<: [*a{n - 1}, *a{n - 1}]}}" for n in range(1, 30))
@@ -182,23 +181,32 @@ def test_tf_after_the_end_of_time_does_not_end_the_node(ros, node, seconds):
     _is_well(ros, node)
 
 
-@pytest.mark.parametrize("kind", ["urdf", "mesh"])
+@pytest.mark.parametrize("kind", ["urdf", "mesh", "yaml"])
 def test_check_and_node_agree_on_hostile_files(ros, node, tmp_path, kind):
-    command = [sys.executable, str(SUPPORT / "hostile_verdicts.py"), str(tmp_path), "2000", str(FILES_EACH), kind]
+    program = str(SUPPORT / "hostile_verdicts.py")
+    command = [sys.executable, program, "node", str(tmp_path), "2000", str(FILES_EACH), kind]
     done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **support_on_path()}, check=True)
     verdicts = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("[")]
-    assert len(verdicts) == FILES_EACH
-    for _, seed, verdict, text in verdicts:
-        config = yaml.safe_load(Path(tmp_path / f"{kind}{seed}" / "it.yaml").read_text())
-        if "loadSoftBody" in config:  # in a world of its own kind
-            continue
-        answer = add(ros, PybulletObject.URDF if "loadURDF" in config else PybulletObject.DYNAMIC, config)
-        assert answer.success == (verdict == "taken"), (seed, verdict, text, answer.message)
-        if answer.success:
-            assert remove(ros, "it").success
-        else:
-            assert answer.message.replace("config: ", "") == text.replace("it.yaml: ", "")
+    assert len(verdicts) == 2 * FILES_EACH
+    for (_, seed, by, verdict, text), (*_, at_start, said) in zip(verdicts[::2], verdicts[1::2]):
+        assert (by, verdict) == ("check", at_start) and verdict in ("taken", "refused"), (seed, text, at_start, said)
+        problems = [line.removeprefix("error: ") for line in text.splitlines() if line.startswith("error: ")]
+        assert all(problem in said for problem in problems), (seed, text, said)
+        if kind != "yaml":
+            _add(ros, yaml.safe_load((tmp_path / f"{kind}{seed}" / "it.yaml").read_text()), verdict, problems)
     _is_well(ros, node)
+
+
+def _add(ros, config, verdict, problems):
+    """Adds to the running world what is in a hostile file, unless that is for a world of its own kind."""
+    if "loadSoftBody" in config:
+        return
+    answer = add(ros, PybulletObject.URDF if "loadURDF" in config else PybulletObject.DYNAMIC, config)
+    assert answer.success == (verdict == "taken"), (config, verdict, problems, answer.message)
+    if answer.success:
+        assert remove(ros, "it").success
+    else:
+        assert answer.message.replace("config: ", "") == "\n".join(problems).replace("it.yaml: ", "")
 
 
 def test_a_node_that_was_out_of_file_handles_hears_again(ros, node):

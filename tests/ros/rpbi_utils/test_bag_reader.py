@@ -10,10 +10,11 @@ from pathlib import Path
 
 import pytest
 import rosbag
-from std_msgs.msg import Float64
+from std_msgs.msg import Float64, String
 
 from rpbi_utils import bag_to_dataframes, topic_report
 from rpbi_utils.errors import BagError
+from rpbi_utils.ros import bag_reader, bag_to_table
 
 WriteBag = Callable[..., Path]
 
@@ -86,3 +87,47 @@ def test_a_bag_that_is_damaged_inside(write_bag: WriteBag, compression: str) -> 
         file.seek(chunk.data_pos)
         file.write(b"\xff" * chunk.compressed_size)
     assert "damaged" in _refused(path)
+
+
+@pytest.fixture
+def bomb(write_bag: WriteBag, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A bag of 5 MB in a few kB, where 1 MB counts as much."""
+    monkeypatch.setattr(bag_reader, "MOST_UNFOLDED", 1_000_000)
+    return write_bag([("/a", String("x" * 1_000_000))] * 5, compression="bz2")
+
+
+def test_a_bag_that_unfolds_to_far_more_than_its_size_is_refused_unless_it_is_asked_for(
+    bomb: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert bomb.stat().st_size * bag_reader.MOST_TIMES < 5_000_000
+    assert "MB unfold to 0.005 GB: more than 255 times as much; --any-size, if you know who made it" in _refused(bomb)
+    assert len(bag_to_dataframes(bomb, any_size=True)["/a"]) == 5
+    assert topic_report(bomb, any_size=True).loc["/a", "bytes"] == 5 * 1_000_004
+    assert bag_to_table.main([str(bomb), "--quiet"]) == 1
+    assert capsys.readouterr().err.endswith("--any-size, if you know who made it\n")
+    assert bag_to_table.main([str(bomb), "--quiet", "--any-size", "--format", "csv"]) == 0
+
+
+def test_lz4_never_unfolds_too_far(write_bag: WriteBag, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bag_reader, "MOST_UNFOLDED", 0)
+    path = write_bag([("/a", String("x" * 1_000_000))] * 5, compression="lz4")
+    assert len(bag_to_dataframes(path)["/a"]) == 5
+
+
+def test_a_chunk_that_unfolds_to_more_than_it_says_is_damaged(write_bag: WriteBag) -> None:
+    path = write_bag([("/a", String("x" * 100_000))], compression="bz2")
+    data = path.read_bytes()
+    at = data.index(b"size=") + len(b"size=")
+    path.write_bytes(data[:at] + (1000).to_bytes(4, "little") + data[at + 4 :])
+    assert "damaged: a chunk unfolds to more than it says" in _refused(path)
+
+
+def test_an_index_that_names_a_message_many_times_is_damaged(tmp_path: Path) -> None:
+    path = tmp_path / "again.bag"
+    with rosbag.Bag(str(path), "w") as bag:
+        bag.write("/a", String("x" * 100_000))
+        for entries in bag._curr_chunk_connection_indexes.values():
+            entries *= 100
+    with rosbag.Bag(str(path)) as bag:
+        assert sum(1 for _ in bag.read_messages()) == 100, "rosbag itself reads it a hundred times"
+    assert "damaged: its index names messages more than once" in _refused(path)

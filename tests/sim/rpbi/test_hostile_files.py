@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
@@ -17,6 +18,7 @@ from ros_system import SUPPORT, support_on_path
 from worlds import ball, write_world
 
 from custom_ros_tools.errors import ConfigError
+from rpbi.bodies.urdf_object import UrdfObject
 from rpbi.config.loading import load_world
 from rpbi.meshes import trial
 from rpbi.meshes.trial import Mesh, Use
@@ -28,7 +30,8 @@ FIRST_SEED, EACH = 1000, 8
 
 
 def _verdicts(folder, *kinds):
-    command = [sys.executable, str(SUPPORT / "hostile_verdicts.py"), str(folder), str(FIRST_SEED), str(EACH), *kinds]
+    program = str(SUPPORT / "hostile_verdicts.py")
+    command = [sys.executable, program, "alone", str(folder), str(FIRST_SEED), str(EACH), *kinds]
     done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **support_on_path()}, check=True)
     return [json.loads(line) for line in done.stdout.splitlines() if line.startswith("[")]
 
@@ -38,12 +41,12 @@ def _verdicts(folder, *kinds):
 def test_a_hostile_file_is_taken_or_refused_in_words(tmp_path, kind):
     found = _verdicts(tmp_path, kind)
     assert len(found) == EACH
-    assert {verdict for _, _, verdict, _ in found} <= {"taken", "refused"}, found
-    assert any(verdict == "refused" for _, _, verdict, _ in found)
+    assert {verdict for *_, verdict, _ in found} <= {"taken", "refused"}, found
+    assert any(verdict == "refused" for *_, verdict, _ in found)
 
 
 def test_without_care_such_files_crash_and_run_code(tmp_path):
-    assert {(kind, verdict) for kind, _, verdict, _ in _verdicts(tmp_path, "controls")} == {
+    assert {(kind, verdict) for kind, *_, verdict, _ in _verdicts(tmp_path, "controls")} == {
         ("urdf", "signal 11"),
         ("bag", "code"),
     }
@@ -114,6 +117,24 @@ def test_a_urdf_of_which_nothing_is_wrong_is_left_alone(tmp_path):
     assert urdf_problems(str(path)) == [] and UrdfDocument(str(path)).root_link() == "a"
 
 
+class LoadsByItself(UrdfObject):
+    """A type of another package that has PyBullet load its file."""
+
+    def __init__(self, pb, config):
+        pb.loadURDF(config.loadURDF.fileName)
+
+
+@pytest.mark.parametrize("kind", ["urdf", f"{__name__}:LoadsByItself"])
+def test_whoever_loads_a_urdf_it_is_looked_at_before(tmp_path, kind):
+    path = tmp_path / "robot.urdf"
+    path.write_text(FAULTS["two parents"][0])
+    with (
+        contextlib.closing(World(load_world(write_world(tmp_path)))) as world,
+        pytest.raises(ConfigError, match="hangs on two joints"),
+    ):
+        world.add(kind, {"name": "it", "loadURDF": {"fileName": str(path)}})
+
+
 VISUAL, COLLISION = "createVisualShape", "createCollisionShape"
 BROKEN = {
     "visual, no scene": (VISUAL, "no.dae", "<COLLADA/>", r"PyBullet crashes when it loads it \(SIG\w+\)"),
@@ -136,10 +157,10 @@ def test_a_mesh_that_went_well_is_not_tried_again(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     mesh = Mesh(Use.URDF_COLLISION, str(tmp_path / "some.obj"))
     Path(mesh.file).write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\nf 1 2 4\nf 2 3 4\n")
-    monkeypatch.setattr(trial, "_tried", {})
+    monkeypatch.setattr(trial, "_tried", set())
     assert trial.faults_in([mesh]) == {}
     assert len(list((tmp_path / "cache/rpbi/meshes").iterdir())) == 1
-    monkeypatch.setattr(trial, "_tried", {})
+    monkeypatch.setattr(trial, "_tried", set())
     monkeypatch.setattr(sys, "executable", "/bin/false")
     assert trial.faults_in([mesh]) == {}, "no process was started"
     Path(mesh.file).write_text("v 0 0 0\n")

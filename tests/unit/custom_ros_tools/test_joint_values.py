@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from custom_ros_tools.joint_values import JointValues, MissingJointsError
+from custom_ros_tools.joint_values import JointConversion, JointValues, MissingJointsError
+from custom_ros_tools.node_configs import RemapConfig
 
 
 def test_values_follow_their_joints_into_the_order_asked_for() -> None:
@@ -60,3 +61,49 @@ def test_faulty_values_are_refused_whole(arguments: tuple, told: str) -> None:
     with pytest.raises(ValueError) as caught:
         JointValues.of(*arguments)
     assert str(caught.value) == told
+
+
+ARM = {
+    "joints": [
+        {"joint": "a", "rename": "A1", "unit": "deg", "sign": -1, "offset": 90.0},
+        {"joint": "c", "rename": "b2", "unit": "mm"},
+    ]
+}
+STATE = JointValues.of(["a", "b", "c"], [0.5, 2.0, 0.03], [0.1, 0.2, 0.3], [1.0, 2.0, 3.0])
+
+
+def remapping(**keys: object) -> tuple[JointConversion, ...]:
+    """Returns what `~config` asks for."""
+    return RemapConfig.parse({**ARM, **keys}, "~config").conversions()
+
+
+def test_joints_are_renamed_and_counted_as_their_driver_does() -> None:
+    there = STATE.converted(remapping())
+    assert there.names == ("A1", "b", "b2")
+    assert there.position == pytest.approx((90.0 - math.degrees(0.5), 2.0, 30.0), rel=1e-15)
+    assert there.velocity == pytest.approx((-math.degrees(0.1), 0.2, 300.0), rel=1e-15), "an offset moves nothing"
+    assert there.effort == (-1.0, 2.0, 3.0)
+
+
+def test_there_and_back_is_the_identity() -> None:
+    back = STATE.converted(remapping()).converted(remapping(inverse=True))
+    assert back.names == STATE.names
+    for quantity in ("position", "velocity", "effort"):
+        assert getattr(back, quantity) == pytest.approx(getattr(STATE, quantity), rel=1e-14)
+    wrong = STATE.converted(remapping()).converted(remapping(inverse=True, joints=[ARM["joints"][1]]))
+    assert wrong.names != STATE.names
+
+
+def test_joints_that_are_not_handed_on_need_not_be_there() -> None:
+    conversions = remapping(joint_names=["c"])
+    assert STATE.in_order(["c"]).converted(conversions).position == (30.0,)
+
+
+def test_joint_that_is_to_be_converted_and_missing_is_named() -> None:
+    with pytest.raises(MissingJointsError, match="^no values for joint 'c': it has a$"):
+        JointValues.of(["a"], [1.0]).converted(remapping())
+
+
+def test_name_that_another_joint_has_already_is_refused() -> None:
+    with pytest.raises(ValueError, match="named once each"):
+        JointValues.of(["a", "b"], [1.0, 2.0]).converted([JointConversion("a", "b")])

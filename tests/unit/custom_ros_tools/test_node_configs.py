@@ -10,7 +10,7 @@ import pytest
 
 from custom_ros_tools.errors import ConfigError
 from custom_ros_tools.marker_config import MarkerConfig
-from custom_ros_tools.node_configs import FloatArrayConfig, RateParameters, StartParameters
+from custom_ros_tools.node_configs import FloatArrayConfig, RateParameters, RemapConfig, StartParameters
 from custom_ros_tools.schema import ConfigModel
 
 MARKER = {"node": {"topic_name": "marker"}, "type": "cube", "scale": [1, 2, 3]}
@@ -90,7 +90,20 @@ def test_numbers_of_a_joint_state_are_positions_in_their_own_order_by_default() 
         ),
         (FloatArrayConfig, {"field": "torque"}, "field: must be 'position', 'velocity' or 'effort', got text 'torque'"),
         (FloatArrayConfig, {"joint_names": "a"}, "joint_names: expected a list"),
-        (FloatArrayConfig, {"joints": ["a"]}, "joints: unknown key 'joints'; did you mean 'joint_names'?"),
+        (FloatArrayConfig, {"joint_name": ["a"]}, "joint_name: unknown key 'joint_name'; did you mean 'joint_names'?"),
+        (RemapConfig, {"joints": [{"rename": "a"}]}, "joints[0].joint: missing"),
+        (RemapConfig, {"joints": [{"joint": "a", "sign": 2}]}, "joints[0].sign: must be 1 or -1, got 2"),
+        (
+            RemapConfig,
+            {"joints": [{"joint": "a", "unit": "turn"}]},
+            "joints[0].unit: must be 'rad', 'deg', 'm' or 'mm'",
+        ),
+        (RemapConfig, {"joints": [{"joint": "a"}] * 2}, "joints[1].joint: 'a' is the name of another joint"),
+        (
+            RemapConfig,
+            {"joints": [{"joint": "a", "rename": "b"}, {"joint": "b"}]},
+            "joints[1].rename: 'b' is the name of another joint of this list",
+        ),
         (StartParameters, {"start_on_init": "yes"}, "start_on_init: expected true or false, got text 'yes'"),
         (RateParameters, {"hz": -1.0}, "hz: must be > 0 [Hz], got -1"),
     ],

@@ -45,6 +45,14 @@ def test_old_spelling_works_with_a_warning_that_says_what_to_write(
     assert caplog.messages == [f"iiwa.yaml: {old}: is an old spelling: write {new}"]
 
 
+def test_the_oldest_name_of_the_motors_works_too(caplog: pytest.LogCaptureFixture) -> None:
+    motors = ROBOT["setJointMotorControlArray"]
+    data = {"name": "iiwa", "loadURDF": ROBOT["loadURDF"], "setJointMotorControlArrayParameters": motors}
+    assert load_object("robot", data, "iiwa.yaml") == robot()
+    [message] = caplog.messages
+    assert message.endswith("setJointMotorControlArrayParameters: is an old spelling: write setJointMotorControlArray")
+
+
 def test_every_old_spelling_means_a_key_that_exists() -> None:
     for section, table in LEGACY_KEYS.items():
         (model,) = {body.Config for body in BODY_TYPES.values() if body.section == section}

@@ -91,8 +91,11 @@ def test_shipped_file_with_a_wrong_key_anywhere_does_not_hold_its_schema(path: P
     named = MODELINE.match(path.read_text())
     assert named
     data = yaml.safe_load(path.read_text())
+    of_sensors = {id(one) for sensor in data.get("sensors", ()) for one in mappings(sensor)}
     count = 0
     for mapping in mappings(data):
+        if id(mapping) in of_sensors:  # any class may have a sensor's keys
+            continue
         mapping["no such key"] = "some text"
         assert faults(path.parent / named[1], data), f"nothing wrong with 'no such key' in {mapping}"
         del mapping["no such key"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .errors import InterfaceError
 
@@ -84,3 +84,50 @@ class JointValues:
         picked = [index[prefix + name] for name in names]
         quantities = (self.position, self.velocity, self.effort)
         return JointValues(tuple(names), *(tuple(v[i] for i in picked) if v else () for v in quantities))
+
+    def converted(self, conversions: Sequence[JointConversion]) -> JointValues:
+        """Returns the values with some joints converted, in the same order; others stay as they are.
+
+        Raises:
+            MissingJointsError: If a joint to convert is missing; it names all of them.
+            ValueError: If a joint gets the name of another, or a value is not finite any more.
+        """
+        if not conversions:
+            return self
+        by_joint = {each.joint: each for each in conversions}
+        missing = [joint for joint in by_joint if joint not in self.names]
+        if missing:
+            raise MissingJointsError(missing, self.names)
+        each = [by_joint.get(name, JointConversion(name, name)) for name in self.names]
+        return JointValues.of(
+            (one.name for one in each),
+            [one.sign * one.factor * value + one.offset for one, value in zip(each, self.position)],
+            [one.sign * one.factor * value for one, value in zip(each, self.velocity)],
+            [one.sign * value for one, value in zip(each, self.effort)],
+        )
+
+
+@dataclass(frozen=True)
+class JointConversion:
+    """How the values of a joint are told to somebody who counts otherwise.
+
+    A position q becomes `sign * factor * q + offset`, a velocity v `sign * factor * v`, an effort e `sign * e`.
+
+    Attributes:
+        joint: Its name here.
+        name: Its name there.
+        sign: 1, or -1 where the joint turns the other way.
+        factor: How many of their units one of ours is.
+        offset: Their position [their unit] where ours is 0.
+    """
+
+    joint: str
+    name: str
+    sign: int = 1
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def inverse(self) -> JointConversion:
+        """Returns the way back."""
+        offset = -self.offset * self.sign / self.factor
+        return replace(self, joint=self.name, name=self.joint, factor=1.0 / self.factor, offset=offset)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from .errors import UnknownNameError, hint, shortened
+from .errors import ConfigError, Problem, UnknownNameError, hint, shortened
 
 own_folders = [str(Path(__file__).parent)]
 """Folders of the packages that look classes up and call them; `cause_of` looks for the fault outside of these."""
@@ -122,6 +122,20 @@ def find_in_table(name: str, base: type, table: Mapping[str, str], kind: str) ->
     if name not in table:
         raise UnknownNameError(kind, name, [*table, "their_package.module:Class"])
     return pkgutil.resolve_name(table[name])
+
+
+def configured_class(name: str, base: type, table: Mapping[str, str], kind: str) -> Any:
+    """Returns what `find_in_table` does, for a name in somebody's configuration.
+
+    Raises:
+        UnknownNameError: If the table does not have the name.
+        MissingDependency: If it needs a library that is not installed.
+        ConfigError: If another package has no such class, or its module cannot be imported.
+    """
+    try:
+        return find_in_table(name, base, table, kind)
+    except ValueError as error:
+        raise ConfigError([Problem("", "", f"{kind} '{name}': {error}")]) from error
 
 
 def full_name(thing: Any) -> str:

@@ -3,8 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any, cast
 
-from custom_ros_tools.errors import ConfigError, Problem
-from custom_ros_tools.plugins import find_in_table
+from custom_ros_tools.plugins import configured_class
 from custom_ros_tools.schema import ConfigModel
 
 from .solver import Solver
@@ -22,10 +21,7 @@ def solver_class(name: str) -> type[Solver]:
         MissingDependency: If a solver of the table needs a library that is not installed.
         ConfigError: If another package has no such class, or its module cannot be imported.
     """
-    try:
-        return cast(type[Solver], find_in_table(name, Solver, SOLVERS, "solver"))
-    except ValueError as error:
-        raise ConfigError([Problem("", "", f"solver '{name}': {error}")]) from error
+    return cast(type[Solver], configured_class(name, Solver, SOLVERS, "solver"))
 
 
 def make_solver(

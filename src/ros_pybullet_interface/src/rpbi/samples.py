@@ -182,3 +182,49 @@ class SurfaceSample(NamedTuple):
     name: str
     corners: tuple[Vector, ...]
     rgba: tuple[float, float, float, float]
+
+
+class ViconSample(NamedTuple):
+    """A body as Vicon sees it.
+
+    Attributes:
+        name: `BODY/SENSOR`, which are Vicon's subject and segment.
+        frame: TF frame that is reported.
+        pose: Its pose in the world.
+        age_ns: How long ago it was there [ns].
+    """
+
+    name: str
+    frame: str
+    pose: Pose
+    age_ns: int
+
+
+class SeenTag(NamedTuple):
+    """An AprilTag that a camera sees.
+
+    Attributes:
+        id: Its number.
+        size: Side of its black square [m].
+        pose: Its pose in the camera's optical frame; x to the right, y up, z out of the tag.
+    """
+
+    id: int
+    size: float
+    pose: Pose
+
+
+class AprilTagsSample(NamedTuple):
+    """The AprilTags that a camera sees.
+
+    Attributes:
+        name: The sensor.
+        frame: TF frame of the camera, an optical one.
+        tags: Those that are seen.
+        age_ns: How long ago they were seen [ns].
+    """
+
+    name: str
+    frame: str
+    tags: tuple[SeenTag, ...]
+    age_ns: int

@@ -26,6 +26,7 @@ from rpbi.engine.mailbox import Mailbox
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.rgbd import RgbdSensor
 from rpbi.sensors.sensor import Sensor
+from rpbi.sensors.tracking.vicon import ViconSensor
 
 from .bodies import Body, BodyConfig
 from .plugins import blame, blaming
@@ -286,7 +287,10 @@ class World:
     def frames(self) -> set[str]:
         """Returns the TF frames that it publishes, without prefix: its own, those of links, and those under `poses`."""
         links = (
-            sensor for name in self.bodies for sensor in self.sensors_of(name) if isinstance(sensor, LinkPoseSensor)
+            sensor
+            for name in self.bodies
+            for sensor in self.sensors_of(name)
+            if isinstance(sensor, (LinkPoseSensor, ViconSensor))
         )
         poses = (pose.tf_id for pose in self.config.poses)
         return {WORLD_FRAME, *poses, *(frame for sensor in links for frame in sensor.frames)}

@@ -123,7 +123,8 @@ class _Frames:
         for slot, followed in self._followed.items():
             name = slot.split("/")[0]
             if (missing := self._missing(followed.tf_id)) is not None:
-                yield Problem(_file_of(self._world, name), "object_tf.tf_id", f"'{name}' follows it: {missing}")
+                key = "tracked_tf.tf_id" if followed.is_tracked else "object_tf.tf_id"
+                yield Problem(_file_of(self._world, name), key, f"'{name}' follows it: {missing}")
 
     def _owner(self, frame: str) -> Body | None:
         """Returns the body whose frame it is by its name, if that can publish any."""

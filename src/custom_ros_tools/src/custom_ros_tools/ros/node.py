@@ -1,8 +1,13 @@
 """What the programs of nodes and commands call; it imports nothing that starts a thread."""
 
+import os
 import pkgutil
+import resource
 import signal
 import sys
+
+LEAST_MEMORY = 500_000_000
+"""Bytes of address space that NumPy and PyBullet need; with less, they end the process."""
 
 
 def run(main: str) -> None:
@@ -12,6 +17,7 @@ def run(main: str) -> None:
     imported; so the function is imported here.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    _mind_memory_limit()
     pkgutil.resolve_name(main)()
 
 
@@ -26,6 +32,7 @@ def run_command(main: str) -> None:
     if heeds:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    _mind_memory_limit()
     function = pkgutil.resolve_name(main)
     try:
         if heeds:
@@ -36,3 +43,15 @@ def run_command(main: str) -> None:
     finally:
         if heeds:  # while Python is leaving, too
             signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def _mind_memory_limit() -> None:
+    """Ends the program with 1 if a limit of memory leaves it too little, and else has it hang on none."""
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit == resource.RLIM_INFINITY:
+        return
+    if limit < LEAST_MEMORY:
+        sys.exit(
+            f"memory is limited to {limit / 1e6:.0f} MB (ulimit -v); expected at least {LEAST_MEMORY / 1e6:.0f} MB"
+        )
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # its threads wait for ever for 128 MB each

@@ -26,7 +26,7 @@ from ros_pybullet_interface.srv import RobotInfo
 from rpbi.geometry import Pose
 
 from .messages import positions_in, problem_message
-from .solver_name import run_for_solver, topics_of
+from .solver_name import run_for_solver, topics_of, trust_only_what_was_named
 from .tf import FreshTf
 
 QUEUE_SIZE = 10
@@ -227,6 +227,7 @@ def main() -> None:
     """Runs the node."""
 
     def make(name: str) -> object:
+        trust_only_what_was_named()
         return RobotIKSetup() if name == "pybullet" and rospy.has_param("~config") else SetupNode(name)
 
     run_for_solver("setup", make)

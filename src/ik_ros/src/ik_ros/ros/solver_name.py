@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import rospy
 
+from custom_ros_tools.plugins import trust_only
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from ik_ros.solvers import SOLVERS
 
@@ -12,6 +13,11 @@ from ik_ros.solvers import SOLVERS
 def topics_of(kind: str, name: str) -> str:
     """Returns the prefix of the topics and services of a solver's node, `setup` or `solver`."""
     return f"ik/{kind}/{name.replace(':', '/').replace('.', '/')}"
+
+
+def trust_only_what_was_named() -> None:
+    """Has the solver and the tasks that the node was started with be all that it ever imports."""
+    trust_only({"ik_ros", "rpbi"}, "nodes of ik_ros import what their options name when they start, no more")
 
 
 def run_for_solver(kind: str, make: Callable[[str], object]) -> None:

@@ -33,7 +33,7 @@ from ik_ros.srv import (
 )
 
 from .messages import pose_message, problem_in, problem_in_trac_ik, trajectory_message
-from .solver_name import run_for_solver, topics_of
+from .solver_name import run_for_solver, topics_of, trust_only_what_was_named
 from .tf import BaseFrame
 
 QUEUE_SIZE = 10
@@ -58,6 +58,7 @@ class SolverNode:
     def __init__(self, name: str) -> None:
         own, options = _parameters()
         self._name, self._solver = name, make_solver(name, options, rospy.get_name())
+        trust_only_what_was_named()
         self._continuity = own.continuity
         self._new_stream()
         self._base = BaseFrame(own.base_frame_id)

@@ -3,5 +3,8 @@
 A user's own one needs no line: `"their_package.module:Class"` serves wherever a name does.
 """
 
-MAPPINGS: dict[str, str] = {}
+MAPPINGS: dict[str, str] = {
+    "scale": "operator_node.mappings.scale:ScaleMapping",
+    "isometric": "operator_node.mappings.isometric:IsometricMapping",
+}
 """Class of each mapping; imported when it is asked for."""

@@ -1,8 +1,10 @@
-"""A person as MVN measures them: 23 rigid segments."""
+"""A person as MVN measures them: 23 rigid segments, and what else it says of them."""
 
 from typing import NamedTuple
 
 import numpy as np
+
+from custom_ros_tools.transforms import Array
 
 SEGMENTS = (
     "Pelvis",
@@ -51,3 +53,73 @@ class SegmentFrame(NamedTuple):
     time_ms: int
     positions: np.ndarray
     quats_xyzw: np.ndarray
+
+
+class JointAngles(NamedTuple):
+    """Angles of a person's joints (type 20).
+
+    Attributes:
+        person: Number of the person, from 0.
+        sample: Counter of the frame.
+        parents: Name of the segment on the pelvis' side of each joint.
+        children: Name of the one on the other side.
+        angles_rad: Angles about x, y and z of each joint (n x 3) [rad].
+    """
+
+    person: int
+    sample: int
+    parents: tuple[str, ...]
+    children: tuple[str, ...]
+    angles_rad: Array
+
+
+class CenterOfMass(NamedTuple):
+    """A person's centre of mass in the world (3) [m] (type 24)."""
+
+    person: int
+    sample: int
+    position: Array
+
+
+class Motion(NamedTuple):
+    """Motion of segments or trackers in MVN's own units (types 21, 22 and 23).
+
+    Attributes:
+        person: Number of the person, from 0.
+        sample: Counter of the frame.
+        kind: The type. 21: position, velocity, acceleration [m, m/s, m/s2]; 22: quaternion w, x, y, z, angular
+            velocity, angular acceleration [deg/s, deg/s2]; 23: quaternion w, x, y, z, acceleration, magnetic field.
+        ids: Ids of segments, from 1, or of trackers.
+        values: What the type has of each of them, in that order.
+    """
+
+    person: int
+    sample: int
+    kind: int
+    ids: tuple[int, ...]
+    values: Array
+
+
+class PersonInfo(NamedTuple):
+    """What MVN says of a person, by its keys, such as `name` and `color` (type 12)."""
+
+    person: int
+    fields: dict[str, str]
+
+
+class TPose(NamedTuple):
+    """Where the origins of a person's segments are in the T-pose [m], by segment (type 13)."""
+
+    person: int
+    origins: dict[str, tuple[float, float, float]]
+
+
+class TimeCode(NamedTuple):
+    """Time of day of a sample, as HH:MM:SS.mmm (type 25)."""
+
+    person: int
+    sample: int
+    time: str
+
+
+Message = SegmentFrame | JointAngles | CenterOfMass | Motion | PersonInfo | TPose | TimeCode

@@ -14,7 +14,7 @@ from custom_ros_tools.errors import PhysicsError
 from custom_ros_tools.schema import ConfigModel
 from rpbi.config.pybullet_models import ObjectTf, ResetBaseVelocity
 from rpbi.control.external_wrenches import ExternalWrench, ExternalWrenches
-from rpbi.control.pose_follower import PoseFollower
+from rpbi.control.pose_follower import PoseFollower, TrackedBase
 from rpbi.engine.client import Client
 from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Pose, Twist, cross, minus, plus
@@ -151,6 +151,13 @@ class Body:
             centre = self.inertial_pose_in_base
             self.pose_follower = PoseFollower(self.pb, self.name, self.body_id, centre, object_tf)
 
+    def _track(self, object_tf: ObjectTf | None) -> None:
+        """Has a base that physics moves follow its TF frame while that is seen, if there is one."""
+        self.object_tf = object_tf
+        if object_tf is not None:
+            centre = self.inertial_pose_in_base
+            self.pose_follower = TrackedBase(self.pb, self.name, self.body_id, centre, object_tf)
+
     def before_step(self, tick: int) -> None:
         """Acts just before the physics of each tick; bodies that need nothing leave it."""
 
@@ -188,7 +195,8 @@ class Body:
         inputs: dict[str, Input] = {}
         if self.object_tf is not None:
             apply = self.set_base_pose if self.pose_follower is None else self.pose_follower.take
-            inputs["pose"] = PoseInput.following(self.object_tf, apply)
+            is_tracked = isinstance(self.pose_follower, TrackedBase)
+            inputs["pose"] = PoseInput.following(self.object_tf, apply, is_tracked)
         if self.has_physics and not self.is_soft and self.external_wrenches.can_act:
             inputs["external_wrench"] = Input(self.external_wrenches.check, self.external_wrenches.set)
         return inputs

@@ -1,10 +1,16 @@
-"""Dynamic objects: moved by physics."""
+"""Dynamic objects: moved by physics, or by TF while that sees them."""
 
 from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import HzOrOff, Position, PositiveKilograms, Quat
-from rpbi.config.pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ResetBaseVelocity
+from rpbi.config.pybullet_models import (
+    ChangeDynamics,
+    CreateCollisionShape,
+    CreateVisualShape,
+    ObjectTf,
+    ResetBaseVelocity,
+)
 from rpbi.config.sensors import ContactsConfig
 from rpbi.engine.client import Client
 from rpbi.sensors.base_state import BaseStateSensor
@@ -27,6 +33,9 @@ class DynamicObjectConfig(BodyConfig):
     baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Start orientation, x, y, z, w.")
     useMaximalCoordinates: MaximalCoordinates = False
     resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity.")
+    tracked_tf: ObjectTf | None = Field(
+        None, description="TF frame to follow while it is seen; physics moves it in between, and without it always."
+    )
     broadcast_hz: HzOrOff = Field(0.0, description="Rate of its pose on TF; 0 is off.")
     base_state_hz: HzOrOff = Field(0.0, description="Rate of its pose and velocity on `base_state`; 0 is off.")
     contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
@@ -42,6 +51,7 @@ class DynamicObject(ShapeObject):
         "createCollisionShape": {"shapeType": "GEOM_SPHERE", "radius": 0.1},
         "changeDynamics": {},
         "baseMass": 1.0,
+        "tracked_tf": {"tf_id": "FRAME"},
         "broadcast_hz": 50.0,
         "base_state_hz": 50.0,
         "contacts": {},
@@ -50,6 +60,9 @@ class DynamicObject(ShapeObject):
     def __init__(self, pb: Client, config: DynamicObjectConfig) -> None:
         if config.useMaximalCoordinates and pb.is_deformable:
             message = "soft bodies do not feel what moves in maximal coordinates; remove it in a deformable world"
+            raise ConfigError([Problem(config.name, "useMaximalCoordinates", message)])
+        if config.useMaximalCoordinates and config.tracked_tf is not None:
+            message = "what moves in maximal coordinates follows no TF; remove one of the two"
             raise ConfigError([Problem(config.name, "useMaximalCoordinates", message)])
         super().__init__(
             pb,
@@ -63,6 +76,7 @@ class DynamicObject(ShapeObject):
         )
         self.change_dynamics(-1, **config.changeDynamics.kwargs())
         self._start_base(config.resetBaseVelocity)
+        self._track(config.tracked_tf)
         self.config = config
 
     def sensors(self) -> tuple[Sensor, ...]:

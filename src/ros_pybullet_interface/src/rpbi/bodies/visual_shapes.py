@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import pybullet
 
+from rpbi.control.pose_follower import TrackedBase
 from rpbi.geometry import Pose, Quaternion, Vector
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
@@ -136,5 +137,7 @@ def link_frame(body: Body, sensors: Iterable[Sensor], link: str) -> str | None:
 
 
 def followed_frame(body: Body) -> str | None:
-    """Returns the frame that the whole body follows, None if it follows none or has joints that move by themselves."""
-    return body.object_tf.tf_id if isinstance(body, ShapeObject) and body.object_tf is not None else None
+    """Returns the frame that the whole body follows, None if it follows none or moves by itself as well."""
+    if body.object_tf is None or not isinstance(body, ShapeObject) or isinstance(body.pose_follower, TrackedBase):
+        return None
+    return body.object_tf.tf_id

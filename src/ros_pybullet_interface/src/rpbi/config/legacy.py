@@ -18,6 +18,7 @@ LEGACY_KEYS: dict[str, dict[str, str]] = {
         "broadcast_link_states_frequency": "broadcast_link_states_hz",
         "brodcast_link_states_frequency": "broadcast_link_states_hz",
         "initial_joint_positions": "initial_joint_position",
+        "setJointMotorControlArrayParameters": "setJointMotorControlArray",
     },
 }
 """By section: an old spelling and the key that it means."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from rpbi.config.pybullet_models import ObjectTf
 from rpbi.engine.client import Client
-from rpbi.geometry import Pose, cross, dot, minus, normalized, rotation_between, scaled
+from rpbi.geometry import Pose, Vector, cross, dot, minus, normalized, rotation_between, scaled
 
 log = logging.getLogger(__name__)
 
@@ -164,11 +164,14 @@ class PoseFollower:
         return self._begin(pose)
 
     def _begin(self, pose: Pose) -> PosePath:
-        tf, dt_s = self._object_tf, self._dt_s
-        ticks = min(max(1, round(1.0 / (tf.hz * dt_s))), MOST_TICKS)
-        self._path = PosePath(pose, ticks, tf.max_speed * dt_s, tf.max_angular_speed * dt_s)
+        self._path = self._path_from(pose)
         self._rest_at(pose)
         return self._path
+
+    def _path_from(self, pose: Pose) -> PosePath:
+        tf, dt_s = self._object_tf, self._dt_s
+        ticks = min(max(1, round(1.0 / (tf.hz * dt_s))), MOST_TICKS)
+        return PosePath(pose, ticks, tf.max_speed * dt_s, tf.max_angular_speed * dt_s)
 
     def _rest_at(self, pose: Pose) -> None:
         self._pb.resetBasePositionAndOrientation(self._body_id, *pose)  # which takes its velocity too
@@ -181,5 +184,51 @@ class PoseFollower:
         # PyBullet moves a base that turns by way + turn x way, so it is told less: the inverse of that
         across = cross(turn, way)
         told = minus(way, scaled(1.0 / (1.0 + dot(turn, turn)), minus(across, cross(turn, across))))
-        self._pb.resetBaseVelocity(self._body_id, scaled(1.0 / self._dt_s, told), scaled(1.0 / self._dt_s, turn))
+        linear, angular = scaled(1.0 / self._dt_s, told), scaled(1.0 / self._dt_s, turn)
+        self._pb.resetBaseVelocity(self._body_id, self._velocity_before(linear), angular)
         self._is_moving = True
+
+    def _velocity_before(self, velocity: Vector) -> Vector:
+        """Returns what a velocity [m/s] is before the forces of a tick act, which none do on a base without mass."""
+        return velocity
+
+
+class TrackedBase(PoseFollower):
+    """Moves the base of a dynamic body along a stream of poses while they come; in between, physics moves it.
+
+    Before each tick it gets the velocity that leads along the path, less what gravity adds in that tick: contacts are
+    solved with that velocity and the body's own mass. When nothing has come for `timeout_s` of the world's time it goes
+    on with the velocity that it has. Poses that come again lead there from where physics has brought it.
+    """
+
+    def __init__(self, pb: Client, name: str, body_id: int, centre: Pose, object_tf: ObjectTf) -> None:
+        super().__init__(pb, name, body_id, centre, object_tf)
+        self._is_known = False
+        self._taken_at = 0
+        """Tick before which the last pose came."""
+        self._timeout_ticks = math.ceil(object_tf.timeout_s / self._dt_s)
+
+    def take(self, pose: Pose) -> None:
+        """Goes to a pose from the next tick on; the first one is where it is put."""
+        self._waiting = pose @ self._centre
+
+    def put(self, pose: Pose) -> None:
+        """Leaves the body, which was put somewhere, to physics until the next pose comes."""
+        self._path = self._waiting = None
+
+    def before_step(self, tick: int) -> None:
+        """Gives the base the velocity of the coming tick, if it is tracked."""
+        if self._waiting is not None:
+            self._taken_at = tick
+            if self._path is None:
+                known = Pose(*self._pb.getBasePositionAndOrientation(self._body_id))
+                self._path = self._path_from(known) if self._is_known else self._begin(self._waiting)
+                self._is_known = True
+            self._path = self._aim(self._path, self._waiting, tick)
+        elif tick - self._taken_at >= self._timeout_ticks:
+            self._path = None
+        if self._path is not None:
+            self._drive_to(self._path.next() if self._path.ticks_left else self._path.goal)
+
+    def _velocity_before(self, velocity: Vector) -> Vector:
+        return minus(velocity, scaled(self._dt_s, self._pb.gravity))

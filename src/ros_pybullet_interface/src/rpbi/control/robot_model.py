@@ -5,11 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from custom_ros_tools.errors import ConfigError, Problem
 from rpbi.config.pybullet_models import LoadURDF
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose, Quaternion, Vector, rotated_back
 from rpbi.urdf.joints import JointModel
-from rpbi.urdf.loading import load_urdf
+from rpbi.urdf.loading import load_urdf, urdf_problems
 
 Array = npt.NDArray[np.float64]
 
@@ -141,6 +142,8 @@ class RobotModel:
             key: value for key, value in self._load_arguments.items() if key in ("fileName", "flags", "globalScaling")
         }
         arguments = {**kept, "useFixedBase": True}
+        if problems := urdf_problems(arguments["fileName"]):  # it may have changed since the robot was loaded
+            raise ConfigError([Problem("the model", "loadURDF.fileName", problem) for problem in problems])
         self._body_id = load_urdf(pb, "the model", arguments, inertia_from_urdf=self._inertia_from_urdf)
         return pb
 

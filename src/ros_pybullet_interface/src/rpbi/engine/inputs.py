@@ -41,16 +41,19 @@ class PoseInput(Input):
         tf_id: The frame to follow.
         hz: How often to look [Hz], in wall time.
         timeout_s: Without anything new for so long, it is stale [s].
+        is_tracked: Whether physics moves the body while it is stale; then a new stamp with the same pose is news too.
     """
 
     tf_id: str
     hz: float
     timeout_s: float
+    is_tracked: bool = False
 
     @classmethod
-    def following(cls, object_tf: ObjectTf, apply: Callable[[Pose], None]) -> PoseInput:
+    def following(cls, object_tf: ObjectTf, apply: Callable[[Pose], None], is_tracked: bool = False) -> PoseInput:
         """Follows the frame that YAML names under `object_tf`."""
-        return cls(check_pose, apply, tf_id=object_tf.tf_id, hz=object_tf.hz, timeout_s=object_tf.timeout_s)
+        tf = object_tf
+        return cls(check_pose, apply, tf_id=tf.tf_id, hz=tf.hz, timeout_s=tf.timeout_s, is_tracked=is_tracked)
 
 
 def check_pose(given: Pose | Mapping[str, Any]) -> Pose:

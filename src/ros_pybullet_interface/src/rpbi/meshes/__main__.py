@@ -27,6 +27,8 @@ GETS_NOTHING = b"cannot extract anything useful"
 def main() -> None:
     """Tries all meshes that the arguments name."""
     for limit, most in ((resource.RLIMIT_AS, MOST_BYTES), (resource.RLIMIT_CPU, MOST_CPU_S), (resource.RLIMIT_CORE, 0)):
+        already = resource.getrlimit(limit)[0]
+        most = most if already == resource.RLIM_INFINITY else min(already, most)
         resource.setrlimit(limit, (most, most))
     report, *meshes = sys.argv[1:]
     said = tempfile.TemporaryFile()

@@ -54,7 +54,7 @@ class Mesh(NamedTuple):
     file: str
 
 
-_tried: dict[tuple[Mesh, int, int], bool] = {}
+_tried: set[tuple[Mesh, int, int]] = set()
 """Meshes that went well, by size and time of the last change [ns]: files that are the same need not be read again."""
 
 
@@ -70,7 +70,7 @@ def faults_in(meshes: Iterable[Mesh]) -> dict[Mesh, str]:
                 record = _folder() / f"{mesh.use.value}-{_hash_of(mesh.file)}"
                 if not _is_there(record):
                     unknown[mesh] = record
-                _tried[key] = True
+                _tried.add(key)
         except OSError as error:
             faults[mesh] = (error.strerror or str(error)).lower()
     for mesh, fault in zip(unknown, _try(list(unknown))):
@@ -78,9 +78,7 @@ def faults_in(meshes: Iterable[Mesh]) -> dict[Mesh, str]:
             faults[mesh] = fault
         else:
             _remember(unknown[mesh])
-    for mesh in faults:
-        for key in [key for key in _tried if key[0] == mesh]:
-            del _tried[key]
+    _tried.difference_update([key for key in _tried if key[0] in faults])
     return faults
 
 

@@ -94,11 +94,14 @@ def config_page(files: Mapping[str, Schema], nodes: Mapping[str, Schema], exampl
     for kind, names in sorted(families.items()):
         parts += [f"### {kind}s", ", ".join(map(code, names)) + "."]
     parts += ["## Nodes", NODES]
+    listed: set[str] = set()
     for node, schema in nodes.items():
         places = _places({node: schema})
         parts += [f"### {node}", _keys(schema, schema, places)]
-        for place in places.values():
-            parts += [f"#### {place.heading}", _keys(place.mapping, schema, places)]
+        for name, place in places.items():
+            if name not in listed:  # else another node has the same mapping
+                parts += [f"#### {place.heading}", _keys(place.mapping, schema, places)]
+        listed.update(places)
     return page(parts)
 
 

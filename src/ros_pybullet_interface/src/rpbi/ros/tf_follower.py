@@ -174,8 +174,9 @@ class TfFollower:
                 )
             return
         pose, stamp_ns = found
+        is_seen_again = followed.pose_input.is_tracked and stamp_ns != followed.last_stamp_ns
         self._tell_if_stale(followed, stamp_ns, now_s)
-        if pose != followed.last_pose:
+        if is_seen_again or pose != followed.last_pose:
             followed.last_pose = pose
             try:
                 self._put(followed.slot, pose)
@@ -197,4 +198,5 @@ class TfFollower:
             if now_s >= followed.quiet_until_s:
                 followed.is_stale, followed.quiet_until_s = True, now_s + STALE_AGAIN_AFTER_S
                 stale = f"TF of '{followed.tf_id}' is stale"
-                rospy.logwarn("%s: %s: nothing new for %.2g s; it stays there", followed.slot, stale, age_s)
+                then = "physics moves it" if followed.pose_input.is_tracked else "it stays there"
+                rospy.logwarn("%s: %s: nothing new for %.2g s; %s", followed.slot, stale, age_s, then)

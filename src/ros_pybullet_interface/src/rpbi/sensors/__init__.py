@@ -17,6 +17,8 @@ SENSOR_TYPES = ClassTable(
         "contact_arrows": "rpbi.sensors.contact_arrows:ContactArrowsSensor",
         "surface": "rpbi.sensors.surface:SurfaceSensor",
         "rgbd": "rpbi.sensors.rgbd:RgbdSensor",
+        "vicon": "rpbi.sensors.tracking.vicon:ViconSensor",
+        "april_tags": "rpbi.sensors.tracking.april_tags:AprilTagsSensor",
     }
 )
 

@@ -23,6 +23,10 @@ class SensedWorld(Protocol):
         """All bodies by name."""
 
     @property
+    def cameras(self) -> Mapping[str, Any]:
+        """All cameras by name, each an `RgbdSensor`."""
+
+    @property
     def contacts(self) -> Any:
         """Who touches whom, a `ContactReader`."""
 

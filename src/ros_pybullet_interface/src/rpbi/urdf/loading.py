@@ -101,7 +101,7 @@ def load_urdf(
     prepare: Callable[[str], str] = resolve_meshes,
     inertia_from_urdf: bool = False,
 ) -> int:
-    """Loads a URDF file and returns PyBullet's id of the body.
+    """Loads a URDF file in which `urdf_problems` finds nothing, and returns PyBullet's id of the body.
 
     Args:
         name: Name of the body, for messages.
@@ -113,8 +113,6 @@ def load_urdf(
         ConfigError: If it cannot be loaded; it names what is wrong with the file.
     """
     file: str = arguments["fileName"]
-    if messages := urdf_problems(file):
-        raise ConfigError([Problem(name, "loadURDF.fileName", message) for message in messages])
     try:
         prepared = prepare(file)
         document = UrdfDocument(prepared)

@@ -1,4 +1,4 @@
-"""Takes an arm to the start of a figure eight and then has it track the figure, by a solver of `ik_ros`."""
+"""Takes an arm to where its target is and then has it track the target, by a solver of `ik_ros`."""
 
 import sys
 
@@ -48,12 +48,12 @@ def _run() -> None:
 
 
 def _track(robot: str, solver: str, target: np.ndarray) -> None:
-    """Switches setup and solver on, when the arm is where the figure begins."""
+    """Switches setup, solver and perhaps the target on, when the arm is where the target is."""
     problem = IKProblem(has_target=True, target=_pose(target), start=_state(HOME))
     start = call_service(f"ik/solver/{solver}/solve_ik", SolveIK, problem).solution
     call_service(f"rpbi/{robot}/move_to_joint_state", ResetJointState, start, APPROACH_S)
-    figure = ("toggle_figure_eight",) if rospy.get_param("~figure_moves", True) else ()
-    for toggle in (f"ik/setup/{solver}/toggle", f"ik/solver/{solver}/toggle", *figure):
+    toggles = (f"ik/setup/{solver}/toggle", f"ik/solver/{solver}/toggle", rospy.get_param("~target_toggle", ""))
+    for toggle in filter(None, toggles):
         call_service(toggle, SetBool, True)
     rospy.loginfo("the arm tracks its target by '%s'", solver)
 

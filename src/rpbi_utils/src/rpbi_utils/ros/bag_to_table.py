@@ -43,6 +43,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--format", choices=FORMATS, default=FORMATS[0], help="default: %(default)s")
     parser.add_argument("--out", type=Path, metavar="DIR", help="default: BAG_tables, beside BAG.bag")
     parser.add_argument("--images", action="store_true", help="topics with binary data too (Parquet only)")
+    parser.add_argument("--any-size", action="store_true", help="also if it unfolds to 255 times its size and 1 GiB")
     parser.add_argument("--quiet", action="store_true", help="no progress bar and no list of files")
     return parser
 
@@ -60,7 +61,9 @@ def _convert(arguments: argparse.Namespace) -> pd.DataFrame:
     """Reads the bag, writes the files and returns what was written, one row a file."""
     bag: Path = arguments.bag
     progress = not arguments.quiet
-    tables = bag_to_dataframes(bag, arguments.topics, images=arguments.images, progress=progress)
+    tables = bag_to_dataframes(
+        bag, arguments.topics, images=arguments.images, any_size=arguments.any_size, progress=progress
+    )
     folder: Path = arguments.out or bag.with_name(f"{bag.stem}_tables")
     folder.mkdir(parents=True, exist_ok=True)
     rows = []

@@ -20,6 +20,7 @@ def bag_to_dataframes(
     topics: str | Iterable[str] | None = None,
     *,
     images: bool = False,
+    any_size: bool = False,
     progress: bool = False,
 ) -> dict[str, pd.DataFrame]:
     """Reads a bag into pandas tables, one a topic.
@@ -38,16 +39,17 @@ def bag_to_dataframes(
         path: A `.bag` file, of any compression. No master and no message packages are needed.
         topics: Names of topics, or one name; by default all but those with binary data, such as images.
         images: Whether to include these by default. Their data are columns of `bytes`.
+        any_size: Whether the bag may unfold to more than 1 GiB and 255 times its size.
         progress: Whether to show a progress bar.
 
     Returns:
         Tables by topic, sorted by name.
 
     Raises:
-        BagError: If there is no such file, or it is no complete bag.
+        BagError: If there is no such file, it is no complete bag, or it unfolds to more than it may.
         UnknownNameError: If the bag does not have a topic that was named.
     """
-    with BagReader(path) as bag:
+    with BagReader(path, any_size) as bag:
         chosen = _choose(bag, [topics] if isinstance(topics, str) else topics, images)
         builders = {topic: TableBuilder(topic, images or topics is not None) for topic in chosen}
         total = sum(bag.counts[topic] for topic in chosen)

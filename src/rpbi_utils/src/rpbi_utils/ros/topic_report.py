@@ -19,8 +19,12 @@ class TopicReport(pd.DataFrame):
         return self.to_string()
 
 
-def topic_report(path: str | Path) -> TopicReport:
+def topic_report(path: str | Path, any_size: bool = False) -> TopicReport:
     """Measures every topic of a bag.
+
+    Args:
+        path: A `.bag` file, of any compression.
+        any_size: Whether the bag may unfold to more than 1 GiB and 255 times its size.
 
     Returns:
         A table with one row a topic (the index), sorted by name, with the columns `type`, `messages`, `bytes`
@@ -29,9 +33,9 @@ def topic_report(path: str | Path) -> TopicReport:
         Times are the stamps of headers, or of recording where there is none, as for `/tf`.
 
     Raises:
-        BagError: If there is no such file, or it is no complete bag.
+        BagError: If there is no such file, it is no complete bag, or it unfolds to more than it may.
     """
-    with BagReader(path) as bag:
+    with BagReader(path, any_size) as bag:
         times: dict[str, list[float]] = {topic: [] for topic in bag.types}
         sizes = dict.fromkeys(bag.types, 0)
         for message in bag.messages(list(bag.types)):

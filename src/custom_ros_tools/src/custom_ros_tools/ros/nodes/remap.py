@@ -1,7 +1,7 @@
-"""The nodes that remap joint states: to another topic as they are, or as bare numbers for drivers that take those."""
+"""The nodes that remap joint states: to another topic, or as bare numbers, with names and units that a driver wants."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import rospy
 from sensor_msgs.msg import JointState
@@ -9,13 +9,15 @@ from std_msgs.msg import Float64MultiArray
 
 from custom_ros_tools.errors import InterfaceError, collecting_problems
 from custom_ros_tools.joint_values import JointValues
-from custom_ros_tools.node_configs import FloatArrayConfig, StartParameters
-from custom_ros_tools.ros.joint_states import values_in
+from custom_ros_tools.node_configs import FloatArrayConfig, RemapConfig, StartParameters
+from custom_ros_tools.ros.joint_states import joint_state, values_in
 from custom_ros_tools.ros.lifecycle.parameters import private_config, private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.ros.services import ToggleService
 from custom_ros_tools.toggle import Toggle
+
+Config = TypeVar("Config", bound=RemapConfig)
 
 TO_FLOAT_ARRAY = "remap_joint_state_to_floatarray"
 TO_JOINT_STATE = "remap_joint_state_to_joint_state"
@@ -73,17 +75,14 @@ def _float_array_node() -> RemapNode:
     Raises:
         ConfigError: If the configuration or a parameter is wrong.
     """
-    with collecting_problems() as part:
-        with part():
-            config = private_config(FloatArrayConfig)
-        with part():
-            start_on_init = private_parameters(StartParameters).start_on_init
+    config, start_on_init = _parameters(FloatArrayConfig)
+    conversions = config.conversions()
 
     def numbers(message: JointState) -> Float64MultiArray:
         values = JointValues.of(message.name, **{config.field: getattr(message, config.field)})
         if config.joint_names is not None:
             values = values.in_order(config.joint_names)
-        data = list(getattr(values, config.field))
+        data = list(getattr(values.converted(conversions), config.field))
         if not data:
             raise ValueError(f"expected {config.field}, got none")
         return Float64MultiArray(data=data)
@@ -93,18 +92,33 @@ def _float_array_node() -> RemapNode:
 
 
 def _joint_state_node() -> RemapNode:
-    start_on_init = private_parameters(StartParameters).start_on_init
-    return RemapNode(TO_JOINT_STATE, "joint_states/from", "joint_states/to", JointState, _sound, start_on_init)
-
-
-def _sound(message: JointState) -> JointState:
-    """Returns the message as it is.
+    """Returns the node that publishes joint states on another topic, with names and units of `~config`.
 
     Raises:
-        ValueError: If it is faulty.
+        ConfigError: If the configuration or a parameter is wrong.
     """
-    values_in(message)
-    return message
+    config, start_on_init = _parameters(RemapConfig)
+    conversions = config.conversions()
+
+    def remapped(message: JointState) -> JointState:
+        values = values_in(message)
+        if config.joint_names is None and not conversions:
+            return message
+        if config.joint_names is not None:
+            values = values.in_order(config.joint_names)
+        return joint_state(values.converted(conversions), message.header)
+
+    return RemapNode(TO_JOINT_STATE, "joint_states/from", "joint_states/to", JointState, remapped, start_on_init)
+
+
+def _parameters(model: type[Config]) -> tuple[Config, bool]:
+    """Returns the configuration and whether the node is on from the start."""
+    with collecting_problems() as part:
+        with part():
+            config = private_config(model)
+        with part():
+            start_on_init = private_parameters(StartParameters).start_on_init
+    return config, start_on_init
 
 
 def remap_to_float_array() -> None:

@@ -6,13 +6,14 @@ from typing import Any
 from rpbi.engine.inputs import PoseInput
 from rpbi.ros.cameras.publisher import ScenePublisher
 from rpbi.ros.inputs import topic_input
-from rpbi.samples import LinkPoseSample, SceneSample
+from rpbi.samples import LinkPoseSample, SceneSample, ViconSample
 from rpbi.world import World
 
 from .sample_topics import sample_topic
 from .status import ClockPublisher
 from .topic_publisher import SampleKey, TopicPublisher, TransformPublisher
 from .topics import FastTopic
+from .tracking import transform_of
 
 
 class SamplePublishers:
@@ -60,6 +61,8 @@ class SamplePublishers:
         """
         for sample in samples:
             self._elsewhere.get(type(sample), self._topics).publish(sample, stamp_ns)
+            if isinstance(sample, ViconSample):
+                self._transforms.publish(transform_of(sample), stamp_ns - sample.age_ns)
         self._transforms.flush()
         self.cameras.flush()
 

@@ -9,11 +9,8 @@ from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, 
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
-from custom_ros_tools.ros.transform_messages import TransformTopic, transform_message
-from ik_ros.node_configs import InteractiveTargetConfig
-from rpbi.geometry import Pose
-
-from .messages import pose_in, pose_message
+from custom_ros_tools.ros.transform_messages import TransformTopic, as_pose, transform_message
+from operator_node.node_configs import InteractiveTargetConfig
 
 NAMESPACE = "ik_target"
 """RViz's display InteractiveMarkers takes `/ik_target/update`."""
@@ -40,9 +37,9 @@ class InteractiveTarget:
         WallTimer(config.hz, lambda: self._topic.send(self._transform))
 
     def _take(self, feedback: InteractiveMarkerFeedback) -> None:
-        pose = pose_in(feedback.pose)
+        p, q = feedback.pose.position, feedback.pose.orientation
         try:
-            self._transform = transform_message(pose.position, pose.quat_xyzw)
+            self._transform = transform_message((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
         except ValueError as error:
             self._warn(f"{NAMESPACE}/feedback", f"pose refused: {error}")
 
@@ -51,7 +48,7 @@ def _marker(config: InteractiveTargetConfig) -> InteractiveMarker:
     """Returns handles to shift it along, and turn it about, each of its axes."""
     marker = InteractiveMarker(name=config.child_frame_id, scale=config.size_m)
     marker.header.frame_id = config.parent_frame_id
-    marker.pose = pose_message(Pose(config.position, config.quat_xyzw))
+    marker.pose = as_pose(transform_message(config.position, config.quat_xyzw))
     for axis, (x, y, z) in AXES.items():
         for name, mode in (
             ("move", InteractiveMarkerControl.MOVE_AXIS),

@@ -1,0 +1,105 @@
+"""The joints between the segments: their names, the order of their axes, and how far people can move them.
+
+Each is three hinges one after the other, with small links between them. The middle axis is one about which the joint
+moves little, since three hinges cannot turn freely where the middle one is at 90 deg. Only shoulders get near that,
+with the arm held sideways and the forearm straight up or down.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from operator_node.mvn.segments import SEGMENTS
+
+AXES = "xyz"
+Range = tuple[float, float]
+
+
+class HumanJoint(NamedTuple):
+    """Three hinges between a segment and its parent; all at 0 in the T-pose.
+
+    Attributes:
+        name: Its name, as MVN has it.
+        parent: The segment that it is fixed to.
+        child: The segment that it moves.
+        order: Axes of the hinges from parent to child, such as "yxz": the child is turned by R_y R_x R_z in the parent.
+        x: Lower and upper limit of the hinge about x (forward) [deg].
+        y: Likewise about y (left).
+        z: Likewise about z (up).
+        effort: Largest torque of each hinge [N m].
+    """
+
+    name: str
+    parent: str
+    child: str
+    order: str
+    x: Range
+    y: Range
+    z: Range
+    effort: float
+
+    @property
+    def hinges(self) -> tuple[str, str, str]:
+        """Names of the hinges from parent to child, such as `jRightElbow_rotz`."""
+        first, second, third = (f"{self.name}_rot{axis}" for axis in self.order)
+        return first, second, third
+
+    @property
+    def limits(self) -> tuple[Range, Range, Range]:
+        """Lower and upper limits of the hinges from parent to child [rad]."""
+        first, second, third = ((math.radians(low), math.radians(high)) for low, high in map(self._range, self.order))
+        return first, second, third
+
+    def _range(self, axis: str) -> Range:
+        return {"x": self.x, "y": self.y, "z": self.z}[axis]
+
+
+def _right(joint: str, parent: str, child: str, order: str, x: Range, y: Range, z: Range, effort: float) -> HumanJoint:
+    return HumanJoint(f"jRight{joint}", parent, f"Right{child}", order, x, y, z, effort)
+
+
+_MIDDLE = (
+    HumanJoint("jL5S1", "Pelvis", "L5", "yxz", (-15, 15), (-15, 35), (-20, 20), 300),
+    HumanJoint("jL4L3", "L5", "L3", "yxz", (-15, 15), (-15, 35), (-20, 20), 300),
+    HumanJoint("jL1T12", "L3", "T12", "yxz", (-15, 15), (-15, 35), (-20, 20), 300),
+    HumanJoint("jT9T8", "T12", "T8", "yxz", (-15, 15), (-15, 35), (-20, 20), 300),
+    HumanJoint("jT1C7", "T8", "Neck", "yxz", (-35, 35), (-35, 35), (-45, 45), 50),
+    HumanJoint("jC1Head", "Neck", "Head", "yxz", (-35, 35), (-35, 35), (-45, 45), 50),
+)
+_RIGHT = (
+    _right("C7Shoulder", "T8", "Shoulder", "xyz", (-45, 15), (-30, 30), (-30, 40), 150),
+    _right("Shoulder", "RightShoulder", "UpperArm", "xyz", (-100, 130), (-120, 100), (-60, 135), 120),
+    _right("Elbow", "RightUpperArm", "ForeArm", "zxy", (-20, 20), (-100, 100), (-10, 150), 80),
+    _right("Wrist", "RightForeArm", "Hand", "xzy", (-80, 90), (-25, 25), (-40, 30), 20),
+    _right("Hip", "Pelvis", "UpperLeg", "yxz", (-50, 40), (-130, 35), (-50, 50), 250),
+    _right("Knee", "RightUpperLeg", "LowerLeg", "yxz", (-15, 15), (-10, 140), (-30, 30), 250),
+    _right("Ankle", "RightLowerLeg", "Foot", "yxz", (-35, 35), (-30, 60), (-35, 35), 180),
+    _right("BallFoot", "RightFoot", "Toe", "yxz", (-15, 15), (-70, 40), (-15, 15), 40),
+)
+
+
+def _mirrored(joint: HumanJoint) -> HumanJoint:
+    """Returns the joint of the left side: rotations about x and z are the other way round."""
+    return joint._replace(
+        name=joint.name.replace("Right", "Left"),
+        parent=joint.parent.replace("Right", "Left"),
+        child=joint.child.replace("Right", "Left"),
+        x=(-joint.x[1], -joint.x[0]),
+        z=(-joint.z[1], -joint.z[0]),
+    )
+
+
+_BY_CHILD = {joint.child: joint for joint in (*_MIDDLE, *_RIGHT, *map(_mirrored, _RIGHT))}
+JOINTS: tuple[HumanJoint, ...] = tuple(_BY_CHILD[name] for name in SEGMENTS[1:])
+"""The joint of each segment but the pelvis, in the order of `SEGMENTS`.
+
+Ranges are those of the American Academy of Orthopaedic Surgeons (Joint Motion: Method of Measuring and Recording, 1965)
+and some 10 deg more, since suits measure no better. Those of trunk and neck are divided evenly, and are half as wide
+again, since people divide them otherwise. The three angles of a shoulder depend on each other, so its ranges are wider.
+About axes that the tables do not name, joints give way a little. Efforts are of the order of what strong adults have.
+"""
+HINGES: tuple[str, ...] = tuple(hinge for joint in JOINTS for hinge in joint.hinges)
+"""The 66 hinges: three for each joint, in the order of `JOINTS`."""
+LOWER, UPPER = np.array([limits for joint in JOINTS for limits in joint.limits]).T
+"""Limits of the hinges (66) [rad]."""

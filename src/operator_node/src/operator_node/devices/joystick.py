@@ -1,0 +1,205 @@
+"""A joystick or gamepad."""
+
+import contextlib
+import math
+import re
+from collections import deque
+from collections.abc import Iterable, Sequence
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, Field
+
+from custom_ros_tools.schema import ConfigModel, Count, ListOf, Switch, Text, optional
+from operator_node.device import Device, DeviceError, Reading
+
+from .sdl import pygame_with_joysticks, triggers_of
+
+RAW = 32768
+"""What pygame divides axes by."""
+FULL = 32767
+UNPLUGGED = "it was unplugged"
+RUMBLE_MS = 200
+"""How long a force is felt unless it is repeated."""
+
+
+def _numbered(path: str) -> str:
+    if not re.search(r"\d+$", path):
+        raise ValueError(f"expected a path that ends with a number, such as /dev/input/js0, got '{path}'")
+    return path
+
+
+class JoystickConfig(ConfigModel):
+    """Which joystick, and how it is read; the names are those of `joy_node`."""
+
+    dev: Annotated[Text, AfterValidator(_numbered)] = Field(
+        "/dev/input/js0", description="The joystick of which number; the first one is 0."
+    )
+    dev_name: Text | None = optional("The first joystick whose name has this in it, in place of `dev`.")
+    deadzone: float = Field(0.05, ge=0.0, lt=1.0, description="How far an axis goes before it counts, as a share.")
+    sticky_buttons: Switch = Field(False, description="Whether a button changes when it is pressed, and stays so.")
+    triggers: ListOf[Count] | None = optional(
+        "Indices of the axes that rest at one end, at 1; by default those of a gamepad that SDL knows."
+    )
+    virtual: Switch = Field(
+        False, description="Whether to make a gamepad that is not there, which the topic `joy/virtual` moves."
+    )
+
+
+class Joystick(Device):
+    """A joystick or gamepad by SDL.
+
+    Axes are positive to the left and up, a trigger is 1 at rest and -1 when it is pressed; hats follow as two axes
+    each, as `joy_node` has it.
+
+    Attributes:
+        is_virtual: Whether it is a gamepad that is not there.
+    """
+
+    Config = JoystickConfig
+    ros_topics = "operator_node.ros.devices.joystick_topics:JoystickTopics"
+
+    def __init__(self, config: JoystickConfig) -> None:
+        self.axes: Sequence[str] = ()
+        self.buttons: Sequence[str] = ()
+        self.is_virtual = config.virtual
+        self._virtual: Any = None
+        self._config = config
+        self._pygame: Any = None
+        self._joystick: Any = None
+        self._triggers: frozenset[int] = frozenset()
+        self._pressed: list[int] = []
+        self._events: deque[Any] = deque()
+        self._is_new = False
+
+    def open(self) -> None:
+        self._pygame = pygame = pygame_with_joysticks()
+        if self._config.virtual and self._virtual is None:
+            from operator_node.emulators.joystick import VirtualJoystick
+
+            self._virtual = VirtualJoystick()
+        with contextlib.suppress(SystemError):  # see `_fetch`
+            pygame.event.get()  # by which it finds those that came
+        index = self._index()
+        try:
+            self._joystick = pygame.joystick.Joystick(index)
+        except pygame.error as error:
+            raise DeviceError("joystick", f"it cannot be opened: {error}; may you read /dev/input?") from None
+        given = self._config.triggers
+        self._triggers = triggers_of(index) if given is None else frozenset(given)
+        self._look_at_buttons()
+        self._events.clear()
+        self._name_all()
+        self._is_new = True
+
+    def read(self, timeout_s: float) -> Reading | None:
+        if self._joystick is None:
+            raise DeviceError("joystick", "it is not open")
+        self._fetch(timeout_s)
+        self._take_events()
+        if not self._is_new:
+            return None
+        self._is_new = False
+        self._name_all()
+        return Reading(tuple(self._positions()), tuple(self._pressed))
+
+    def close(self) -> None:
+        if self._joystick is not None:
+            self._joystick.quit()
+        if self._virtual is not None:
+            self._virtual.unplug()
+        self._joystick = self._virtual = None
+
+    def at_rest(self) -> Reading:
+        axes = tuple(float(index in self._triggers) for index in range(len(self.axes)))
+        return Reading(axes, (0,) * len(self.buttons))
+
+    def cue(self, force: Sequence[float]) -> None:
+        strength = min(1.0, math.hypot(*force))
+        self.rumble(strength, strength)
+
+    def rumble(self, strong: float, weak: float) -> None:
+        """Rumbles for a moment with the strong and the weak motor, each from 0 to 1."""
+        if self._joystick is not None:
+            self._joystick.rumble(strong, weak, RUMBLE_MS)
+
+    def move_virtual(self, axes: Sequence[float], buttons: Sequence[int]) -> None:
+        """Moves the gamepad that is not there, see `VirtualJoystick.move`."""
+        if self._virtual is not None:
+            self._virtual.move(axes, buttons)
+
+    def _index(self) -> int:
+        pygame, name = self._pygame, self._config.dev_name
+        names = [pygame.joystick.Joystick(index).get_name() for index in range(pygame.joystick.get_count())]
+        if name is not None:
+            found = [index for index, each in enumerate(names) if name in each]
+            if not found:
+                raise DeviceError("joystick", f"none is called '{name}'; there are {', '.join(names) or 'none'}")
+            return found[0]
+        number = int(re.findall(r"\d+$", self._config.dev)[0])
+        if number >= len(names):
+            raise DeviceError("joystick", f"there is no number {number}; there are {', '.join(names) or 'none'}")
+        return number
+
+    def _fetch(self, timeout_s: float) -> None:
+        """Waits for events if none wait.
+
+        pygame 2.1 loses what has come when a joystick goes that nobody has opened; then all is looked at anew.
+        """
+        event = self._pygame.event
+        try:
+            if not self._events and timeout_s > 0.0:
+                self._events.append(event.wait(max(1, math.ceil(1e3 * timeout_s))))
+            self._events.extend(event.get())
+        except SystemError:
+            joysticks = self._pygame.joystick
+            there = [joysticks.Joystick(index).get_instance_id() for index in range(joysticks.get_count())]
+            if self._joystick.get_instance_id() not in there:
+                raise DeviceError("joystick", UNPLUGGED) from None
+            self._look_at_buttons()
+            self._is_new = True
+
+    def _look_at_buttons(self) -> None:
+        joystick = self._joystick
+        self._pressed = [joystick.get_button(number) for number in range(joystick.get_numbuttons())]
+
+    def _take_events(self) -> None:
+        """Notes what has happened, up to the next button, so that the shortest tap is a reading."""
+        pygame, ours = self._pygame, self._joystick.get_instance_id()
+        while self._events:
+            event = self._events.popleft()
+            if getattr(event, "instance_id", None) != ours:
+                continue
+            if event.type == pygame.JOYDEVICEREMOVED:
+                raise DeviceError("joystick", UNPLUGGED)
+            self._is_new = True
+            if event.type in (pygame.JOYBUTTONDOWN, pygame.JOYBUTTONUP):
+                self._press(event.button, event.type == pygame.JOYBUTTONDOWN)
+                return
+
+    def _press(self, button: int, is_down: bool) -> None:
+        self._pressed += [0] * (button + 1 - len(self._pressed))
+        if not self._config.sticky_buttons:
+            self._pressed[button] = int(is_down)
+        elif is_down:
+            self._pressed[button] = 1 - self._pressed[button]
+
+    def _positions(self) -> Iterable[float]:
+        for index in range(self._joystick.get_numaxes()):
+            yield axis_of(round(RAW * self._joystick.get_axis(index)), self._config.deadzone)
+        for index in range(self._joystick.get_numhats()):
+            right, up = self._joystick.get_hat(index)
+            yield from (float(-right), float(up))
+
+    def _name_all(self) -> None:
+        sticks, hats = self._joystick.get_numaxes(), self._joystick.get_numhats()
+        self.axes = [*map(str, range(sticks)), *(f"hat {hat} {axis}" for hat in range(hats) for axis in "xy")]
+        self.buttons = [*map(str, range(len(self._pressed)))]
+
+
+def axis_of(raw: int, deadzone: float) -> float:
+    """Returns an axis in [-1, 1] from what the hardware says, from -32768 to 32767, which has the other sign.
+
+    Within the dead zone, a share of the full way, it is 0; from there it rises to 1 at the end.
+    """
+    beyond = max(0.0, abs(raw) - FULL * deadzone)
+    return -math.copysign(min(1.0, beyond / (FULL * (1.0 - deadzone))), raw) if beyond else 0.0

@@ -1,0 +1,100 @@
+"""The keyboard by a terminal, which says when a key goes down, and not when it goes up."""
+
+import contextlib
+import os
+import select
+import sys
+import termios
+import time
+import tty
+
+from operator_node.device import DeviceError
+from operator_node.key_axes import KEY_CODES
+
+from .held_keys import HeldKeys
+from .key_window import CODES
+
+ESCAPE = "\x1b"
+SEQUENCES = {
+    **{
+        f"{start}{end}": name
+        for start in ("[", "O")
+        for end, name in zip("ABCDHF", ("UP", "DOWN", "RIGHT", "LEFT", "HOME", "END"))
+    },
+    "[1~": "HOME",
+    "[2~": "INSERT",
+    "[3~": "DELETE",
+    "[4~": "END",
+    "[5~": "PAGEUP",
+    "[6~": "PAGEDOWN",
+    **{f"O{end}": f"F{number}" for number, end in enumerate("PQRS", 1)},
+    **{f"[{code}~": f"F{number}" for number, code in enumerate((15, 17, 18, 19, 20, 21, 23, 24), 5)},
+}
+"""Names of keys by what follows an escape, as xterm and VT100 send it."""
+CONTROLS = {"\x7f": "BACKSPACE", "\b": "BACKSPACE", "\t": "TAB", "\r": "RETURN", "\n": "RETURN", ESCAPE: "ESCAPE"}
+MOST_BYTES = 4096
+
+
+def codes_in(text: str) -> list[int]:
+    """Returns the codes of the keys that a terminal sent; 0 for those that have none."""
+    codes = []
+    while text:
+        length = next((n for n in (4, 3, 2) if text[0] == ESCAPE and text[1 : 1 + n] in SEQUENCES), 0)
+        key, text = text[: 1 + length], text[1 + length :]
+        name = SEQUENCES.get(key[1:]) or CONTROLS.get(key)
+        code = KEY_CODES[name] if name else ord(key.lower())
+        codes.append(code if code in CODES else 0)
+    return codes
+
+
+class KeyTerminal:
+    """Notes the keys that are typed at the terminal; each counts as held for a time after it came last.
+
+    A terminal repeats a key that is held, but begins so only after half a second: the time is to be longer.
+
+    Args:
+        keys: Where it notes them.
+        hold_s: The time [s].
+
+    Raises:
+        DeviceError: If there is no terminal.
+    """
+
+    def __init__(self, keys: HeldKeys, hold_s: float) -> None:
+        self._keys, self._hold_s = keys, hold_s
+        self._until_s: dict[int, float] = {}
+        self._file = sys.stdin.fileno()
+        try:
+            self._settings = termios.tcgetattr(self._file)
+            tty.setcbreak(self._file)
+        except termios.error as error:
+            raise DeviceError("keyboard", f"its standard input is no terminal: {error}") from None
+
+    def wait(self, timeout_s: float) -> None:
+        """Deals with what was typed, or waits for it.
+
+        Raises:
+            DeviceError: If the terminal has gone.
+        """
+        due_s = min(self._until_s.values(), default=float("inf"))
+        timeout_s = max(0.0, min(timeout_s, due_s - time.monotonic()))
+        if select.select([self._file], [], [], timeout_s)[0]:
+            try:
+                typed = os.read(self._file, MOST_BYTES)
+            except OSError as error:
+                raise DeviceError("keyboard", f"its terminal has gone: {error}") from None
+            if not typed:
+                raise DeviceError("keyboard", "its terminal has gone")
+            for code in codes_in(typed.decode(errors="replace")):
+                self._keys.press(code)
+                self._until_s[code] = time.monotonic() + self._hold_s
+        now_s = time.monotonic()
+        for code, until_s in [*self._until_s.items()]:
+            if now_s >= until_s:
+                del self._until_s[code]
+                self._keys.release(code)
+
+    def close(self) -> None:
+        """Leaves the terminal as it was."""
+        with contextlib.suppress(termios.error):
+            termios.tcsetattr(self._file, termios.TCSADRAIN, self._settings)

@@ -1,0 +1,189 @@
+"""A window that takes the keyboard."""
+
+import math
+import time
+from collections.abc import Sequence
+from tkinter import Event, Misc
+from typing import NamedTuple
+
+from operator_node.key_axes import KEY_CODES
+
+from .held_keys import CAPS_LOCK, NUM_LOCK, HeldKeys
+from .window import INK, Window
+
+WIDTH_PX, HEIGHT_PX = 420, 220
+LOCKS = {0x02: CAPS_LOCK, 0x10: NUM_LOCK}
+"""Bit of a lock by its bit in an event's state."""
+REPEAT_GAP_S = 0.003
+"""X says of a key that is held that it goes up and in the same moment down again; so long the second is waited for."""
+NAMES = {
+    "BackSpace": "BACKSPACE",
+    "Tab": "TAB",
+    "ISO_Left_Tab": "TAB",
+    "Clear": "CLEAR",
+    "Return": "RETURN",
+    "Pause": "PAUSE",
+    "Escape": "ESCAPE",
+    "Delete": "DELETE",
+    "KP_Decimal": "KP_PERIOD",
+    "KP_Delete": "KP_PERIOD",
+    "KP_Divide": "KP_DIVIDE",
+    "KP_Multiply": "KP_MULTIPLY",
+    "KP_Subtract": "KP_MINUS",
+    "KP_Add": "KP_PLUS",
+    "KP_Enter": "KP_ENTER",
+    "KP_Equal": "KP_EQUALS",
+    "KP_Insert": "KP0",
+    "KP_End": "KP1",
+    "KP_Down": "KP2",
+    "KP_Next": "KP3",
+    "KP_Left": "KP4",
+    "KP_Begin": "KP5",
+    "KP_Right": "KP6",
+    "KP_Home": "KP7",
+    "KP_Up": "KP8",
+    "KP_Prior": "KP9",
+    **{f"KP_{number}": f"KP{number}" for number in range(10)},
+    "Up": "UP",
+    "Down": "DOWN",
+    "Right": "RIGHT",
+    "Left": "LEFT",
+    "Insert": "INSERT",
+    "Home": "HOME",
+    "End": "END",
+    "Prior": "PAGEUP",
+    "Next": "PAGEDOWN",
+    **{f"F{number}": f"F{number}" for number in range(1, 16)},
+    "Num_Lock": "NUMLOCK",
+    "Caps_Lock": "CAPSLOCK",
+    "Scroll_Lock": "SCROLLOCK",
+    "Shift_R": "RSHIFT",
+    "Shift_L": "LSHIFT",
+    "Control_R": "RCTRL",
+    "Control_L": "LCTRL",
+    "Alt_R": "RALT",
+    "Alt_L": "LALT",
+    "Meta_R": "RMETA",
+    "Meta_L": "LMETA",
+    "Super_L": "LSUPER",
+    "Super_R": "RSUPER",
+    "Mode_switch": "MODE",
+    "ISO_Level3_Shift": "MODE",
+    "Multi_key": "COMPOSE",
+    "Help": "HELP",
+    "Print": "PRINT",
+    "Sys_Req": "SYSREQ",
+    "Break": "BREAK",
+    "Menu": "MENU",
+    "EuroSign": "EURO",
+    "Undo": "UNDO",
+}
+"""Names of keys by those that X gives to their symbols; all others are characters, whose codes are theirs."""
+CODES = frozenset(KEY_CODES.values())
+SHOWN = {code: name for name, code in KEY_CODES.items()}
+
+
+def code_of(name: str, number: int) -> int:
+    """Returns the code of a symbol of X by its name and number; 0 if it has none."""
+    if name in NAMES:
+        return KEY_CODES[NAMES[name]]
+    code = ord(chr(number).lower()) if ord("A") <= number <= ord("Z") else number
+    return code if code in CODES and number < 256 else 0
+
+
+class Rising(NamedTuple):
+    """A key that goes up, unless X says that it has gone down in the same moment.
+
+    Attributes:
+        place: Its place on the keyboard.
+        time: The moment, by X.
+        locks: The locks that were on.
+        due_s: When it has gone up, by `time.monotonic`.
+    """
+
+    place: int
+    time: int
+    locks: int
+    due_s: float
+
+
+class KeyWindow:
+    """Notes the keys that are pressed while its window has the keyboard, and shows those that are held.
+
+    Args:
+        keys: Where it notes them.
+        explanation: Lines that the window shows.
+
+    Raises:
+        DeviceError: If there is no screen.
+    """
+
+    def __init__(self, keys: HeldKeys, explanation: Sequence[str]) -> None:
+        self._keys, self._explanation = keys, explanation
+        self._codes: dict[int, int] = {}
+        """Code of each key that is held by its place on the keyboard: its symbol depends on others."""
+        self._rising: Rising | None = None
+        self._has_focus = False
+        self._drawn: object = None
+        self._window = window = Window("keyboard", "keyboard", WIDTH_PX, HEIGHT_PX)
+        window.bind("<KeyPress>", self._press)
+        window.bind("<KeyRelease>", self._release)
+        window.bind("<FocusIn>", lambda _: self._set_focus(True))
+        window.bind("<FocusOut>", lambda _: self._set_focus(False))
+        window.bind("<Configure>", lambda _: self._draw())
+        window.focus()
+        self._draw()
+
+    def wait(self, timeout_s: float) -> None:
+        """Deals with what has happened, or happens next; see `Window.wait`."""
+        now_s = time.monotonic()
+        due_s = self._rising.due_s if self._rising else math.inf
+        self._window.wait(max(0.0, min(timeout_s, due_s - now_s)))
+        if self._rising and time.monotonic() >= self._rising.due_s:
+            self._let_rise()
+        if self._drawn != (tuple(self._keys.codes), self._has_focus):
+            self._draw()
+
+    def close(self) -> None:
+        """Closes the window."""
+        self._window.close()
+
+    def _press(self, event: "Event[Misc]") -> None:
+        if self._rising and (event.keycode, event.time) == self._rising[:2]:
+            self._rising = None  # a repetition
+            return
+        self._let_rise()
+        code = code_of(event.keysym, event.keysym_num)
+        self._codes[event.keycode] = code
+        self._keys.press(code, _locks(event))
+
+    def _release(self, event: "Event[Misc]") -> None:
+        self._let_rise()
+        if event.keycode in self._codes:
+            self._rising = Rising(event.keycode, event.time, _locks(event), time.monotonic() + REPEAT_GAP_S)
+
+    def _let_rise(self) -> None:
+        if self._rising is not None:
+            self._keys.release(self._codes.pop(self._rising.place), self._rising.locks)
+        self._rising = None
+
+    def _set_focus(self, has_focus: bool) -> None:
+        self._has_focus = has_focus
+        if not has_focus:
+            self._codes.clear()
+            self._rising = None
+            self._keys.release_all()
+
+    def _draw(self) -> None:
+        self._drawn = (tuple(self._keys.codes), self._has_focus)
+        canvas = self._window.canvas
+        canvas.delete("all")
+        held = "  ".join(SHOWN.get(code, "?") for code in self._keys.codes)
+        if not self._has_focus:
+            held = "click here to use the keyboard"
+        canvas.create_text(16, 16, anchor="nw", text=held, fill="#1060c0", font=("TkFixedFont", 16))
+        canvas.create_text(16, 60, anchor="nw", text="\n".join(self._explanation), fill=INK, font="TkFixedFont")
+
+
+def _locks(event: "Event[Misc]") -> int:
+    return sum(bit for mask, bit in LOCKS.items() if int(event.state) & mask)

@@ -1,0 +1,93 @@
+"""The keys of a keyboard."""
+
+import sys
+import time
+from typing import Annotated
+
+from pydantic import Field
+
+from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.schema import ConfigModel, ListOf, Positive, Seconds, Switch, Unit
+from operator_node.device import Device, DeviceError, Reading
+from operator_node.key_axes import KeyAxes, KeyName, KeyPair
+
+from .held_keys import HeldKeys, KeyEvent
+from .key_terminal import KeyTerminal
+from .key_window import KeyWindow
+
+Milliseconds = Annotated[Positive, Unit("ms")]
+
+
+class KeyboardConfig(ConfigModel):
+    """Which keys are axes and buttons, and how keys repeat."""
+
+    axes: ListOf[KeyPair] = Field((), description="For each axis of `joy`, the negative and the positive key.")
+    buttons: ListOf[KeyName] = Field((), description="For each button of `joy`, its key.")
+    allow_repeat: Switch = Field(False, description="Whether a key that is held goes down again and again.")
+    repeat_delay: Milliseconds = Field(500.0, description="How long it is held until then.")
+    repeat_interval: Milliseconds = Field(30.0, description="How often it then does.")
+    terminal: Switch = Field(
+        False, description="Whether keys are read from the terminal, in place of a window; there, no key goes up."
+    )
+    terminal_hold_s: Seconds = Field(0.6, description="How long a key of the terminal counts as held.")
+
+
+class Keyboard(Device):
+    """Keys that are pressed in a window of its own, or in the terminal.
+
+    Its events are each `KeyEvent`. When the window is not the one that is typed into, nothing is held.
+
+    Raises:
+        ConfigError: If the terminal is asked for, and there is none.
+    """
+
+    Config = KeyboardConfig
+    ros_topics = "operator_node.ros.devices.keyboard_topics:KeyboardTopics"
+
+    def __init__(self, config: KeyboardConfig) -> None:
+        if config.terminal and not sys.stdin.isatty():
+            problem = "there is no terminal to read from: run the node in one, by rosrun rather than roslaunch"
+            raise ConfigError([Problem("", "terminal", problem)])
+        self.axes = tuple(f"{negative}/{positive}" for negative, positive in config.axes)
+        self.buttons = tuple(config.buttons)
+        self._config = config
+        self._axes = KeyAxes(config.axes, config.buttons)
+        self._source: KeyWindow | KeyTerminal | None = None
+        self._is_new = False
+        self._reset()
+
+    def open(self) -> None:
+        self._reset()
+        if self._config.terminal:
+            self._source = KeyTerminal(self._keys, self._config.terminal_hold_s)
+        else:
+            self._source = KeyWindow(self._keys, self._explanation())
+
+    def read(self, timeout_s: float) -> Reading | None:
+        if self._source is None:
+            raise DeviceError("keyboard", "it is not open")
+        self._source.wait(max(0.0, min(timeout_s, self._keys.repeat_at_s - time.monotonic())))
+        events = self._keys.take_events()
+        if not events and not self._is_new:
+            return None
+        self._is_new = False
+        return self._axes.reading(self._keys.codes)._replace(events=events)
+
+    def close(self) -> None:
+        if self._source is not None:
+            self._source.close()
+        self._source = None
+        self._reset()
+
+    def at_rest(self) -> Reading:
+        events = tuple(KeyEvent(code, 0, False) for code in [*self._keys.codes][::-1])
+        return self._axes.reading(())._replace(events=events)
+
+    def _reset(self) -> None:
+        config = self._config
+        self._keys = HeldKeys(config.allow_repeat, 1e-3 * config.repeat_delay, 1e-3 * config.repeat_interval)
+        self._is_new = True
+
+    def _explanation(self) -> list[str]:
+        axes = [f"axis {index}:   - {minus:9} + {plus}" for index, (minus, plus) in enumerate(self._config.axes)]
+        return [*axes, *(f"button {index}: {name}" for index, name in enumerate(self._config.buttons))]

@@ -1,0 +1,63 @@
+"""A person who raises the right arm, holds it out and sways a little, as 23 segments."""
+
+import math
+
+import numpy as np
+
+from operator_node.avatar.anthropometry import Array, segment_offsets
+from operator_node.avatar.forward import segment_frame
+from operator_node.mvn.segments import SegmentFrame
+
+RAISING_S = 3.0
+"""Time in which the arm is raised [s]."""
+ARMS_DOWN_RAD = 1.3
+SWAY_RAD, SWAY_HZ = 0.02, 0.4
+"""Nobody holds an arm quite still."""
+LEVEL = np.array((0.0, 0.0, 0.0, 1.0))
+
+
+class ArmHeldOut:
+    """A person as a function of time, who looks along x; how they hold the arm is random.
+
+    Args:
+        height_m: Body height [m].
+        seed: Of what is random.
+        start: Where the person stands, x and y [m].
+        t_pose_s: For how long the person stands in the T-pose first [s].
+    """
+
+    def __init__(
+        self, height_m: float = 1.75, seed: int = 0, start: tuple[float, float] = (0.0, 0.0), t_pose_s: float = 0.0
+    ) -> None:
+        random = np.random.default_rng(seed)
+        self._offsets, self._t_pose_s = segment_offsets(height_m), t_pose_s
+        self._hips = np.array((*start, 0.53 * height_m))
+        self._held = np.radians((random.uniform(-8, 8), random.uniform(74, 86), random.uniform(5, 25)))
+        self._phase = random.uniform(0.0, 2.0 * math.pi)
+        self.t_pose: Array = segment_frame(self._offsets, self._hips, LEVEL, {}).positions
+        """Origins of the segments in the T-pose (23 x 3) [m]; all are turned as the world is."""
+
+    def frame(self, time_s: float) -> SegmentFrame:
+        """Returns the segments at a time [s]."""
+        since_s = time_s - self._t_pose_s
+        raised, lowered = _smooth(since_s / RAISING_S), _smooth(since_s / (0.5 * RAISING_S)) if self._t_pose_s else 1.0
+        up, ahead, elbow = self._held
+        sway = SWAY_RAD * math.sin(2.0 * math.pi * SWAY_HZ * time_s + self._phase)
+        hinges = {
+            "jLeftShoulder_rotx": -lowered * ARMS_DOWN_RAD,
+            "jRightShoulder_rotx": (1.0 - raised) * lowered * ARMS_DOWN_RAD + raised * up + sway,
+            "jRightShoulder_rotz": raised * ahead + sway,
+            "jRightElbow_rotz": raised * elbow,
+        }
+        return segment_frame(self._offsets, self._hips, LEVEL, hinges)
+
+    def pose(self, time_s: float) -> tuple[Array, Array]:
+        """Returns origins (23 x 3) [m] and orientations (23 x 4), x, y, z, w, of the segments at a time [s]."""
+        frame = self.frame(time_s)
+        return frame.positions, frame.quats_xyzw
+
+
+def _smooth(share: float) -> float:
+    """Returns 0 before 0, 1 after 1, and a smooth step between."""
+    share = min(max(share, 0.0), 1.0)
+    return share * share * (3.0 - 2.0 * share)

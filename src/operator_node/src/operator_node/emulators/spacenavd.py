@@ -1,0 +1,217 @@
+"""`spacenavd_emulator.py`: the daemon of 6-D mice, with a device that moves by itself."""
+
+import argparse
+import contextlib
+import os
+import select
+import socket
+import threading
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from operator_node.devices.spacenav import (
+    ANSWERS,
+    DEVICE,
+    GET_BUTTONS,
+    MOTION,
+    PACKET,
+    PRESS,
+    PROTOCOL_MASK,
+    PROTOCOL_TAG,
+    RELEASE,
+    REQUEST,
+    WORD,
+    socket_path,
+)
+
+FULL = 350
+"""What most devices say at the end of an axis."""
+SET_NAME, SET_SENSITIVITY, SET_MASK, GET_NAME, GET_AXES = (
+    REQUEST | number for number in (0x1000, 0x1001, 0x1003, 0x2000, 0x2002)
+)
+EVENT_BITS = {MOTION: 1, PRESS: 2, RELEASE: 2, DEVICE: 4}
+MASK_AT_FIRST = {0: 3, 1: 7}
+"""Which events a client gets that has asked for none, by the version of its protocol."""
+NAME, CHUNK = b"emulated 6-D mouse", 24
+CONTINUED = 0x10000
+REFUSED = -1
+PERIOD_S = 0.01
+HOLD_S = 1.0
+
+
+class Client:
+    """One client of the daemon."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self.socket = connection
+        self.protocol, self.mask = 0, MASK_AT_FIRST[0]
+        self.received = bytearray()
+
+
+class SpacenavDaemon:
+    """Serves a 6-D mouse to any number of clients, until it is closed.
+
+    Args:
+        path: The socket; a file that is there is replaced.
+        protocol: Newest version of the protocol that it speaks, 0 or 1.
+        buttons: How many buttons the device has.
+
+    Attributes:
+        path: The socket.
+    """
+
+    def __init__(self, path: str | Path, protocol: int = 1, buttons: int = 2) -> None:
+        self.path = Path(path)
+        self._protocol, self._buttons = protocol, buttons
+        self._is_plugged = True
+        self._clients: list[Client] = []
+        self._lock = threading.RLock()
+        self._wake_reader, self._wake_writer = os.pipe()
+        self.path.unlink(missing_ok=True)
+        self._listener = socket.socket(socket.AF_UNIX)
+        self._listener.bind(str(self.path))
+        self._listener.listen()
+        self._thread = threading.Thread(target=self._serve, name="spacenavd", daemon=True)
+        self._thread.start()
+
+    @property
+    def clients(self) -> int:
+        """How many clients it has."""
+        return len(self._clients)
+
+    def move(self, x: int, y: int, z: int, rx: int = 0, ry: int = 0, rz: int = 0) -> None:
+        """Says where the cap is: x right, y up, z away from the person, and turns about them."""
+        self._tell(MOTION, x, y, z, rx, ry, rz, 0)
+
+    def press(self, button: int, is_down: bool = True) -> None:
+        """Presses a button, or lets go of it."""
+        self._tell(PRESS if is_down else RELEASE, button, int(is_down))
+
+    def unplug(self) -> None:
+        """Takes the device away."""
+        self._is_plugged = False
+        self._tell(DEVICE, 1, 0)
+
+    def plug(self) -> None:
+        """Puts the device in."""
+        self._is_plugged = True
+        self._tell(DEVICE, 0, 0)
+
+    def send(self, data: bytes) -> None:
+        """Sends all clients whatever it is given."""
+        with self._lock:
+            for client in [*self._clients]:
+                self._send(client, data)
+
+    def close(self) -> None:
+        """Ends all connections."""
+        os.write(self._wake_writer, b".")
+        self._thread.join()
+        for client in self._clients:
+            client.socket.close()
+        self._listener.close()
+        os.close(self._wake_reader)
+        os.close(self._wake_writer)
+        self.path.unlink(missing_ok=True)
+
+    def _serve(self) -> None:
+        while True:
+            clients = {client.socket.fileno(): client for client in self._clients}
+            ready, _, _ = select.select([self._wake_reader, self._listener.fileno(), *clients], [], [])
+            if self._wake_reader in ready:
+                return
+            for number in ready:
+                with self._lock:
+                    if number in clients:
+                        self._hear(clients[number])
+                    else:
+                        self._clients.append(Client(self._listener.accept()[0]))
+
+    def _hear(self, client: Client) -> None:
+        received = b""
+        with contextlib.suppress(OSError):
+            received = client.socket.recv(4096)
+        if not received:
+            self._drop(client)
+            return
+        client.received += received
+        while client in self._clients and self._answer(client):
+            pass
+
+    def _answer(self, client: Client) -> bool:
+        """Deals with one request and returns whether there was one."""
+        if client.protocol == 1:
+            if len(client.received) < PACKET.size:
+                return False
+            request = PACKET.unpack_from(client.received)
+            del client.received[: PACKET.size]
+            self._answer_request(client, request)
+            return True
+        if len(client.received) < WORD.size:
+            return False
+        (word,) = WORD.unpack_from(client.received)
+        del client.received[: WORD.size]
+        if self._protocol == 1 and word & PROTOCOL_MASK == PROTOCOL_TAG:  # else it is a sensitivity
+            client.protocol = min(word & 0xFF, self._protocol)
+            client.mask = MASK_AT_FIRST[client.protocol]
+            self._send(client, WORD.pack(PROTOCOL_TAG | client.protocol))
+        return True
+
+    def _answer_request(self, client: Client, request: Sequence[int]) -> None:
+        kind = request[0]
+        if kind not in ANSWERS:
+            return
+        if kind == SET_MASK:
+            client.mask = request[1]
+        elif kind == GET_NAME and self._is_plugged:
+            for start in range(0, len(NAME), CHUNK):
+                chunk = NAME[start : start + CHUNK].ljust(CHUNK, b"\0")
+                length = (len(NAME) - start) | (CONTINUED if start else 0)
+                self._send(client, WORD.pack(kind) + chunk + WORD.pack(length))
+            return
+        has_device = self._is_plugged or kind in (SET_NAME, SET_SENSITIVITY, SET_MASK)
+        value = {GET_BUTTONS: self._buttons, GET_AXES: 6}.get(kind, request[1])
+        self._send(client, PACKET.pack(kind, value, *[0] * 5, 0 if has_device else REFUSED))
+
+    def _tell(self, kind: int, *values: int) -> None:
+        packet = PACKET.pack(kind, *values, *[0] * (7 - len(values)))
+        with self._lock:
+            for client in [*self._clients]:
+                if client.mask & EVENT_BITS[kind]:
+                    self._send(client, packet)
+
+    def _send(self, client: Client, data: bytes) -> None:
+        try:
+            client.socket.sendall(data)
+        except OSError:
+            self._drop(client)
+
+    def _drop(self, client: Client) -> None:
+        client.socket.close()
+        self._clients = [each for each in self._clients if each is not client]
+
+
+def main() -> None:
+    """Runs the daemon; its cap goes along each axis in turn, forth and back, until Ctrl-C."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--socket", default=socket_path(), help="by default where clients look for it")
+    parser.add_argument("--protocol", type=int, choices=(0, 1), default=1, help="newest version that it speaks")
+    arguments = parser.parse_args()
+    daemon = SpacenavDaemon(arguments.socket, arguments.protocol)
+    print(f"serves a 6-D mouse at {daemon.path}, which goes along each axis in turn, until Ctrl-C", flush=True)
+    try:
+        while True:
+            for axis in range(6):
+                for value in (FULL, 0, -FULL, 0):
+                    _hold(daemon, [value if each == axis else 0 for each in range(6)])
+    finally:
+        daemon.close()
+
+
+def _hold(daemon: SpacenavDaemon, motion: Sequence[int]) -> None:
+    """Says the same for a time, as a cap that a hand holds does."""
+    end_s = time.monotonic() + HOLD_S
+    while time.monotonic() < end_s:
+        daemon.move(*motion)
+        time.sleep(PERIOD_S)

@@ -1,0 +1,174 @@
+"""Haply Inverse3, by the websocket of its service."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+from typing import Literal
+
+from pydantic import Field
+
+from custom_ros_tools.errors import MissingDependency
+from custom_ros_tools.schema import Positive, PositiveMetres, Text, Vec3
+from operator_node.device import DeviceError
+from operator_node.haptics.device import HapticConfig, HapticDevice, HapticReading, ReadingError
+from operator_node.haptics.vectors import ZERO, norm
+from rpbi.geometry import Vector, minus
+
+from .haply_messages import command_of, device_in, state_in
+
+try:
+    from websockets.exceptions import WebSocketException
+    from websockets.legacy.client import connect
+except ImportError as error:
+    raise MissingDependency("websockets", "apt-get install python3-websockets") from error
+
+PATIENCE_S = 1.0
+"""After so long without an answer the connection counts as lost [s]."""
+PERIOD_S = 0.001
+LONGEST_FRAME = 1 << 18
+TRIED = 50
+"""So many forces in a row that are not felt mean that the service knows another key."""
+FELT_N = 0.3
+"""Forces below this tell nothing about the key [N]."""
+KEYS = ("vector", "values")
+
+
+class HaplyConfig(HapticConfig):
+    """A Haply Inverse3."""
+
+    max_force_n: Positive = Field(8.0, description="The largest force that it is sent [N].")
+    workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")
+    url: Text = Field("ws://localhost:10001", description="The service's websocket; port 10000 before 3.1.")
+    device_id: str = Field("", description="Which Inverse3, if there are several; empty takes the first one.")
+    centre: Vec3 = Field((0.0, 0.0, 0.0), description="Middle of the workspace in the device's own axes [m].")
+    force_key: Literal["auto", "vector", "values"] = Field(
+        "auto", description="What the service calls a force; auto tries which one it reports back."
+    )
+
+
+class HaplyDevice(HapticDevice):
+    """Speaks with the service in a thread of its own, at 1 kHz: one force there, one state back."""
+
+    Config = HaplyConfig
+    config: HaplyConfig
+
+    def __init__(self, config: HaplyConfig) -> None:
+        super().__init__(config)
+        self._thread: threading.Thread | None = None
+        self._command: tuple[Vector, float] = (ZERO, 0.0)
+        self.force_key = ForceKey(config.force_key)
+
+    def open(self) -> None:
+        """Connects to the service.
+
+        Raises:
+            DeviceError: If it does not answer, or has no Inverse3.
+        """
+        self._closing, self._opened = threading.Event(), threading.Event()
+        self._trouble = ""
+        self._frame: str | bytes | None = None
+        self._command = (ZERO, 0.0)
+        self._thread = threading.Thread(target=self._run, name="haply", daemon=True)
+        self._thread.start()
+        self._opened.wait(3.0 * PATIENCE_S)
+        if self._trouble or not self._opened.is_set():
+            self.close()
+            raise DeviceError("haply", self._trouble or f"{self.config.url} does not answer")
+
+    def read(self) -> HapticReading | None:
+        """Returns the newest state.
+
+        Raises:
+            DeviceError: If the service has gone.
+            ReadingError: If the state makes no sense.
+        """
+        frame, self._frame = self._frame, None
+        if frame is None:
+            if self._trouble:
+                raise DeviceError("haply", self._trouble)
+            return None
+        state = state_in(frame, self._device_id)
+        force, _ = self._sent
+        if not self.force_key.judge(force, state.force):
+            self.count("force not taken")
+        x, y, z = minus(state.position, self.config.centre)
+        vx, vy, vz = state.velocity
+        qx, qy, qz, qw = state.quat_xyzw
+        return HapticReading((y, -x, z), (vy, -vx, vz), (qy, -qx, qz, qw), state.buttons)
+
+    def send(self, force: Vector, expires_s: float) -> None:
+        """Has the thread send a force until it expires."""
+        self._command = force, expires_s
+
+    def close(self) -> None:
+        """Sends zero force and hangs up."""
+        if self._thread is not None:
+            self._closing.set()
+            self._thread.join(2.0 * PATIENCE_S)
+            self._thread = None
+
+    def _run(self) -> None:
+        try:
+            asyncio.run(self._converse())
+        except (TimeoutError, OSError, WebSocketException) as error:
+            self._trouble = f"{self.config.url}: {error or 'does not answer'}"
+        except ReadingError as error:
+            self._trouble = f"{self.config.url}: {error}"
+        finally:
+            self._trouble = self._trouble or "closed"
+            self._opened.set()
+
+    async def _converse(self) -> None:
+        """Exchanges forces and states until the device is closed."""
+        async with connect(
+            self.config.url, open_timeout=PATIENCE_S, ping_interval=None, close_timeout=0.1, max_size=LONGEST_FRAME
+        ) as connection:
+            first = await asyncio.wait_for(connection.recv(), PATIENCE_S)
+            self._device_id = device_in(first, self.config.device_id)
+            self._sent = self._command
+            self._opened.set()
+            due_s = time.monotonic()
+            while not self._closing.is_set():
+                force, expires_s = self._sent = self._command
+                if time.monotonic() >= expires_s:
+                    force = ZERO
+                    self._sent = ZERO, expires_s
+                await connection.send(command_of(self._device_id, force, self.force_key.key))
+                self._frame = await asyncio.wait_for(connection.recv(), PATIENCE_S)
+                due_s = max(due_s + PERIOD_S, time.monotonic())
+                # Nothing else runs in this thread, and asyncio's own timers are too coarse
+                time.sleep(max(due_s - time.monotonic(), 0.0))
+            await connection.send(command_of(self._device_id, ZERO, self.force_key.key))
+
+
+class ForceKey:
+    """Which key of a force the service takes: its documentation has `vector`, its examples `values`.
+
+    Args:
+        key: One of them, or `auto` to find out by what the service reports back.
+
+    Attributes:
+        key: The one in use.
+    """
+
+    def __init__(self, key: str) -> None:
+        self._may_change = key == "auto"
+        self.key = KEYS[0] if key == "auto" else key
+        self._unfelt = 0
+
+    def judge(self, sent: Vector, reported: Vector) -> bool:
+        """Takes a force that was sent and one that was reported [N]; returns False when it seems to have no effect."""
+        if norm(sent) < FELT_N:
+            return True
+        if norm(reported) > 0.1 * norm(sent):
+            self._unfelt, self._may_change = 0, False
+            return True
+        self._unfelt += 1
+        if self._unfelt < TRIED:
+            return True
+        self._unfelt = 0
+        if self._may_change:
+            self.key = KEYS[1 - KEYS.index(self.key)]
+        return False

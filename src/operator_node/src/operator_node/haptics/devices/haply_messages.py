@@ -1,0 +1,116 @@
+"""Messages of the service of a Haply Inverse3, as JSON: states in, forces out."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, NamedTuple
+
+from operator_node.haptics.device import ReadingError
+from operator_node.haptics.vectors import ZERO
+from rpbi.geometry import Quaternion, Vector
+
+
+class HaplyState(NamedTuple):
+    """What the service says, in the device's own axes: x right, y forward, z up.
+
+    Attributes:
+        position: Of the cursor [m].
+        velocity: Of the cursor [m/s].
+        quat_xyzw: Orientation of the grip, none without one.
+        buttons: Those of the grip.
+        force: What the device pushes with [N].
+    """
+
+    position: Vector
+    velocity: Vector
+    quat_xyzw: Quaternion
+    buttons: tuple[int, ...]
+    force: Vector
+
+
+def command_of(device_id: str, force: Vector, key: str) -> str:
+    """Returns the message that sends a force, in the axes of `HapticReading` [N]."""
+    x, y, z = -force[1], force[0], force[2]
+    commands = {"set_cursor_force": {key: {"x": x, "y": y, "z": z}}}
+    return json.dumps({"inverse3": [{"device_id": device_id, "commands": commands}]})
+
+
+def device_in(frame: str | bytes, wanted: str) -> str:
+    """Returns the id of an Inverse3 that the first message names.
+
+    Raises:
+        ReadingError: If it names none, or not the one that is wanted.
+    """
+    known = [str(each.get("device_id", "")) for each in _entries(_message(frame), "inverse3")]
+    if not known or (wanted and wanted not in known):
+        names = f"it has {', '.join(known)}" if known else "it has none"
+        raise ReadingError("no device", f"expected an Inverse3{wanted and f' {wanted}'}, {names}")
+    return wanted or known[0]
+
+
+def state_in(frame: str | bytes, device_id: str) -> HaplyState:
+    """Returns the state of an Inverse3, and of the first grip, in a message.
+
+    Raises:
+        ReadingError: If it is not there, or not made of finite numbers.
+    """
+    message = _message(frame)
+    states = [each for each in _entries(message, "inverse3") if each.get("device_id") == device_id]
+    if not states:
+        raise ReadingError("no device", f"a message without Inverse3 {device_id}")
+    state = _mapping(states[0], "state")
+    quat: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    buttons: tuple[int, ...] = ()
+    for kind in ("verse_grip", "wireless_verse_grip"):
+        for grip in _entries(message, kind)[:1]:
+            held = _mapping(grip, "state")
+            x, y, z, w = _numbers(held, "orientation", "xyzw")
+            quat = x, y, z, w
+            pressed = held.get("buttons", {"a": held.get("button", False)})
+            if not isinstance(pressed, dict):
+                raise ReadingError("not a state", f"expected buttons by name, got {type(pressed).__name__}")
+            buttons = tuple(int(bool(pressed[name])) for name in sorted(pressed))
+    force = _vector(state, "current_cursor_force") if "current_cursor_force" in state else ZERO
+    return HaplyState(_vector(state, "cursor_position"), _vector(state, "cursor_velocity"), quat, buttons, force)
+
+
+def _message(frame: str | bytes) -> dict[str, Any]:
+    try:
+        message = json.loads(frame)
+    except (ValueError, RecursionError) as error:
+        raise ReadingError("not JSON", str(error)[:80]) from None
+    if not isinstance(message, dict):
+        raise ReadingError("not a state", f"expected a JSON object, got {type(message).__name__}")
+    return message
+
+
+def _entries(message: dict[str, Any], key: str) -> list[dict[str, Any]]:
+    entries = message.get(key, [])
+    if not isinstance(entries, list) or not all(isinstance(each, dict) for each in entries):
+        raise ReadingError("not a state", f"expected {key} to be a list of objects")
+    return entries
+
+
+def _mapping(entry: dict[str, Any], key: str) -> dict[str, Any]:
+    found = entry.get(key)
+    if not isinstance(found, dict):
+        raise ReadingError("not a state", f"expected an object {key}, got {type(found).__name__}")
+    return found
+
+
+def _numbers(state: dict[str, Any], key: str, names: str) -> list[float]:
+    values = _mapping(state, key)
+    numbers = []
+    for name in names:
+        value = values.get(name)
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise ReadingError("not a state", f"expected a number {key}.{name}, got {type(value).__name__}")
+        if not abs(value) < 1e9:
+            raise ReadingError("not finite", f"{key}.{name} is not a finite number below 1e9")
+        numbers.append(float(value))
+    return numbers
+
+
+def _vector(state: dict[str, Any], key: str) -> Vector:
+    x, y, z = _numbers(state, key, "xyz")
+    return x, y, z

@@ -1,0 +1,127 @@
+"""A haptic device for those who have none: a window, a mouse, and an arrow for the force."""
+
+import math
+import os
+import socket
+import struct
+import subprocess
+import sys
+import time
+
+from pydantic import Field
+
+from custom_ros_tools.schema import Positive, PositiveMetres
+from operator_node.device import DeviceError
+from operator_node.haptics.device import DeviceEnded, HapticConfig, HapticReading
+from operator_node.haptics.vectors import ZERO, within
+from rpbi.geometry import Vector
+
+from .emulated import EmulatedDevice
+
+FROM_WINDOW = struct.Struct("=4d")
+"""x, y, z of the mouse [m] and whether the button is held."""
+TO_WINDOW = struct.Struct("=6d")
+"""Position of the handle [m] and force [N]."""
+SHOW_S = 0.02
+"""How often the window is told [s]."""
+
+
+class VirtualConfig(HapticConfig):
+    """A window with a handle."""
+
+    max_force_n: Positive = Field(10.0, description="The largest force that it is sent [N].")
+    workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")
+
+
+class VirtualDevice(EmulatedDevice):
+    """A handle on a spring that the mouse pulls: a force moves it away from the mouse, and is drawn as an arrow.
+
+    The window is a process of its own, so that drawing does not hold up the loop.
+    """
+
+    Config = VirtualConfig
+
+    def __init__(self, config: VirtualConfig) -> None:
+        super().__init__(config)
+        self._socket: socket.socket | None = None
+        self._mouse: Vector = ZERO
+        self._shown_s = 0.0
+
+    def open(self) -> None:
+        """Opens the window.
+
+        Raises:
+            DeviceError: If there is no screen.
+        """
+        if not os.environ.get("DISPLAY"):
+            raise DeviceError("virtual", "its window needs a screen, and DISPLAY is not set")
+        ours, theirs = socket.socketpair()
+        ours.setblocking(False)
+        config = self.config
+        program = "operator_node.haptics.devices.virtual_window"
+        numbers = [str(number) for number in (theirs.fileno(), config.workspace_m, config.max_force_n)]
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", program, *numbers], pass_fds=(theirs.fileno(),), start_new_session=True
+            )
+        self._socket, self._mouse, self._received = ours, ZERO, b""
+        super().open()
+
+    def wanted(self, time_s: float) -> Vector:
+        """Returns where the mouse is."""
+        return self._mouse
+
+    def read(self) -> HapticReading | None:
+        """Returns where the handle is.
+
+        Raises:
+            DeviceEnded: If the window was closed.
+        """
+        self._listen()
+        reading = super().read()
+        if reading is not None and (now_s := time.monotonic()) - self._shown_s > SHOW_S:
+            self._shown_s = now_s
+            self._show(TO_WINDOW.pack(*reading.position, *self.force))
+        return reading
+
+    def close(self) -> None:
+        """Closes the window."""
+        super().close()
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+            try:
+                self._process.wait(2.0)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
+
+    def _listen(self) -> None:
+        if self._socket is None:
+            raise DeviceError("virtual", "its window is not open")
+        try:
+            received = self._socket.recv(4096)
+        except BlockingIOError:
+            return
+        except OSError:
+            received = b""
+        if not received:
+            raise DeviceEnded("virtual", "its window was closed")
+        self._received += received
+        size = FROM_WINDOW.size
+        whole = len(self._received) // size * size
+        if whole:
+            x, y, z, held = FROM_WINDOW.unpack(self._received[whole - size : whole])
+            self._received = self._received[whole:]
+            if math.isfinite(x + y + z):
+                self._mouse = within((x, y, z), 1.5 * self.config.workspace_m)
+            self.buttons = (int(held > 0.5),)
+
+    def _show(self, message: bytes) -> None:
+        assert self._socket is not None
+        try:
+            self._socket.send(message)
+        except BlockingIOError:
+            return  # a window that is slow gets the next one
+        except OSError:
+            raise DeviceEnded("virtual", "its window was closed") from None

@@ -1,0 +1,95 @@
+"""Recordings of a stream: each datagram as it came, with the time of its arrival.
+
+A file begins with the line `MVN datagrams 1`. Each record is an arrival since the first one [s] as a big-endian double,
+a length as a big-endian unsigned short, and so many bytes.
+"""
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from custom_ros_tools.errors import InterfaceError
+
+MAGIC = b"MVN datagrams 1\n"
+LONGEST_PAUSE_S = 3600.0
+_RECORD = struct.Struct(">dH")
+
+
+class Record(NamedTuple):
+    """A datagram and when it came, since the first one [s]."""
+
+    time_s: float
+    data: bytes
+
+
+class Recording:
+    """Writes datagrams into a file.
+
+    Raises:
+        InterfaceError: If the file exists, or cannot be written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.count = path, 0
+        self._begin_s: float | None = None
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = open(path, "xb")
+            self._file.write(MAGIC)
+        except OSError as error:
+            raise _cannot_write(path, error) from None
+
+    def write(self, now_s: float, data: bytes) -> None:
+        """Adds a datagram that came at a time of any steady clock [s].
+
+        Raises:
+            InterfaceError: If it cannot be written, for instance because the disk is full.
+        """
+        if self._begin_s is None:
+            self._begin_s = now_s
+        try:
+            self._file.write(_RECORD.pack(max(now_s - self._begin_s, 0.0), len(data)) + data)
+        except OSError as error:
+            raise _cannot_write(self.path, error) from None
+        self.count += 1
+
+    def close(self) -> None:
+        """Ends the file.
+
+        Raises:
+            InterfaceError: If what is left cannot be written.
+        """
+        try:
+            self._file.close()
+        except OSError as error:
+            raise _cannot_write(self.path, error) from None
+
+
+def _cannot_write(path: Path, error: OSError) -> InterfaceError:
+    return InterfaceError(f"{path}: cannot be written: {error.strerror}")
+
+
+def read_recording(path: Path) -> Iterator[Record]:
+    """Yields what was recorded; a record that was cut off at the end is left out.
+
+    Raises:
+        InterfaceError: If the file cannot be read, is no recording, or has times that make no sense.
+    """
+    try:
+        with open(path, "rb") as file:
+            if file.read(len(MAGIC)) != MAGIC:
+                raise InterfaceError(f"{path}: is no recording: expected the line '{MAGIC.decode().strip()}' first")
+            before_s = 0.0
+            while len(head := file.read(_RECORD.size)) == _RECORD.size:
+                at = file.tell()
+                time_s, length = _RECORD.unpack(head)
+                if not before_s <= time_s <= before_s + LONGEST_PAUSE_S:
+                    raise InterfaceError(f"{path}: byte {at}: expected a time after {before_s:g} s, got {time_s:g} s")
+                data = file.read(length)
+                if len(data) < length:
+                    return
+                before_s = time_s
+                yield Record(time_s, data)
+    except OSError as error:
+        raise InterfaceError(f"{path}: cannot be read: {error.strerror}") from None

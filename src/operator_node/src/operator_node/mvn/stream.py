@@ -1,0 +1,236 @@
+"""From datagrams of MVN to frames of people: grouped by person and sample, in metres, z up."""
+
+from collections import Counter, deque
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from custom_ros_tools.transforms import Array
+
+from . import packets
+from .packets import Datagram, PacketError
+from .segments import SEGMENTS, CenterOfMass, JointAngles, Message, Motion, PersonInfo, SegmentFrame, TimeCode, TPose
+
+MOST_BEHIND = 100
+"""A datagram that is so many samples behind is late; further behind, the stream has begun anew."""
+MOST_LATE = 20
+"""So many late datagrams of a message type in a row, and the stream has begun anew too, as a short recording does."""
+MOST_REFUSED = 1000
+LONG_GONE = 500
+"""After so many datagrams of others a person gives way to a new one, if there are too many."""
+LENGTH_TOLERANCE = 0.01
+_COUNTER_RANGE = 2**32
+_METRES_PER_CM = 0.01
+
+
+@dataclass
+class _Group:
+    """The newest message of one type of one person."""
+
+    sample: int
+    parts: dict[int, Datagram] = field(default_factory=dict)
+    last: int | None = None
+    is_done: bool = False
+    late_in_a_row: int = 0
+
+
+class StreamDecoder:
+    """Makes messages of datagrams, in whatever order they come; its memory is bounded, whatever comes.
+
+    A message is given once all of its datagrams are there, and dropped when one of a newer sample comes first.
+
+    Args:
+        position_scale: What positions of types 02, 21 and 24 are multiplied by to be metres.
+        y_up: Whether those types are Y-up, which MVN can be told to send; else they are Z-up. Type 01 always is Y-up
+            and in centimetres.
+        max_people: Of how many people at most it takes messages; others are refused.
+
+    Attributes:
+        counts: `received` is the number of datagrams; each of them is `used`, `late`, `duplicate`, `incomplete` (its
+            message was dropped), `ignored` (type 01 beside type 02) or `refused: REASON`, or waits for the rest of its
+            message. Beside those, `frames` is how many `SegmentFrame`s were given, and `skipped` how many samples were
+            passed over by those; they were lost, came late, or MVN streams at a lower rate than it measures.
+        refused: Reason of each datagram that was refused, of `packets.REASONS`, the newest of them; may be emptied.
+        refusals: What was the matter with the newest one of each reason.
+        remarks: What is odd, by subject; may be emptied.
+    """
+
+    def __init__(self, position_scale: float = 1.0, y_up: bool = False, max_people: int = 8) -> None:
+        self.counts: Counter[str] = Counter()
+        self.refused: deque[str] = deque(maxlen=MOST_REFUSED)
+        self.refusals: dict[str, str] = {}
+        self.remarks: dict[str, str] = {}
+        self._scale, self._y_up, self._max_people = position_scale, y_up, max_people
+        self._groups: dict[tuple[int, int], _Group] = {}
+        self._people: dict[int, int] = {}
+        """How many datagrams had been received when each person's last one was."""
+        self._frame_samples: dict[int, int] = {}
+
+    def reset(self) -> None:
+        """Forgets whose stream it was, for instance after silence; counts go on."""
+        for group in self._groups.values():
+            self._drop(group)
+        self._groups.clear()
+        self._people.clear()
+        self._frame_samples.clear()
+
+    @property
+    def waiting(self) -> int:
+        """How many datagrams wait for the rest of their messages."""
+        return sum(len(group.parts) for group in self._groups.values())
+
+    def take(self, data: bytes) -> Message | None:
+        """Takes what came as one datagram; returns the message that is complete with it, if one is."""
+        self.counts["received"] += 1
+        try:
+            datagram = packets.parse(data)
+            self._admit(datagram.person)
+            if datagram.kind in packets.TEXTS:
+                message = _text_message(datagram)
+                self.counts["used"] += 1
+                return message
+            return self._grouped(datagram)
+        except PacketError as error:
+            self._refuse(error, 1)
+            return None
+
+    def _refuse(self, error: PacketError, count: int) -> None:
+        self.counts[f"refused: {error.reason}"] += count
+        self.refused.extend([error.reason] * count)
+        self.refusals[error.reason] = str(error)
+
+    def _admit(self, person: int) -> None:
+        """Makes room for a person, in the place of one of whom nothing has come for long, if need be."""
+        received = self.counts["received"]
+        if person not in self._people and len(self._people) >= self._max_people:
+            oldest = min(self._people, key=self._people.__getitem__)
+            if received - self._people[oldest] < LONG_GONE:
+                raise PacketError("too many people", f"person {person} beside {sorted(self._people)}")
+            self._forget(oldest)
+        self._people[person] = received
+
+    def _forget(self, person: int) -> None:
+        del self._people[person]
+        self._frame_samples.pop(person, None)
+        for key in [key for key in self._groups if key[0] == person]:
+            self._drop(self._groups.pop(key))
+
+    def _grouped(self, datagram: Datagram) -> Message | None:
+        """Returns the message that a datagram completes."""
+        group = self._group_of(datagram)
+        if group is None:
+            return None
+        if group.is_done or datagram.part in group.parts:
+            self.counts["duplicate"] += 1
+            return None
+        last = datagram.part if datagram.is_last else group.last
+        if (datagram.is_last and group.last is not None) or any(
+            last is not None and index > last for index in (datagram.part, *group.parts)
+        ):
+            raise PacketError("counts", f"datagram {datagram.part} of a message of {(group.last or 0) + 1}")
+        group.parts[datagram.part], group.last = datagram, last
+        if group.last is None or len(group.parts) <= group.last:
+            return None
+        parts = [group.parts[index] for index in range(group.last + 1)]
+        group.parts, group.is_done = {}, True
+        return self._completed(parts)
+
+    def _group_of(self, datagram: Datagram) -> _Group | None:
+        """Returns where a datagram belongs, None if that has gone by."""
+        key = (datagram.person, datagram.kind)
+        group = self._groups.get(key)
+        if group is not None:
+            ahead = (datagram.sample - group.sample) % _COUNTER_RANGE
+            if ahead == 0:
+                return group
+            behind = _COUNTER_RANGE - ahead
+            if behind <= MOST_BEHIND and group.late_in_a_row < MOST_LATE:
+                group.late_in_a_row += 1
+                self.counts["late"] += 1
+                return None
+            self._drop(group)
+        self._groups[key] = group = _Group(datagram.sample)
+        return group
+
+    def _drop(self, group: _Group) -> None:
+        self.counts["incomplete"] += len(group.parts)
+        group.parts = {}
+
+    def _completed(self, parts: list[Datagram]) -> Message | None:
+        first = parts[0]
+        ids = np.concatenate([part.ids for part in parts])
+        try:
+            if len({part.values.shape[1] for part in parts}) > 1 or len(ids) > packets.MOST_ITEMS:
+                raise PacketError("counts", f"{len(ids)} items in {len(parts)} datagrams")
+            message = self._message(first, ids, np.concatenate([part.values for part in parts]))
+        except PacketError as error:
+            self._refuse(error, len(parts))
+            return None
+        self.counts["ignored" if message is None else "used"] += len(parts)
+        if isinstance(message, SegmentFrame):
+            self._count_frame(message)
+        return message
+
+    def _count_frame(self, frame: SegmentFrame) -> None:
+        self.counts["frames"] += 1
+        before = self._frame_samples.get(frame.person)
+        self._frame_samples[frame.person] = frame.sample
+        if before is not None:
+            step = (frame.sample - before) % _COUNTER_RANGE
+            if 0 < step <= MOST_BEHIND:
+                self.counts["skipped"] += step - 1
+
+    def _message(self, first: Datagram, ids: Array, values: Array) -> Message | None:
+        kind, person, sample = first.kind, first.person, first.sample
+        if kind == packets.POSE_QUATERNION or kind == packets.POSE_EULER:
+            if kind == packets.POSE_EULER and (person, packets.POSE_QUATERNION) in self._groups:
+                return None
+            positions, quats_xyzw = self._poses(kind, values[packets.body_rows(ids)])
+            return SegmentFrame(person, sample, first.time_ms, positions, quats_xyzw)
+        if kind == packets.JOINT_ANGLES:
+            parents, children = (tuple(map(_segment_of_point, column)) for column in ids.T.tolist())
+            return JointAngles(person, sample, parents, children, np.radians(values))
+        if kind == packets.CENTER_OF_MASS:
+            position = self._scale * values[0, :3]
+            return CenterOfMass(person, sample, position[_Z_UP] if self._y_up else position)
+        return Motion(person, sample, kind, tuple(ids[:, 0].tolist()), values)
+
+    def _poses(self, kind: int, values: Array) -> tuple[Array, Array]:
+        """Returns positions [m] and quaternions x, y, z, w, z up."""
+        if kind == packets.POSE_EULER:
+            quats, scale, y_up = _quats_of_euler(values[:, 3:]), _METRES_PER_CM, True
+        else:
+            quats, length = packets.unit_quats(values[:, [4, 5, 6, 3]])
+            scale, y_up = self._scale, self._y_up
+            if abs(length - 1.0) > LENGTH_TOLERANCE:
+                self.remarks["quaternions"] = f"have length {length:.3g} instead of 1; they are normalised"
+        positions = scale * values[:, :3]
+        return (positions[:, _Z_UP], quats[:, [*_Z_UP, 3]]) if y_up else (positions, quats)
+
+
+_Z_UP = [2, 0, 1]
+"""Which parts of a Y-up vector are x, y and z of a Z-up one; there, a person looks along z, here along x."""
+
+
+def _quats_of_euler(angles_deg: Array) -> Array:
+    """Returns quaternions x, y, z, w of turns about the fixed x, y and z axis in this order, as MVN's receiver does."""
+    return np.asarray(Rotation.from_euler("xyz", angles_deg, degrees=True).as_quat())
+
+
+def _segment_of_point(point: int) -> str:
+    """Returns the segment that a point is on."""
+    segment = point // 256
+    if not 1 <= segment <= len(SEGMENTS):
+        raise PacketError("segment ids", f"point {point}")
+    return SEGMENTS[segment - 1]
+
+
+def _text_message(datagram: Datagram) -> Message | None:
+    person, text = datagram.person, datagram.text
+    if datagram.kind == packets.PERSON_INFO:
+        return PersonInfo(person, packets.info_in(text))
+    if datagram.kind == packets.TIME_CODE:
+        return TimeCode(person, datagram.sample, packets.time_code_in(text))
+    origins = packets.t_pose_in(text)
+    return TPose(person, origins) if origins else None

@@ -1,0 +1,5 @@
+"""A node that maps a device in a way of its own."""
+
+from operator_node.ros.mappings.operator_node import OperatorNode
+
+__all__ = ["OperatorNode"]

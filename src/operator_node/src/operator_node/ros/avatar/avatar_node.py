@@ -1,0 +1,134 @@
+"""`avatar_node.py`: segments of a person in, joint targets and base of their avatar out."""
+
+import threading
+import time
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import PoseArray
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger, TriggerResponse
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.lifecycle.parameters import private_parameters
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
+from custom_ros_tools.ros.tf_interface import TfInterface
+from operator_node.avatar.engagement import Engagement
+from operator_node.avatar.joints import HINGES
+from operator_node.avatar.parameters import AvatarParameters
+from operator_node.avatar.retargeting import AvatarPose, Place, Retargeting
+from operator_node.avatar.urdf_offsets import urdf_offsets
+from operator_node.mvn.segments import SegmentFrame
+
+from .messages import frame_in
+
+SEGMENTS_TOPIC = "mvn/segments"
+START_PATIENCE_S = 5.0
+"""After so long without joint states, it is said that the avatar waits for them [s]."""
+LOOKS_HZ = 20.0
+"""How often to look whether segments have ceased."""
+
+
+class AvatarNode:
+    """Has an avatar do what a person does, as long as segments come.
+
+    Raises:
+        ConfigError: If a parameter is wrong.
+    """
+
+    def __init__(self) -> None:
+        self._config = config = private_parameters(AvatarParameters)
+        self._retargeting: Retargeting | None = None
+        self._engagement = Engagement(config.max_joint_speed, config.max_speed, config.max_angular_speed)
+        self._tf = TfInterface()
+        self._warn = ThrottledWarning()
+        self._lock = threading.Lock()
+        self._hinges: np.ndarray | None = None
+        """Where the avatar's hinges are as the simulator says; None as long as that is not known."""
+        self._begins, self._last_s, self._holds = True, 0.0, True
+        self._began_s, self._last_stamp = time.monotonic(), rospy.Time()
+        self._states = f"rpbi/{config.robot_name}/joint_states"
+        self._targets = rospy.Publisher(f"{self._states}/target", JointState, queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber(self._states, JointState, self._take_state, queue_size=1)
+        rospy.Subscriber(SEGMENTS_TOPIC, PoseArray, self._take, queue_size=1, tcp_nodelay=True)
+        rospy.Service("avatar/engage", Trigger, self._engage)
+        WallTimer(LOOKS_HZ, self._look)
+
+    def _take_state(self, message: JointState) -> None:
+        positions = dict(zip(message.name, message.position))
+        if all(hinge in positions for hinge in HINGES):
+            self._hinges = np.array([positions[hinge] for hinge in HINGES])
+        else:
+            missing = next(hinge for hinge in HINGES if hinge not in positions)
+            self._warn(rospy.resolve_name(self._states), f"message refused: it lacks the joint '{missing}' of a person")
+
+    def _take(self, message: PoseArray) -> None:
+        with self._lock:
+            try:
+                self._follow(frame_in(message))
+            except (ValueError, InterfaceError) as error:
+                self._warn(rospy.resolve_name(SEGMENTS_TOPIC), f"message refused: {error}")
+
+    def _follow(self, frame: SegmentFrame) -> None:
+        now = rospy.Time.now()
+        if now <= self._last_stamp:
+            return  # simulated time stands still, or has not begun: TF with wall time would hide all that comes later
+        if self._hinges is None and time.monotonic() - self._began_s < START_PATIENCE_S:
+            return
+        if self._begins or self._retargeting is None:
+            self._begin(frame)
+        assert self._retargeting is not None
+        target = self._retargeting.pose(frame)
+        if self._holds:
+            rospy.loginfo("the avatar follows %s", rospy.resolve_name(SEGMENTS_TOPIC))
+        self._publish(self._engagement.step(target, (now - self._last_stamp).to_sec()), now)
+        self._last_stamp, self._last_s, self._holds = now, time.monotonic(), False
+
+    def _begin(self, frame: SegmentFrame) -> None:
+        """Begins where the avatar is, with a person of any size.
+
+        Raises:
+            ValueError: If nothing is known of the avatar yet.
+        """
+        name, place = self._config.robot_name, self._config.place
+        if self._hinges is None:
+            raise ValueError(f"nothing has come on {rospy.resolve_name(self._states)} yet: is the avatar in the world?")
+        parameter = rospy.resolve_name(f"rpbi/{name}/robot_description")
+        offsets = urdf_offsets(parameter, rospy.get_param(parameter, ""))
+        self._retargeting = Retargeting(offsets, None if place is None else Place(*place))
+        self._retargeting.begin(self._hinges)
+        target = self._retargeting.pose(frame)
+        position, quat = self._tf.get_tf(self._config.parent_frame_id, f"rpbi/{name}/Pelvis")
+        if position is None or quat is None:
+            position, quat = target.position, target.quat_xyzw
+        self._engagement.begin(AvatarPose(position, quat, self._hinges))
+        self._begins = False
+
+    def _publish(self, pose: AvatarPose, now: rospy.Time) -> None:
+        target = JointState(name=HINGES, position=pose.hinges.tolist())
+        target.header.stamp = now
+        self._targets.publish(target)
+        base = self._tf.pack_tf_msg(
+            self._config.parent_frame_id, self._config.base_frame_id, pose.position, pose.quat_xyzw
+        )
+        base.header.stamp = now
+        self._tf.tf_broadcaster.sendTransform(base)
+
+    def _look(self) -> None:
+        with self._lock:
+            if not self._holds and time.monotonic() - self._last_s > self._config.input_timeout_s:
+                self._holds = True
+                silence = f"nothing has come for {self._config.input_timeout_s:g} s"
+                rospy.logwarn("%s: %s; the avatar holds its last pose", rospy.resolve_name(SEGMENTS_TOPIC), silence)
+
+    def _engage(self, _: object) -> TriggerResponse:
+        """Begins anew from where the avatar is now, with whoever is in the suit."""
+        with self._lock:
+            self._begins = True
+        return TriggerResponse(True, "the avatar begins anew with the next segments")
+
+
+def main() -> None:
+    """Runs the node."""
+    run_node("avatar", AvatarNode)

@@ -1,0 +1,1 @@
+"""The haptic node, and devices that are spoken to by topics."""

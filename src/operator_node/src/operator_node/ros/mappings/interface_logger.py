@@ -1,0 +1,71 @@
+"""`operator_interface_logger`: the last seconds of the operator's signal."""
+
+import threading
+
+import rospy
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+
+from custom_ros_tools.ros.lifecycle.parameters import private_parameters
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
+from operator_node.node_configs import LoggerParameters
+from operator_node.ros.stamps import stamp
+from operator_node.signal_window import SignalWindow
+
+NAME = "operator_interface_logger"
+QUEUE_SIZE = 100
+"""Signals kept while the machine is busy: none may be missing in the window."""
+
+
+class InterfaceLogger:
+    """Publishes on `operator_node/window` what came on `operator_node/signal`, with each signal or at a rate.
+
+    The data are records `[t, s_1, ..., s_n]`, oldest first, where t is ROS time when the signal came [s].
+
+    Raises:
+        ConfigError: If a parameter is wrong.
+    """
+
+    def __init__(self) -> None:
+        parameters = private_parameters(LoggerParameters)
+        self._publishes_each = not parameters.hz
+        self._window = SignalWindow(parameters.window_duration)
+        self._lock = threading.Lock()
+        self._warn = ThrottledWarning()
+        self._publisher = rospy.Publisher("operator_node/window", Float64MultiArray, queue_size=1, tcp_nodelay=True)
+        self._subscriber = rospy.Subscriber(
+            "operator_node/signal", Float64MultiArray, self._take, queue_size=QUEUE_SIZE, tcp_nodelay=True
+        )
+        if parameters.hz:
+            WallTimer(parameters.hz, self._publish_present)
+
+    def _take(self, message: Float64MultiArray) -> None:
+        with self._lock:
+            try:
+                self._window.add(stamp().to_sec(), message.data)
+            except ValueError as error:
+                self._warn(self._subscriber.resolved_name, f"message refused: {error}")
+                return
+            if self._publishes_each:
+                self._publish()
+
+    def _publish_present(self) -> None:
+        with self._lock:
+            had_any = self._window.size > 0
+            self._window.forget(stamp().to_sec())
+            if had_any:  # the last one is empty, and says so
+                self._publish()
+
+    def _publish(self) -> None:
+        message = Float64MultiArray(data=self._window.data())
+        length = self._window.size + 1
+        message.layout.dim = [
+            MultiArrayDimension("records", len(message.data) // length, len(message.data)),
+            MultiArrayDimension("time and signal", length, length),
+        ]
+        self._publisher.publish(message)
+
+
+def main() -> None:
+    """Runs the node."""
+    run_node(NAME, InterfaceLogger)

@@ -1,0 +1,133 @@
+"""From `joy` to `operator_node/signal`."""
+
+import math
+import threading
+from abc import ABC, abstractmethod
+
+import numpy as np
+import rospy
+from numpy.typing import ArrayLike
+from sensor_msgs.msg import Joy
+from std_msgs.msg import Float64MultiArray
+
+from custom_ros_tools.plugins import cause_of
+from custom_ros_tools.ros.lifecycle.parameters import private_parameters
+from custom_ros_tools.ros.lifecycle.run_node import leave_ros_on_signals
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
+from custom_ros_tools.ros.services import ToggleService
+from custom_ros_tools.toggle import Toggle
+from operator_node.node_configs import OperatorParameters
+from operator_node.ros.watched_input import QUEUE_SIZE, WatchedInput
+
+NAME = "operator_node"
+LOOK_HZ = 50.0
+"""How often it is looked whether input has ceased."""
+
+
+class OperatorNode(ABC):
+    """Publishes a signal while it is switched on, which `operator_node/toggle` does.
+
+    A subclass says in `callback` by `publish` what the signal is. It stays in force until the next one, and is repeated
+    `~repeat_hz` times a second unless it is zero, so that whoever takes it can tell a person who holds still from a
+    node that has gone. When it is switched off, when input ceases (`~input_timeout_s`) or a message is refused, what is
+    in force ends with one zero signal.
+
+    In a process that is no node yet, it makes the node `operator_node`; `run_node` is the other way.
+
+    Attributes:
+        config: The parameter `~config`, a mapping.
+
+    Raises:
+        ConfigError: If a parameter is wrong.
+    """
+
+    def __init__(self) -> None:
+        if not rospy.core.is_initialized():
+            rospy.init_node(NAME, disable_signals=True)
+            leave_ros_on_signals()
+        self.config = rospy.get_param("~config", {})
+        self._lock = threading.RLock()
+        self._is_on = False
+        self._in_force: tuple[float, ...] = ()
+        self._warn = ThrottledWarning()
+        self.post_init()
+        parameters = private_parameters(OperatorParameters)
+        self._publisher = rospy.Publisher(
+            "operator_node/signal", Float64MultiArray, queue_size=QUEUE_SIZE, tcp_nodelay=True
+        )
+        operator = Toggle("operator node", self._start, self._end)
+        if parameters.start_on_init:
+            operator.on()
+        self._joy = WatchedInput("joy", Joy, self._take, parameters.input_timeout_s)
+        ToggleService("operator_node/toggle", operator.on, operator.off)
+        rospy.on_shutdown(self._end)
+        WallTimer(LOOK_HZ, self._look)
+        if parameters.repeat_hz:
+            WallTimer(parameters.repeat_hz, self._repeat)
+
+    def post_init(self) -> None:  # noqa: B027 (most need none)
+        """Prepares what the subclass needs, before the first message; `config` is there."""
+
+    @abstractmethod
+    def callback(self, joy: Joy) -> None:
+        """Publishes what a message means; its numbers are finite.
+
+        Raises:
+            ValueError: If it makes no sense; it says why.
+        """
+
+    def publish(self, array: ArrayLike) -> None:
+        """Publishes a signal, one or more numbers.
+
+        Raises:
+            ValueError: If it is empty or not finite.
+        """
+        signal = tuple(np.asarray(array, dtype=float).ravel().tolist())
+        if not signal or not all(map(math.isfinite, signal)):
+            raise ValueError(f"its signal must be finite, got {', '.join(f'{v:g}' for v in signal) or 'none'}")
+        with self._lock:
+            if self._is_on:
+                self._in_force = signal
+                self._publisher.publish(Float64MultiArray(data=signal))
+
+    def spin(self) -> None:
+        """Waits until ROS shuts down."""
+        rospy.spin()
+
+    def _start(self) -> None:
+        with self._lock:
+            self._is_on = True
+
+    def _end(self) -> None:
+        with self._lock:
+            self._end_signal()
+            self._is_on = False
+
+    def _end_signal(self) -> None:
+        with self._lock:
+            if self._in_force:
+                self._publisher.publish(Float64MultiArray(data=[0.0] * len(self._in_force)))
+                self._in_force = ()
+
+    def _take(self, joy: Joy) -> None:
+        with self._lock:
+            if not self._is_on:
+                return
+            try:
+                if not all(map(math.isfinite, joy.axes)):
+                    raise ValueError(f"axes must be finite, got {', '.join(f'{v:g}' for v in joy.axes)}")
+                self.callback(joy)
+            except Exception as error:  # whatever goes wrong in a class of another's, the signal ends
+                reason = str(error) if isinstance(error, ValueError) else cause_of(error)
+                self._warn(self._joy.topic, f"message refused: {reason}")
+                self._end_signal()
+
+    def _look(self) -> None:
+        with self._lock:
+            if any(self._in_force) and self._joy.has_ceased("the signal is zero"):
+                self._end_signal()
+
+    def _repeat(self) -> None:
+        with self._lock:
+            if any(self._in_force):
+                self._publisher.publish(Float64MultiArray(data=self._in_force))

@@ -1,0 +1,48 @@
+"""The last seconds of a signal."""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+
+
+class SignalWindow:
+    """Keeps the signals of some time, and those only.
+
+    Args:
+        duration_s: How old a signal may be [s].
+        most: How many are kept at most: time that stands still must not fill the memory.
+    """
+
+    def __init__(self, duration_s: float, most: int = 20_000) -> None:
+        self._duration_s = duration_s
+        self._records: deque[tuple[float, ...]] = deque(maxlen=most)
+
+    @property
+    def size(self) -> int:
+        """How many numbers a signal has; 0 if there is none."""
+        return len(self._records[0]) - 1 if self._records else 0
+
+    def add(self, time_s: float, signal: Sequence[float]) -> None:
+        """Adds the newest signal, at a time [s].
+
+        Those from before are forgotten if the signal has another size, or if time has gone back, as it does when a
+        simulation begins again.
+
+        Raises:
+            ValueError: If the signal is empty or not finite; then nothing is added.
+        """
+        if not signal or not all(map(math.isfinite, (time_s, *signal))):
+            raise ValueError(f"expected finite numbers, got {', '.join(f'{v:g}' for v in signal) or 'none'}")
+        if self._records and (len(signal) != self.size or time_s < self._records[-1][0]):
+            self._records.clear()
+        self._records.append((time_s, *signal))
+        self.forget(time_s)
+
+    def forget(self, now_s: float) -> None:
+        """Forgets the signals that are too old at a time [s]."""
+        while self._records and now_s - self._records[0][0] > self._duration_s:
+            self._records.popleft()
+
+    def data(self) -> list[float]:
+        """Returns the records, each a time [s] and its signal, one after the other, oldest first."""
+        return [value for record in self._records for value in record]

@@ -1,0 +1,156 @@
+"""A frame that a person moves by velocities, within a box."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, NamedTuple
+
+from pydantic import Field, model_validator
+
+from custom_ros_tools.schema import ConfigModel, FrameId, Hz, KeyedError, Positive, Switch, Unit
+
+Vector = tuple[float, float, float]
+ZERO: Vector = (0.0, 0.0, 0.0)
+LATE_PERIODS = 2
+"""So many periods count at most from one step to the next: a timer that is late makes no jump."""
+_Limit = Annotated[float, Field(allow_inf_nan=True), Unit("m")]
+Limits = Annotated[tuple[_Limit, _Limit], Field(strict=False)]
+
+
+class TeleopConfig(ConfigModel):
+    """The frame, and how far and how fast it goes."""
+
+    target_frame_id: FrameId = Field(description="The frame that is moved.")
+    parent_frame_id: FrameId = Field("world", description="The frame that it moves in, where it is to begin with.")
+    hz: Hz = Field(100.0, description="How often it is moved and broadcast, in wall time.")
+    xlim: Limits = Field((-math.inf, math.inf), description="Least and largest x; 0 is between them.")
+    ylim: Limits = Field((-math.inf, math.inf), description="Least and largest y.")
+    zlim: Limits = Field((-math.inf, math.inf), description="Least and largest z.")
+    max_speed: Annotated[Positive, Unit("m/s")] = Field(2.0, description="A signal that is faster is slowed to this.")
+    max_turn_rate: Annotated[Positive, Unit("rad/s")] = Field(
+        2.0 * math.pi, description="Likewise for each rate of roll, pitch and yaw."
+    )
+
+    broadcast_always: Switch = Field(
+        False, description="Whether it is broadcast while it is switched off, too, for those who go there first."
+    )
+
+    @model_validator(mode="after")
+    def _box_has_the_start(self) -> TeleopConfig:
+        for key in ("xlim", "ylim", "zlim"):
+            least, largest = getattr(self, key)
+            if not least <= 0.0 <= largest:
+                got = f"got [{least:g}, {largest:g}]"
+                raise KeyedError(key, f"expected the least and the largest value, with 0 between them, {got}")
+        if self.target_frame_id == self.parent_frame_id:
+            raise KeyedError("target_frame_id", f"must be another one than parent_frame_id, '{self.parent_frame_id}'")
+        return self
+
+    @property
+    def box(self) -> tuple[tuple[float, float], ...]:
+        """Limits of x, y, z [m]."""
+        return self.xlim, self.ylim, self.zlim
+
+
+class TeleopPose(NamedTuple):
+    """Where a frame is in its parent.
+
+    Attributes:
+        position: x, y, z [m].
+        rpy: Roll, pitch, yaw [rad], about the fixed axes of the parent in this order, each in [-pi, pi].
+    """
+
+    position: Vector = ZERO
+    rpy: Vector = ZERO
+
+
+class Teleop:
+    """Moves a frame by a signal, from where it is: nothing but `reset` puts it anywhere at once.
+
+    A signal is a velocity, and an interval between two steps never counts more than `LATE_PERIODS`, so that no step is
+    longer than `max_speed * LATE_PERIODS / hz`, whatever the signal does when it begins, ceases and comes back.
+    Times are those of a clock that never goes back [s].
+
+    Args:
+        config: What moves, and how far and how fast.
+        timeout_s: How long a signal lasts when no other comes [s]; 0 is for ever.
+
+    Attributes:
+        pose: Where the frame is in its parent.
+    """
+
+    def __init__(self, config: TeleopConfig, timeout_s: float = 0.0) -> None:
+        self.pose = TeleopPose()
+        self._config, self._timeout_s = config, timeout_s or math.inf
+        self._linear = self._angular = ZERO
+        self._commanded_s = self._stepped_s = -math.inf
+
+    def command(self, signal: Sequence[float], now_s: float) -> bool:
+        """Sets the velocity until the next signal; returns whether it had to be slowed.
+
+        Args:
+            signal: Velocity along x, y, z of the parent [m/s], and perhaps rates of roll, pitch and yaw [rad/s], which
+                are 0 otherwise.
+            now_s: The time.
+
+        Raises:
+            ValueError: If it has not 3 or 6 finite numbers; then the frame stands still.
+        """
+        self.stop()
+        if len(signal) not in (3, 6):
+            raise ValueError(f"expected 3 numbers (velocity) or 6 (and rates of roll, pitch, yaw), got {len(signal)}")
+        if not all(map(math.isfinite, signal)):
+            raise ValueError(f"must be finite, got {', '.join(f'{v:g}' for v in signal)}")
+        x, y, z, *rates = signal
+        speed, fastest = math.hypot(x, y, z), self._config.max_turn_rate
+        if math.isinf(speed):
+            raise ValueError(f"expected a velocity [m/s], got {x:g}, {y:g}, {z:g}")
+        share = min(1.0, self._config.max_speed / speed) if speed else 1.0
+        roll, pitch, yaw = (min(max(rate, -fastest), fastest) for rate in rates or ZERO)
+        self._linear, self._angular = (share * x, share * y, share * z), (roll, pitch, yaw)
+        self._commanded_s = now_s
+        return share < 1.0 or self._angular != tuple(rates or ZERO)
+
+    def stop(self) -> None:
+        """Stands still until the next signal."""
+        self._linear = self._angular = ZERO
+
+    @property
+    def moves(self) -> bool:
+        """Whether a signal is in force that moves it."""
+        return any(self._linear + self._angular)
+
+    def step(self, now_s: float) -> TeleopPose:
+        """Moves the frame for the time since the last step; returns where it is.
+
+        A signal that is too old ends.
+        """
+        dt_s = min(max(now_s - self._stepped_s, 0.0), LATE_PERIODS / self._config.hz)
+        self._stepped_s = now_s
+        if now_s - self._commanded_s > self._timeout_s:
+            self.stop()
+        position, rpy = self.pose
+        x, y, z = (
+            min(max(value + rate * dt_s, least), largest)
+            for value, rate, (least, largest) in zip(position, self._linear, self._config.box)
+        )
+        roll, pitch, yaw = (
+            math.remainder(angle + rate * dt_s, 2.0 * math.pi) for angle, rate in zip(rpy, self._angular)
+        )
+        self.pose = TeleopPose((x, y, z), (roll, pitch, yaw))
+        return self.pose
+
+    def reset(self, pose: TeleopPose) -> None:
+        """Puts the frame somewhere, where it stands still until the next signal.
+
+        Raises:
+            ValueError: If that is outside of the box, or not finite; then it stays where it is, and moves on.
+        """
+        if not all(map(math.isfinite, (*pose.position, *pose.rpy))):
+            raise ValueError("must be finite")
+        for axis, value, (least, largest) in zip("xyz", pose.position, self._config.box):
+            if not least <= value <= largest:
+                raise ValueError(f"{axis} must be within {least:g} and {largest:g} m, got {value:g}")
+        self.stop()
+        self.pose = pose

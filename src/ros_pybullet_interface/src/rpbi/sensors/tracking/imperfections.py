@@ -1,0 +1,118 @@
+"""What tracking systems do not do well: they are late and noisy, and see not everything."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections import deque
+from typing import Annotated, Generic, TypeVar
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel, Count, Fraction, NonNegative, Seconds, Unit, optional
+from rpbi.config.sensors import Deviation, SensorConfig
+from rpbi.geometry import Pose, Quaternion, Vector, plus
+from rpbi.sensors.filters import SeededNoise
+
+Measured = TypeVar("Measured")
+
+
+class OcclusionConfig(ConfigModel):
+    """For how long and how often something is hidden, by chance."""
+
+    share: Fraction = Field(description="Share of the time for which it is hidden.")
+    length_s: Seconds = Field(0.5, description="Time is divided into parts of this length, each hidden or not.")
+
+
+class TrackingConfig(SensorConfig):
+    """Keys of all sensors that report poses as a tracking system does."""
+
+    latency_s: Annotated[NonNegative, Unit("s")] = Field(
+        0.0,
+        description="How late poses are reported, in whole samples; their stamps say when they were seen.",
+    )
+    noise_m: Annotated[Deviation, Unit("m")] = Field(
+        (0.0, 0.0, 0.0),
+        description="Standard deviation of the positions' noise, in the axes of what is reported.",
+    )
+    noise_rad: Annotated[NonNegative, Unit("rad")] = Field(
+        0.0, description="Standard deviation of the rotations' noise about each axis."
+    )
+    occlusion: OcclusionConfig | None = optional("When it is hidden by chance; without it, never.")
+    seed: Count | None = optional("Seed of noise and occlusion; without it, one that follows from the names.")
+
+    def seed_of(self, name: str) -> int:
+        """Returns the seed of the sensor of a name."""
+        return zlib.crc32(name.encode()) if self.seed is None else self.seed
+
+
+class Occlusion:
+    """Hides something by chance; the same at the same tick, whatever was asked before.
+
+    Args:
+        config: How often and how long; None is never.
+        seed: Seed, 0 or greater.
+        dt_s: Length of a tick [s].
+    """
+
+    def __init__(self, config: OcclusionConfig | None, seed: int, dt_s: float) -> None:
+        self._share = 0.0 if config is None else config.share
+        self._ticks = 1 if config is None else max(1, round(config.length_s / dt_s))
+        self._seed = seed
+
+    def hides(self, tick: int) -> bool:
+        """Tells whether it is hidden at a tick."""
+        if not self._share:
+            return False
+        return bool(np.random.default_rng((self._seed, tick // self._ticks)).random() < self._share)
+
+
+class PoseNoise:
+    """Noise of poses; the same at the same tick.
+
+    Args:
+        config: Its deviations.
+        seed: Seed, 0 or greater.
+    """
+
+    def __init__(self, config: TrackingConfig, seed: int) -> None:
+        self._noise = SeededNoise(seed, (*config.noise_m, *[config.noise_rad] * 3), [0.0] * 6)
+
+    def on(self, pose: Pose, tick: int) -> Pose:
+        """Returns a pose with the noise of a tick on it."""
+        x, y, z, *turn = self._noise.at(tick).tolist()
+        rotated = Pose((0.0, 0.0, 0.0), _quaternion(turn)) @ Pose((0.0, 0.0, 0.0), pose.quat_xyzw)
+        return Pose(plus(pose.position, (x, y, z)), rotated.quat_xyzw)
+
+
+def _quaternion(turn: list[float]) -> Quaternion:
+    """Returns the quaternion of a rotation vector [rad]."""
+    angle = math.hypot(*turn)
+    half = 0.5 if angle < 1e-9 else math.sin(angle / 2.0) / angle
+    vector: Vector = (half * turn[0], half * turn[1], half * turn[2])
+    return (*vector, math.cos(angle / 2.0))
+
+
+class Delay(Generic[Measured]):
+    """Keeps measurements until they are old enough.
+
+    Args:
+        ticks: How old they are to be at least.
+    """
+
+    def __init__(self, ticks: int) -> None:
+        self._ticks = ticks
+        self._waiting: deque[tuple[int, Measured]] = deque()
+
+    def take(self, tick: int, measured: Measured) -> None:
+        """Takes what was measured at a tick, the first time for each tick."""
+        if not self._waiting or self._waiting[-1][0] != tick:
+            self._waiting.append((tick, measured))
+
+    def newest(self, tick: int) -> tuple[int, Measured] | None:
+        """Returns the newest one that is old enough at a tick, and when it was measured; None if there is none yet."""
+        while len(self._waiting) > 1 and tick - self._waiting[1][0] >= self._ticks:
+            self._waiting.popleft()
+        first = self._waiting[0] if self._waiting else None
+        return first if first is not None and tick - first[0] >= self._ticks else None

@@ -1,0 +1,139 @@
+"""`tracked_object_node.py`: what Vicon or an AprilTag detector sees, as smooth TF frames that objects follow."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+
+import rospy
+import tf2_ros
+from apriltag_ros.msg import AprilTagDetectionArray
+from geometry_msgs.msg import Pose as PoseMessage
+from geometry_msgs.msg import TransformStamped
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
+
+from custom_ros_tools.ros.lifecycle.parameters import private_config
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
+from custom_ros_tools.ros.tf_listener import TfListener
+from custom_ros_tools.ros.transform_messages import as_pose, transform_message
+from rpbi.engine.inputs import check_pose
+from rpbi.geometry import Pose
+from rpbi_utils.tracking.config import TrackedObjectConfig, TrackingNodeConfig
+from rpbi_utils.tracking.tracker import PoseTracker
+
+QUEUE_SIZE = 100
+LOOKS_HZ = 10.0
+"""How often it is looked whether an object is lost [Hz]."""
+
+
+class TrackedObject:
+    """An object, and whether it is seen."""
+
+    def __init__(self, config: TrackedObjectConfig, node: TrackingNodeConfig) -> None:
+        self.config = config
+        self._timeout_s = node.timeout_s
+        self.tracker = PoseTracker(node.smoothing, node.outliers, node.timeout_s)
+        self._seen_s = -math.inf
+        self._is_seen = False
+
+    def note_seen(self) -> None:
+        """Notes that it is seen now."""
+        self._seen_s = time.monotonic()
+        if not self._is_seen:
+            self._is_seen = True
+            rospy.loginfo("%s: is seen", self.config.name)
+
+    def tell_if_lost(self) -> None:
+        """Tells once that nothing has come of it for too long."""
+        if self._is_seen and time.monotonic() - self._seen_s > self._timeout_s:
+            self._is_seen = False
+            rospy.logwarn("%s: is lost: no pose for %g s; nothing is broadcast", self.config.name, self._timeout_s)
+
+
+class TrackedObjectNode:
+    """Broadcasts the frames of the objects of `~config` while they are seen.
+
+    Raises:
+        ConfigError: If the configuration is wrong.
+    """
+
+    def __init__(self) -> None:
+        config = private_config(TrackingNodeConfig)
+        self._frame_id = config.frame_id
+        self._objects = [TrackedObject(each, config) for each in config.objects]
+        self._by_tags = {each.config.tag_ids: each for each in self._objects if each.config.tag_ids}
+        self._warn = ThrottledWarning()
+        self._buffer = tf2_ros.Buffer()
+        self._listener = TfListener(self._buffer)
+        self._publisher = rospy.Publisher("/tf", TFMessage, queue_size=QUEUE_SIZE, tcp_nodelay=True)
+        for each in self._objects:
+            if each.config.vicon is not None:
+                topic = f"vicon/{each.config.vicon.strip('/')}"
+                self._subscribe(topic, TransformStamped, lambda message, each=each: self._take_vicon(each, message))
+        if self._by_tags:
+            self._subscribe("tag_detections", AprilTagDetectionArray, self._take_tags)
+        WallTimer(LOOKS_HZ, self._tell_what_is_lost)
+
+    def _subscribe(self, topic: str, message_type: type, take: object) -> None:
+        rospy.Subscriber(topic, message_type, take, queue_size=QUEUE_SIZE, tcp_nodelay=True)
+
+    def _tell_what_is_lost(self) -> None:
+        for each in self._objects:
+            each.tell_if_lost()
+
+    def _take_vicon(self, tracked: TrackedObject, message: TransformStamped) -> None:
+        self._take(tracked, message.header, as_pose(message.transform))
+
+    def _take_tags(self, message: AprilTagDetectionArray) -> None:
+        for detection in message.detections:
+            tracked = self._by_tags.get(_key(detection.id))
+            if tracked is not None:
+                stamped = detection.pose
+                self._take(tracked, stamped.header if stamped.header.frame_id else message.header, stamped.pose.pose)
+
+    def _take(self, tracked: TrackedObject, header: Header, message: PoseMessage) -> None:
+        config = tracked.config
+        try:
+            frame_id = config.frame_id or header.frame_id.strip("/")  # as vicon_bridge sends it, tf2 does not take it
+            stamp = header.stamp or rospy.Time.now()
+            pose = self._in_world(frame_id, stamp) @ _pose_in(message, config.unit) @ config.offset
+            smoothed = tracked.tracker.take(pose, stamp.to_sec())
+        except tf2_ros.TransformException as error:
+            self._warn(config.name, f"left out: no TF from '{self._frame_id}' to '{frame_id}': {error}")
+            return
+        except ValueError as error:
+            self._warn(config.name, f"left out: {error}")
+            return
+        if smoothed is not None:
+            tracked.note_seen()
+            transform = TransformStamped(Header(0, stamp, self._frame_id), config.name, transform_message(*smoothed))
+            self._publisher.publish(TFMessage([transform]))
+
+    def _in_world(self, frame_id: str, stamp: rospy.Time) -> Pose:
+        """Returns where a source's frame was when it saw something; where it is now if TF does not reach that far."""
+        if frame_id == self._frame_id:
+            return Pose()
+        try:
+            found = self._buffer.lookup_transform(self._frame_id, frame_id, stamp)
+        except tf2_ros.ExtrapolationException:
+            found = self._buffer.lookup_transform(self._frame_id, frame_id, rospy.Time(0))
+        return _pose_in(as_pose(found.transform), "m")
+
+
+def _key(ids: Sequence[int]) -> tuple[int, ...]:
+    return tuple(sorted(ids))
+
+
+def _pose_in(message: PoseMessage, unit: str) -> Pose:
+    """Returns the pose in a message in metres; raises a ValueError if it is none."""
+    scale = 0.001 if unit == "mm" else 1.0
+    p, q = message.position, message.orientation
+    return check_pose(Pose((scale * p.x, scale * p.y, scale * p.z), (q.x, q.y, q.z, q.w)))
+
+
+def main() -> None:
+    """Runs the node."""
+    run_node("tracked_object", TrackedObjectNode)

@@ -1,0 +1,108 @@
+"""What the nodes of tracking systems read from `~config`."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from custom_ros_tools.schema import (
+    ConfigModel,
+    Count,
+    FrameId,
+    KeyedError,
+    ListOf,
+    Position,
+    PositiveMetres,
+    Quat,
+    Seconds,
+    Switch,
+    Text,
+    optional,
+)
+from rpbi.geometry import Pose
+
+from .one_euro import SmoothingConfig
+from .tracker import OutlierConfig
+
+FAMILY_SIZE = 587
+"""Tags in the family tag36h11."""
+
+
+class TrackedObjectConfig(ConfigModel):
+    """An object, by what sees it: either Vicon or AprilTags."""
+
+    name: FrameId = Field(description="TF frame of the object that is broadcast.")
+    vicon: Text | None = optional("Subject and segment, as `SUBJECT/SEGMENT`; the topic is `vicon/SUBJECT/SEGMENT`.")
+    april_tag: Count | ListOf[Count] | None = optional("Id of a tag on `tag_detections`, or a list: those of a bundle.")
+    frame_id: FrameId | None = optional("TF frame that its poses are in; without it, the one that messages name.")
+    unit: Literal["m", "mm"] = Field("m", description="Unit of the positions that come.")
+    position: Position = Field((0.0, 0.0, 0.0), description="The object's frame in what is tracked.")
+    orientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="How it is turned there, x, y, z, w.")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> TrackedObjectConfig:
+        if (self.vicon is None) == (self.april_tag is None):
+            raise KeyedError("vicon", "an object is seen by either vicon or april_tag, one of them")
+        if self.vicon is not None and len([part for part in self.vicon.split("/") if part]) != 2:
+            raise KeyedError("vicon", f"expected SUBJECT/SEGMENT, got '{self.vicon}'")
+        return self
+
+    @property
+    def tag_ids(self) -> tuple[int, ...]:
+        """The ids of its tags, sorted; none if Vicon sees it."""
+        if self.april_tag is None:
+            return ()
+        return (self.april_tag,) if isinstance(self.april_tag, int) else tuple(sorted(self.april_tag))
+
+    @property
+    def offset(self) -> Pose:
+        """Pose of the object's frame in what is tracked."""
+        return Pose(self.position, self.orientation)
+
+
+class TrackingNodeConfig(ConfigModel):
+    """Objects that a tracking system sees, and what is made of their poses."""
+
+    frame_id: FrameId = Field("rpbi/world", description="TF frame in which poses are smoothed and broadcast.")
+    timeout_s: Seconds = Field(0.5, description="Without a pose for so long an object is lost: nothing is broadcast.")
+    smoothing: SmoothingConfig = Field(SmoothingConfig(), description="How poses are smoothed.")
+    outliers: OutlierConfig = Field(OutlierConfig(), description="Which poses are left out.")
+    objects: ListOf[TrackedObjectConfig] = Field(description="The objects.")
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> TrackingNodeConfig:
+        if not self.objects:
+            raise KeyedError("objects", "expected at least one object")
+        names = [each.name for each in self.objects]
+        for index, name in enumerate(names):
+            if name in names[:index]:
+                raise KeyedError(f"objects[{index}].name", f"'{name}' is the name of another object")
+        return self
+
+
+class StandaloneTag(ConfigModel):
+    """A tag that is reported."""
+
+    id: Count = Field(description="Its number in the family.")
+    size: PositiveMetres = Field(description="Side of its black square.")
+    name: FrameId | None = optional("Its TF frame; without it, `tag_ID`.")
+
+
+class AprilTagNodeConfig(ConfigModel):
+    """Which tags of the family tag36h11 are reported."""
+
+    standalone_tags: ListOf[StandaloneTag] = Field(description="The tags.")
+    publish_tf: Switch = Field(True, description="Whether their poses are on TF too.")
+
+    @model_validator(mode="after")
+    def _ids_differ(self) -> AprilTagNodeConfig:
+        if not self.standalone_tags:
+            raise KeyedError("standalone_tags", "expected at least one tag")
+        ids = [tag.id for tag in self.standalone_tags]
+        for index, one in enumerate(ids):
+            if one in ids[:index]:
+                raise KeyedError(f"standalone_tags[{index}].id", f"{one} is the id of another tag")
+            if one >= FAMILY_SIZE:
+                raise KeyedError(f"standalone_tags[{index}].id", f"tag36h11 has ids below {FAMILY_SIZE}, got {one}")
+        return self

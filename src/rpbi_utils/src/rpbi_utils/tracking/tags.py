@@ -1,0 +1,120 @@
+"""AprilTags of the family tag36h11 in images, by OpenCV."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import partial
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from custom_ros_tools.errors import MissingDependency
+from rpbi.geometry import Pose
+
+CELLS = 8
+"""Cells along a side of a tag's black square."""
+PIXEL_CENTRE = 0.5
+"""Where the family's own search for squares, which OpenCV has as CORNER_REFINE_APRILTAG, has the centre of pixel 0."""
+Image = npt.NDArray[np.uint8]
+
+
+class DetectedTag(NamedTuple):
+    """A tag in an image.
+
+    Attributes:
+        id: Its number.
+        corners: 4 x 2 pixels of the black square: bottom left, bottom right, top right, top left of the
+            upright tag; pixel centres are at whole numbers.
+    """
+
+    id: int
+    corners: npt.NDArray[np.float64]
+
+
+def _opencv() -> Any:
+    """Returns the module; raises MissingDependency if there is none."""
+    try:
+        return import_module("cv2")
+    except ImportError as error:
+        raise MissingDependency("OpenCV", "./rpbi setup tags") from error
+
+
+def _dictionary(cv2: Any) -> Any:
+    return cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
+
+
+def tag_image(number: int) -> Image:
+    """Returns a tag with a white margin of one cell, a pixel a cell, 0 or 255, as the family's authors draw it.
+
+    OpenCV's tags of this family are upside down.
+    """
+    cv2 = _opencv()
+    draw = getattr(cv2.aruco, "generateImageMarker", None) or cv2.aruco.drawMarker
+    upright = np.rot90(draw(_dictionary(cv2), number, CELLS), 2)
+    return np.pad(upright, 1, constant_values=255)
+
+
+class TagDetector:
+    """Finds tags in grey images, corners refined to parts of a pixel.
+
+    Raises:
+        MissingDependency: If OpenCV is not installed.
+    """
+
+    def __init__(self) -> None:
+        cv2 = _opencv()
+        aruco, dictionary = cv2.aruco, _dictionary(cv2)
+        is_new = hasattr(aruco, "ArucoDetector")  # from OpenCV 4.7 on
+        parameters = aruco.DetectorParameters() if is_new else aruco.DetectorParameters_create()
+        parameters.cornerRefinementMethod = aruco.CORNER_REFINE_APRILTAG
+        self._find = (
+            aruco.ArucoDetector(dictionary, parameters).detectMarkers
+            if is_new
+            else partial(aruco.detectMarkers, dictionary=dictionary, parameters=parameters)
+        )
+
+    def detect(self, grey: Image) -> list[DetectedTag]:
+        """Returns the tags in an image (rows x columns), each once; what is seen twice is left out."""
+        corners, ids, _ = self._find(grey)
+        numbers = [] if ids is None else ids.ravel().tolist()
+        # OpenCV begins with what is the bottom right of the upright tag, and goes clockwise
+        found = (
+            DetectedTag(number, found.reshape(4, 2)[[1, 0, 3, 2]].astype(float) - PIXEL_CENTRE)
+            for number, found in zip(numbers, corners)
+            if numbers.count(number) == 1
+        )
+        return sorted(found, key=lambda tag: tag.id)
+
+
+def tag_pose(tag: DetectedTag, size: float, camera_matrix: npt.NDArray[np.float64]) -> Pose | None:
+    """Returns the pose of a tag in the optical frame, None if there is none before the camera.
+
+    The tag's frame has x to the right, y up and z out of the tag.
+
+    Args:
+        size: Side of the black square [m].
+        camera_matrix: 3 x 3, of a rectified image.
+    """
+    cv2 = _opencv()
+    half = size / 2.0
+    # In the order that SOLVEPNP_IPPE_SQUARE wants: top left, top right, bottom right, bottom left
+    square = np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
+    pixels = tag.corners[[3, 2, 1, 0]]
+    found, rotation, translation = cv2.solvePnP(square, pixels, camera_matrix, None, flags=cv2.SOLVEPNP_IPPE_SQUARE)
+    if not found or not np.isfinite(translation).all() or translation[2, 0] <= 0.0:
+        return None
+    x, y, z = translation.ravel().tolist()
+    qx, qy, qz, qw = Rotation.from_rotvec(rotation.ravel()).as_quat().tolist()
+    return Pose((x, y, z), (qx, qy, qz, qw))
+
+
+def tag_poses(
+    detector: TagDetector, grey: Image, camera_matrix: npt.NDArray[np.float64], sizes: Mapping[int, float]
+) -> Iterator[tuple[int, Pose]]:
+    """Yields id and pose of the tags in an image whose sizes [m] are known."""
+    for tag in detector.detect(grey):
+        if tag.id in sizes and (pose := tag_pose(tag, sizes[tag.id], camera_matrix)) is not None:
+            yield tag.id, pose

@@ -1,0 +1,98 @@
+"""What is made of the poses of one tracked object before anybody gets them."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel, Count, NonNegative, NonNegativeMetres, Positive, Unit
+from rpbi.geometry import Pose, rotation_between
+
+from .one_euro import OneEuroPose, SmoothingConfig
+
+
+class OutlierConfig(ConfigModel):
+    """What no object does: such poses are left out, unless they go on."""
+
+    max_speed: Annotated[Positive, Unit("m/s")] = Field(5.0, description="Fastest motion of the object.")
+    max_angular_speed: Annotated[Positive, Unit("rad/s")] = Field(20.0, description="Its fastest rotation.")
+    tolerance_m: NonNegativeMetres = Field(0.02, description="What is added to the way at that speed, for noise.")
+    tolerance_rad: Annotated[NonNegative, Unit("rad")] = Field(0.2, description="What is added to the rotation.")
+    in_a_row: Annotated[Count, Field(ge=1)] = Field(
+        5,
+        description="So many in a row that agree with each other are where it is now; 1 leaves none out.",
+    )
+
+
+class OutlierError(ValueError):
+    """A pose where the object cannot be."""
+
+
+class PoseTracker:
+    """Makes a smooth path of the poses of one object, in the time of their stamps.
+
+    Args:
+        smoothing: How they are smoothed.
+        outliers: What is left out.
+        timeout_s: After so long without a pose it begins anew [s].
+    """
+
+    def __init__(self, smoothing: SmoothingConfig, outliers: OutlierConfig, timeout_s: float) -> None:
+        self._smoothing, self._outliers, self._timeout_s = smoothing, outliers, timeout_s
+        self._pose: Pose | None = None
+        self._stamp_s: float | None = None
+        self._left_out: list[tuple[Pose, float]] = []
+        self._filter: OneEuroPose | None = None
+        self._forget()
+
+    def take(self, pose: Pose, stamp_s: float) -> Pose | None:
+        """Takes a pose and the time [s] at which the object was there; returns the smoothed one.
+
+        None is for a pose that is not later than the one before: it was there already, or messages changed places.
+
+        Raises:
+            OutlierError: If the object cannot be there; the pose is left out.
+        """
+        age_s = math.inf if self._stamp_s is None else stamp_s - self._stamp_s
+        if age_s > self._timeout_s or age_s < -self._timeout_s:  # seen anew, or another clock
+            self._forget()
+        elif age_s <= 0.0:
+            return None
+        self._refuse_outlier(pose, stamp_s)
+        dt_s = 0.0 if self._stamp_s is None else stamp_s - self._stamp_s
+        self._stamp_s, self._pose, self._left_out = stamp_s, pose, []
+        return pose if self._filter is None else self._filter.step(pose, dt_s)
+
+    def _refuse_outlier(self, pose: Pose, stamp_s: float) -> None:
+        if self._pose is None or self._stamp_s is None:
+            return
+        reason = self._impossible(self._pose, pose, stamp_s - self._stamp_s)
+        if reason is None:
+            return
+        left_out = self._left_out
+        if left_out:
+            last, last_s = left_out[-1]
+            if stamp_s <= last_s or self._impossible(last, pose, stamp_s - last_s) is not None:
+                left_out.clear()
+        left_out.append((pose, stamp_s))
+        if len(left_out) < self._outliers.in_a_row:
+            raise OutlierError(reason)
+        self._forget()
+
+    def _impossible(self, start: Pose, end: Pose, dt_s: float) -> str | None:
+        """Returns why no object goes from one pose to another in a time, None if it may."""
+        limits = self._outliers
+        way = math.dist(start.position, end.position)
+        turn = math.hypot(*rotation_between(start.quat_xyzw, end.quat_xyzw))
+        if way > limits.tolerance_m + limits.max_speed * dt_s:
+            return f"outlier: {way:.3g} m in {dt_s:.3g} s is more than max_speed {limits.max_speed:g} m/s allows"
+        if turn > limits.tolerance_rad + limits.max_angular_speed * dt_s:
+            most = f"max_angular_speed {limits.max_angular_speed:g} rad/s"
+            return f"outlier: {turn:.3g} rad in {dt_s:.3g} s is more than {most} allows"
+        return None
+
+    def _forget(self) -> None:
+        self._pose, self._stamp_s, self._left_out = None, None, []
+        self._filter = OneEuroPose(self._smoothing) if self._smoothing.min_cutoff_hz else None

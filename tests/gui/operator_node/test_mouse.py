@@ -1,0 +1,110 @@
+"""The mouse, moved by real motions in its window."""
+
+from __future__ import annotations
+
+import pytest
+from ros_system import wait_until
+
+from operator_node.conformance import DeviceConformance, Reader
+from operator_node.device import DeviceClosedError, DeviceError
+from operator_node.lookup import make_device
+
+NUMBERS = {"left": "1", "middle": "2", "right": "3"}
+WHEEL = {True: "4", False: "5"}
+
+
+@pytest.fixture(autouse=True)
+def display(screen, monkeypatch):
+    """Windows of this process are on the virtual screen, and the pointer is in the middle of where they are."""
+    monkeypatch.setenv("DISPLAY", screen.environment["DISPLAY"])
+    yield
+    screen.run("xdotool", "mouseup", "1", "mouseup", "2", "mouseup", "3")
+
+
+def window(screen):
+    """Returns the window of the mouse."""
+    return wait_until(lambda: [each for each in screen.windows() if each.title == "mouse"], "its window is there")[0]
+
+
+class TestMouse(DeviceConformance):
+    device_name = "mouse"
+    options = {"wheel_step": 1.0}
+    moves = ("x", "y", "wheel")
+    presses = ("middle", "right")
+    can_be_unplugged = False
+
+    @pytest.fixture(autouse=True)
+    def _screen(self, screen):
+        self.screen = screen
+
+    def move(self, axis, share):
+        place = window(self.screen)
+        x, y = place.x + place.width // 2, place.y + place.height // 2
+        if axis == "wheel":
+            commands = ["mousemove", x, y]
+            if share:
+                commands += ["click", WHEEL[share > 0]]
+        elif share == 0.0:
+            commands = ["mouseup", 1]
+        else:
+            way = round(0.9 * share * place.width / 2)
+            commands = ["mousemove", x, y, "mousedown", 1, "mousemove"]
+            commands += [x + way, y] if axis == "x" else [x, y - way]
+        self.screen.run("xdotool", *map(str, commands))
+
+    def press(self, button, is_down):
+        place = window(self.screen)
+        middle = [str(place.x + place.width // 2), str(place.y + place.height // 2)]
+        self.screen.run("xdotool", "mousemove", *middle, "mousedown" if is_down else "mouseup", NUMBERS[button])
+
+
+@pytest.fixture
+def reader():
+    reader = Reader("mouse", make_device("mouse", {}))
+    reader.until(lambda: len(reader.feed.free_axes) == 3, "it is open")
+    yield reader
+    reader.feed.close()
+
+
+def test_a_drag_counts_as_a_share_of_half_the_window_from_where_it_began(screen, reader):
+    place = window(screen)
+    x, y = place.x + 60, place.y + 80
+    screen.run("xdotool", "mousemove", str(x), str(y), "mousedown", "1", "mousemove", str(x + 50), str(y + 100))
+    reader.until(lambda: reader.axis("y") < -0.4, "it is dragged")
+    assert reader.last.axes == pytest.approx((50 / 200, -100 / 200, 0.0))
+    assert reader.last.buttons == (1, 0, 0)
+    screen.run("xdotool", "mousemove", str(place.x + 1000), str(y))
+    reader.until(lambda: reader.axis("x") == 1.0, "it is dragged out of the window")
+    screen.run("xdotool", "mouseup", "1")
+    reader.until(lambda: reader.is_at_rest, "it is let go")
+
+
+def test_the_wheel_returns_by_itself(screen, reader):
+    place = window(screen)
+    screen.run("xdotool", "mousemove", str(place.x + 60), str(place.y + 80), "click", "5", "click", "5")
+    reader.until(lambda: reader.axis("wheel") < -0.4, "it turns")
+    assert reader.last.axes == (0.0, 0.0, -0.5)
+    reader.until(lambda: reader.is_at_rest, "it returns")
+
+
+def test_a_window_that_is_hidden_lets_go(screen, reader):
+    place = window(screen)
+    at = [str(place.x + 60), str(place.y + 80)]
+    screen.run("xdotool", "mousemove", *at, "mousedown", "1", "mousemove", str(place.x + 160), str(place.y + 80))
+    reader.until(lambda: reader.axis("x") > 0.4, "it is dragged")
+    screen.run("xdotool", "search", "--name", "^mouse$", "windowunmap")
+    reader.until(lambda: reader.is_at_rest, "it is let go")
+
+
+def test_closing_the_window_is_the_end(screen, reader):
+    reader.device._window._note_closed()  # what the cross of a window manager does, which is not there
+    with pytest.raises(DeviceClosedError, match="closed"):
+        reader.until(lambda: False, "it ends")
+    assert reader.is_at_rest
+    wait_until(lambda: not [each for each in screen.windows() if each.title == "mouse"], "its window has gone")
+
+
+def test_without_a_screen_it_says_what_to_set(monkeypatch):
+    monkeypatch.delenv("DISPLAY")
+    with pytest.raises(DeviceError, match="DISPLAY"):
+        make_device("mouse", {}).open()

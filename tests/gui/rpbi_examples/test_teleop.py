@@ -1,0 +1,127 @@
+"""Real key presses, mouse drags, and joystick and 6-D mouse by what stands in for them, move the arm of the example.
+
+With the environment variable TELEOP_DEVICES=all they all do, else the keys, which leaves half a minute to other tests.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+import rospy
+import tf2_ros
+from ros_system import RosSystem, stop_group, wait_until
+from sensor_msgs.msg import Joy
+from std_msgs.msg import Float64MultiArray
+
+from custom_ros_tools.ros.tf_listener import TfListener
+from operator_node.emulators.spacenavd import SpacenavDaemon
+
+SLOW_S = 60.0
+TARGET, TIP = "rpbi/teleop_tip", "rpbi/kuka_lwr/end_effector_ball"
+AWAY, RIGHT, UP = np.array([-1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+"""Directions of a person who stands behind the arm, in the world."""
+SPEED = "speed:=0.4"
+all_devices = pytest.mark.skipif(os.environ.get("TELEOP_DEVICES") != "all", reason="runs with TELEOP_DEVICES=all")
+
+
+@pytest.fixture(scope="module")
+def example(ros_master, screen, tmp_path_factory) -> Iterator[RosSystem]:
+    """The example, in which the arm is at its target."""
+    system = RosSystem(tmp_path_factory.mktemp("teleop"))
+    try:
+        arguments = ("teleop.launch", "headless:=true", "ik_hz:=30", SPEED)
+        process = system.start(["roslaunch", "rpbi_examples", *arguments], **screen.environment)
+        wait_until(lambda: "the arm tracks its target" in system.output(process), "the arm is there", SLOW_S)
+        yield system
+    finally:
+        system.close()
+
+
+@pytest.fixture(scope="module")
+def position(example) -> Iterator[Callable[[str], np.ndarray]]:
+    """Where a frame is in the world [m]."""
+    buffer = tf2_ros.Buffer(debug=False)
+    listener = TfListener(buffer)
+
+    def position(frame: str) -> np.ndarray:
+        found = buffer.lookup_transform("rpbi/world", frame, rospy.Time(0)).transform.translation
+        return np.array([found.x, found.y, found.z])
+
+    wait_until(lambda: all(buffer.can_transform("rpbi/world", each, rospy.Time(0)) for each in (TARGET, TIP)), "TF")
+    yield position
+    listener.unregister()
+
+
+@pytest.fixture
+def follows(example, position) -> Callable[[np.ndarray, Callable[[], object], Callable[[], object]], None]:
+    """Moves a device until the arm has gone 4 cm in a direction, lets go, and sees it stand still at its target."""
+    signals = example.listen("operator_node/signal", Float64MultiArray)
+
+    def run(direction: np.ndarray, move: Callable[[], object], let_go: Callable[[], object]) -> None:
+        start = position(TIP)
+        wait_until(lambda: move() or (position(TIP) - start) @ direction > 0.04, "the arm follows", SLOW_S)
+        let_go()
+        wait_until(lambda: signals.messages and not any(signals.messages[-1].data), "the signal is zero")
+        wait_until(lambda: np.linalg.norm(position(TIP) - position(TARGET)) < 2e-3, "the arm is at its target", SLOW_S)
+        way = position(TIP) - start
+        assert np.linalg.norm(way - (way @ direction) * direction) < 5e-3, "it goes in no other direction"
+
+    return run
+
+
+@contextlib.contextmanager
+def device(example, screen, name: str, *arguments: str, **environment: str) -> Iterator[None]:
+    """Runs another device in the place of the one before."""
+    command = ["roslaunch", "operator_node", f"{name}.launch", SPEED, *arguments]
+    process = example.start(command, **screen.environment, **environment)
+    try:
+        yield
+    finally:
+        stop_group(process)
+
+
+def nothing() -> None:
+    """Does nothing: the device is moved already."""
+
+
+def test_keys_move_the_arm(screen, follows):
+    screen.run("xdotool", "search", "--sync", "--name", "keyboard", "windowfocus", "--sync")
+    for key, direction in (("Up", AWAY), ("Right", RIGHT), ("b", -UP)):
+        screen.run("xdotool", "keydown", key)
+        follows(direction, nothing, lambda: screen.run("xdotool", "keyup", key))  # noqa: B023 (it is called here)
+
+
+@all_devices
+def test_mouse_moves_the_arm(example, screen, follows):
+    with device(example, screen, "mouse"):
+        screen.run(
+            "xdotool", "search", "--sync", "--name", "mouse", "windowraise", "mousemove", "--window", "%1", "100", "200"
+        )
+        screen.run("xdotool", "mousedown", "1", "mousemove_relative", "--", "-80", "0")
+        follows(-RIGHT, nothing, lambda: screen.run("xdotool", "mouseup", "1"))
+
+
+@all_devices
+def test_joystick_moves_the_arm(example, screen, follows):
+    with device(example, screen, "joystick", "virtual:=true"):
+        stick, joy = rospy.Publisher("joy/virtual", Joy, queue_size=10), example.listen("joy", Joy)
+
+        def hold(away: float) -> None:
+            stick.publish(Joy(axes=[0.0, away, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0], buttons=[0] * 11))
+
+        wait_until(lambda: hold(0.08) or (joy.messages and joy.messages[-1].axes[1]), "the stick has been at rest")
+        follows(-AWAY, lambda: hold(-0.8), lambda: hold(0.0))
+        stick.unregister()
+
+
+@all_devices
+def test_6d_mouse_moves_the_arm(example, screen, follows, tmp_path):
+    cap = SpacenavDaemon(tmp_path / "spnav.sock")
+    with device(example, screen, "spacenav", SPNAV_SOCKET=str(cap.path)):
+        wait_until(lambda: cap.clients, "it is connected")
+        follows(UP, lambda: cap.move(0, 300, 0), lambda: cap.move(0, 0, 0))
+    cap.close()

@@ -1,0 +1,144 @@
+"""`avatar_node.py` and `segment_forces_node.py`: a person's segments move their avatar in the running simulator."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+
+import numpy as np
+import pytest
+import rospy
+from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion
+from node_world import Rosout, main_config, publishing
+from ros_system import find_executable, wait_until
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from worlds import box
+
+from operator_node.avatar.anthropometry import segment_offsets
+from operator_node.avatar.forward import segment_frame
+from operator_node.avatar.urdf_offsets import urdf_offsets
+from operator_node.msg import SegmentForces
+from operator_node.mvn.segments import SEGMENTS
+
+HEIGHT_M = 1.75
+HUMAN = {
+    "name": "human",
+    "loadURDF": {
+        "fileName": "{rpbi_examples}/robots/human_model.urdf",
+        "basePosition": [0, 0, 0.93],
+        "useFixedBase": True,
+    },
+    "setJointMotorControlArray": {"controlMode": "POSITION_CONTROL"},
+    "object_tf": {"tf_id": "human/base", "hz": 60},
+    "broadcast_link_states": True,
+    "contacts": {"hz": 50},
+}
+HINGE = "jRightElbow_rotz"
+LOAD_KG = 0.5
+FOREARM = SEGMENTS.index("RightForeArm")
+
+
+def message(hinges: dict[str, float], position=(0.0, 0.0, 0.93)) -> PoseArray:
+    frame = segment_frame(segment_offsets(HEIGHT_M), np.array(position), np.array((0.0, 0.0, 0.0, 1.0)), hinges)
+    poses = [Pose(Point(*p), Quaternion(*q)) for p, q in zip(frame.positions.tolist(), frame.quats_xyzw.tolist())]
+    return PoseArray(poses=poses)
+
+
+@pytest.fixture(scope="module")
+def avatar(module_ros, tmp_path_factory):
+    """The avatar in a world, with a box on its right forearm, and its nodes."""
+    ros = module_ros
+    hand_x, arm_y, arm_z = 0.0, -(0.129 + 0.186 + 0.073) * HEIGHT_M, 0.93 + (0.818 - 0.53) * HEIGHT_M
+    load = box("load", (0.03, 0.03, 0.03), baseMass=LOAD_KG, basePosition=[hand_x, arm_y, arm_z + 0.07])
+    load["changeDynamics"] = {"lateralFriction": 1.0}
+    ros.simulator(main_config(tmp_path_factory.mktemp("world"), robots=(HUMAN,), dynamic=(load,), timeStep=0.004))
+    ros.avatar_log = ros.start(["rosrun", "operator_node", "avatar_node.py", "_max_joint_speed:=4.0"])
+    ros.start(["rosrun", "operator_node", "segment_forces_node.py"])
+    with publishing("/mvn/segments", PoseArray) as publisher:
+        ros.send = publisher.publish
+        yield ros
+
+
+def follow(ros, hinges, position, condition, what):
+    """Sends one pose until a condition holds."""
+
+    def is_so():
+        ros.send(message(hinges, position))
+        rospy.rostime.wallsleep(0.01)
+        return condition()
+
+    wait_until(is_so, what, every_s=0.0)
+
+
+def test_what_it_carries_is_felt_by_its_forearm(avatar):
+    forces = avatar.listen("avatar/segment_forces", SegmentForces)
+
+    def carries() -> bool:
+        newest = np.array([each.forces[FOREARM].z for each in forces.messages[-10:]])
+        return len(newest) == 10 and abs(newest.mean() + LOAD_KG * 9.81) < 0.05 * LOAD_KG * 9.81
+
+    wait_until(carries, "the forearm feels the weight")
+    assert forces.messages[-1].segments == list(SEGMENTS)
+    others = [force.z for name, force in zip(SEGMENTS, forces.messages[-1].forces) if name != "RightForeArm"]
+    assert not any(others)
+
+
+def test_the_avatar_does_what_the_person_does_and_never_jumps(avatar, own_tf):
+    states = avatar.listen("rpbi/human/joint_states", JointState)
+    targets = avatar.listen("rpbi/human/joint_states/target", JointState)
+    place = (0.3, 0.2, 0.93)
+
+    def is_there() -> bool:
+        position = dict(zip(states.messages[-1].name, states.messages[-1].position)) if states.messages else {}
+        base, _ = own_tf.get_tf("rpbi/world", "rpbi/human/Pelvis")
+        near = base is not None and math.dist(base, place) < 1e-3
+        return near and abs(position.get(HINGE, 9.0) - 1.2) < 2e-3
+
+    follow(avatar, {HINGE: 1.2}, place, is_there, "elbow and base are where the person has them")
+    bends = [dict(zip(each.name, each.position))[HINGE] for each in targets.messages]
+    times = [each.header.stamp.to_sec() for each in targets.messages]
+    assert bends[0] < 0.5, "it begins where the avatar is"
+    speeds = np.diff(bends) / np.maximum(np.diff(times), 1e-3)
+    assert len(bends) > 10 and np.median(speeds[np.abs(np.diff(bends)) > 1e-6]) < 5.0
+
+
+def test_silence_is_told_and_the_pose_is_held_until_it_goes_on(avatar):
+    log = Rosout(avatar)
+    targets = avatar.listen("rpbi/human/joint_states/target", JointState)
+    follow(avatar, {HINGE: 1.2}, (0.3, 0.2, 0.93), lambda: targets.messages, "it follows")
+    log.wait_for(["/mvn/segments: nothing has come for 0.5 s; the avatar holds its last pose"])
+    count = len(targets.messages)
+    follow(avatar, {HINGE: 1.2}, (0.3, 0.2, 0.93), lambda: len(targets.messages) > count, "it goes on")
+    assert avatar.call("avatar/engage", Trigger).success
+
+
+def test_what_makes_no_sense_is_refused_and_named(avatar):
+    log = Rosout(avatar)
+    wrong = message({})
+    wrong.poses[6].position.x = math.nan
+
+    def told() -> bool:
+        avatar.send(wrong)
+        rospy.rostime.wallsleep(0.02)
+        return bool(log.logs("Head: a number is not finite"))
+
+    wait_until(told, "the segment is named", every_s=0.0)
+    targets = avatar.listen("rpbi/human/joint_states/target", JointState)
+    follow(avatar, {}, (0.0, 0.0, 0.93), lambda: targets.messages, "it follows what makes sense")
+
+
+def test_the_command_measures_who_is_in_the_suit(avatar):
+    """Somebody of 1.75 m, whatever height the command is told."""
+    program = find_executable("operator_node", "human_urdf.py")
+    command = [program, "--height", "1.8", "--mass", "55", "--measure", "/mvn/segments"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+
+    def has_ended() -> bool:
+        avatar.send(message({}))
+        return process.poll() is not None
+
+    wait_until(has_ended, "it has measured")
+    printed, _ = process.communicate()
+    assert process.returncode == 0 and "A person of 1.8 m and 55 kg" in printed
+    assert urdf_offsets("printed", printed) == pytest.approx(segment_offsets(HEIGHT_M), abs=1e-5)

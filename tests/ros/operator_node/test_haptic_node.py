@@ -1,0 +1,190 @@
+"""The haptic node with emulated devices that speak the true protocols: what moves, what is felt, that force ends."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import time
+
+import pytest
+import rospy
+from geometry_msgs.msg import PoseStamped, TwistStamped, Vector3, WrenchStamped
+from node_world import publishing
+from ros_system import RosSystem, wait_until
+from sensor_msgs.msg import Joy
+from std_srvs.srv import SetBool, Trigger
+from tf2_msgs.msg import TFMessage
+
+from operator_node.device import DeviceError
+from operator_node.emulators.haply import HaplyEmulator
+from operator_node.msg import HapticState
+from operator_node.ros.haptics.touch import TouchConfig, TouchDevice
+
+DOWN = (0.0, 0.0, -0.03)
+
+
+def start_haptic_node(ros: RosSystem, device: str, device_options: dict[str, object], **parameters: object):
+    """Starts the node and waits until its device is connected."""
+    state = ros.listen("/haptics/state", HapticState)
+    rospy.set_param("/haptic_node", {"device": device, "device_options": device_options, **parameters})
+    process = ros.start(["rosrun", "operator_node", "haptic_node.py"])
+    wait_until(lambda: state.messages and state.messages[-1].connected, "the device is connected", 60.0)
+    return process, state
+
+
+class Wrenches:
+    """Publishes a force on the tool at 250 Hz, as a simulator does, from a process that can be stopped."""
+
+    def __init__(self, ros: RosSystem, force_n: float) -> None:
+        self.process = ros.start_program("pushes_a_tool.py", str(force_n))
+
+    def fall_silent(self) -> None:
+        os.killpg(self.process.pid, signal.SIGSTOP)
+
+    def go_on(self) -> None:
+        os.killpg(self.process.pid, signal.SIGCONT)
+
+
+@pytest.fixture
+def haply():
+    """A Haply with a hand that wants to be 3 cm lower after a moment."""
+    emulator = HaplyEmulator(lambda time_s: DOWN if time_s % 2.0 > 1.0 else (0.0, 0.0, 0.0), key="values")
+    emulator.start()
+    yield emulator
+    emulator.stop()
+
+
+def test_haply_moves_a_frame_and_is_sent_forces_that_end_when_the_simulator_stops(ros, haply):
+    force, pose, joy = (
+        ros.listen(topic, kind)
+        for topic, kind in (("/haptics/force", WrenchStamped), ("/haptics/pose", PoseStamped), ("/joy", Joy))
+    )
+    twist, tf = ros.listen("/haptics/twist", TwistStamped), ros.listen("/tf", TFMessage)
+    options = {"url": f"ws://localhost:{haply.port}"}
+    _, state = start_haptic_node(
+        ros, "haply", options, target_frame_id="target", energy_allowance_j=0.1, energy_refill_w=0.1
+    )
+    wrenches = Wrenches(ros, 2.0)
+    wait_until(lambda: max(map(abs, haply.force)) > 1.0, "the hand feels the force, by the key that the service knows")
+    wait_until(lambda: min(each.pose.position.z for each in pose.wait_for()) < -0.02, "the handle goes down")
+    wait_until(lambda: max(abs(each.axes[2]) for each in joy.wait_for()) > 0.15, "and joy says so")
+    assert max(abs(value) for each in joy.messages for value in each.axes) <= 1.0
+    assert min(each.twist.linear.z for each in twist.wait_for()) < -0.01
+
+    def target_range():
+        """Returns how far the target has moved up and down lately [m]; where it stands depends on when it began."""
+        found = [each for message in tf.messages[-2000:] for each in message.transforms]
+        heights = [each.transform.translation.z for each in found if each.child_frame_id == "target"]
+        return max(heights) - min(heights) if heights else 0.0
+
+    wait_until(lambda: target_range() > 0.015, "the target follows")
+    said = state.messages[-1]
+    assert said.device == "haply" and said.energy >= said.energy_bound
+    wait_until(lambda: "force not taken" in state.messages[-1].fault_names, "the state says that it tried another key")
+    for _ in range(2):
+        wrenches.fall_silent()
+        wait_until(lambda: max(map(abs, haply.force)) == 0.0, "no force without the simulator", every_s=0.001)
+        wait_until(lambda: state.messages[-1].delay > 0.05, "the state says how long the tool has been silent")
+        wrenches.go_on()
+        wait_until(lambda: max(map(abs, haply.force)) > 0.5, "the force is back with it")
+    assert all(math.hypot(f.x, f.y, f.z) <= 8.0 for f in (each.wrench.force for each in force.messages))
+
+
+def test_a_haply_that_hangs_up_is_back_by_itself_and_nothing_jumps(ros):
+    emulator = HaplyEmulator(lambda time_s: DOWN)
+    emulator.start()
+    _, state = start_haptic_node(ros, "haply", {"url": f"ws://localhost:{emulator.port}"})
+    pose, joy = ros.listen("/haptics/pose", PoseStamped), ros.listen("/joy", Joy)
+    wait_until(lambda: pose.wait_for()[-1].pose.position.z < -0.02, "the handle is below")
+    port = emulator.port
+    emulator.stop()
+    wait_until(lambda: not state.messages[-1].connected, "it is gone")
+    assert str(port) in state.messages[-1].message
+    there = HaplyEmulator(lambda time_s: (0.0, 0.0, 0.0), port=port)
+    before = len(joy.messages)
+    there.start()
+    try:
+        wait_until(lambda: state.messages[-1].connected, "it is back")
+        first = joy.wait_for(before + 1)[before]
+        assert first.axes == pytest.approx((0.0, 0.0, 0.0), abs=0.05), "the handle is elsewhere, the tool goes on"
+    finally:
+        there.stop()
+
+
+def test_touch_is_sent_zero_when_the_simulator_stops_and_when_the_node_ends(ros):
+    """The driver holds the last force for ever, so that silence on our side would not do."""
+    rospy.set_param("/touch_emulator", {"depth": 0.03})
+    ros.start(["rosrun", "operator_node", "touch_emulator.py"])
+    felt = ros.listen("/phantom/felt", Vector3)
+    process, state = start_haptic_node(ros, "touch", {}, energy_allowance_j=0.1, energy_refill_w=0.1)
+    joy = ros.listen("/joy", Joy)
+    wrenches = Wrenches(ros, 2.0)
+    wait_until(lambda: felt.messages and felt.messages[-1].z > 1.0, "the hand feels the force")
+    wait_until(lambda: min(each.axes[2] for each in joy.wait_for()) < -0.1, "the handle goes down")
+    assert state.messages[-1].fault_names == []
+    wrenches.fall_silent()
+    wait_until(lambda: felt.messages[-1].z == 0.0, "zero is sent", every_s=0.001)
+    wrenches.go_on()
+    wait_until(lambda: felt.messages[-1].z > 0.5, "the force is back")
+    os.killpg(process.pid, signal.SIGINT)
+    wait_until(lambda: process.poll() is not None, "the node ends")
+    wait_until(lambda: felt.messages[-1].z == 0.0, "with zero")
+
+
+def test_touch_by_the_papers_own_driver(ros):
+    """Its axes are x right, y up, z towards the person; ours x forward, y left, z up."""
+    rospy.set_param("/touch_emulator", {"driver": "touch_x", "depth": 0.03})
+    ros.start(["rosrun", "operator_node", "touch_emulator.py"])
+    felt = ros.listen("/phantom/felt", Vector3)
+    device = TouchDevice(TouchConfig(driver="touch_x"))
+    wait_until(lambda: is_open(device), "its driver speaks")
+    lowest, down = [0.0], [0.0]
+
+    def go_on():
+        reading = device.read()
+        device.send((0.0, 0.0, 1.0), time.monotonic() + 0.016)
+        if reading is not None:
+            lowest.append(reading.position[2])
+            down.append(reading.velocity[2] if reading.velocity else 0.0)
+            assert reading.position[:2] == pytest.approx((0.0, 0.0), abs=1e-6)
+        return min(lowest) < -0.02 and min(down) < -0.01 and felt.messages and felt.messages[-1].z == 1.0
+
+    wait_until(go_on, "the hand goes down and feels the force")
+    device.close()
+    wait_until(lambda: felt.messages[-1].z == 0.0, "zero is sent at the end")
+
+
+def is_open(device: TouchDevice) -> bool:
+    """Opens a device if it is there."""
+    try:
+        device.open()
+    except DeviceError:
+        return False
+    return True
+
+
+def test_switched_off_there_is_no_device_and_wrong_forces_are_refused(ros):
+    options = {"depth_m": 0.02, "wait_s": 30.0}
+    process, state = start_haptic_node(ros, "scripted", options, energy_allowance_j=0.1, energy_refill_w=0.1)
+    force = ros.listen("/haptics/force", WrenchStamped)
+    with publishing("/haptics/wrench", WrenchStamped) as wrench:
+        bad = WrenchStamped()
+        bad.wrench.force.z = math.nan
+        for _ in range(20):
+            wrench.publish(bad)
+        wait_until(lambda: "expected finite numbers, got 0, 0, nan" in ros.output(process), "it is named")
+    assert all(math.isfinite(each.wrench.force.z) for each in force.wait_for())
+    assert ros.call("/haptics/reset", Trigger).success
+    assert ros.call("/haptics/toggle", SetBool, False).success
+    wait_until(lambda: not state.messages[-1].connected, "it is closed")
+    assert not ros.call("/haptics/toggle", SetBool, False).success
+    assert ros.call("/haptics/toggle", SetBool, True).success
+    wait_until(lambda: state.messages[-1].connected, "it is open again")
+
+
+def test_a_wrong_parameter_ends_the_node_with_its_name(ros):
+    rospy.set_param("/haptic_node", {"device": "haptly"})
+    process = ros.start(["rosrun", "operator_node", "haptic_node.py"])
+    assert wait_until(lambda: process.poll(), "it ends") == 1
+    assert "unknown haptic device 'haptly': known are haply, scripted, touch, virtual" in ros.output(process)

@@ -1,0 +1,18 @@
+"""What users write: a mapping of their own."""
+
+from operator_node.mappings.mapping import AxesConfig, Mapping
+
+
+class DeadZone(Mapping):
+    """One axis, which is 0 near its middle."""
+
+    Config = AxesConfig
+    size = 1
+
+    def __init__(self, config: AxesConfig) -> None:
+        self._config = config
+
+    def map(self, axes):
+        """Returns the signal."""
+        (axis,) = self._config.pick(axes)
+        return (axis if abs(axis) > 0.1 else 0.0,)
