@@ -1,68 +1,44 @@
-"""The guard's node, between a program that sends targets and one that takes commands."""
+"""Guards' nodes, two on one master, between a program that sends targets and one that takes commands."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 import rospy
+from guard_nodes import NAMES, GuardStation
 from guarded_arm import SLIDER
 from node_world import publishing
-from ros_system import Listener, wait_until
+from ros_system import wait_until
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
-from std_srvs.srv import Trigger
 
-from safe_robot.msg import Status, Violation
-
-NODE = "robot_safety_node"
-NAMES = ["slide", "turn"]
+from custom_ros_tools.errors import ConfigError
+from safe_robot.check import Situation
+from safe_robot.ros.parameters import guard_of_parameters
 
 
-@pytest.fixture
-def start(ros) -> Callable[..., Any]:
-    """Starts the node for a robot without shapes, and waits until it is there."""
-
-    def run(**parameters: Any) -> Any:
-        rospy.set_param("/robot_description", SLIDER)
-        options = {"start_from": "target", "period_s": 0.01, "limits": {"velocity": 1.0}, **parameters}
-        for name, value in options.items():
-            rospy.set_param(f"/{NODE}/{name}", value)
-        process = ros.start(["rosrun", "safe_robot", "safe_robot_node.py"])
-        rospy.wait_for_service("robot_safety/start_subscriber", timeout=60.0)
-        return process
-
-    return run
+@pytest.fixture(scope="module")
+def stations(module_ros) -> Iterator[tuple[GuardStation, GuardStation]]:
+    """One that takes the first target's word for where the robot is, and one that asks for measured positions."""
+    patient = {"limits": {"velocity": 1.0}, "checks": {"staleness": {"timeout_s": 60.0}}}
+    left = GuardStation(module_ros, "/left", start_from="target", period_s=0.01, **patient)
+    right = GuardStation(module_ros, "/right", period_s=0.2, publish_as_joint_state=False, **patient)
+    yield left, right
+    left.close()
+    right.close()
 
 
 @pytest.fixture
-def listen(ros) -> Callable[..., Listener]:
-    """Listens to a topic of the node, from now on."""
-
-    def connected(topic: str, message_type: type) -> Listener:
-        listener = ros.listen(topic, message_type)
-        wait_until(lambda: listener.is_connected, f"the node sends {topic} to the test")
-        return listener
-
-    return connected
+def left(stations) -> GuardStation:
+    stations[0].wait()
+    return stations[0]
 
 
 @pytest.fixture
-def target():
-    """Publishes a target, with the present time unless another is given; returns the message."""
-    publisher = rospy.Publisher("joint_states/target", JointState, queue_size=100, tcp_nodelay=True)
-
-    def send(*position: float, age_s: float = 0.0, **fields: Any) -> JointState:
-        message = JointState(**{"name": NAMES, "position": position, **fields})
-        message.header.stamp = rospy.Time.from_sec(time.time() - age_s)
-        wait_until(publisher.get_num_connections, "the guard listens")
-        publisher.publish(message)
-        return message
-
-    yield send
-    publisher.unregister()
+def right(stations) -> GuardStation:
+    stations[1].wait()
+    return stations[1]
 
 
 def same(command: JointState, sent: JointState) -> bool:
@@ -72,83 +48,84 @@ def same(command: JointState, sent: JointState) -> bool:
 
 
 @pytest.mark.quick
-def test_targets_pass_unchanged_until_one_is_unsafe_and_again_after_a_start(ros, start, target, listen):
-    start()
-    commands, statuses = listen("joint_states/command", JointState), listen("robot_safety/status", Status)
-    violations = listen("robot_safety/violation", Violation)
+def test_targets_pass_unchanged_until_one_is_unsafe_and_again_after_a_start(left):
     sent = []
     for k in range(5):
-        position = (0.001 * k, -0.002 * k)
-        sent.append(target(*position))
-        assert same(commands.wait_for(k + 1)[k], sent[k])
-    assert all(each.is_safe for each in statuses.wait_for(5))
-    bad = target(0.5, 0.0)
-    status = statuses.wait_for(6)[5]
+        sent.append(left.send(0.001 * k, -0.002 * k))
+        assert same(left.commands.wait_for(k + 1)[k], sent[k])
+    assert all(each.is_safe for each in left.statuses.wait_for(5))
+    bad = left.send(0.5, 0.0)
+    status = left.statuses.wait_for(6)[5]
     assert (status.is_safe, status.header.stamp) == (False, bad.header.stamp)
     assert status.message.startswith("joint_velocity: joint 'slide' would have ")
-    violation = violations.wait_for()[0]
+    violation = left.violations.wait_for()[0]
     assert (violation.check, violation.subject, violation.limit) == ("joint_velocity", "joint 'slide'", 0.95)
-    target(0.004, -0.008)
-    assert ros.call("robot_safety/start_subscriber", Trigger).success
-    assert not ros.call("robot_safety/start_subscriber", Trigger).success
-    again = target(0.004, -0.008)
-    assert same(commands.wait_for(6)[5], again) and len(statuses.wait_for(7)) == 7
-    assert ros.call("robot_safety/stop_subscriber", Trigger).success
-    assert not ros.call("robot_safety/stop_subscriber", Trigger).success
+    left.send(0.004, -0.008)
+    assert left.call("start").success
+    assert not left.call("start").success
+    again = left.send(0.004, -0.008)
+    assert same(left.commands.wait_for(6)[5], again) and len(left.statuses.wait_for(7)) == 7
+    assert left.call("stop").success
+    assert not left.call("stop").success
 
 
-def test_commands_of_a_burst_go_out_a_period_apart(ros, start, target, listen):
-    """Late targets that come together make the robot no faster."""
-    start(period_s=0.2, checks={"staleness": {"timeout_s": 10.0}})
-    commands = listen("joint_states/command", JointState)
-    statuses = listen("robot_safety/status", Status)
-    target(0.0, 0.0)
-    commands.wait_for(1)
-    for k in range(1, 4):
-        target(0.001 * k, 0.0)
-    commands.wait_for(4)
-    took_s = commands.arrival_s[3] - commands.arrival_s[0]
-    assert took_s >= 0.4, took_s  # 0.6 s there, and the first may have arrived late
-    assert all(each.is_safe for each in statuses.messages)
+@pytest.mark.parametrize(
+    "fields, words",
+    [
+        ({"position": (0.0, float("nan"))}, "values must be finite"),
+        ({"name": ["slide"], "position": (0.0,)}, "no values for joint 'turn'"),
+        ({"name": ["slide", "turn", "more"], "position": (0.0, 0.0, 0.0)}, "'more' too"),
+        ({"effort": (1.0, 1.0)}, "expected no efforts"),
+        ({"velocity": (9.0, 0.0)}, "joint 'slide': expected a velocity within 0.95, got 9"),
+        ({"age_s": 100.0}, "staleness: the "),
+        ({"age_s": -100.0}, "staleness: the age of the target would have -"),
+    ],
+)
+def test_what_cannot_be_answered_for_is_refused_and_named(left, fields, words):
+    left.send(*fields.pop("position", (0.0, 0.0)), **fields)
+    status = left.statuses.wait_for()[0]
+    assert not status.is_safe and words in status.message
+    assert left.commands.messages == []
 
 
-def test_joints_in_another_order_are_taken_by_name_and_numbers_come_in_the_robots_order(ros, start, target, listen):
-    start(publish_as_joint_state=False)
-    numbers = listen("joint_states/command", Float64MultiArray)
-    target(7.0, 0.3, -0.2, name=["mount", "turn", "slide"])  # that of the mount is fixed
-    assert numbers.wait_for()[0].data == (-0.2, 0.3)
-
-
-def test_a_target_that_is_too_old_and_a_source_that_dies_while_the_robot_moves_halt_it(ros, start, target, listen):
-    start()
-    statuses = listen("robot_safety/status", Status)
-    target(0.0, 0.0, age_s=1.0)
-    assert "staleness: the age of the target" in statuses.wait_for()[0].message
-    ros.call("robot_safety/start_subscriber", Trigger)
-    target(0.0, 0.0)
-    statuses.wait_for(2)
-    target(0.001, 0.0)
-    last = statuses.wait_for(4)
-    assert [each.is_safe for each in last[1:]] == [True, True, False]
-    assert "time without a target while the robot moves" in last[3].message
-
-
-def test_the_first_target_waits_for_measured_positions(ros, start, target, listen):
-    start(start_from="measured")
-    statuses = listen("robot_safety/status", Status)
-    commands = listen("joint_states/command", JointState)
-    target(0.0, 0.0)
-    assert "start: measured positions" in statuses.wait_for()[0].message
-    with publishing("joint_states/measured", JointState) as measured:
-        message = JointState(name=["turn", "slide", "more"], position=[0.0, 0.01, 5.0])
+def test_numbers_come_in_the_robots_order_a_period_apart_and_from_where_the_robot_was_measured(left, right):
+    """Late targets that come together make the robot no faster; and what one guard is told another does not hear."""
+    right.send(0.3, -0.2)
+    assert "start: measured positions" in right.statuses.wait_for()[0].message
+    with publishing("/right/joint_states/measured", JointState) as measured:
+        message = JointState(name=["turn", "slide", "more"], position=[-0.2, 0.31, 5.0])
+        measured.publish(message)
         wait_until(
-            lambda: measured.publish(message) or target(0.0, 0.0) and commands.messages, "a command comes", every_s=0.1
+            lambda: measured.publish(message) or right.send(0.3, -0.2) and right.commands.messages,
+            "a command comes",
+            every_s=0.25,
         )
+    right.send(7.0, -0.2, 0.3, name=["mount", "turn", "slide"])  # that of the mount is fixed
+    for k in range(1, 4):
+        right.send(0.3 + 0.001 * k, -0.2)
+    wait_until(lambda: right.commands.messages[-1].data == (0.303, -0.2), "the last target has passed")
+    assert [each.data for each in right.commands.messages[-4:]] == [(0.3 + 0.001 * k, -0.2) for k in range(4)]
+    took_s = right.commands.arrival_s[-1] - right.commands.arrival_s[-4]
+    assert took_s >= 0.4, took_s  # 0.6 s there, and the first may have arrived late
+    assert left.statuses.messages == []
 
 
-def test_parameters_of_the_release_are_taken(ros, start, target, listen):
-    start(
-        limits={},
+@pytest.fixture
+def parameters(ros) -> Any:
+    """Sets private parameters of the tests' own node."""
+
+    def set_all(**values: Any) -> None:
+        rospy.set_param("~robot_description", SLIDER)
+        for name, value in values.items():
+            rospy.set_param(f"~{name}", value)
+
+    return set_all
+
+
+def test_parameters_of_the_release_are_taken(parameters):
+    parameters(
+        start_from="target",
+        period_s=0.01,
         exotica_xml_filename="any.xml",
         joint_velocity_limit="0.4 3",
         joint_position_upper_limit="0.5 2",
@@ -157,27 +134,23 @@ def test_parameters_of_the_release_are_taken(ros, start, target, listen):
         links="hand",
         box_xlim="-0.1 inf",
     )
-    statuses = listen("robot_safety/status", Status)
-    target(0.0, 0.0)
-    target(0.0021, 0.0)
-    assert "would have 0.21 m/s; the limit is 0.2" in statuses.wait_for(2)[1].message
-    ros.call("robot_safety/start_subscriber", Trigger)
-    target(-0.0005, 0.0)
-    assert statuses.wait_for(3)[2].is_safe
+    guard, output = guard_of_parameters()
+    assert guard.joint_names == tuple(NAMES) and output.publish_as_joint_state
+    guard.start()
+    assert guard.decide((0.0, 0.0), Situation()).command
+    violation = guard.decide((0.0021, 0.0), Situation()).violation
+    assert "would have 0.21 m/s; the limit is 0.2" in str(violation)
 
 
 @pytest.mark.parametrize(
-    "parameters, words",
+    "values, words",
     [
-        ({"checks": {"link_box": {"boxes": {"hnd": {}}}}}, f"/{NODE}: checks.link_box.boxes.hnd: unknown link 'hnd'"),
-        ({"joint_velocity_limit": "1 2 3"}, f"/{NODE}: joint_velocity_limit: expected 2 numbers"),
-        ({"polcy": "limit"}, f"/{NODE}: polcy: unknown key"),
+        ({"checks": {"link_box": {"boxes": {"hnd": {}}}}}, "checks.link_box.boxes.hnd: unknown link 'hnd'"),
+        ({"joint_velocity_limit": "1 2 3"}, "joint_velocity_limit: expected 2 numbers"),
+        ({"polcy": "limit"}, "polcy: unknown key"),
     ],
 )
-def test_a_parameter_that_is_wrong_ends_the_node_with_what_is_wrong(ros, parameters, words):
-    rospy.set_param("/robot_description", SLIDER)
-    for name, value in parameters.items():
-        rospy.set_param(f"/{NODE}/{name}", value)
-    process = ros.start(["rosrun", "safe_robot", "safe_robot_node.py"])
-    assert process.wait(60.0) == 1
-    assert words in ros.output(process)
+def test_a_parameter_that_is_wrong_is_named(parameters, values, words):
+    parameters(**values)
+    with pytest.raises(ConfigError, match=words):
+        guard_of_parameters()

@@ -39,3 +39,8 @@ class OutputConfig(ConfigModel):
     publish_as_joint_state: Switch = Field(
         True, description="Whether commands are joint states; else bare numbers in the order of the joints."
     )
+    silence_s: Seconds = Field(
+        0.02,
+        description="How old the newest target may be when one is sent on; older ones wait for a newer one, and a"
+        " source that died is followed no longer than this.",
+    )

@@ -1,10 +1,7 @@
 """`safe_robot_node.py`: targets of a robot in, safe commands out."""
 
-import threading
 import time
 from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
 
 import rospy
 from geometry_msgs.msg import WrenchStamped
@@ -12,26 +9,27 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, Header
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
-from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
+from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.joint_values import JointValues
 from custom_ros_tools.ros.joint_states import values_in
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
-from rpbi.urdf.files import write_description
-from safe_robot import legacy
 from safe_robot.check import Situation, Violation
-from safe_robot.config import GuardConfig, OutputConfig
-from safe_robot.guard import Decision, Guard
+from safe_robot.guard import Decision
 from safe_robot.msg import Status
 from safe_robot.msg import Violation as ViolationMessage
-from safe_robot.robot import GuardedRobot
+
+from .master_connection import MasterConnection
+from .parameters import guard_of_parameters
+from .target_queue import TargetQueue
 
 NODE = "robot_safety_node"
-DESCRIPTION = "robot_description"
 QUEUE_SIZE = 100
 """Messages kept while the machine is busy; what has become too old is refused."""
 WATCH_HZ = 100.0
 """How often it is looked whether targets still come."""
+JUMP_S = 0.5
+"""How much further than the time that has gone by a stamp may be from the one before [s]."""
 NEVER_S = float("-inf")
 
 
@@ -43,55 +41,68 @@ class GuardNode:
     """
 
     def __init__(self) -> None:
-        self._guard, as_joint_state = _guard_of_parameters()
-        self._period_s = self._guard.config.period_s
-        self._lock = threading.Lock()
+        self._guard, output = guard_of_parameters()
+        self._as_joint_state = output.publish_as_joint_state
+        self._silence_s = output.silence_s
         self._warn = ThrottledWarning()
-        self._due_s = self._sent_s = NEVER_S
-        self._last_stamp: rospy.Time | None = None
+        self._sent_s = NEVER_S
+        self._last_stamp: tuple[rospy.Time, float] | None = None
         self._measured: tuple[Mapping[str, float], float] = {}, NEVER_S
         self._wrench: tuple[tuple[float, ...], float] = (0.0,) * 6, NEVER_S
         self._target_topic = rospy.resolve_name("joint_states/target")
-        self._as_joint_state = as_joint_state
         self._command = rospy.Publisher(
             "joint_states/command",
-            JointState if as_joint_state else Float64MultiArray,
+            JointState if self._as_joint_state else Float64MultiArray,
             queue_size=QUEUE_SIZE,  # a command that is left out would make the next one a jump
             tcp_nodelay=True,
         )
         self._status = rospy.Publisher("robot_safety/status", Status, queue_size=QUEUE_SIZE, latch=True)
         self._violation = rospy.Publisher("robot_safety/violation", ViolationMessage, queue_size=QUEUE_SIZE, latch=True)
         self._guard.start()
+        self._queue = TargetQueue(self._guard.config.period_s, self._silence_s, self._take, self._end_wait)
+        self._master = MasterConnection(self._lose_master)
         rospy.Service("robot_safety/start_subscriber", Trigger, self._start)
         rospy.Service("robot_safety/stop_subscriber", Trigger, self._stop)
         options = {"queue_size": QUEUE_SIZE, "tcp_nodelay": True}
         rospy.Subscriber("joint_states/measured", JointState, self._take_measured, **options)
         rospy.Subscriber("robot_safety/wrench", WrenchStamped, self._take_wrench, **options)
-        rospy.Subscriber(self._target_topic, JointState, self._take, **options)
+        self._targets = rospy.Subscriber(self._target_topic, JointState, self._receive, **options)
         WallTimer(WATCH_HZ, self._watch)
 
-    def _take(self, message: JointState) -> None:
-        with self._lock:
-            if self._guard.is_halted:
-                self._warn(self._target_topic, "halted; call robot_safety/start_subscriber to go on")
-                return
-            self._wait_until_due()
-            try:
-                decision = self._decide(message)
-            except Exception as error:
-                self._guard.halt()
-                decision = Decision(None, Violation("input", f"it cannot be judged: {error!r}", *NO_NUMBERS), True)
+    def _receive(self, message: JointState) -> None:
+        stamp = message.header.stamp
+        self._queue.put(message, (_now() - stamp).to_sec() if stamp else 0.0)
+
+    def _take(self, message: JointState) -> bool:
+        """Decides on a target; returns whether a command has gone out."""
+        if self._guard.is_halted:
+            self._warn(self._target_topic, "halted; call robot_safety/start_subscriber to go on")
+            return False
+        try:
+            decision = self._decide(message)
             if decision.command is not None:
                 self._send(message, decision)
+        except Exception as error:
+            self._guard.halt()
+            decision = Decision(None, Violation("input", f"it cannot be judged: {error!r}", *NO_NUMBERS), True)
         self._tell(message.header, decision.violation, decision.is_halted)
+        return decision.command is not None
 
-    def _wait_until_due(self) -> None:
-        """Waits until a period is over since the last command, so that what comes in a burst goes out one by one."""
-        now_s = time.monotonic()
-        if now_s < self._due_s:
-            time.sleep(self._due_s - now_s)
-        else:
-            self._due_s = now_s
+    def _end_wait(self, age_s: float) -> None:
+        self._halt(Violation("staleness", "the newest target", age_s, self._silence_s, "s of age"))
+
+    def _lose_master(self) -> None:
+        reason = f"the ROS master at {self._master.uri} has gone, and nobody could find stop_subscriber"
+        with self._queue.lock:
+            self._halt(Violation("master", reason, *NO_NUMBERS))
+
+    def _halt(self, violation: Violation) -> None:
+        """Halts for a reason that no target is to blame for; the queue's lock is held."""
+        if self._guard.is_halted:
+            return
+        self._guard.halt()
+        self._queue.clear()
+        self._tell(Header(stamp=_now()), violation, True)
 
     def _decide(self, message: JointState) -> Decision:
         try:
@@ -101,9 +112,12 @@ class GuardNode:
         stamp = message.header.stamp
         age_s, step_s = 0.0, None
         if stamp:
-            age_s = (_now() - stamp).to_sec()
-            step_s = None if self._last_stamp is None else (stamp - self._last_stamp).to_sec()
-            self._last_stamp = stamp
+            age_s, now_s = (_now() - stamp).to_sec(), time.monotonic()
+            if self._last_stamp is not None:
+                step_s = (stamp - self._last_stamp[0]).to_sec()
+                if step_s > now_s - self._last_stamp[1] + JUMP_S:
+                    return self._guard.refuse(f"stamps jump by {step_s:g} s")
+            self._last_stamp = stamp, now_s
         return self._guard.decide(values.position, self._situation(age_s, step_s))
 
     def _checked(self, message: JointState) -> JointValues:
@@ -141,7 +155,6 @@ class GuardNode:
         )
 
     def _send(self, message: JointState, decision: Decision) -> None:
-        self._due_s += self._period_s
         self._sent_s = time.monotonic()
         if not self._as_joint_state:
             self._command.publish(Float64MultiArray(data=decision.command))
@@ -172,10 +185,15 @@ class GuardNode:
         self._warn(self._target_topic, f"{message}{then}")
 
     def _watch(self) -> None:
-        with self._lock:
-            violation = self._guard.late(self._situation())
-        if violation is not None:
-            self._tell(Header(stamp=_now()), violation, True)
+        with self._queue.lock:
+            if self._guard.is_halted:
+                return
+            if self._guard.is_moving and not self._targets.get_num_connections():
+                reason = f"nobody sends {self._target_topic} any more, while the robot moves"
+                self._halt(Violation("source", reason, *NO_NUMBERS))
+            elif violation := self._guard.late(self._situation()):
+                self._queue.clear()
+                self._tell(Header(stamp=_now()), violation, True)
 
     def _take_measured(self, message: JointState) -> None:
         try:
@@ -192,15 +210,18 @@ class GuardNode:
         self._wrench = wrench, time.monotonic()
 
     def _start(self, _: TriggerRequest) -> TriggerResponse:
-        with self._lock:
+        with self._queue.lock:
             if not self._guard.is_halted:
                 return TriggerResponse(False, "targets are taken already")
+            if not self._master.is_there:
+                return TriggerResponse(False, f"the ROS master at {self._master.uri} has gone")
             self._last_stamp = None
+            self._queue.clear()
             self._guard.start()
         return TriggerResponse(True, "targets are taken; the first one has to be where the robot is")
 
     def _stop(self, _: TriggerRequest) -> TriggerResponse:
-        with self._lock:
+        with self._queue.lock:
             if self._guard.is_halted:
                 return TriggerResponse(False, "no targets are taken already")
             self._guard.halt()
@@ -213,35 +234,6 @@ NO_NUMBERS = (float("nan"), float("nan"), "")
 def _now() -> rospy.Time:
     """Returns ROS time if it has begun, else wall time."""
     return rospy.Time.now() or rospy.Time.from_sec(time.time())
-
-
-def _guard_of_parameters() -> tuple[Guard, bool]:
-    """Returns the guard that private parameters and `robot_description` tell of, and whether it sends joint states."""
-    node = rospy.get_name()
-    given: dict[str, Any] = dict(rospy.get_param("~", {}))
-    given.pop(DESCRIPTION, None)
-    output = OutputConfig.parse({key: given.pop(key) for key in OutputConfig.model_fields if key in given}, node)
-    path = _description_file()
-    config = GuardConfig.parse(legacy.translated(given, list(GuardedRobot(path).joint_names), node), node)
-    try:
-        robot = GuardedRobot(path, config.joint_names)
-    except InterfaceError as error:
-        raise ConfigError([Problem(node, "joint_names", str(error))]) from None
-    return Guard(config, robot, node), output.publish_as_joint_state
-
-
-def _description_file() -> str:
-    """Returns a file of the robot's description.
-
-    Raises:
-        ConfigError: If there is none.
-    """
-    key = rospy.search_param(DESCRIPTION)
-    text = None if key is None else rospy.get_param(key)
-    if not isinstance(text, str):
-        message = f"expected the robot's URDF in the parameter '{DESCRIPTION}', got nothing"
-        raise ConfigError([Problem(rospy.get_name(), DESCRIPTION, message)])
-    return write_description(text.replace("file://", "")) if "<" in text else str(Path(text))
 
 
 def main() -> None:
