@@ -34,7 +34,9 @@ ALLOWED = {
     "operator_node": {"custom_ros_tools", "ros_pybullet_interface"},
     "safe_robot": {"custom_ros_tools", "ros_pybullet_interface"},
     "rpbi_utils": {"custom_ros_tools", "ros_pybullet_interface"},
-    "rpbi_examples": {"custom_ros_tools", "ros_pybullet_interface", "ik_ros", "operator_node", "rpbi_utils"},
+    "rpbi_examples": {
+        *("custom_ros_tools", "ros_pybullet_interface", "ik_ros", "operator_node", "safe_robot", "rpbi_utils"),
+    },
 }
 """What each package may depend on."""
 FORMER_NODES = {"ik_ros": {"operator_node"}}
