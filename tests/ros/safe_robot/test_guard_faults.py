@@ -49,7 +49,7 @@ def test_what_a_dead_source_left_behind_is_not_sent(silence_s, is_dropped):
             done.set()
         return True
 
-    queue = TargetQueue(0.05, silence_s, take, lambda age_s: given_up.set())
+    queue = TargetQueue(0.05, silence_s, 100, take, lambda age_s: given_up.set())
     for item in range(10):
         queue.put(item, 0.0)
     assert (given_up if is_dropped else done).wait(60.0)

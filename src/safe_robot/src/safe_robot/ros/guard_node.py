@@ -59,7 +59,9 @@ class GuardNode:
         self._status = rospy.Publisher("robot_safety/status", Status, queue_size=QUEUE_SIZE, latch=True)
         self._violation = rospy.Publisher("robot_safety/violation", ViolationMessage, queue_size=QUEUE_SIZE, latch=True)
         self._guard.start()
-        self._queue = TargetQueue(self._guard.config.period_s, self._silence_s, self._take, self._end_wait)
+        # what limits can skip targets that are late; a skipped one would make the next a jump, which `reject` halts at
+        size = 1 if self._guard.config.policy == "limit" else QUEUE_SIZE
+        self._queue = TargetQueue(self._guard.config.period_s, self._silence_s, size, self._take, self._end_wait)
         self._master = MasterConnection(self._lose_master)
         rospy.Service("robot_safety/start_subscriber", Trigger, self._start)
         rospy.Service("robot_safety/stop_subscriber", Trigger, self._stop)

@@ -7,8 +7,6 @@ from collections.abc import Callable
 from typing import Generic, TypeVar
 
 Item = TypeVar("Item")
-LONGEST = 100
-"""Targets that wait at most."""
 PATIENCE_S = 0.1
 """How long targets wait for a sign of life of their source [s]."""
 
@@ -23,6 +21,7 @@ class TargetQueue(Generic[Item]):
     Args:
         period_s: The period [s].
         silence_s: How old the newest target may be [s].
+        size: How many targets wait at most; older ones are dropped.
         take: Gets each target, `lock` held; returns whether the period begins anew.
         give_up: Is called, `lock` held, with the age of the newest target [s], when targets have waited in vain;
             they are dropped.
@@ -32,12 +31,17 @@ class TargetQueue(Generic[Item]):
     """
 
     def __init__(
-        self, period_s: float, silence_s: float, take: Callable[[Item], bool], give_up: Callable[[float], None]
+        self,
+        period_s: float,
+        silence_s: float,
+        size: int,
+        take: Callable[[Item], bool],
+        give_up: Callable[[float], None],
     ) -> None:
         self._period_s, self._silence_s = period_s, silence_s
         self._take, self._give_up = take, give_up
         self.lock = threading.Condition()
-        self._waiting: deque[tuple[Item, float]] = deque(maxlen=LONGEST)
+        self._waiting: deque[tuple[Item, float]] = deque(maxlen=size)
         self._due_s = self._alive_s = float("-inf")
         threading.Thread(target=self._run, name="target queue", daemon=True).start()
 
