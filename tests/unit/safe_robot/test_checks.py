@@ -7,11 +7,13 @@ import pytest
 from guarded_arm import HOME, KUKA, LIMITS, folding, slider
 
 from custom_ros_tools.errors import ConfigError
+from rpbi.geometry import Pose
 from rpbi.kinematics import Kinematics
 from safe_robot.braking import Brake
 from safe_robot.check import Situation
 from safe_robot.checks import CHECKS
 from safe_robot.conformance import CheckConformance
+from safe_robot.geometry.obstacles import Obstacle
 from safe_robot.limits import JointLimits, LimitsConfig
 from safe_robot.lookup import make_checks
 from safe_robot.motion import Motion, State
@@ -78,6 +80,21 @@ class TestSelfCollision(Arm):
         return self.motion(State.at_rest(np.array(HOME)), FOLDED), Situation()
 
 
+TABLE = Obstacle("table", "box", (1.0, 1.0, 0.1), Pose((0.7, 0.0, 0.0)))
+
+
+class TestEnvironment(Arm):
+    check_name = "environment"
+
+    def by(self, step: float, q=HOME):
+        motion, situation = super().by(step, q)
+        return motion, situation._replace(obstacles=(TABLE,))
+
+    def unsafe(self):
+        motion = self.motion(State.at_rest(np.array(HOME)), (0.0, -2.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        return motion, Situation(obstacles=(TABLE,))
+
+
 class TestStaleness(Arm):
     check_name = "staleness"
     is_about_motion = False
@@ -122,9 +139,9 @@ def test_every_check_is_held_to_the_conformance_suite():
     assert held == set(CHECKS)
 
 
-def check_of(name: str, robot: GuardedRobot, limits: dict | None = None, **options):
-    joint_limits = JointLimits.of(robot, LimitsConfig(**(limits or {})), "guard.yaml")
-    return next(c for c in make_checks({name: options}, robot, joint_limits, "guard.yaml") if c.name == name)
+def check_of(name: str, guarded: GuardedRobot, limits: dict | None = None, /, **options):
+    joint_limits = JointLimits.of(guarded, LimitsConfig(**(limits or {})), "guard.yaml")
+    return next(c for c in make_checks({name: options}, guarded, joint_limits, "guard.yaml") if c.name == name)
 
 
 @pytest.mark.parametrize("bad", ["nan", "inf", "-inf"])
@@ -243,9 +260,116 @@ def test_distances_that_are_remembered_change_no_answer():
         step = np.clip(q + generator.normal(0.0, 0.05, 7), -2.0, 2.0)
         motion = Motion(robot, State.at_rest(q), step, 0.01)
         remembered = check.check(motion, Situation())
-        check._known_m[:] = -np.inf
+        check.proximity.forget(range(len(check.pairs)))
         assert check.check(motion, Situation()) == remembered
         q = q if remembered else step
+
+
+BALL = Obstacle("ball", "sphere", (0.2, 0.2, 0.2), Pose((0.0, 0.0, 1.0)))
+FURTHER = np.array((0.0, 1e-4))
+
+
+def stretched(tmp_path, q=(0.0, 0.0), step=FURTHER):
+    """Two boxes along x, from the middle of the base to x = 0.85."""
+    robot = folding(tmp_path)
+    return check_of("environment", robot), Motion(robot, State.at_rest(np.array(q)), np.array(q) + step, 0.01)
+
+
+@pytest.mark.parametrize(
+    "obstacle",
+    [
+        Obstacle("it", "box", (0.2, 0.2, 0.2)),
+        Obstacle("it", "sphere", (0.2, 0.2, 0.2)),
+        Obstacle("it", "cylinder", (0.2, 0.2, 0.2)),
+        Obstacle("it", "capsule", (0.2, 0.2, 0.2)),
+        Obstacle("it", "points", (1.0, 1.0, 1.0), corners=((-0.1, 0.0, 0.0), (0.1, 0.1, 0.0), (0.0, -0.1, 0.1))),
+    ],
+    ids=lambda obstacle: obstacle.kind,
+)
+def test_any_shape_is_kept_away_from(tmp_path, obstacle):
+    for x, is_safe in ((0.965, False), (0.972, True)):  # 0.85 of the arm, 0.1 of the obstacle, 0.02 between them
+        check, motion = stretched(tmp_path, step=np.array((0.0, 0.0)))
+        away = Motion(check.robot, State.at_rest(np.array((1.0, 0.0))), np.zeros(2), 0.01)
+        there = obstacle._replace(pose=Pose((x, 0.0, 0.0)))
+        violation = check.check(away, Situation(obstacles=(there,)))
+        assert (violation is None) == is_safe
+        assert check.check(motion, Situation(obstacles=(there,))) is None, "what stands comes no nearer"
+    assert check.check(away, Situation(obstacles=(there,))) is None
+    assert check.check(away, Situation(obstacles=())) is None
+
+
+def test_what_is_around_the_robot_may_come_go_and_move(tmp_path):
+    check, motion = stretched(tmp_path)
+    near, far = (BALL._replace(pose=Pose((0.6, y, 0.0))) for y in (0.14, 0.3))
+    for obstacles, is_safe in (((), True), ((near,), False), ((far,), True), ((far, near), False), ((far, BALL), True)):
+        assert (check.check(motion, Situation(obstacles=obstacles)) is None) == is_safe, obstacles
+    back = Motion(check.robot, motion.start, motion.start.position - FURTHER, 0.01)
+    assert check.check(back, Situation(obstacles=(near,))) is None, "away from what came near it may go"
+    nowhere = BALL._replace(pose=Pose((np.nan, 0.0, 0.0)))
+    with pytest.raises(ValueError, match="obstacle 'ball': expected finite numbers"):
+        check.check(motion, Situation(obstacles=(nowhere,)))
+
+
+def test_where_nobody_tells_of_the_environment_nothing_is_safe(tmp_path):
+    check, motion = stretched(tmp_path)
+    assert "nobody tells what is around" in str(check.check(motion, Situation()))
+
+
+BOX = """
+name: box
+createVisualShape: {shapeType: GEOM_BOX, halfExtents: [0.1, 0.1, 0.1]}
+createCollisionShape: {shapeType: GEOM_BOX, halfExtents: [0.1, 0.1, 0.1]}
+basePosition: [2.4, 0.5, 0.0]
+"""
+WALL = """
+name: wall
+createVisualShape: {shapeType: GEOM_PLANE}
+createCollisionShape: {shapeType: GEOM_PLANE, planeNormal: [1, 0, 0]}
+"""
+ROBOT = """
+name: arm
+loadURDF: {fileName: folding.urdf, basePosition: [2.0, 0.0, 0.0], useFixedBase: true}
+setJointMotorControlArray: {controlMode: POSITION_CONTROL}
+"""
+
+
+def world_of(folder) -> str:
+    """Returns the file of a world with the folding robot, a box beside it and a wall behind it."""
+    for name, text in (("box", BOX), ("wall", WALL), ("arm", ROBOT)):
+        (folder / f"{name}.yaml").write_text(text)
+    path = folder / "world.yaml"
+    path.write_text(
+        "{connect: {connection_mode: DIRECT}, collision_objects: [box.yaml, wall.yaml], robots: [arm.yaml]}"
+    )
+    return str(path)
+
+
+def test_a_world_file_tells_of_bodies_in_the_root_of_the_robot_that_stands_in_it(tmp_path):
+    robot = folding(tmp_path)
+    check = check_of("environment", robot, world=world_of(tmp_path))
+    box, wall = check._obstacles
+    assert (box.name, box.kind, box.size) == ("box", "box", (0.2, 0.2, 0.2))
+    assert box.pose.position == pytest.approx((0.4, 0.5, 0.0)) and wall.kind == "plane"
+    turned = Motion(robot, State.at_rest(np.array((0.0, 0.0))), np.array((0.0, 1.5)), 0.01)
+    assert check.check(turned, Situation()).subject == "link 'lower' and 'box'"
+    live = Situation(obstacles=(BALL._replace(pose=Pose((0.6, 0.12, 0.0))),))
+    assert check.check(turned, live).subject == "link 'lower' and 'box'"
+    assert check.check(Motion(robot, turned.start, FURTHER, 0.01), live).subject == "link 'lower' and 'ball'"
+    check.distances.place(np.zeros(2))
+    assert check.distances.distance(("lower", 1), 5.0) == pytest.approx(2.45, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ({"robot": "amr"}, "world.yaml: unknown robot 'amr'.*did you mean 'arm'"),
+        ({"world": "none.yaml"}, "none.yaml"),
+    ],
+)
+def test_a_world_that_cannot_be_taken_is_named(tmp_path, options, message):
+    robot, world = folding(tmp_path), world_of(tmp_path)
+    with pytest.raises(ConfigError, match=message):
+        check_of("environment", robot, **{"world": world, **options})
 
 
 def test_pairs_can_be_read_changed_and_read_again(tmp_path):

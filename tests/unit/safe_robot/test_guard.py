@@ -11,7 +11,7 @@ from guarded_arm import HOME, KUKA, LIMITS, PERIOD_S, decide, folding, guard_of,
 
 from custom_ros_tools.errors import ConfigError
 from safe_robot.check import Check, Situation, Violation
-from safe_robot.distances import LinkDistances
+from safe_robot.geometry.distances import LinkDistances
 from safe_robot.robot import GuardedRobot
 
 FUZZ = "GUARD_FUZZ_TARGETS"

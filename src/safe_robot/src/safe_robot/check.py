@@ -10,6 +10,7 @@ from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, Switch
 
+from .geometry.obstacles import Obstacle
 from .limits import JointLimits
 from .motion import Motion
 from .robot import GuardedRobot
@@ -60,6 +61,7 @@ class Situation(NamedTuple):
         measured_age_s: How old they are [s].
         wrench: Measured force x, y, z [N] and torque x, y, z [N m].
         wrench_age_s: How old they are [s]; inf if there are none.
+        obstacles: Bodies of the environment, as they are now; None if nobody tells. Equal ones are the same tuple.
     """
 
     now_s: float = 0.0
@@ -70,6 +72,7 @@ class Situation(NamedTuple):
     measured_age_s: float = 0.0
     wrench: tuple[float, ...] = (0.0,) * 6
     wrench_age_s: float = float("inf")
+    obstacles: tuple[Obstacle, ...] | None = None
 
 
 class Check(ABC):

@@ -71,6 +71,11 @@ class Motion:
         """The command before, and the k rows: (k + 1) x n positions [rad or m]."""
         return np.concatenate((self.start.position[None], self.position))
 
+    @cached_property
+    def path(self) -> np.ndarray:
+        """How far each of n joints moves after row 0, there and back counted [rad or m]."""
+        return np.abs(np.diff(self.position, axis=0)).sum(axis=0)
+
     def poses(self, link: str) -> LinkPoses:
         """Returns where a link is in the robot's root, in the command before and the k rows."""
         if link not in self._poses:

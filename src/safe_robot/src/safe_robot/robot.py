@@ -103,10 +103,14 @@ class GuardedRobot:
                     found[joint.child] = LinkPoses(parent.rotation @ rotation, position)
         return {link: found[link] for link in links}
 
-    def positions_of_all(self, q: np.ndarray) -> dict[str, float]:
-        """Returns the positions of all joints that move, in one configuration of n positions [rad or m]."""
-        moving = [joint for joint in self._all.values() if joint.is_moving]
-        return {joint.name: float(self._positions(joint, q[None])[0]) for joint in moving}
+    def coupling(self, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+        """Returns how m joints follow from the n guarded ones: factors, m x n, and offsets, m [rad or m]."""
+        offsets = self._positions_at(names, np.zeros(len(self.joint_names)))
+        columns = [self._positions_at(names, unit) - offsets for unit in np.eye(len(self.joint_names))]
+        return np.stack(columns, axis=1), offsets
+
+    def _positions_at(self, names: Sequence[str], q: np.ndarray) -> np.ndarray:
+        return np.array([float(self._positions(self._all[name], q[None])[0]) for name in names])
 
     def _positions(self, joint: UrdfJoint, q: np.ndarray) -> np.ndarray:
         """Returns k positions of any joint; 1 if it is the same in all."""
@@ -117,15 +121,15 @@ class GuardedRobot:
             return q[:, self._index[joint.name]]
         return np.array([min(max(0.0, joint.lower), joint.upper)])
 
-    def reach(self, link: str, radius_m: float, other: str) -> np.ndarray:
+    def reach(self, link: str, radius_m: float, other: str | None = None) -> np.ndarray:
         """Returns how far, at most, each of n joints moves any point of a link in another link, for 1 rad or m each.
 
         Args:
             link: The link.
             radius_m: How far its shape goes from its origin [m].
-            other: The other link; what both hang on does not move one in the other.
+            other: The other link, by default the root; what both hang on does not move one in the other.
         """
-        still = {joint.name for joint in self.chain(other)}
+        still = {joint.name for joint in self.chain(self._root if other is None else other)}
         reach, beyond = np.zeros(len(self.joint_names)), radius_m
         for joint in reversed(self.chain(link)):
             if joint.name in still:

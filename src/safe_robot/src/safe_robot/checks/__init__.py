@@ -11,6 +11,7 @@ CHECKS = {
     "link_box": "safe_robot.checks.link_box:LinkBox",
     "link_velocity": "safe_robot.checks.link_velocity:LinkVelocity",
     "self_collision": "safe_robot.checks.self_collision:SelfCollision",
+    "environment": "safe_robot.checks.environment:Environment",
     "staleness": "safe_robot.checks.staleness:Staleness",
     "tracking": "safe_robot.checks.tracking:Tracking",
     "force": "safe_robot.checks.force:Force",

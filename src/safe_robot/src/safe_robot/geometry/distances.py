@@ -1,9 +1,10 @@
-"""Distances between the links of a robot, in a PyBullet client of its own."""
+"""Distances between the links of a robot and obstacles, in a PyBullet client of its own."""
 
 import math
 import random
 import weakref
 from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pybullet
@@ -11,14 +12,32 @@ import pybullet
 from rpbi.engine.client import Client
 from rpbi.urdf.joints import Joint
 from rpbi.urdf.loading import load_urdf
+from safe_robot.robot import GuardedRobot
 
-from .robot import GuardedRobot
+from .obstacles import Obstacle
 
-Pair = tuple[str, str]
+Pair = tuple[str, str | int]
+"""Two links, or a link and the number of an obstacle."""
 SAMPLES = 200
 """Random configurations in which pairs are tried that may always be near."""
 ALWAYS = 0.95
 """Pairs that are too near in this share of them are left out: they are built so."""
+
+
+class Contact(NamedTuple):
+    """How far two things are apart.
+
+    Attributes:
+        distance: Between their surfaces; negative if they are in each other [m].
+        direction: Unit vector to the first one, in the robot's root.
+        first: Where the first one is nearest, in the root [m].
+        second: The same for the second.
+    """
+
+    distance: float
+    direction: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
 
 
 class LinkDistances:
@@ -41,33 +60,72 @@ class LinkDistances:
         weakref.finalize(self, self._pb.disconnect)
         self._body = load_urdf(self._pb, robot.urdf_path, {"fileName": robot.urdf_path, "useFixedBase": True})
         joints = Joint.all_of(self._pb, self._body)
-        self._moving = [(joint.index, joint.name) for joint in joints if robot.document.joints[joint.name].is_moving]
+        moving = [(joint.index, joint.name) for joint in joints if robot.document.joints[joint.name].is_moving]
+        self._moving = [index for index, _ in moving]
+        self._all = robot.coupling([name for _, name in moving])
         names = {-1: self._pb.getBodyInfo(self._body)[0].decode(), **{joint.index: joint.link for joint in joints}}
         self._index = {name: i for i, name in names.items() if self._pb.getCollisionShapeData(self._body, i)}
+        self._obstacles: tuple[tuple[Obstacle, int], ...] = ()
         self.links = tuple(self._index)
         self.place(np.zeros(len(robot.joint_names)))
         self.radius_m = {link: self._radius(link) for link in self.links}
 
     def place(self, q: np.ndarray) -> None:
         """Puts the robot into a configuration of n positions [rad or m]."""
-        positions = self._robot.positions_of_all(q)
-        indices = [index for index, _ in self._moving]
-        values = [[positions[name]] for _, name in self._moving]
-        self._pb.resetJointStatesMultiDof(self._body, indices, values)
+        factors, offsets = self._all
+        values = (factors @ q + offsets)[:, None].tolist()
+        self._pb.resetJointStatesMultiDof(self._body, self._moving, values)
+
+    def place_obstacles(self, obstacles: Sequence[Obstacle]) -> list[int]:
+        """Puts obstacles where they are, in place of those before; returns which of them are new or elsewhere.
+
+        Raises:
+            ValueError: If PyBullet cannot have one.
+        """
+        before, now, changed = self._obstacles, list[tuple[Obstacle, int]](), list[int]()
+        self._obstacles = ()
+        for i, obstacle in enumerate(obstacles):
+            old, body = before[i] if i < len(before) else (None, -1)
+            if old is None or old.shape != obstacle.shape:
+                if body >= 0:
+                    self._pb.removeBody(body)
+                body = obstacle.add_to(self._pb)
+                changed.append(i)
+            elif old.pose != obstacle.pose:
+                self._pb.resetBasePositionAndOrientation(body, *obstacle.pose)
+                changed.append(i)
+            now.append((obstacle, body))
+        for _, body in before[len(now) :]:
+            self._pb.removeBody(body)
+        self._obstacles = tuple(now)
+        return changed
 
     def distance(self, pair: Pair, most_m: float) -> float:
-        """Returns how far two links are apart where `place` put them [m]; inf if that is more than some distance."""
-        a, b = (self._index[link] for link in pair)
-        body = self._body
-        points = self._pb.getClosestPoints(bodyA=body, bodyB=body, distance=most_m, linkIndexA=a, linkIndexB=b)
-        return min((point[8] for point in points), default=math.inf)
+        """Returns how far two things are apart where they were put [m]; inf if that is more than some distance."""
+        return min([point[8] for point in self._closest(pair, most_m)], default=math.inf)
+
+    def contact(self, pair: Pair, most_m: float) -> Contact | None:
+        """Returns where two things are nearest where they were put; None if they are further apart than a distance."""
+        points = self._closest(pair, most_m)
+        if not points:
+            return None
+        point = min(points, key=lambda each: each[8])
+        return Contact(point[8], *(np.array(point[i]) for i in (7, 5, 6)))
+
+    def _closest(self, pair: Pair, most_m: float) -> Any:
+        link, other = pair
+        a, body = self._index[link], self._body
+        second = (body, self._index[other]) if isinstance(other, str) else (self._obstacles[other][1], -1)
+        return self._pb.getClosestPoints(body, second[0], most_m, a, second[1])
 
     def reach(self, pair: Pair) -> np.ndarray:
-        """Returns how far, at most, each of n joints moves two links in each other, for 1 rad or m each."""
+        """Returns how far, at most, each of n joints moves two things in each other, for 1 rad or m each."""
         a, b = pair
+        if isinstance(b, int):
+            return self._robot.reach(a, self.radius_m[a])
         return self._robot.reach(a, self.radius_m[a], b) + self._robot.reach(b, self.radius_m[b], a)
 
-    def pairs(self, margin_m: float) -> list[Pair]:
+    def pairs(self, margin_m: float) -> list[tuple[str, str]]:
         """Returns the pairs of links that may come too near.
 
         Those that a joint ties, or several fixed ones, are left out, and those that nearly always are nearer than the
@@ -110,8 +168,3 @@ class LinkDistances:
 
 def _anywhere(generator: random.Random, lower: float, upper: float) -> float:
     return generator.uniform(max(lower, -math.pi), min(upper, math.pi))
-
-
-def named(pair: Sequence[str]) -> str:
-    """Returns a pair in words."""
-    return f"links '{pair[0]}' and '{pair[1]}'"
