@@ -33,8 +33,8 @@ class GuardConfig(ConfigModel):
     checks: dict[str, dict[str, Any]] = Field({}, description="Options of checks by name.")
 
 
-class OutputConfig(ConfigModel):
-    """What the guard's node publishes."""
+class NodeConfig(ConfigModel):
+    """What the guard's node does beside deciding."""
 
     publish_as_joint_state: Switch = Field(
         True, description="Whether commands are joint states; else bare numbers in the order of the joints."
@@ -43,4 +43,10 @@ class OutputConfig(ConfigModel):
         0.02,
         description="How old the newest target may be when one is sent on; older ones wait for a newer one, and a"
         " source that died is followed no longer than this.",
+    )
+    base_frame: Text | None = Field(
+        None, description="TF frame of the robot's root; with it the bodies of rpbi/markers are around the robot."
+    )
+    left_out: ListOf[Text] = Field(
+        (), description="Bodies of rpbi/markers that are no obstacles: first the robot itself."
     )

@@ -19,6 +19,8 @@ from safe_robot.guard import Decision
 from safe_robot.msg import Status
 from safe_robot.msg import Violation as ViolationMessage
 
+from .guard_markers import GuardMarkers
+from .live_obstacles import LiveObstacles
 from .master_connection import MasterConnection
 from .parameters import guard_of_parameters
 from .target_queue import TargetQueue
@@ -41,9 +43,10 @@ class GuardNode:
     """
 
     def __init__(self) -> None:
-        self._guard, output = guard_of_parameters()
-        self._as_joint_state = output.publish_as_joint_state
-        self._silence_s = output.silence_s
+        self._guard, config = guard_of_parameters()
+        self._as_joint_state = config.publish_as_joint_state
+        self._silence_s = config.silence_s
+        self._around = None if config.base_frame is None else LiveObstacles(config.base_frame, config.left_out)
         self._warn = ThrottledWarning()
         self._sent_s = NEVER_S
         self._last_stamp: tuple[rospy.Time, float] | None = None
@@ -62,6 +65,7 @@ class GuardNode:
         # what limits can skip targets that are late; a skipped one would make the next a jump, which `reject` halts at
         size = 1 if self._guard.config.policy == "limit" else QUEUE_SIZE
         self._queue = TargetQueue(self._guard.config.period_s, self._silence_s, size, self._take, self._end_wait)
+        GuardMarkers(self._guard, self._queue.lock, config.base_frame or self._guard.robot.document.root_link())
         self._master = MasterConnection(self._lose_master)
         rospy.Service("robot_safety/start_subscriber", Trigger, self._start)
         rospy.Service("robot_safety/stop_subscriber", Trigger, self._stop)
@@ -154,6 +158,7 @@ class GuardNode:
             measured_age_s=now_s - measured_s,
             wrench=wrench,
             wrench_age_s=now_s - wrench_s,
+            obstacles=None if self._around is None else self._around.obstacles,
         )
 
     def _send(self, message: JointState, decision: Decision) -> None:

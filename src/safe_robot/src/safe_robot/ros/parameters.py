@@ -8,15 +8,15 @@ import rospy
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
 from rpbi.urdf.files import write_description
 from safe_robot import legacy
-from safe_robot.config import GuardConfig, OutputConfig
+from safe_robot.config import GuardConfig, NodeConfig
 from safe_robot.guard import Guard
 from safe_robot.robot import GuardedRobot
 
 DESCRIPTION = "robot_description"
 
 
-def guard_of_parameters() -> tuple[Guard, OutputConfig]:
-    """Returns the guard that private parameters and `robot_description` tell of, and how its commands go out.
+def guard_of_parameters() -> tuple[Guard, NodeConfig]:
+    """Returns the guard that private parameters and `robot_description` tell of, and what its node does beside.
 
     Raises:
         ConfigError: If a parameter, or the robot, is wrong.
@@ -24,7 +24,7 @@ def guard_of_parameters() -> tuple[Guard, OutputConfig]:
     node = rospy.get_name()
     given: dict[str, Any] = dict(rospy.get_param("~", {}))
     given.pop(DESCRIPTION, None)
-    output = OutputConfig.parse({key: given.pop(key) for key in OutputConfig.model_fields if key in given}, node)
+    output = NodeConfig.parse({key: given.pop(key) for key in NodeConfig.model_fields if key in given}, node)
     path = _description_file()
     config = GuardConfig.parse(legacy.translated(given, list(GuardedRobot(path).joint_names), node), node)
     try:
