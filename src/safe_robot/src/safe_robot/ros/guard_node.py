@@ -124,6 +124,8 @@ class GuardNode:
                 if step_s > now_s - self._last_stamp[1] + JUMP_S:
                     return self._guard.refuse(f"stamps jump by {step_s:g} s")
             self._last_stamp = stamp, now_s
+            if self._guard.last_command is None and age_s > self._silence_s:  # it waited for a connection
+                return Decision(None, Violation("staleness", "the first target", age_s, self._silence_s, "s of age"))
         return self._guard.decide(values.position, self._situation(age_s, step_s))
 
     def _checked(self, message: JointState) -> JointValues:
