@@ -49,7 +49,8 @@ def run(quick: bool) -> list[Result]:
 def _through_ros(seconds: float) -> list[Result]:
     """Returns how long it takes from the publication of a target to its command, and how many get there."""
     echoed, commanded, shares = [], [], []
-    options = {"start_from": "target", "period_s": 0.9 / HZ, "checks": CHECKS, "limits": LIMITS}
+    options = {"start_from": "target", "period_s": 0.9 / HZ, "limits": LIMITS}
+    options |= {"silence_s": 1.0, "checks": {**CHECKS, "staleness": {"timeout_s": 1.0}}}  # lateness is what is measured
     with Session(use_sim_time=False) as ros:
         ros.program("echo", "/sent", "/echoed")
         ros.set_parameters("/robot_safety_node", {**options, "robot_description": str(LWR)})

@@ -73,8 +73,9 @@ class TargetQueue(Generic[Item]):
 
     def _hand_on(self) -> None:
         item, _ = self._waiting.popleft()
+        begin_s = time.monotonic()  # else each period would be longer by what a decision takes
         if self._take(item):
-            self._due_s = max(self._due_s, time.monotonic()) + self._period_s
+            self._due_s = max(self._due_s, begin_s) + self._period_s
 
     def _run(self) -> None:
         with self.lock:
