@@ -159,14 +159,14 @@ def test_without_a_measurement_nothing_is_safe(name):
     assert violation is not None and "age" in violation.subject
 
 
-def test_poses_of_links_are_those_of_pybullet(tmp_path):
+def test_origins_of_links_are_those_of_pybullet(tmp_path):
     generator = np.random.default_rng(3)
     for robot, link in ((GuardedRobot(KUKA), "lwr_arm_7_link"), (slider(tmp_path), "hand")):
         q = generator.uniform(-1.0, 1.0, (20, len(robot.joint_names)))
-        poses, kinematics = robot.poses(q, [link])[link], Kinematics(robot.urdf_path)
+        kinematics = Kinematics(robot.urdf_path)
         assert kinematics.joint_names == robot.joint_names
         expected = [kinematics.forward(row.tolist(), link).position for row in q]
-        np.testing.assert_allclose(np.broadcast_to(poses.position, (20, 3)), expected, atol=1e-6)
+        np.testing.assert_allclose(robot.link_positions(q, link), expected, atol=1e-6)
 
 
 def test_a_link_box_reaches_where_the_link_is(tmp_path):
