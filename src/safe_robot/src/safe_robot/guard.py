@@ -83,9 +83,7 @@ class Guard:
         self._watches = {check.name for check in self.checks if check.watches}
         self._keeps_bounds = config.policy == "limit" and can_keep_bounds()
         if config.policy == "limit" and not self._keeps_bounds:
-            log.warning(
-                "%s: policy limit: without DAQP it comes less near to targets; `./rpbi setup ik` installs it", file
-            )
+            log.warning("%s: policy limit comes less near to targets without DAQP: run `./rpbi setup ik`", file)
         self.is_halted = True
         self._state: State | None = None
         self._is_first = True

@@ -11,7 +11,7 @@ from .limits import JointLimits
 from .motion import State
 
 STEPS = 10
-"""Between braking as hard and going on as fast as possible so many commands are tried, and as many between two of them."""
+"""Between braking hard and going on as fast as possible so many commands are tried, and as many between two of them."""
 ROUNDING = 1e-12
 """Positions that differ by less are equal [rad or m]."""
 

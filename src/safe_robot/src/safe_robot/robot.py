@@ -138,7 +138,7 @@ class _Turn:
         self._carrying = np.concatenate((self._fixed + versine, sine, -versine)).T.copy()
 
     def carry(self, position: np.ndarray, point: np.ndarray) -> np.ndarray:
-        """Returns where points that hang on it are in what it hangs on, k x 3, at k positions; points are k x 3, too."""
+        """Returns where k points, or one, that hang on it are in what it hangs on, k x 3, at k positions."""
         if not point.any():
             turned = point
         elif self._joint.is_moving and self._joint.is_revolute:

@@ -122,7 +122,7 @@ class LinkDistances:
     def gradient(self, pair: Pair, contact: Contact, q: np.ndarray) -> np.ndarray:
         """Returns how fast two things go apart as each of n joints moves, by where `contact` found them [m/rad or 1].
 
-        The robot is in q, n positions; it is put there again, since which of two links PyBullet took first has to be tried.
+        The robot is in q, n positions, and put there again: which of two links PyBullet took first has to be tried.
         """
         states = self._pb.getLinkStates(self._body, self._moving, computeForwardKinematics=1)
         along = np.zeros(len(self._moving))

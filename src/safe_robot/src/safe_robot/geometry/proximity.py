@@ -38,7 +38,7 @@ class TooNear(NamedTuple):
 
 
 def _onward(travelled: list[float], mark: int, to_m: float, last: int) -> int:
-    """Returns the furthest mark until which no further is travelled, so that pairs often meet at one; above the last: all."""
+    """Returns the first mark beyond a way, or one before it where pairs often meet; above the last one: none is."""
     found = bisect_right(travelled, to_m)
     if found > last:
         return found
