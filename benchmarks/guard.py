@@ -1,4 +1,4 @@
-"""How long the guard takes for a decision on a seven-joint arm, with all checks of joints, links and self-collision.
+"""How long the guard takes for a decision on a seven-joint arm, with all checks of joints and shapes.
 
 Alone, and through ROS at 500 Hz; there the floor is a rospy echo of the same messages, in turns.
 """
@@ -13,8 +13,10 @@ import numpy as np
 from result import Result, Target
 from session import Session
 
+from rpbi.geometry import Pose
 from safe_robot.check import Situation
 from safe_robot.config import GuardConfig
+from safe_robot.geometry.obstacles import Obstacle
 from safe_robot.guard import Guard
 from safe_robot.robot import GuardedRobot
 
@@ -30,7 +32,14 @@ CHECKS = {
     "link_box": {"boxes": {"lwr_arm_7_link": {"z": [-0.5, 5.0]}}},
     "link_velocity": {"links": {"lwr_arm_7_link": 3.0}},
     "self_collision": {},
+    "environment": {},
 }
+AROUND = Situation(
+    obstacles=(
+        Obstacle("table", "box", (1.0, 1.0, 0.1), Pose((-0.7, 0.0, 0.0))),
+        Obstacle("pole", "cylinder", (0.1, 0.1, 2.0), Pose((-0.5, 0.6, 1.0))),
+    )
+)
 
 
 def run(quick: bool) -> list[Result]:
@@ -84,7 +93,7 @@ def _durations_ms(policy: str, count: int, amplitude: float) -> list[float]:
         ramp = (1.0 - math.cos(math.pi * min(t / 2.0, 1.0))) / 2.0
         target = tuple((HOME + amplitude * ramp * ramp * np.sin(SPEEDS * t)).tolist())
         start_s = time.perf_counter()
-        decision = guard.decide(target, Situation())
+        decision = guard.decide(target, AROUND)
         durations.append(1e3 * (time.perf_counter() - start_s))
         assert policy == "limit" or decision.command == target, decision.violation
     return durations

@@ -159,14 +159,14 @@ def test_without_a_measurement_nothing_is_safe(name):
     assert violation is not None and "age" in violation.subject
 
 
-def test_poses_of_links_are_those_of_pybullet(tmp_path):
+def test_origins_of_links_are_those_of_pybullet(tmp_path):
     generator = np.random.default_rng(3)
     for robot, link in ((GuardedRobot(KUKA), "lwr_arm_7_link"), (slider(tmp_path), "hand")):
         q = generator.uniform(-1.0, 1.0, (20, len(robot.joint_names)))
-        poses, kinematics = robot.poses(q, [link])[link], Kinematics(robot.urdf_path)
+        kinematics = Kinematics(robot.urdf_path)
         assert kinematics.joint_names == robot.joint_names
         expected = [kinematics.forward(row.tolist(), link).position for row in q]
-        np.testing.assert_allclose(np.broadcast_to(poses.position, (20, 3)), expected, atol=1e-6)
+        np.testing.assert_allclose(robot.link_positions(q, link), expected, atol=1e-6)
 
 
 def test_a_link_box_reaches_where_the_link_is(tmp_path):
@@ -308,6 +308,30 @@ def test_what_is_around_the_robot_may_come_go_and_move(tmp_path):
     nowhere = BALL._replace(pose=Pose((np.nan, 0.0, 0.0)))
     with pytest.raises(ValueError, match="obstacle 'ball': expected finite numbers"):
         check.check(motion, Situation(obstacles=(nowhere,)))
+
+
+RAIL = """<robot name="rail"><link name="base"/>
+  <link name="cart"><collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>
+  <joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
+    <limit lower="-1" upper="1" effort="1" velocity="2"/></joint>
+</robot>"""
+
+
+def test_how_far_joints_have_moved_since_a_distance_was_looked_at_counts(tmp_path):
+    path = tmp_path / "rail.urdf"
+    path.write_text(RAIL)
+    check = check_of("environment", GuardedRobot(str(path)))
+    around = Situation(obstacles=(BALL._replace(pose=Pose((0.6, 0.0, 0.0))),))  # 0.4 m away
+    for x, brake_m, is_safe in ((0.0, 0.0, True), (0.05, 0.32, True), (0.05, 0.36, False)):
+        start = State.at_rest(np.array((x,)))
+        brake = Brake(np.linspace(0.0, brake_m, 40)[:, None], *(np.zeros((40, 1)),) * 3)
+        violation = check.check(Motion(check.robot, start, start.position, 0.01, brake), around)
+        assert (violation is None) == is_safe, brake_m
+
+
+def test_a_factor_takes_as_much_of_the_range_from_both_ends(tmp_path):
+    limits = JointLimits.of(slider(tmp_path), LimitsConfig(position_factor=0.5), "guard.yaml")
+    assert limits.lower.tolist() == [-0.5, -1.0] and limits.upper.tolist() == [0.5, 1.0]
 
 
 def test_where_nobody_tells_of_the_environment_nothing_is_safe(tmp_path):

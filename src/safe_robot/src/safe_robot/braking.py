@@ -13,6 +13,7 @@ GROWTH = 1.15
 """How much longer each length of braking is than the one before."""
 INSIDE = 1.0 - 1e-6
 """Braking keeps this share of the limits, so that rounding does not bring it over them."""
+TINY = 1e-300
 FASTEST = 10.0
 """Speed from which braking is prepared where none is the limit [rad/s or m/s]."""
 
@@ -58,40 +59,77 @@ class Braking:
             lengths.append(max(lengths[-1] + 1, round(lengths[-1] * GROWTH)))
         self._lengths = np.array(lengths)
         lines = np.array([_jerk_line(length) for length in lengths])
-        self._first, self._slope = lines[:, 0], lines[:, 1]  # jerk m of length l is first[l] + slope[l] m, times (v, a)
+        first, slope = lines[:, 0], lines[:, 1]  # jerk m of length l is first[l] + slope[l] m, times (v, a)
+        last = first + slope * self._lengths[:, None]
+        self._lines = np.stack((first, slope, first + slope, last, first + slope + (0.0, 1.0)))
         m = np.arange(1, lengths[-1] + 1)[None, :, None]
         is_within = m <= self._lengths[:, None, None]
-        jerk = np.where(is_within, self._first[:, None] + self._slope[:, None] * m, 0.0)
+        jerk = np.where(is_within, first[:, None] + slope[:, None] * m, 0.0)
         acceleration = np.where(m < self._lengths[:, None, None], np.cumsum(jerk, axis=1) + (0.0, 1.0), 0.0)
         velocity = np.where(m < self._lengths[:, None, None], np.cumsum(acceleration, axis=1) + (1.0, 0.0), 0.0)
         displacement = np.cumsum(velocity, axis=1)
-        self._tables = np.stack((displacement, velocity / period_s, acceleration / period_s**2, jerk / period_s**3))
+        self._ends = displacement[:, -1]
+        tables = np.stack((displacement, velocity / period_s, acceleration / period_s**2, jerk / period_s**3))
+        self._tables = np.ascontiguousarray(tables.transpose(1, 0, 2, 3))
 
     def plan(self, velocity: np.ndarray, acceleration: np.ndarray) -> Brake | None:
         """Returns how n joints come to rest from n velocities and n accelerations, None if their limits forbid it.
 
         Velocities and positions on the way are for others to judge.
         """
-        shortest = self._shortest(velocity * self._period_s, acceleration * self._period_s**2)
-        if shortest is None:
+        state = np.stack((velocity * self._period_s, acceleration * self._period_s**2))
+        fits = self._fits(state[:, None])[:, 0]
+        if not fits.any(axis=0).all():
             return None
+        shortest = fits.argmax(axis=0)
         rows = int(self._lengths[shortest].max())
-        state = np.stack((velocity * self._period_s, acceleration * self._period_s**2), axis=1)  # n x 2
-        displacement, v, a, j = np.einsum("dnki,ni->dkn", self._tables[:, shortest, :rows], state)
-        return Brake(displacement, v, a, j)
+        tables = self._tables[shortest, :, :rows]  # n x 4 x rows x 2
+        found = tables[..., 0] * state[0, :, None, None] + tables[..., 1] * state[1, :, None, None]
+        return Brake(*found.transpose(1, 2, 0))
 
-    def _shortest(self, v: np.ndarray, a: np.ndarray) -> np.ndarray | None:
-        """Returns where n joints have the shortest possible length, from velocity and acceleration in periods."""
-        first = np.outer(self._first[:, 0], v) + np.outer(self._first[:, 1], a)  # l x n, as all below
-        slope = np.outer(self._slope[:, 0], v) + np.outer(self._slope[:, 1], a)
-        length = self._lengths[:, None]
-        jerk = np.maximum(np.abs(first + slope), np.abs(first + slope * length))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            turn = np.where(slope != 0.0, -first / slope - 0.5, 1.0)  # where the acceleration has its extremum
+    def ends(self, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Returns how far n joints go until they rest, from each of m x n states, and their largest speed on the way.
+
+        NaN where the limits of `plan` forbid it [rad or m, rad/s or m/s].
+        """
+        state = np.stack((velocity * self._period_s, acceleration * self._period_s**2))
+        fits = self._fits(state)
+        shortest = fits.argmax(axis=0)
+        end = self._ends[shortest]
+        can = np.where(fits.any(axis=0), 1.0, np.nan)
+        speed = np.maximum(np.abs(state[0]), np.abs(self._turning_speed(state, shortest))) / self._period_s
+        return can * (end[..., 0] * state[0] + end[..., 1] * state[1]), can * speed
+
+    def _turning_speed(self, state: np.ndarray, which: np.ndarray) -> np.ndarray:
+        """Returns the speed where the acceleration first changes its sign, in periods, as `state`."""
+        v, a = state
+        lines = self._lines[:2, which]  # 2 x m x n x 2
+        first, slope = lines[..., 0] * v + lines[..., 1] * a
+        p, q = slope / 2.0, first + slope / 2.0  # a + q m + p m^2 = 0
+        root = -2.0 * a / (q - np.copysign(1.0, a) * np.sqrt(np.maximum(q * q - 4.0 * p * a, 0.0)) + TINY)
+        m = np.floor(np.clip(root, 0.0, self._lengths[which]))
+        speed: np.ndarray = v + m * (a + (m + 1.0) * (first / 2.0 + slope * (m + 2.0) / 6.0))
+        return speed
+
+    def end_factors(self, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Returns how far n joints go until they rest, by velocity and by acceleration: it is linear."""
+        state = np.stack((velocity * self._period_s, acceleration * self._period_s**2))
+        end = self._ends[self._fits(state[:, None])[:, 0].argmax(axis=0)]
+        return end[:, 0] * self._period_s, end[:, 1] * self._period_s**2
+
+    def _fits(self, state: np.ndarray) -> np.ndarray:
+        """Returns for which of l lengths each of m x n states keeps the limits; 2 x m x n, in periods."""
+        first, slope, first_jerk, last_jerk, first_acceleration = np.tensordot(self._lines, state, 1)  # l x m x n
+        length = self._lengths[:, None, None]
+        jerk = np.maximum(np.abs(first_jerk), np.abs(last_jerk))
+        slope_or_1 = np.where(slope != 0.0, slope, 1.0)
+        turn = np.where(slope != 0.0, -first / slope_or_1 - 0.5, 1.0)  # where the acceleration has its extremum
         turn = np.minimum(np.maximum(turn, 1.0), length)
-        peak = np.maximum(np.abs(a + first * turn + slope * turn * (turn + 1.0) / 2.0), np.abs(a + first + slope))
-        fits = (jerk <= self._max_jerk * self._period_s**3) & (peak <= self._max_acceleration * self._period_s**2)
-        return fits.argmax(axis=0) if fits.any(axis=0).all() else None
+        peak = state[1] + turn * (first + slope * (turn + 1.0) / 2.0)
+        peak = np.maximum(np.abs(peak), np.abs(first_acceleration))
+        is_within = jerk <= self._max_jerk * self._period_s**3
+        is_within &= peak <= self._max_acceleration * self._period_s**2
+        return is_within
 
 
 def _jerk_line(length: int) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from custom_ros_tools.schema import ConfigModel, Switch
 from .geometry.obstacles import Obstacle
 from .limits import JointLimits
 from .motion import Motion
+from .pursuit import Bound
 from .robot import GuardedRobot
 
 
@@ -108,6 +109,17 @@ class Check(ABC):
 
         What is not a number is never safe. A robot that is outside a limit of where it may be, may go further in.
         """
+
+    def bounds(self, end: np.ndarray, spread: np.ndarray) -> Sequence[Bound]:
+        """Returns what keeps the robot safe near where it would come to rest; only for the policy `limit`.
+
+        It helps to find a command that `check` will let pass, and judges nothing. It is called after `check`.
+
+        Args:
+            end: n positions where the robot would come to rest [rad or m].
+            spread: How far from there joints may come to rest instead; what is out of their reach may be left out.
+        """
+        return ()
 
     def first_above(self, values: np.ndarray, limit: np.ndarray, unit: tuple[str, str]) -> Violation | None:
         """Returns the first of k x n sizes that is above n limits.

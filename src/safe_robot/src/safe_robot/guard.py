@@ -1,5 +1,6 @@
 """The guard: takes a target, and decides what the robot is commanded to."""
 
+import logging
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -12,10 +13,12 @@ from .config import GuardConfig
 from .limits import JointLimits
 from .lookup import make_checks
 from .motion import Motion, State
-from .pursuit import pursue
+from .pursuit import Ends, can_keep_bounds, pursue, within_bounds
 from .robot import GuardedRobot
 
-SHARES = (1.0, 0.5, 0.25, 0.125)
+log = logging.getLogger(__name__)
+
+SHARES = (1.0, 0.5, 0.2)
 """How much of the way from braking to what is wanted is tried."""
 SLOW_S = 1e6
 """How long the way from where the robot is to the first target is taken to last [s]: it is not judged by speed."""
@@ -78,6 +81,9 @@ class Guard:
         self.checks: Sequence[Check] = make_checks(config.checks, robot, self.limits, file)
         self._braking = Braking(self.limits.velocity, self.limits.acceleration, self.limits.jerk, config.period_s)
         self._watches = {check.name for check in self.checks if check.watches}
+        self._keeps_bounds = config.policy == "limit" and can_keep_bounds()
+        if config.policy == "limit" and not self._keeps_bounds:
+            log.warning("%s: policy limit comes less near to targets without DAQP: run `./rpbi setup ik`", file)
         self.is_halted = True
         self._state: State | None = None
         self._is_first = True
@@ -230,12 +236,33 @@ class Guard:
         if self.config.policy == "reject" or violation.check in self._watches:  # no other command mends these
             return self._refused(violation)
         next_stop = self._stop[0] if len(self._stop) else self._state.position
-        wanted = pursue(np.array(target), self._state, self.limits, self._braking, self.config.period_s)
+        wanted = self._nearest(target)
         for share in SHARES:
             found = self._judged(tuple((next_stop + share * (wanted - next_stop)).tolist()), situation)
             if not isinstance(found, Violation):
                 return Decision(self._sent(found), violation)
         return Decision(self._brake_on(), violation)
+
+    def _nearest(self, target: tuple[float, ...]) -> np.ndarray:
+        """Returns the command that is nearest to what the joints alone can do, and which checks may let pass."""
+        assert self._state is not None
+        state, period_s = self._state, self.config.period_s
+        wanted, slowest = pursue(np.array(target), state, self.limits, self._braking, period_s)
+        if not self._keeps_bounds:
+            return wanted
+        there = self._stop[-1] if len(self._stop) else state.position
+        ends = Ends(wanted, state, self._braking, period_s)
+        spread = np.abs(ends.of(wanted) - there)
+        bounds = [bound for check in self.checks for bound in check.bounds(there, spread)]
+        if not bounds:
+            return wanted
+        other = np.where(self._may_rest(ends.of(slowest)), slowest, self._stop[0] if len(self._stop) else there)
+        least, most = np.minimum(wanted, other), np.maximum(wanted, other)
+        found = within_bounds(wanted, least, most, bounds, ends, there)
+        return wanted if found is None else found
+
+    def _may_rest(self, end: np.ndarray) -> np.ndarray:
+        return (end >= self.limits.lower) & (end <= self.limits.upper)
 
     def _brake_on(self) -> tuple[float, ...]:
         assert self._state is not None

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .braking import Brake
-from .robot import GuardedRobot, LinkPoses
+from .robot import GuardedRobot
 
 
 class State(NamedTuple):
@@ -57,14 +57,14 @@ class Motion:
         self.robot, self.start, self.period_s = robot, start, period_s
         state = start.then(command, period_s)
         jerk = (state.acceleration - start.acceleration) / period_s
-        rows = ((command, state.velocity, state.acceleration, jerk),)
-        self.position, self.velocity, self.acceleration, self.jerk = (np.array(row) for row in zip(*rows))
+        self.position, self.velocity = command[None], state.velocity[None]
+        self.acceleration, self.jerk = state.acceleration[None], jerk[None]
         if brake is not None:
             self.position = np.concatenate((self.position, command + brake.displacement))
             self.velocity = np.concatenate((self.velocity, brake.velocity))
             self.acceleration = np.concatenate((self.acceleration, brake.acceleration))
             self.jerk = np.concatenate((self.jerk, brake.jerk))
-        self._poses: dict[str, LinkPoses] = {}
+        self._link_positions: dict[str, np.ndarray] = {}
 
     @cached_property
     def with_start(self) -> np.ndarray:
@@ -72,26 +72,20 @@ class Motion:
         return np.concatenate((self.start.position[None], self.position))
 
     @cached_property
+    def travelled(self) -> np.ndarray:
+        """How far each joint moves from row 0 to each row, there and back counted, k x n [rad or m]."""
+        travelled = np.zeros_like(self.position)
+        np.cumsum(np.abs(self.position[1:] - self.position[:-1]), axis=0, out=travelled[1:])
+        return travelled
+
+    @property
     def path(self) -> np.ndarray:
         """How far each of n joints moves after row 0, there and back counted [rad or m]."""
-        return np.abs(np.diff(self.position, axis=0)).sum(axis=0)
+        path: np.ndarray = self.travelled[-1]
+        return path
 
-    def poses(self, link: str) -> LinkPoses:
-        """Returns where a link is in the robot's root, in the command before and the k rows."""
-        if link not in self._poses:
-            self._poses.update(self.robot.poses(self.with_start, [link]))
-        return self._poses[link]
-
-    def sparse_rows(self, reach: np.ndarray, spacing_m: float) -> np.ndarray:
-        """Returns rows of `with_start`, 0 excluded, between which nothing moves further than a spacing.
-
-        Row 1, the command, and the last row are among them; a single period's motion is not divided.
-
-        Args:
-            reach: How far n joints move anything, for 1 rad or m each, see `GuardedRobot.reach`.
-            spacing_m: The spacing [m].
-        """
-        travelled = np.cumsum(np.abs(np.diff(self.with_start, axis=0)) @ reach)
-        marks = np.arange(travelled[0] + spacing_m, travelled[-1], spacing_m)
-        rows = np.searchsorted(travelled, marks, side="right")
-        return np.unique(np.concatenate(((1,), rows, (len(self.position),))))
+    def link_positions(self, link: str) -> np.ndarray:
+        """Returns where the origin of a link is in the robot's root, in the command before and the k rows [m]."""
+        if link not in self._link_positions:
+            self._link_positions[link] = self.robot.link_positions(self.with_start, link)
+        return self._link_positions[link]

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -10,18 +9,6 @@ from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.transforms import quat_of
 from rpbi.geometry import Vector
 from rpbi.urdf.document import UrdfDocument, UrdfJoint
-
-
-class LinkPoses(NamedTuple):
-    """Where a link is in k configurations.
-
-    Attributes:
-        rotation: k x 3 x 3, or 1 x 3 x 3 if it is the same in all.
-        position: k x 3, or 1 x 3 [m].
-    """
-
-    rotation: np.ndarray
-    position: np.ndarray
 
 
 class GuardedRobot:
@@ -86,22 +73,12 @@ class GuardedRobot:
             link = joints[-1].parent
         return joints[::-1]
 
-    def poses(self, q: np.ndarray, links: Sequence[str]) -> dict[str, LinkPoses]:
-        """Returns where links are in the root, in k configurations.
-
-        Args:
-            q: k x n positions [rad or m].
-            links: Names of links.
-        """
-        found = {self._root: LinkPoses(np.eye(3)[None], np.zeros((1, 3)))}
-        for link in links:
-            for joint in self.chain(link):
-                if joint.child not in found:
-                    parent = found[joint.parent]
-                    rotation, shift = self._turns[joint.name].at(self._positions(joint, q))
-                    position = parent.position + (parent.rotation @ shift[..., None])[..., 0]
-                    found[joint.child] = LinkPoses(parent.rotation @ rotation, position)
-        return {link: found[link] for link in links}
+    def link_positions(self, q: np.ndarray, link: str) -> np.ndarray:
+        """Returns where the origin of a link is in the root, k x 3 [m], in k configurations of n positions."""
+        position = np.zeros((1, 3))
+        for joint in reversed(self.chain(link)):
+            position = self._turns[joint.name].carry(self._positions(joint, q), position)
+        return np.broadcast_to(position, (len(q), 3))
 
     def coupling(self, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
         """Returns how m joints follow from the n guarded ones: factors, m x n, and offsets, m [rad or m]."""
@@ -156,17 +133,23 @@ class _Turn:
         self._joint = joint
         x, y, z = joint.axis
         cross = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
-        self._sine, self._versine = self._fixed @ cross, self._fixed @ cross @ cross
+        sine, versine = self._fixed @ cross, self._fixed @ cross @ cross
         self._way = self._fixed @ np.array(joint.axis)
+        self._carrying = np.concatenate((self._fixed + versine, sine, -versine)).T.copy()
 
-    def at(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns rotations, k x 3 x 3, and shifts, k x 3, at k positions."""
-        if not self._joint.is_moving:
-            return self._fixed[None], self._shift[None]
-        if not self._joint.is_revolute:
-            return self._fixed[None], self._shift + position[:, None] * self._way
-        sine, versine = np.sin(position)[:, None, None], (1.0 - np.cos(position))[:, None, None]
-        return self._fixed + sine * self._sine + versine * self._versine, self._shift[None]
+    def carry(self, position: np.ndarray, point: np.ndarray) -> np.ndarray:
+        """Returns where k points, or one, that hang on it are in what it hangs on, k x 3, at k positions."""
+        if not point.any():
+            turned = point
+        elif self._joint.is_moving and self._joint.is_revolute:
+            parts = point @ self._carrying
+            sine, cosine = np.sin(position)[:, None], np.cos(position)[:, None]
+            turned = parts[:, :3] + sine * parts[:, 3:6] + cosine * parts[:, 6:]
+        else:
+            turned = point @ self._fixed.T
+        if self._joint.is_moving and not self._joint.is_revolute:
+            turned = turned + position[:, None] * self._way
+        return turned + self._shift
 
 
 def _matrix(rpy: Vector) -> np.ndarray:

@@ -13,6 +13,7 @@ from safe_robot.geometry.obstacles import Obstacle, obstacles_of_world
 from safe_robot.geometry.proximity import Proximity
 from safe_robot.limits import JointLimits
 from safe_robot.motion import Motion
+from safe_robot.pursuit import Bound
 from safe_robot.robot import GuardedRobot
 
 
@@ -71,6 +72,10 @@ class Environment(Check):
         link, number = found.pair
         subject = f"link '{link}' and '{self._obstacles[int(number)].name}'"
         return Violation(self.name, subject, found.distance, margin_m, unit, found.is_while_braking)
+
+    def bounds(self, end: np.ndarray, spread: np.ndarray) -> list[Bound]:
+        """See `Check`."""
+        return self.proximity.bounds(end, spread)
 
     def _take(self, live: tuple[Obstacle, ...]) -> None:
         """Puts obstacles where they are; what has not moved is not looked at anew."""

@@ -11,7 +11,13 @@ from custom_ros_tools.schema import ConfigModel, KeyedError
 from safe_robot.check import Check, CheckConfig, Situation, Violation
 from safe_robot.limits import JointLimits
 from safe_robot.motion import Motion
+from safe_robot.pursuit import Bound
 from safe_robot.robot import GuardedRobot
+
+STEP = 1e-6
+"""By so much joints are moved to see where a link goes [rad or m]."""
+KEPT_M = 1e-4
+"""So much inside its box a link is kept where a command is chosen [m]."""
 
 
 class BoxConfig(ConfigModel):
@@ -57,7 +63,7 @@ class LinkBox(Check):
     def check(self, motion: Motion, situation: Situation) -> Violation | None:
         """See `Check`."""
         for link, (low, high) in self._boxes.items():
-            position = motion.poses(link).position
+            position = motion.link_positions(link)
             before = position[0]
             is_inside = (position >= np.minimum(low, before)) & (position <= np.maximum(high, before))
             if not is_inside.all():
@@ -66,3 +72,15 @@ class LinkBox(Check):
                 limit = float(low[axis] if value < low[axis] else high[axis])
                 return Violation(self.name, f"{'xyz'[axis]} of link '{link}'", value, limit, "m", row > 1)
         return None
+
+    def bounds(self, end: np.ndarray, spread: np.ndarray) -> list[Bound]:
+        """See `Check`."""
+        bounds = []
+        rows = np.concatenate((end[None], end + STEP * np.eye(len(end))))
+        for link, (low, high) in self._boxes.items():
+            position = self.robot.link_positions(rows, link)
+            slopes = (position[1:] - position[0]).T / STEP  # 3 x n
+            for slope, room in ((slopes, position[0] - low), (-slopes, high - position[0])):
+                near = np.flatnonzero(np.abs(slope) @ spread > room - KEPT_M)
+                bounds += [Bound(slope[axis], max(float(room[axis]) - KEPT_M, 0.0)) for axis in near.tolist()]
+        return bounds

@@ -15,6 +15,7 @@ from safe_robot.geometry.distances import LinkDistances
 from safe_robot.geometry.proximity import Proximity
 from safe_robot.limits import JointLimits
 from safe_robot.motion import Motion
+from safe_robot.pursuit import Bound
 from safe_robot.robot import GuardedRobot
 
 
@@ -50,6 +51,10 @@ class SelfCollision(Check):
             return None
         subject, margin_m = "links '{}' and '{}'".format(*found.pair), self.config.margin_m
         return Violation(self.name, subject, found.distance, margin_m, "m of distance", found.is_while_braking)
+
+    def bounds(self, end: np.ndarray, spread: np.ndarray) -> list[Bound]:
+        """See `Check`."""
+        return self.proximity.bounds(end, spread)
 
     def _pairs(self) -> list[tuple[str, str]]:
         path = self.config.pairs_file

@@ -10,6 +10,7 @@ import numpy as np
 import pybullet
 
 from rpbi.engine.client import Client
+from rpbi.geometry import Vector, cross, dot, minus, rotated
 from rpbi.urdf.joints import Joint
 from rpbi.urdf.loading import load_urdf
 from safe_robot.robot import GuardedRobot
@@ -23,21 +24,26 @@ SAMPLES = 200
 ALWAYS = 0.95
 """Pairs that are too near in this share of them are left out: they are built so."""
 
+TRIED = 1e-4
+"""By so much joints are moved to see which way is apart [rad or m]."""
+FLAT = 1e-6
+"""What goes apart no faster than this does not move [m/rad]."""
+
 
 class Contact(NamedTuple):
     """How far two things are apart.
 
     Attributes:
         distance: Between their surfaces; negative if they are in each other [m].
-        direction: Unit vector to the first one, in the robot's root.
-        first: Where the first one is nearest, in the root [m].
-        second: The same for the second.
+        direction: Unit vector from one to the other, in the robot's root.
+        first: Where one of them is nearest, in the root [m].
+        second: The same for the other.
     """
 
     distance: float
-    direction: np.ndarray
-    first: np.ndarray
-    second: np.ndarray
+    direction: Vector
+    first: Vector
+    second: Vector
 
 
 class LinkDistances:
@@ -62,6 +68,7 @@ class LinkDistances:
         joints = Joint.all_of(self._pb, self._body)
         moving = [(joint.index, joint.name) for joint in joints if robot.document.joints[joint.name].is_moving]
         self._moving = [index for index, _ in moving]
+        self._row = {name: i for i, (_, name) in enumerate(moving)}
         self._all = robot.coupling([name for _, name in moving])
         names = {-1: self._pb.getBodyInfo(self._body)[0].decode(), **{joint.index: joint.link for joint in joints}}
         self._index = {name: i for i, name in names.items() if self._pb.getCollisionShapeData(self._body, i)}
@@ -110,7 +117,30 @@ class LinkDistances:
         if not points:
             return None
         point = min(points, key=lambda each: each[8])
-        return Contact(point[8], *(np.array(point[i]) for i in (7, 5, 6)))
+        return Contact(point[8], point[7], point[5], point[6])
+
+    def gradient(self, pair: Pair, contact: Contact, q: np.ndarray) -> np.ndarray:
+        """Returns how fast two things go apart as each of n joints moves, by where `contact` found them [m/rad or 1].
+
+        The robot is in q, n positions, and put there again: which of two links PyBullet took first has to be tried.
+        """
+        states = self._pb.getLinkStates(self._body, self._moving, computeForwardKinematics=1)
+        along = np.zeros(len(self._moving))
+        for link, point, sign in ((pair[0], contact.first, 1.0), (pair[1], contact.second, -1.0)):
+            for joint in self._robot.chain(link) if isinstance(link, str) else ():
+                if joint.is_moving:
+                    i = self._row[joint.name]
+                    axis = rotated(states[i][5], joint.axis)
+                    way = cross(axis, minus(point, states[i][4])) if joint.is_revolute else axis
+                    along[i] += sign * dot(contact.direction, way)
+        gradient = along @ self._all[0]
+        steepest = float(np.abs(gradient).max())
+        if steepest < FLAT:
+            return gradient
+        self.place(q + TRIED * gradient / steepest)
+        is_further = self.distance(pair, math.inf) > contact.distance
+        self.place(q)
+        return gradient if is_further else -gradient
 
     def _closest(self, pair: Pair, most_m: float) -> Any:
         link, other = pair
@@ -162,8 +192,8 @@ class LinkDistances:
     def _radius(self, link: str) -> float:
         """Returns how far the shape of a link goes from the link's origin, at most [m]."""
         lower, upper = self._pb.getAABB(self._body, self._index[link])
-        pose = self._robot.poses(np.zeros((1, len(self._robot.joint_names))), [link])[link]
-        return math.hypot(*np.maximum(np.subtract(upper, pose.position[0]), np.subtract(pose.position[0], lower)))
+        origin = self._robot.link_positions(np.zeros((1, len(self._robot.joint_names))), link)[0]
+        return math.hypot(*np.maximum(np.subtract(upper, origin), np.subtract(origin, lower)))
 
 
 def _anywhere(generator: random.Random, lower: float, upper: float) -> float:

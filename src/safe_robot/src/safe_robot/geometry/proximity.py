@@ -1,19 +1,25 @@
 """Which things come too near to each other while a robot moves."""
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from safe_robot.motion import Motion
+from safe_robot.pursuit import Bound
 
-from .distances import Contact, LinkDistances, Pair
+from .distances import LinkDistances, Pair
 
 LEAST_SPACING_M = 0.01
 """The braking is tried no more densely than this [m], however small the margin is."""
 ROUNDING_M = 1e-9
 """Distances that differ by less are equal [m]."""
-FAR_M = 0.3
+KEPT_M = 1e-4
+"""So much more than the margin is kept where a command is chosen, since distances are taken to be linear there [m]."""
+STALE = 0.25
+"""A distance is looked at anew when joints have moved so much of it."""
+FAR_M = 0.5
 """Distances are not looked at beyond this [m]."""
 
 
@@ -31,11 +37,22 @@ class TooNear(NamedTuple):
     is_while_braking: bool
 
 
+def _onward(travelled: list[float], mark: int, to_m: float, last: int) -> int:
+    """Returns the first mark beyond a way, or one before it where pairs often meet; above the last one: none is."""
+    found = bisect_right(travelled, to_m)
+    if found > last:
+        return found
+    for coarse in (8, 4, 2):
+        if found // coarse * coarse > mark:
+            return found // coarse * coarse
+    return found
+
+
 class Proximity:
     """Finds out which pairs come nearer than a margin, and nearer than they were.
 
     Distances are looked at anew only when joints have moved so far since that a pair might be too near. So most
-    commands need few of them, and the answers are the same.
+    commands need few of them.
 
     Args:
         distances: Where shapes are.
@@ -54,49 +71,66 @@ class Proximity:
         self._known_m[list(indices)] = -np.inf
 
     def first(self, motion: Motion) -> TooNear | None:
-        """Returns the first pair that comes too near in a motion."""
+        """Returns the first pair that comes too near in a motion.
+
+        From where a pair is so far apart, the braking is followed to where it might be too near, and so on.
+        """
         if not len(self._pairs):
             return None
-        near = self._near(motion)
-        if len(near):
-            self._look_at(motion.position[0], near)
-            near = self._near(motion)
-        return self._nearer(motion, near) if len(near) else None
-
-    def contacts(self, q: np.ndarray, within_m: float) -> list[tuple[Pair, Contact]]:
-        """Returns where pairs are nearest that are within a distance, in a configuration of n positions."""
-        if not len(self._pairs):
-            return []
-        nearest = self._known_m - (np.abs(q - self._known_at) * self._reach).sum(axis=1)
-        near = np.flatnonzero(~(nearest > within_m)).tolist()
-        if near:
-            self._distances.place(q)
-        found = ((self._pairs[i], self._distances.contact(self._pairs[i], within_m)) for i in near)
-        return [(pair, contact) for pair, contact in found if contact is not None]
-
-    def _look_at(self, q: np.ndarray, indices: np.ndarray) -> None:
-        self._distances.place(q)
-        self._known_m[indices] = [min(self._distances.distance(self._pairs[i], FAR_M), FAR_M) for i in indices.tolist()]
-        self._known_at[indices] = q
-
-    def _near(self, motion: Motion) -> np.ndarray:
-        """Returns which pairs might come too near, by how far they were apart somewhere and how far they move."""
-        moved = np.abs(motion.position[0] - self._known_at) + motion.path  # pairs x n
-        nearest = self._known_m - (moved * self._reach).sum(axis=1)
-        return np.flatnonzero(~(nearest > self._margin_m + ROUNDING_M))
-
-    def _nearer(self, motion: Motion, near: np.ndarray) -> TooNear | None:
-        margin_m = self._margin_m
-        reach = self._reach[near].max(axis=0)
-        indices = near.tolist()
-        for row in motion.sparse_rows(reach, max(2.0 * margin_m, LEAST_SPACING_M)).tolist():
-            self._distances.place(motion.with_start[row])
-            found = [(i, self._distances.distance(self._pairs[i], margin_m)) for i in indices]
-            for i, distance in found:
-                if not distance >= margin_m and not distance >= self._at(motion.start.position, i) - ROUNDING_M:
-                    return TooNear(self._pairs[i], distance, row > 1)
+        margin_m, reach = self._margin_m, self._reach
+        lost = (np.abs(motion.position[0] - self._known_at) * reach).sum(axis=1)
+        room = self._known_m - lost - (margin_m + ROUNDING_M)
+        near = np.flatnonzero(~(room > reach @ motion.path))
+        if not len(near):
+            return None
+        room = np.where(lost[near] <= STALE * (self._known_m[near] - margin_m), room[near], -1.0)
+        least = max(2.0 * margin_m, LEAST_SPACING_M)
+        rows = self._sparse(motion.travelled @ reach[near].max(axis=0), least)
+        travelled = (motion.travelled[rows] @ reach[near].T).T.tolist()  # of each pair, from the command on
+        last = len(rows) - 1
+        due = [_onward(one, -1, each, last) if each > 0.0 else 0 for one, each in zip(travelled, room.tolist())]
+        while (mark := min(due)) <= last:
+            self._distances.place(motion.position[rows[mark]])
+            for k in [k for k, each in enumerate(due) if each == mark]:
+                i = int(near[k])
+                distance = self._distances.distance(self._pairs[i], FAR_M)
+                if not distance >= margin_m and not self._is_further(motion, i, distance, rows[mark]):
+                    return TooNear(self._pairs[i], distance, mark > 0)
+                distance = min(distance, FAR_M)
+                if mark == 0:
+                    self._known_m[i], self._known_at[i] = distance, motion.position[0]
+                room_m = distance - margin_m - ROUNDING_M
+                to_m = travelled[k][mark] + room_m
+                due[k] = mark + 1 if room_m <= least else max(_onward(travelled[k], mark, to_m, last), mark + 1)
         return None
 
-    def _at(self, q: np.ndarray, i: int) -> float:
-        self._distances.place(q)
-        return self._distances.distance(self._pairs[i], self._margin_m)
+    def _sparse(self, travelled: np.ndarray, spacing_m: float) -> list[int]:
+        """Returns rows, the first and the last among them, between which nothing moves further than a spacing."""
+        marks = np.arange(spacing_m, travelled[-1], spacing_m)
+        rows = np.searchsorted(travelled, marks, side="right").tolist()
+        return list(dict.fromkeys((0, *rows, len(travelled) - 1)))
+
+    def _is_further(self, motion: Motion, i: int, distance: float, row: int) -> bool:
+        """Returns whether a pair that is too near was no further apart before the motion."""
+        self._distances.place(motion.start.position)
+        before = self._distances.distance(self._pairs[i], FAR_M)
+        self._distances.place(motion.position[row])
+        return distance >= before - ROUNDING_M
+
+    def bounds(self, end: np.ndarray, spread: np.ndarray) -> list[Bound]:
+        """Returns what keeps pairs apart near a configuration, see `Check.bounds`."""
+        if not len(self._pairs):
+            return []
+        moved = np.abs(end - self._known_at) + spread
+        nearest = self._known_m - (moved * self._reach).sum(axis=1)
+        near = np.flatnonzero(~(nearest > self._margin_m + KEPT_M)).tolist()
+        if near:
+            self._distances.place(end)
+        bounds = []
+        for i in near:
+            within_m = self._margin_m + KEPT_M + float(spread @ self._reach[i])
+            contact = self._distances.contact(self._pairs[i], within_m)
+            if contact is not None:
+                room = max(contact.distance - self._margin_m - KEPT_M, 0.0)
+                bounds.append(Bound(self._distances.gradient(self._pairs[i], contact, end), room))
+        return bounds
