@@ -20,9 +20,9 @@ from result import Result, table
 
 BENCHMARKS = (
     *("loop", "many", "load", "camera", "latency", "free_run", "reset", "tables"),
-    *("ik", "ik_nodes", "device", "mvn", "grasp", "physics"),
+    *("ik", "ik_nodes", "device", "mvn", "grasp", "guard", "physics"),
 )
-WHEN_NAMED = ("dressing", "haptics", "passivity", "press", "soak")
+WHEN_NAMED = ("dressing", "guard_faults", "haptics", "passivity", "press", "soak")
 """Those that take too long to run with the others."""
 FIND_RENDERER = """
 from rpbi.render.camera import Intrinsics

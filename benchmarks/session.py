@@ -87,6 +87,10 @@ class Session:
         """Starts one of `programs/`."""
         return self.start([sys.executable, "-u", str(PROGRAMS / f"{name}.py"), *map(str, arguments)])
 
+    def set_parameters(self, name: str, values: dict[str, Any]) -> None:
+        """Sets the parameters below a name."""
+        self._master.setParam(name, values)
+
     def simulator(self, world: dict[str, Any]) -> subprocess.Popen[bytes]:
         """Starts the simulator with a main configuration and waits until it is up."""
         self._master.setParam("/ros_pybullet_interface/config", world)

@@ -22,6 +22,7 @@ MODULES = {
     "ros_pybullet_interface": "rpbi",
     "ik_ros": "ik_ros",
     "operator_node": "operator_node",
+    "safe_robot": "safe_robot",
     "rpbi_utils": "rpbi_utils",
     "rpbi_examples": "rpbi_examples",
 }
@@ -31,8 +32,11 @@ ALLOWED = {
     "ros_pybullet_interface": {"custom_ros_tools"},
     "ik_ros": {"custom_ros_tools", "ros_pybullet_interface"},
     "operator_node": {"custom_ros_tools", "ros_pybullet_interface"},
+    "safe_robot": {"custom_ros_tools", "ros_pybullet_interface"},
     "rpbi_utils": {"custom_ros_tools", "ros_pybullet_interface"},
-    "rpbi_examples": {"custom_ros_tools", "ros_pybullet_interface", "ik_ros", "operator_node", "rpbi_utils"},
+    "rpbi_examples": {
+        *("custom_ros_tools", "ros_pybullet_interface", "ik_ros", "operator_node", "safe_robot", "rpbi_utils"),
+    },
 }
 """What each package may depend on."""
 FORMER_NODES = {"ik_ros": {"operator_node"}}
@@ -133,6 +137,7 @@ FAMILIES = {
     "task": ("ik_ros.tasks:TASKS", "ik_ros.formulation.task:Task", "ik_tasks.md"),
     "device": ("operator_node.devices:DEVICES", "operator_node.device:Device", "devices.md"),
     "mapping": ("operator_node.mappings:MAPPINGS", "operator_node.mappings.mapping:Mapping", "teleoperation.md"),
+    "check": ("safe_robot.checks:CHECKS", "safe_robot.check:Check", "safety.md"),
 }
 """Table, base class and page of each family of plug-ins; their files are where the table is."""
 

@@ -24,6 +24,7 @@ TABLES = (
     "ik_ros.tasks",
     "operator_node.devices",
     "operator_node.mappings",
+    "safe_robot.checks",
 )
 """Packages whose classes have a file each, whoever imports them."""
 ONE_PLACE = {

@@ -18,6 +18,7 @@ from ik_ros.msg import IKProblem
 JOINTS = [f"lwr_arm_{index}_joint" for index in range(7)]
 CENTRE = (-0.5, 0.0, 0.4)  # [m], where the tip of the LWR points downwards
 RADIUS_M, LAP_S = 0.1, 4.0
+HOME, SWING_RAD = (0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0), 0.1
 WARM_UP_S = 1.0
 ANSWER_S = 0.5
 """How long the last answers may take."""
@@ -31,9 +32,10 @@ def problem(header: Header, time_s: float) -> IKProblem:
     return IKProblem(header=header, has_target=True, target=Pose(place, Quaternion(1.0, 0.0, 0.0, 0.0)))
 
 
-def joint_state(header: Header, time_s: float) -> JointState:
-    """Returns a joint state as large as a target."""
-    return JointState(header=header, name=JOINTS, position=[time_s] * 7)
+def joint_state(header: Header, share: float) -> JointState:
+    """Returns a joint state at a share of a way on which the arm swings out of its home and comes to rest there."""
+    swing = SWING_RAD * math.sin(math.pi * min(share / 0.95, 1.0)) ** 4
+    return JointState(header=header, name=JOINTS, position=[position + swing for position in HOME])
 
 
 def latencies_s(sent_ns: list[int], arrivals_ns: dict[int, int]) -> list[float]:
@@ -62,11 +64,12 @@ def main() -> None:
     arguments = parser.parse_args()
     rospy.init_node("circle", anonymous=True, disable_signals=True)
     arrivals_ns: dict[int, int] = {}
+    to_wall_ns = time.time_ns() - time.monotonic_ns()
 
     def take(message: JointState) -> None:
-        arrivals_ns[message.header.stamp.to_nsec()] = time.monotonic_ns()
+        arrivals_ns[message.header.stamp.to_nsec() - to_wall_ns] = time.monotonic_ns()
 
-    make, message_type = (joint_state, JointState) if arguments.joint_states else (problem, IKProblem)
+    message_type = JointState if arguments.joint_states else IKProblem
     publisher = rospy.Publisher(arguments.topic, message_type, queue_size=10, tcp_nodelay=True)
     subscriber = rospy.Subscriber(arguments.target, JointState, take, tcp_nodelay=True)
     while not (publisher.get_num_connections() and subscriber.get_num_connections()):
@@ -80,8 +83,11 @@ def main() -> None:
         if left_ns > 0:
             time.sleep(left_ns * 1e-9)
         sent_ns.append(time.monotonic_ns())
-        stamp = genpy.Time(*divmod(sent_ns[-1], 1_000_000_000))
-        publisher.publish(make(Header(stamp=stamp, frame_id="base"), tick * period_ns * 1e-9))
+        header = Header(stamp=genpy.Time(*divmod(sent_ns[-1] + to_wall_ns, 1_000_000_000)), frame_id="base")
+        if arguments.joint_states:
+            publisher.publish(joint_state(header, tick / (warm_up + arguments.count)))
+        else:
+            publisher.publish(problem(header, tick * period_ns * 1e-9))
     time.sleep(ANSWER_S)
     answered = sum(sent in arrivals_ns for sent in sent_ns[warm_up:]) / arguments.count
     print("result:", json.dumps({"answered": answered, "latencies_s": latencies_s(sent_ns, arrivals_ns)[warm_up:]}))

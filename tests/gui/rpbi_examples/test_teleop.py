@@ -61,12 +61,18 @@ def follows(example, position) -> Callable[[np.ndarray, Callable[[], object], Ca
     """Moves a device until the arm has gone 4 cm in a direction, lets go, and sees it stand still at its target."""
     signals = example.listen("operator_node/signal", Float64MultiArray)
 
+    def stands(before: list[np.ndarray]) -> bool:
+        """Tells whether the tip is at its target, and was where it is when this was asked before."""
+        before.append(position(TIP))
+        return np.linalg.norm(before[-1] - before[-2]) < 5e-4 and np.linalg.norm(before[-1] - position(TARGET)) < 2e-3
+
     def run(direction: np.ndarray, move: Callable[[], object], let_go: Callable[[], object]) -> None:
         start = position(TIP)
         wait_until(lambda: move() or (position(TIP) - start) @ direction > 0.04, "the arm follows", SLOW_S)
         let_go()
         wait_until(lambda: signals.messages and not any(signals.messages[-1].data), "the signal is zero")
-        wait_until(lambda: np.linalg.norm(position(TIP) - position(TARGET)) < 2e-3, "the arm is at its target", SLOW_S)
+        seen = [start]  # it goes a little too far and comes back, since it cannot stop as suddenly as a key is let go
+        wait_until(lambda: stands(seen), "the arm stands at its target", SLOW_S, every_s=0.3)
         way = position(TIP) - start
         assert np.linalg.norm(way - (way @ direction) * direction) < 5e-3, "it goes in no other direction"
 

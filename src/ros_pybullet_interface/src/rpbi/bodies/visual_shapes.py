@@ -98,7 +98,7 @@ def _parts(body: Body, data: Sequence[Any]) -> list[BodyShape]:
     if kind == pybullet.GEOM_PLANE:
         # PyBullet does not tell the normal of a plane; that of a URDF is taken to be z.
         normal = visual.planeNormal if visual is not None else None
-        surface = frame @ Pose(quat_xyzw=_turned_to(normal or (0.0, 0.0, 1.0)))
+        surface = frame @ Pose(quat_xyzw=turned_to(normal or (0.0, 0.0, 1.0)))
         middle = surface @ Pose((0.0, 0.0, -PLANE_THICKNESS_M / 2))
         return [shape(ShapeKind.BOX, (PLANE_SIZE_M, PLANE_SIZE_M, PLANE_THICKNESS_M), middle)]
     if file:
@@ -112,7 +112,7 @@ def _cube(edge_m: float) -> Vector:
     return edge_m, edge_m, edge_m
 
 
-def _turned_to(normal: Vector) -> Quaternion:
+def turned_to(normal: Vector) -> Quaternion:
     """Returns the shortest rotation that turns z to a direction: about their cross product, `1 + cos` as its w."""
     length = math.hypot(*normal)
     x, y, z = (component / length for component in normal)

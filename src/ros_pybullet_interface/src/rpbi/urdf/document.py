@@ -295,6 +295,19 @@ def mimics_of(path: str) -> dict[str, Mimic]:
     return {}
 
 
+def disabled_collisions(path: str) -> set[frozenset[str]]:
+    """Returns the pairs of links of which a SRDF file says that they need not be kept apart.
+
+    Raises:
+        ConfigError: If it cannot be read or is not well-formed.
+    """
+    try:
+        root = _parse(read_file(path, MOST_BYTES).decode(errors="replace"))
+    except (OSError, expat.ExpatError, RecursionError) as error:
+        raise ConfigError([Problem(path, "", f"expected a SRDF file: {error}")]) from None
+    return {frozenset((pair.get("link1", ""), pair.get("link2", ""))) for pair in root.iter("disable_collisions")}
+
+
 def chain_urdf(joints: Sequence[UrdfJoint]) -> str:
     """Returns a URDF of a chain of joints with bare links, from its base to its tip."""
     links = [_element("link", name=name) for name in (joints[0].parent, *(joint.child for joint in joints))]

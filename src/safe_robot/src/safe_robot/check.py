@@ -1,0 +1,142 @@
+"""What every check is."""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel, Switch
+
+from .geometry.obstacles import Obstacle
+from .limits import JointLimits
+from .motion import Motion
+from .pursuit import Bound
+from .robot import GuardedRobot
+
+
+class CheckConfig(ConfigModel):
+    """Options that every check has."""
+
+    active: Switch = Field(True, description="Whether it is made.")
+
+
+class Violation(NamedTuple):
+    """Why a target is not safe.
+
+    Attributes:
+        check: Name of the check.
+        subject: The joint, the link, the pair of links, or what else it is about.
+        value: What the target would bring about, in `unit`; NaN, as `limit`, if it is not about a number.
+        limit: What is allowed, in `unit`.
+        unit: The unit of both.
+        is_while_braking: Whether it is not the target itself but the braking from it that is not safe.
+    """
+
+    check: str
+    subject: str
+    value: float
+    limit: float
+    unit: str
+    is_while_braking: bool = False
+
+    def __str__(self) -> str:
+        if math.isnan(self.limit):
+            return f"{self.check}: {self.subject}"
+        while_braking = " while braking from there" if self.is_while_braking else ""
+        value = f"{self.value:.6g} {self.unit}{while_braking}"
+        return f"{self.check}: {self.subject} would have {value}; the limit is {self.limit:.6g}"
+
+
+class Situation(NamedTuple):
+    """What a target is judged by, beside the motion.
+
+    Attributes:
+        now_s: The present time [s], of a clock that never goes back.
+        age_s: How old the target is [s]; 0 if nobody knows.
+        stamp_step_s: How much later its stamp is than that of the target before [s]; None without one.
+        since_command_s: How long ago the command before was sent [s].
+        measured: Measured positions by joint [rad or m], empty if there are none.
+        measured_age_s: How old they are [s].
+        wrench: Measured force x, y, z [N] and torque x, y, z [N m].
+        wrench_age_s: How old they are [s]; inf if there are none.
+        obstacles: Bodies of the environment, as they are now; None if nobody tells. Equal ones are the same tuple.
+    """
+
+    now_s: float = 0.0
+    age_s: float = 0.0
+    stamp_step_s: float | None = None
+    since_command_s: float = 0.0
+    measured: Mapping[str, float] = {}
+    measured_age_s: float = 0.0
+    wrench: tuple[float, ...] = (0.0,) * 6
+    wrench_age_s: float = float("inf")
+    obstacles: tuple[Obstacle, ...] | None = None
+
+
+class Check(ABC):
+    """A check of motions. It keeps no state: equal motions have equal answers, whatever was asked before.
+
+    Args:
+        config: Its options.
+        robot: The robot.
+        limits: Limits of its n joints.
+        file: Where the options come from, for messages.
+
+    Raises:
+        ConfigError: If the options do not go with the robot.
+
+    Attributes:
+        Config: Model of its options.
+        name: Its name in the table and in messages.
+        is_default: Whether it is made without being named in the configuration.
+        watches: Whether it is about the situation, not the command, so that it is made also while no target comes.
+    """
+
+    Config: ClassVar[type[CheckConfig]] = CheckConfig
+    name: ClassVar[str]
+    is_default: ClassVar[bool] = False
+    watches: ClassVar[bool] = False
+
+    def __init__(self, config: Any, robot: GuardedRobot, limits: JointLimits, file: str) -> None:
+        self.config, self.robot, self.limits, self.file = config, robot, limits, file
+
+    @abstractmethod
+    def check(self, motion: Motion, situation: Situation) -> Violation | None:
+        """Returns what is not safe about a motion, None if nothing is.
+
+        What is not a number is never safe. A robot that is outside a limit of where it may be, may go further in.
+        """
+
+    def bounds(self, end: np.ndarray, spread: np.ndarray) -> Sequence[Bound]:
+        """Returns what keeps the robot safe near where it would come to rest; only for the policy `limit`.
+
+        It helps to find a command that `check` will let pass, and judges nothing. It is called after `check`.
+
+        Args:
+            end: n positions where the robot would come to rest [rad or m].
+            spread: How far from there joints may come to rest instead; what is out of their reach may be left out.
+        """
+        return ()
+
+    def first_above(self, values: np.ndarray, limit: np.ndarray, unit: tuple[str, str]) -> Violation | None:
+        """Returns the first of k x n sizes that is above n limits.
+
+        Args:
+            values: Sizes, none negative.
+            limit: n limits, or k x n.
+            unit: The unit for a joint that turns, and for one that slides.
+        """
+        is_inside = values <= limit
+        if is_inside.all():
+            return None
+        row, i = divmod(int(np.argmin(is_inside)), values.shape[1])
+        most = float(np.broadcast_to(limit, values.shape)[row, i])
+        return self.of_joint(i, float(values[row, i]), most, unit, row > 0)
+
+    def of_joint(self, i: int, value: float, limit: float, unit: tuple[str, str], is_while_braking: bool) -> Violation:
+        """Returns the violation of a joint."""
+        words = unit[0] if self.robot.joints[i].is_revolute else unit[1]
+        return Violation(self.name, f"joint '{self.robot.joint_names[i]}'", value, limit, words, is_while_braking)

@@ -1,0 +1,39 @@
+"""Measured forces and torques."""
+
+import math
+
+from pydantic import Field
+
+from custom_ros_tools.schema import Positive, Seconds
+from safe_robot.check import Check, CheckConfig, Situation, Violation
+from safe_robot.motion import Motion
+
+
+class ForceConfig(CheckConfig):
+    """How much force a sensor may feel."""
+
+    force_n: Positive = Field(50.0, description="Largest force [N].")
+    torque_nm: Positive = Field(10.0, description="Largest torque [N m].")
+    timeout_s: Seconds = Field(0.1, description="Oldest measurement.")
+
+
+class Force(Check):
+    """A sensor feels no more force and torque than it may, and its measurement is not old."""
+
+    Config = ForceConfig
+    name = "force"
+    watches = True
+
+    def check(self, motion: Motion, situation: Situation) -> Violation | None:
+        """See `Check`."""
+        config = self.config
+        if not situation.wrench_age_s <= config.timeout_s:
+            return Violation(self.name, "the age of the wrench", situation.wrench_age_s, config.timeout_s, "s")
+        for what, values, limit, unit in (
+            ("the force", situation.wrench[:3], config.force_n, "N"),
+            ("the torque", situation.wrench[3:], config.torque_nm, "N m"),
+        ):
+            size = math.hypot(*values)
+            if not size <= limit:
+                return Violation(self.name, what, size, limit, unit)
+        return None

@@ -1,0 +1,19 @@
+"""Accelerations of joints within their limits."""
+
+import numpy as np
+
+from safe_robot.check import Check, Situation, Violation
+from safe_robot.motion import Motion
+
+UNIT = ("rad/s^2", "m/s^2")
+
+
+class JointAcceleration(Check):
+    """No joint has more acceleration than its limit, in the differences of commands a period apart."""
+
+    name = "joint_acceleration"
+    is_default = True
+
+    def check(self, motion: Motion, situation: Situation) -> Violation | None:
+        """See `Check`."""
+        return self.first_above(np.abs(motion.acceleration), self.limits.acceleration, UNIT)

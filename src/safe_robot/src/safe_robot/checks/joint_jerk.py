@@ -1,0 +1,19 @@
+"""Jerks of joints within their limits."""
+
+import numpy as np
+
+from safe_robot.check import Check, Situation, Violation
+from safe_robot.motion import Motion
+
+UNIT = ("rad/s^3", "m/s^3")
+
+
+class JointJerk(Check):
+    """No joint has more jerk than its limit, in the differences of commands a period apart."""
+
+    name = "joint_jerk"
+    is_default = True
+
+    def check(self, motion: Motion, situation: Situation) -> Violation | None:
+        """See `Check`."""
+        return self.first_above(np.abs(motion.jerk), self.limits.jerk, UNIT)

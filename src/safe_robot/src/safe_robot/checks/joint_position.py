@@ -1,0 +1,26 @@
+"""Positions of joints within their limits."""
+
+import numpy as np
+
+from safe_robot.check import Check, Situation, Violation
+from safe_robot.motion import Motion
+
+UNIT = ("rad", "m")
+
+
+class JointPosition(Check):
+    """Every joint stays within its limits, and can come to rest there: so it is the slower the nearer the limit is."""
+
+    name = "joint_position"
+    is_default = True
+
+    def check(self, motion: Motion, situation: Situation) -> Violation | None:
+        """See `Check`."""
+        q, before = motion.position, motion.start.position
+        low, high = np.minimum(self.limits.lower, before), np.maximum(self.limits.upper, before)
+        is_inside = (q >= low) & (q <= high)
+        if is_inside.all():
+            return None
+        row, i = divmod(int(np.argmin(is_inside)), q.shape[1])
+        limit = self.limits.lower[i] if q[row, i] < low[i] else self.limits.upper[i]
+        return self.of_joint(i, float(q[row, i]), float(limit), UNIT, row > 0)

@@ -1,0 +1,86 @@
+"""Boxes that links stay in."""
+
+import math
+from typing import Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
+from custom_ros_tools.schema import ConfigModel, KeyedError
+from safe_robot.check import Check, CheckConfig, Situation, Violation
+from safe_robot.limits import JointLimits
+from safe_robot.motion import Motion
+from safe_robot.pursuit import Bound
+from safe_robot.robot import GuardedRobot
+
+STEP = 1e-6
+"""By so much joints are moved to see where a link goes [rad or m]."""
+KEPT_M = 1e-4
+"""So much inside its box a link is kept where a command is chosen [m]."""
+
+
+class BoxConfig(ConfigModel):
+    """A box in the robot's root link; an axis without limits may be left out."""
+
+    x: tuple[float | None, float | None] = Field((None, None), strict=False, description="Least and greatest x [m].")
+    y: tuple[float | None, float | None] = Field((None, None), strict=False, description="Least and greatest y [m].")
+    z: tuple[float | None, float | None] = Field((None, None), strict=False, description="Least and greatest z [m].")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> "BoxConfig":
+        for key in "xyz":
+            low, high = getattr(self, key)
+            if low is not None and high is not None and low >= high:
+                raise KeyedError(key, f"expected the least value first, got {low:g} and {high:g}")
+        return self
+
+
+class LinkBoxConfig(CheckConfig):
+    """Boxes that links stay in."""
+
+    boxes: dict[str, BoxConfig] = Field({}, description="A box for each link whose origin is to stay in one.")
+
+
+class LinkBox(Check):
+    """The origins of links stay in boxes."""
+
+    Config = LinkBoxConfig
+    name = "link_box"
+
+    def __init__(self, config: Any, robot: GuardedRobot, limits: JointLimits, file: str) -> None:
+        super().__init__(config, robot, limits, file)
+        self._boxes: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        for link, box in config.boxes.items():
+            try:
+                robot.check_link(link)
+            except UnknownNameError as error:
+                raise ConfigError([Problem(file, f"checks.link_box.boxes.{link}", str(error))]) from None
+            low = [-math.inf if axis[0] is None else axis[0] for axis in (box.x, box.y, box.z)]
+            high = [math.inf if axis[1] is None else axis[1] for axis in (box.x, box.y, box.z)]
+            self._boxes[link] = np.array(low), np.array(high)
+
+    def check(self, motion: Motion, situation: Situation) -> Violation | None:
+        """See `Check`."""
+        for link, (low, high) in self._boxes.items():
+            position = motion.link_positions(link)
+            before = position[0]
+            is_inside = (position >= np.minimum(low, before)) & (position <= np.maximum(high, before))
+            if not is_inside.all():
+                row, axis = divmod(int(np.argmin(is_inside)), 3)
+                value = float(position[row, axis])
+                limit = float(low[axis] if value < low[axis] else high[axis])
+                return Violation(self.name, f"{'xyz'[axis]} of link '{link}'", value, limit, "m", row > 1)
+        return None
+
+    def bounds(self, end: np.ndarray, spread: np.ndarray) -> list[Bound]:
+        """See `Check`."""
+        bounds = []
+        rows = np.concatenate((end[None], end + STEP * np.eye(len(end))))
+        for link, (low, high) in self._boxes.items():
+            position = self.robot.link_positions(rows, link)
+            slopes = (position[1:] - position[0]).T / STEP  # 3 x n
+            for slope, room in ((slopes, position[0] - low), (-slopes, high - position[0])):
+                near = np.flatnonzero(np.abs(slope) @ spread > room - KEPT_M)
+                bounds += [Bound(slope[axis], max(float(room[axis]) - KEPT_M, 0.0)) for axis in near.tolist()]
+        return bounds

@@ -1,0 +1,46 @@
+"""Speeds of links."""
+
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
+from custom_ros_tools.schema import Positive
+from safe_robot.check import Check, CheckConfig, Situation, Violation
+from safe_robot.limits import JointLimits
+from safe_robot.motion import Motion
+from safe_robot.robot import GuardedRobot
+
+
+class LinkVelocityConfig(CheckConfig):
+    """How fast links may be."""
+
+    links: dict[str, Positive] = Field({}, description="The largest speed of the origin of each of these links [m/s].")
+
+
+class LinkVelocity(Check):
+    """The origins of links are not faster than they may be, also while all joints brake."""
+
+    Config = LinkVelocityConfig
+    name = "link_velocity"
+
+    def __init__(self, config: Any, robot: GuardedRobot, limits: JointLimits, file: str) -> None:
+        super().__init__(config, robot, limits, file)
+        for link in config.links:
+            try:
+                robot.check_link(link)
+            except UnknownNameError as error:
+                raise ConfigError([Problem(file, f"checks.link_velocity.links.{link}", str(error))]) from None
+
+    def check(self, motion: Motion, situation: Situation) -> Violation | None:
+        """See `Check`."""
+        for link, limit in self.config.links.items():
+            position = motion.link_positions(link)
+            step = position[1:] - position[:-1]
+            speed = np.sqrt((step * step).sum(axis=1)) / motion.period_s
+            is_slow = speed <= limit
+            if not is_slow.all():
+                row = int(np.argmin(is_slow))
+                return Violation(self.name, f"link '{link}'", float(speed[row]), limit, "m/s", row > 0)
+        return None

@@ -1,0 +1,97 @@
+"""Distances between the links of the robot."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from pydantic import Field
+
+from custom_ros_tools.errors import ConfigError, Problem, hint
+from custom_ros_tools.schema import NonNegativeMetres, Text
+from rpbi.urdf.document import disabled_collisions
+from safe_robot.check import Check, CheckConfig, Situation, Violation
+from safe_robot.geometry.distances import LinkDistances
+from safe_robot.geometry.proximity import Proximity
+from safe_robot.limits import JointLimits
+from safe_robot.motion import Motion
+from safe_robot.pursuit import Bound
+from safe_robot.robot import GuardedRobot
+
+
+class SelfCollisionConfig(CheckConfig):
+    """How near the links of the robot may come to each other."""
+
+    margin_m: NonNegativeMetres = Field(0.01, description="Least distance between links [m].")
+    srdf: Text | None = Field(None, description="A SRDF; pairs for which it disables collisions are left out.")
+    pairs_file: Text | None = Field(
+        None, description="YAML of the pairs; it is written if it is not there, and read if it is."
+    )
+
+
+class SelfCollision(Check):
+    """Links that are not neighbours stay apart, also while the robot brakes."""
+
+    Config = SelfCollisionConfig
+    name = "self_collision"
+    is_default = True
+
+    def __init__(self, config: Any, robot: GuardedRobot, limits: JointLimits, file: str) -> None:
+        super().__init__(config, robot, limits, file)
+        self.distances = LinkDistances(robot)
+        self.pairs = self._pairs()
+        self.proximity = Proximity(self.distances, self.pairs, config.margin_m)
+
+    def check(self, motion: Motion, situation: Situation) -> Violation | None:
+        """See `Check`."""
+        if not np.isfinite(motion.position).all():  # PyBullet would find nothing near it
+            return Violation(self.name, "the robot", float("nan"), self.config.margin_m, "m of distance")
+        found = self.proximity.first(motion)
+        if found is None:
+            return None
+        subject, margin_m = "links '{}' and '{}'".format(*found.pair), self.config.margin_m
+        return Violation(self.name, subject, found.distance, margin_m, "m of distance", found.is_while_braking)
+
+    def bounds(self, end: np.ndarray, spread: np.ndarray) -> list[Bound]:
+        """See `Check`."""
+        return self.proximity.bounds(end, spread)
+
+    def _pairs(self) -> list[tuple[str, str]]:
+        path = self.config.pairs_file
+        if path is not None and Path(path).exists():
+            return self._read(path)
+        pairs = (
+            self.distances.pairs(self.config.margin_m) if self.config.srdf is None else self._all_but(self._disabled())
+        )
+        if path is not None:
+            Path(path).write_text(yaml.safe_dump({"pairs": [list(pair) for pair in pairs]}, default_flow_style=None))
+        return pairs
+
+    def _read(self, path: str) -> list[tuple[str, str]]:
+        try:
+            pairs = [(str(a), str(b)) for a, b in yaml.safe_load(Path(path).read_text())["pairs"]]
+        except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
+            message = f"expected 'pairs': a list of pairs of links, got {error}"
+            raise ConfigError([Problem(path, "", message)]) from None
+        self._check_links(path, {link for pair in pairs for link in pair}, self.distances.links)
+        return pairs
+
+    def _disabled(self) -> set[frozenset[str]]:
+        path = str(self.config.srdf)
+        disabled = disabled_collisions(path)
+        self._check_links(path, {link for pair in disabled for link in pair}, self.robot.links)
+        return disabled
+
+    def _check_links(self, path: str, links: set[str], known: Any) -> None:
+        problems = [
+            Problem(path, link, f"expected a link of {self.robot.urdf_path}, got '{link}'{hint(link, known)}")
+            for link in sorted(links)
+            if link not in known
+        ]
+        if problems:
+            raise ConfigError(problems)
+
+    def _all_but(self, disabled: set[frozenset[str]]) -> list[tuple[str, str]]:
+        links = self.distances.links
+        every = [(a, b) for i, a in enumerate(links) for b in links[i + 1 :]]
+        return [pair for pair in every if frozenset(pair) not in disabled]

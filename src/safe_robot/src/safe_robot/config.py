@@ -1,0 +1,52 @@
+"""What a guard is told."""
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel, ListOf, NonNegative, Seconds, Switch, Text
+
+from .limits import LimitsConfig
+
+
+class GuardConfig(ConfigModel):
+    """A guard."""
+
+    policy: Literal["reject", "limit"] = Field(
+        "reject",
+        description="What happens to a target that is not safe: reject sends nothing and halts; limit sends what is"
+        " safe instead, and goes on.",
+    )
+    period_s: Seconds = Field(
+        0.009,
+        description="Time between two commands: none follows another sooner, and each counts as so much time. A few"
+        " percent less than that between two targets, so that late ones can be caught up with.",
+    )
+    joint_names: ListOf[Text] = Field((), description="The joints that are guarded; by default all of the robot.")
+    limits: LimitsConfig = Field(LimitsConfig(), description="Limits of the joints.")
+    start_from: Literal["measured", "target"] = Field(
+        "measured", description="Where the robot is before the first command: as measured, or as the first target says."
+    )
+    start_tolerance: NonNegative = Field(
+        0.05, description="How far the first target may be from where the robot is [rad or m]."
+    )
+    checks: dict[str, dict[str, Any]] = Field({}, description="Options of checks by name.")
+
+
+class NodeConfig(ConfigModel):
+    """What the guard's node does beside deciding."""
+
+    publish_as_joint_state: Switch = Field(
+        True, description="Whether commands are joint states; else bare numbers in the order of the joints."
+    )
+    silence_s: Seconds = Field(
+        0.02,
+        description="How old the newest target may be when one is sent on; older ones wait for a newer one, and a"
+        " source that died is followed no longer than this.",
+    )
+    base_frame: Text | None = Field(
+        None, description="TF frame of the robot's root; with it the bodies of rpbi/markers are around the robot."
+    )
+    left_out: ListOf[Text] = Field(
+        (), description="Bodies of rpbi/markers that are no obstacles: first the robot itself."
+    )

@@ -1,0 +1,107 @@
+"""Tests that any check passes; a package with checks of its own may subclass them in its tests."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from custom_ros_tools.errors import ConfigError
+
+from .check import Check, Situation
+from .limits import JointLimits, LimitsConfig
+from .lookup import make_checks
+from .motion import Motion, State
+from .robot import GuardedRobot
+
+
+class CheckConformance:
+    """Tests that any check passes.
+
+    A subclass names the check, its options and a robot, and has one motion that is safe and one that is not.
+
+    Attributes:
+        check_name: A name of the table, or `"their_package.module:Class"`.
+        options: Its options.
+        limits: Limits of the robot's joints.
+        urdf: The robot's description.
+        period_s: Period of the motions [s].
+        is_about_motion: Whether it judges the motion, else it only judges the situation.
+    """
+
+    check_name: ClassVar[str]
+    options: ClassVar[Mapping[str, Any]] = {}
+    limits: ClassVar[Mapping[str, Any]] = {}
+    urdf: ClassVar[str]
+    period_s: ClassVar[float] = 0.01
+    is_about_motion: ClassVar[bool] = True
+
+    # --- What a subclass has.
+
+    def safe(self) -> tuple[Motion, Situation]:
+        """Returns what is safe."""
+        raise NotImplementedError
+
+    def unsafe(self) -> tuple[Motion, Situation]:
+        """Returns what is not safe."""
+        raise NotImplementedError
+
+    # --- What it may use.
+
+    def motion(self, start: State, command: Any) -> Motion:
+        """Returns the motion of a command, without braking."""
+        return Motion(self.robot, start, np.array(command, dtype=float), self.period_s)
+
+    @property
+    def robot(self) -> GuardedRobot:
+        """The robot."""
+        return GuardedRobot(self.urdf)
+
+    def make(self) -> Check:
+        """Returns a new check."""
+        robot = self.robot
+        limits = JointLimits.of(robot, LimitsConfig(**self.limits), "guard.yaml")
+        options = {self.check_name: {**self.options, "active": True}}
+        return next(each for each in make_checks(options, robot, limits, "guard.yaml") if self._is_it(each))
+
+    def _is_it(self, check: Check) -> bool:
+        return check.name == self.check_name or self.check_name.endswith(f":{type(check).__name__}")
+
+    # --- The tests.
+
+    def test_what_is_safe_passes(self) -> None:
+        """Refusing everything fails here."""
+        assert self.make().check(*self.safe()) is None
+
+    def test_what_is_not_safe_is_refused_with_numbers_on_the_wrong_side_of_each_other(self) -> None:
+        """Letting everything pass fails here."""
+        check = self.make()
+        violation = check.check(*self.unsafe())
+        assert violation is not None
+        assert violation.check == check.name and violation.subject and violation.unit
+        assert violation.value != violation.limit
+        assert f"{violation.limit:.6g}" in str(violation)
+
+    def test_equal_motions_have_equal_answers_whatever_was_asked_before(self) -> None:
+        """Also of another check that is made the same way."""
+        check, other = self.make(), self.make()
+        answers = [check.check(*each()) for each in (self.unsafe, self.safe, self.unsafe, self.unsafe, self.safe)]
+        assert answers == [answers[0], None, answers[0], answers[0], None]
+        assert other.check(*self.safe()) is None
+        assert other.check(*self.unsafe()) == answers[0]
+
+    def test_what_is_not_a_number_is_refused(self) -> None:
+        """Comparisons with it are false, so a check that looks for what is too large would let it pass."""
+        if not self.is_about_motion:
+            pytest.skip(f"'{self.check_name}' does not look at the motion")
+        motion, situation = self.safe()
+        nowhere = self.motion(motion.start, [math.nan] * len(motion.start.position))
+        assert self.make().check(nowhere, situation) is not None
+
+    def test_an_unknown_option_is_named(self) -> None:
+        """A misspelt one would leave a limit away unnoticed."""
+        robot = self.robot
+        limits = JointLimits.of(robot, LimitsConfig(), "guard.yaml")
+        with pytest.raises(ConfigError, match=f"guard.yaml: checks.{self.check_name}.no_such_option"):
+            make_checks({self.check_name: {"no_such_option": 1}}, robot, limits, "guard.yaml")

@@ -1,0 +1,200 @@
+"""Distances between the links of a robot and obstacles, in a PyBullet client of its own."""
+
+import math
+import random
+import weakref
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pybullet
+
+from rpbi.engine.client import Client
+from rpbi.geometry import Vector, cross, dot, minus, rotated
+from rpbi.urdf.joints import Joint
+from rpbi.urdf.loading import load_urdf
+from safe_robot.robot import GuardedRobot
+
+from .obstacles import Obstacle
+
+Pair = tuple[str, str | int]
+"""Two links, or a link and the number of an obstacle."""
+SAMPLES = 200
+"""Random configurations in which pairs are tried that may always be near."""
+ALWAYS = 0.95
+"""Pairs that are too near in this share of them are left out: they are built so."""
+
+TRIED = 1e-4
+"""By so much joints are moved to see which way is apart [rad or m]."""
+FLAT = 1e-6
+"""What goes apart no faster than this does not move [m/rad]."""
+
+
+class Contact(NamedTuple):
+    """How far two things are apart.
+
+    Attributes:
+        distance: Between their surfaces; negative if they are in each other [m].
+        direction: Unit vector from one to the other, in the robot's root.
+        first: Where one of them is nearest, in the root [m].
+        second: The same for the other.
+    """
+
+    distance: float
+    direction: Vector
+    first: Vector
+    second: Vector
+
+
+class LinkDistances:
+    """Distances between the collision shapes of links: convex hulls, where a shape is a mesh.
+
+    Args:
+        robot: The robot; its meshes have to be there.
+
+    Attributes:
+        links: Links that have a collision shape.
+        radius_m: How far the shape of each goes from the link's origin, at most [m].
+
+    Raises:
+        ConfigError: If the robot cannot be loaded.
+    """
+
+    def __init__(self, robot: GuardedRobot) -> None:
+        self._robot = robot
+        self._pb = Client(pybullet.DIRECT)
+        weakref.finalize(self, self._pb.disconnect)
+        self._body = load_urdf(self._pb, robot.urdf_path, {"fileName": robot.urdf_path, "useFixedBase": True})
+        joints = Joint.all_of(self._pb, self._body)
+        moving = [(joint.index, joint.name) for joint in joints if robot.document.joints[joint.name].is_moving]
+        self._moving = [index for index, _ in moving]
+        self._row = {name: i for i, (_, name) in enumerate(moving)}
+        self._all = robot.coupling([name for _, name in moving])
+        names = {-1: self._pb.getBodyInfo(self._body)[0].decode(), **{joint.index: joint.link for joint in joints}}
+        self._index = {name: i for i, name in names.items() if self._pb.getCollisionShapeData(self._body, i)}
+        self._obstacles: tuple[tuple[Obstacle, int], ...] = ()
+        self.links = tuple(self._index)
+        self.place(np.zeros(len(robot.joint_names)))
+        self.radius_m = {link: self._radius(link) for link in self.links}
+
+    def place(self, q: np.ndarray) -> None:
+        """Puts the robot into a configuration of n positions [rad or m]."""
+        factors, offsets = self._all
+        values = (factors @ q + offsets)[:, None].tolist()
+        self._pb.resetJointStatesMultiDof(self._body, self._moving, values)
+
+    def place_obstacles(self, obstacles: Sequence[Obstacle]) -> list[int]:
+        """Puts obstacles where they are, in place of those before; returns which of them are new or elsewhere.
+
+        Raises:
+            ValueError: If PyBullet cannot have one.
+        """
+        before, now, changed = self._obstacles, list[tuple[Obstacle, int]](), list[int]()
+        self._obstacles = ()
+        for i, obstacle in enumerate(obstacles):
+            old, body = before[i] if i < len(before) else (None, -1)
+            if old is None or old.shape != obstacle.shape:
+                if body >= 0:
+                    self._pb.removeBody(body)
+                body = obstacle.add_to(self._pb)
+                changed.append(i)
+            elif old.pose != obstacle.pose:
+                self._pb.resetBasePositionAndOrientation(body, *obstacle.pose)
+                changed.append(i)
+            now.append((obstacle, body))
+        for _, body in before[len(now) :]:
+            self._pb.removeBody(body)
+        self._obstacles = tuple(now)
+        return changed
+
+    def distance(self, pair: Pair, most_m: float) -> float:
+        """Returns how far two things are apart where they were put [m]; inf if that is more than some distance."""
+        return min([point[8] for point in self._closest(pair, most_m)], default=math.inf)
+
+    def contact(self, pair: Pair, most_m: float) -> Contact | None:
+        """Returns where two things are nearest where they were put; None if they are further apart than a distance."""
+        points = self._closest(pair, most_m)
+        if not points:
+            return None
+        point = min(points, key=lambda each: each[8])
+        return Contact(point[8], point[7], point[5], point[6])
+
+    def gradient(self, pair: Pair, contact: Contact, q: np.ndarray) -> np.ndarray:
+        """Returns how fast two things go apart as each of n joints moves, by where `contact` found them [m/rad or 1].
+
+        The robot is in q, n positions, and put there again: which of two links PyBullet took first has to be tried.
+        """
+        states = self._pb.getLinkStates(self._body, self._moving, computeForwardKinematics=1)
+        along = np.zeros(len(self._moving))
+        for link, point, sign in ((pair[0], contact.first, 1.0), (pair[1], contact.second, -1.0)):
+            for joint in self._robot.chain(link) if isinstance(link, str) else ():
+                if joint.is_moving:
+                    i = self._row[joint.name]
+                    axis = rotated(states[i][5], joint.axis)
+                    way = cross(axis, minus(point, states[i][4])) if joint.is_revolute else axis
+                    along[i] += sign * dot(contact.direction, way)
+        gradient = along @ self._all[0]
+        steepest = float(np.abs(gradient).max())
+        if steepest < FLAT:
+            return gradient
+        self.place(q + TRIED * gradient / steepest)
+        is_further = self.distance(pair, math.inf) > contact.distance
+        self.place(q)
+        return gradient if is_further else -gradient
+
+    def _closest(self, pair: Pair, most_m: float) -> Any:
+        link, other = pair
+        a, body = self._index[link], self._body
+        second = (body, self._index[other]) if isinstance(other, str) else (self._obstacles[other][1], -1)
+        return self._pb.getClosestPoints(body, second[0], most_m, a, second[1])
+
+    def reach(self, pair: Pair) -> np.ndarray:
+        """Returns how far, at most, each of n joints moves two things in each other, for 1 rad or m each."""
+        a, b = pair
+        if isinstance(b, int):
+            return self._robot.reach(a, self.radius_m[a])
+        return self._robot.reach(a, self.radius_m[a], b) + self._robot.reach(b, self.radius_m[b], a)
+
+    def pairs(self, margin_m: float) -> list[tuple[str, str]]:
+        """Returns the pairs of links that may come too near.
+
+        Those that a joint ties, or several fixed ones, are left out, and those that nearly always are nearer than the
+        margin [m], as in a compact wrist. It goes by random configurations, the same every time.
+        """
+        groups = {link: self._group(link) for link in self.links}
+        parents = {child: self._group(parent) for child, parent in self._parents().items()}
+        apart = [
+            (a, b)
+            for i, a in enumerate(self.links)
+            for b in self.links[i + 1 :]
+            if groups[a] != groups[b] and parents.get(groups[a]) != groups[b] and parents.get(groups[b]) != groups[a]
+        ]
+        touching = dict.fromkeys(apart, 0)
+        generator = random.Random(0)
+        for _ in range(SAMPLES):
+            self.place(np.array([_anywhere(generator, joint.lower, joint.upper) for joint in self._robot.joints]))
+            for pair in apart:
+                touching[pair] += self.distance(pair, margin_m) < margin_m
+        return [pair for pair in apart if touching[pair] < ALWAYS * SAMPLES]
+
+    def _group(self, link: str) -> str:
+        """Returns the first of the links that fixed joints tie to a link."""
+        for joint in reversed(self._robot.chain(link)):
+            if joint.is_moving:
+                return joint.child
+            link = joint.parent
+        return link
+
+    def _parents(self) -> dict[str, str]:
+        """Returns the link above each that a joint moves."""
+        return {joint.child: joint.parent for joint in self._robot.document.joints.values() if joint.is_moving}
+
+    def _radius(self, link: str) -> float:
+        """Returns how far the shape of a link goes from the link's origin, at most [m]."""
+        lower, upper = self._pb.getAABB(self._body, self._index[link])
+        origin = self._robot.link_positions(np.zeros((1, len(self._robot.joint_names))), link)[0]
+        return math.hypot(*np.maximum(np.subtract(upper, origin), np.subtract(origin, lower)))
+
+
+def _anywhere(generator: random.Random, lower: float, upper: float) -> float:
+    return generator.uniform(max(lower, -math.pi), min(upper, math.pi))

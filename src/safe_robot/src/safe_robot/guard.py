@@ -1,0 +1,274 @@
+"""The guard: takes a target, and decides what the robot is commanded to."""
+
+import logging
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from .braking import Braking
+from .check import Check, Situation, Violation
+from .config import GuardConfig
+from .limits import JointLimits
+from .lookup import make_checks
+from .motion import Motion, State
+from .pursuit import Ends, can_keep_bounds, pursue, within_bounds
+from .robot import GuardedRobot
+
+log = logging.getLogger(__name__)
+
+SHARES = (1.0, 0.5, 0.2)
+"""How much of the way from braking to what is wanted is tried."""
+SLOW_S = 1e6
+"""How long the way from where the robot is to the first target is taken to last [s]: it is not judged by speed."""
+MEASURED = "measured positions"
+"""What a start waits for."""
+
+
+class Decision(NamedTuple):
+    """What a guard answers to a target.
+
+    Attributes:
+        command: n positions to be commanded [rad or m]; the target's own ones if it is safe, None: nothing is sent.
+        violation: Why the target is not safe; None if it is.
+        is_halted: Whether nothing is sent from now on until `Guard.start`.
+    """
+
+    command: tuple[float, ...] | None
+    violation: Violation | None = None
+    is_halted: bool = False
+
+
+class _Safe(NamedTuple):
+    """A command that is safe, and the commands that bring the robot to rest after it, k x n."""
+
+    command: tuple[float, ...]
+    state: State
+    stop: np.ndarray
+
+
+class Guard:
+    """Lets targets pass that are safe.
+
+    A target is safe if every check says so of it and of the braking from it. So after every command the robot can be
+    brought to rest within all limits, and how is known: no state is entered from which there is no safe way to rest.
+
+    The reference is what was commanded before, never what is measured. Every command counts as one period, whatever
+    stamps say, so that they cannot make the robot faster; that no command follows sooner is up to who sends them.
+
+    Args:
+        config: What to guard and how.
+        robot: The robot.
+        file: Where the configuration comes from, for messages.
+
+    Attributes:
+        config: What it guards and how.
+        robot: The robot.
+        joint_names: The n joints.
+        limits: Their limits.
+        checks: The checks that are made.
+        is_halted: Whether nothing is sent until `start`, as at first.
+
+    Raises:
+        ConfigError: If the configuration does not go with the robot.
+    """
+
+    def __init__(self, config: GuardConfig, robot: GuardedRobot, file: str = "~") -> None:
+        self.config, self.robot = config, robot
+        self.joint_names = robot.joint_names
+        self.limits = JointLimits.of(robot, config.limits, file)
+        self.checks: Sequence[Check] = make_checks(config.checks, robot, self.limits, file)
+        self._braking = Braking(self.limits.velocity, self.limits.acceleration, self.limits.jerk, config.period_s)
+        self._watches = {check.name for check in self.checks if check.watches}
+        self._keeps_bounds = config.policy == "limit" and can_keep_bounds()
+        if config.policy == "limit" and not self._keeps_bounds:
+            log.warning("%s: policy limit comes less near to targets without DAQP: run `./rpbi setup ik`", file)
+        self.is_halted = True
+        self._state: State | None = None
+        self._is_first = True
+        self._stop = np.empty((0, len(self.joint_names)))
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the last commands move the robot."""
+        return self._state is not None and not self._state.is_at_rest
+
+    @property
+    def last_command(self) -> tuple[float, ...] | None:
+        """The n positions that were commanded last [rad or m]; None before the first command."""
+        return None if self._state is None or self._is_first else tuple(self._state.position.tolist())
+
+    @property
+    def stop_commands(self) -> np.ndarray:
+        """The commands that bring the robot to rest from now on, k x n [rad or m], as they were found safe."""
+        return self._stop.copy()
+
+    def start(self) -> None:
+        """Lets targets pass again; the first one has to be near where the robot is."""
+        self.is_halted, self._is_first = False, True
+
+    def halt(self) -> None:
+        """Sends nothing any more; the robot is taken to stand where it was commanded to last."""
+        self.is_halted = True
+        if self._state is not None:
+            self._state = State.at_rest(self._state.position)
+        self._stop = self._stop[:0]
+
+    def decide(self, target: Sequence[float], situation: Situation) -> Decision:
+        """Returns what to command.
+
+        Args:
+            target: n positions [rad or m].
+            situation: What else counts.
+        """
+        if self.is_halted:
+            return Decision(None, None, True)
+        try:
+            decision = self._decide(tuple(target), situation)
+        except BaseException:
+            self.halt()  # fails closed: who cannot judge does not let pass
+            raise
+        if decision.is_halted:
+            self.halt()
+        return decision
+
+    def refuse(self, reason: str) -> Decision:
+        """Returns what to command in place of a target that cannot even be judged, and why it cannot."""
+        if self.is_halted:
+            return Decision(None, None, True)
+        decision = self._refused(Violation("input", reason, math.nan, math.nan, ""))
+        if decision.is_halted:
+            self.halt()
+        return decision
+
+    def late(self, situation: Situation) -> Violation | None:
+        """Returns what is wrong while no target comes; if anything is, it halts."""
+        if self.is_halted or self._is_first or self._state is None:
+            return None
+        motion = Motion(self.robot, self._state, self._state.position, self.config.period_s)
+        for check in self.checks:
+            if check.watches and (violation := check.check(motion, situation)):
+                self.halt()
+                return violation
+        return None
+
+    def _decide(self, target: tuple[float, ...], situation: Situation) -> Decision:
+        if violation := self._input_problem(target):
+            return self._refused(violation)
+        if self._is_first and (violation := self._take_start(target, situation)):
+            return Decision(None, violation, violation.subject != MEASURED)
+        found = self._judged(target, situation)
+        if isinstance(found, Violation):
+            return self._instead(target, found, situation)
+        return Decision(self._sent(found))
+
+    def _refused(self, violation: Violation) -> Decision:
+        if self.config.policy == "reject" or self._is_first:
+            return Decision(None, violation, True)
+        return Decision(self._brake_on(), violation)
+
+    def _input_problem(self, target: tuple[float, ...]) -> Violation | None:
+        n = len(self.joint_names)
+        if len(target) != n:
+            return Violation("input", "the number of joints", len(target), n, "joints")
+        for name, position in zip(self.joint_names, target):
+            if not math.isfinite(position):
+                return Violation("input", f"joint '{name}'", position, math.inf, "as position")
+        return None
+
+    def _take_start(self, target: tuple[float, ...], situation: Situation) -> Violation | None:
+        """Puts the guard where the robot is, if the first target is near; the robot stands."""
+        position = np.array(target)
+        there = self._whereabouts(position, situation)
+        if there is None:
+            return Violation("start", MEASURED, math.inf, 0.0, "as age, since there are none of all joints")
+        distance = np.abs(position - there)
+        if not (distance <= self.config.start_tolerance).all():
+            i = int(np.argmin(distance <= self.config.start_tolerance))
+            subject = f"joint '{self.joint_names[i]}'"
+            unit = "of distance to where the robot is"
+            return Violation("start", subject, float(distance[i]), self.config.start_tolerance, unit)
+        slow = Motion(self.robot, State.at_rest(there), position, SLOW_S)
+        for check in self.checks:
+            if violation := check.check(slow, situation):
+                return violation
+        self._state = State.at_rest(position)
+        self._stop = self._state.position[None]
+        self._is_first = False
+        return None
+
+    def _whereabouts(self, target: np.ndarray, situation: Situation) -> np.ndarray | None:
+        if all(name in situation.measured for name in self.joint_names):
+            return np.array([situation.measured[name] for name in self.joint_names])
+        if self.config.start_from == "measured":
+            return None
+        return target if self._state is None else self._state.position
+
+    def _judged(self, command: Sequence[float], situation: Situation) -> _Safe | Violation:
+        """Returns the command if it is safe, else what is not."""
+        assert self._state is not None
+        period_s = self.config.period_s
+        position = np.array(command)
+        state = self._state.then(position, period_s)
+        brake = self._braking.plan(state.velocity, state.acceleration)
+        motion = Motion(self.robot, self._state, position, period_s, brake)
+        for check in self.checks:
+            if violation := check.check(motion, situation):
+                return violation
+        if brake is None:
+            return self._cannot_brake(state)
+        return _Safe(tuple(command), state, motion.position[1:])
+
+    def _cannot_brake(self, state: State) -> Violation:
+        share = np.abs(state.acceleration) / self.limits.acceleration
+        i = int(np.argmax(share))
+        subject, limit = f"joint '{self.joint_names[i]}'", float(self.limits.acceleration[i])
+        return Violation("braking", subject, float(abs(state.acceleration[i])), limit, "of acceleration", True)
+
+    def _sent(self, safe: _Safe) -> tuple[float, ...]:
+        self._state, self._stop = safe.state, safe.stop
+        return safe.command
+
+    def _instead(self, target: tuple[float, ...], violation: Violation, situation: Situation) -> Decision:
+        """Returns the nearest safe command that is found, or the next one of the braking that is known to be safe."""
+        assert self._state is not None
+        if self.config.policy == "reject" or violation.check in self._watches:  # no other command mends these
+            return self._refused(violation)
+        next_stop = self._stop[0] if len(self._stop) else self._state.position
+        wanted = self._nearest(target)
+        for share in SHARES:
+            found = self._judged(tuple((next_stop + share * (wanted - next_stop)).tolist()), situation)
+            if not isinstance(found, Violation):
+                return Decision(self._sent(found), violation)
+        return Decision(self._brake_on(), violation)
+
+    def _nearest(self, target: tuple[float, ...]) -> np.ndarray:
+        """Returns the command that is nearest to what the joints alone can do, and which checks may let pass."""
+        assert self._state is not None
+        state, period_s = self._state, self.config.period_s
+        wanted, slowest = pursue(np.array(target), state, self.limits, self._braking, period_s)
+        if not self._keeps_bounds:
+            return wanted
+        there = self._stop[-1] if len(self._stop) else state.position
+        ends = Ends(wanted, state, self._braking, period_s)
+        spread = np.abs(ends.of(wanted) - there)
+        bounds = [bound for check in self.checks for bound in check.bounds(there, spread)]
+        if not bounds:
+            return wanted
+        other = np.where(self._may_rest(ends.of(slowest)), slowest, self._stop[0] if len(self._stop) else there)
+        least, most = np.minimum(wanted, other), np.maximum(wanted, other)
+        found = within_bounds(wanted, least, most, bounds, ends, there)
+        return wanted if found is None else found
+
+    def _may_rest(self, end: np.ndarray) -> np.ndarray:
+        return (end >= self.limits.lower) & (end <= self.limits.upper)
+
+    def _brake_on(self) -> tuple[float, ...]:
+        assert self._state is not None
+        if len(self._stop):
+            self._state = self._state.then(self._stop[0], self.config.period_s)
+            self._stop = self._stop[1:]
+        if not len(self._stop):
+            self._state = State.at_rest(self._state.position)
+        return tuple(self._state.position.tolist())

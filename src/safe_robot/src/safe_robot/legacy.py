@@ -1,0 +1,94 @@
+"""Parameters of the authors' release, and of its README, as the configuration of a guard."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from custom_ros_tools.errors import ConfigError, Problem
+
+CHECKERS = {
+    "jointpositionlimit": "joint_position",
+    "jointvelocitylimit": "joint_velocity",
+    "linkboxlimit": "link_box",
+    "statevalidity": "self_collision",
+}
+"""Our check for each `~checker/NAME/active`."""
+SWITCHES = {
+    "check_joint_position_limits": "joint_position",
+    "check_joint_velocity_limits": "joint_velocity",
+    "check_link_limits": "link_box",
+    "check_self_collision": "self_collision",
+}
+FACTORS = {"joint_position_limit_factor": "position_factor", "joint_velocity_limit_factor": "velocity_factor"}
+BY_JOINT = {
+    "joint_position_lower_limit": "lower",
+    "joint_position_upper_limit": "upper",
+    "joint_velocity_limit": "velocity",
+}
+AXES = {f"{prefix}_{axis}lim": axis for prefix in ("box", "link") for axis in "xyz"}
+LINKS = ("links", "safe_links")
+UNUSED = ("exotica_xml_filename", "stop_after_first_fail", "debug")
+"""What the release needed, and this guard does not."""
+KEYS = (
+    "checker", "joint_name_order", "safe_distance", *SWITCHES, *FACTORS, *BY_JOINT, *AXES, *LINKS, *UNUSED,
+)  # fmt: skip
+
+
+def translated(given: Mapping[str, Any], joint_names: list[str], file: str) -> dict[str, Any]:
+    """Returns the keys of `GuardConfig` that say the same as parameters of the release.
+
+    Args:
+        given: The parameters; others than those of the release are left as they are.
+        joint_names: The joints of the robot, in the order of lists of numbers, unless `joint_name_order` names others.
+        file: Where they come from, for messages.
+
+    Raises:
+        ConfigError: If one is not as the release has it.
+    """
+    config = {key: value for key, value in given.items() if key not in KEYS}
+    limits: dict[str, Any] = dict(config.get("limits", {}))
+    checks: dict[str, dict[str, Any]] = {name: dict(options) for name, options in config.get("checks", {}).items()}
+    if "joint_name_order" in given:
+        config["joint_names"] = joint_names = _words(given["joint_name_order"])
+    for name, options in given.get("checker", {}).items():
+        if name not in CHECKERS or not isinstance(options, Mapping):
+            raise _wrong(file, f"checker.{name}", f"one of {', '.join(CHECKERS)}, with 'active'", name)
+        checks.setdefault(CHECKERS[name], {})["active"] = options.get("active", True)
+    for key, name in SWITCHES.items():
+        if key in given:
+            checks.setdefault(name, {})["active"] = given[key]
+    limits |= {ours: given[key] for key, ours in FACTORS.items() if key in given}
+    for key, ours in BY_JOINT.items():
+        if key in given:
+            numbers = _numbers(given[key], len(joint_names), key, file)
+            limits[ours] = dict(zip(joint_names, numbers))
+    if "safe_distance" in given:
+        checks.setdefault("self_collision", {})["margin_m"] = given["safe_distance"]
+    links = [link for key in LINKS for link in _words(given.get(key, []))]
+    box = {axis: _axis(given[key], key, file) for key, axis in AXES.items() if key in given}
+    if links:
+        checks.setdefault("link_box", {})["boxes"] = dict.fromkeys(links, box)
+    return config | ({"limits": limits} if limits else {}) | ({"checks": checks} if checks else {})
+
+
+def _words(value: Any) -> list[str]:
+    return value.split() if isinstance(value, str) else list(value)
+
+
+def _numbers(value: Any, count: int, key: str, file: str) -> list[float]:
+    """Returns the numbers of a text, or a list, or of one number."""
+    try:
+        numbers = [float(word) for word in (str(value).split() if not isinstance(value, list) else value)]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count or any(map(math.isnan, numbers)):
+        raise _wrong(file, key, f"{count} numbers with spaces between them", value)
+    return numbers
+
+
+def _axis(value: Any, key: str, file: str) -> list[float | None]:
+    return [number if math.isfinite(number) else None for number in _numbers(value, 2, key, file)]
+
+
+def _wrong(file: str, key: str, expected: str, got: Any) -> ConfigError:
+    return ConfigError([Problem(file, key, f"expected {expected}, got '{got}'")])

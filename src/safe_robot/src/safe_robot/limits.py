@@ -1,0 +1,116 @@
+"""The limits of the guarded joints: the robot description's, narrowed by the configuration."""
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.errors import ConfigError, Problem, hint
+from custom_ros_tools.schema import ConfigModel, Positive
+
+from .robot import GuardedRobot
+
+Factor = Annotated[float, Field(gt=0, le=1)]
+PerJoint = Positive | dict[str, Positive]
+"""A number for all joints, or one by joint."""
+
+
+class LimitsConfig(ConfigModel):
+    """Limits of the joints."""
+
+    lower: dict[str, float] = Field({}, description="Lower limits by joint [rad or m], above those of the URDF.")
+    upper: dict[str, float] = Field({}, description="Upper limits by joint [rad or m], below those of the URDF.")
+    position_factor: Factor = Field(1.0, description="Share of the range that is used, about its middle.")
+    velocity: PerJoint | None = Field(None, description="Largest speed [rad/s or m/s]; by default the URDF's.")
+    velocity_factor: Factor = Field(0.95, description="Share of the largest speed that is used.")
+    acceleration: PerJoint | None = Field(None, description="Largest acceleration [rad/s^2 or m/s^2]; else any.")
+    jerk: PerJoint | None = Field(None, description="Largest jerk [rad/s^3 or m/s^3]; by default any.")
+
+
+class JointLimits(NamedTuple):
+    """Limits of n joints; inf where there is none.
+
+    Attributes:
+        lower: n [rad or m].
+        upper: n [rad or m].
+        velocity: n [rad/s or m/s].
+        acceleration: n [rad/s^2 or m/s^2].
+        jerk: n [rad/s^3 or m/s^3].
+    """
+
+    lower: np.ndarray
+    upper: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    jerk: np.ndarray
+
+    @classmethod
+    def of(cls, robot: GuardedRobot, config: LimitsConfig, file: str) -> "JointLimits":
+        """Returns the limits of a robot.
+
+        Raises:
+            ConfigError: If limits contradict each other, or are wider than the robot's; it names file, key, and both.
+        """
+        problems: list[Problem] = []
+        lower = _narrowed(robot, "lower", [joint.lower for joint in robot.joints], config.lower, problems, file)
+        upper = _narrowed(robot, "upper", [joint.upper for joint in robot.joints], config.upper, problems, file)
+        for name, least, most in zip(robot.joint_names, lower, upper):
+            if least >= most:
+                message = f"expected a lower limit below the upper one, got {least:g} and {most:g}"
+                problems.append(Problem(file, f"limits.lower.{name}", message))
+        fastest = [joint.max_velocity for joint in robot.joints]
+        velocity = _largest(robot, "velocity", fastest, config.velocity, problems, file)
+        unlimited = [math.inf] * len(robot.joints)
+        acceleration = _largest(robot, "acceleration", unlimited, config.acceleration, problems, file)
+        jerk = _largest(robot, "jerk", unlimited, config.jerk, problems, file)
+        if problems:
+            raise ConfigError(problems)
+        low, high = np.array(lower), np.array(upper)
+        cut = np.where(np.isfinite(high - low), (1.0 - config.position_factor) / 2.0 * (high - low), 0.0)
+        return cls(
+            low + cut, high - cut, config.velocity_factor * np.array(velocity), *map(np.array, (acceleration, jerk))
+        )
+
+
+def _narrowed(
+    robot: GuardedRobot, key: str, own: Sequence[float], given: dict[str, float], problems: list[Problem], file: str
+) -> list[float]:
+    _check_names(robot, f"limits.{key}", given, problems, file)
+    limits = list(own)
+    for i, name in enumerate(robot.joint_names):
+        if name not in given:
+            continue
+        is_inside = given[name] >= own[i] if key == "lower" else given[name] <= own[i]
+        if not is_inside:
+            side = "above" if key == "lower" else "below"
+            message = f"expected a limit {side} that of {robot.urdf_path}, {own[i]:g}, got {given[name]:g}"
+            problems.append(Problem(file, f"limits.{key}.{name}", message))
+        limits[i] = given[name]
+    return limits
+
+
+def _largest(
+    robot: GuardedRobot,
+    key: str,
+    own: Sequence[float],
+    given: float | dict[str, float] | None,
+    problems: list[Problem],
+    file: str,
+) -> list[float]:
+    if given is None:
+        return list(own)
+    by_joint = given if isinstance(given, dict) else dict.fromkeys(robot.joint_names, given)
+    _check_names(robot, f"limits.{key}", by_joint, problems, file)
+    for name, most in zip(robot.joint_names, own):
+        if by_joint.get(name, 0.0) > most and isinstance(given, dict):
+            message = f"expected at most that of {robot.urdf_path}, {most:g}, got {by_joint[name]:g}"
+            problems.append(Problem(file, f"limits.{key}.{name}", message))
+    return [min(most, by_joint.get(name, math.inf)) for name, most in zip(robot.joint_names, own)]
+
+
+def _check_names(robot: GuardedRobot, key: str, given: dict[str, float], problems: list[Problem], file: str) -> None:
+    for name in given:
+        if name not in robot.joint_names:
+            problems.append(Problem(file, f"{key}.{name}", f"unknown joint{hint(name, robot.joint_names)}"))

@@ -1,0 +1,91 @@
+"""What is checked: a command, and the braking from it."""
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from .braking import Brake
+from .robot import GuardedRobot
+
+
+class State(NamedTuple):
+    """Where n joints were commanded to last, and how they moved there: backward differences of the commands.
+
+    Attributes:
+        position: n [rad or m].
+        velocity: n [rad/s or m/s].
+        acceleration: n [rad/s^2 or m/s^2].
+    """
+
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+
+    @classmethod
+    def at_rest(cls, position: np.ndarray) -> "State":
+        """Returns the state of a robot that stands."""
+        return cls(position, np.zeros_like(position), np.zeros_like(position))
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether nothing moves."""
+        return not (self.velocity.any() or self.acceleration.any())
+
+    def then(self, position: np.ndarray, period_s: float) -> "State":
+        """Returns the state after a further command of n positions [rad or m], a period [s] later."""
+        velocity = (position - self.position) / period_s
+        return State(position, velocity, (velocity - self.velocity) / period_s)
+
+
+class Motion:
+    """A command to n joints in row 0, and the braking from it in the rows below: k rows, a period apart.
+
+    Attributes:
+        robot: The robot.
+        period_s: The period [s].
+        start: The state before the command.
+        position: k x n [rad or m].
+        velocity: k x n [rad/s or m/s].
+        acceleration: k x n [rad/s^2 or m/s^2].
+        jerk: k x n [rad/s^3 or m/s^3].
+    """
+
+    def __init__(
+        self, robot: GuardedRobot, start: State, command: np.ndarray, period_s: float, brake: Brake | None = None
+    ) -> None:
+        self.robot, self.start, self.period_s = robot, start, period_s
+        state = start.then(command, period_s)
+        jerk = (state.acceleration - start.acceleration) / period_s
+        self.position, self.velocity = command[None], state.velocity[None]
+        self.acceleration, self.jerk = state.acceleration[None], jerk[None]
+        if brake is not None:
+            self.position = np.concatenate((self.position, command + brake.displacement))
+            self.velocity = np.concatenate((self.velocity, brake.velocity))
+            self.acceleration = np.concatenate((self.acceleration, brake.acceleration))
+            self.jerk = np.concatenate((self.jerk, brake.jerk))
+        self._link_positions: dict[str, np.ndarray] = {}
+
+    @cached_property
+    def with_start(self) -> np.ndarray:
+        """The command before, and the k rows: (k + 1) x n positions [rad or m]."""
+        return np.concatenate((self.start.position[None], self.position))
+
+    @cached_property
+    def travelled(self) -> np.ndarray:
+        """How far each joint moves from row 0 to each row, there and back counted, k x n [rad or m]."""
+        travelled = np.zeros_like(self.position)
+        np.cumsum(np.abs(self.position[1:] - self.position[:-1]), axis=0, out=travelled[1:])
+        return travelled
+
+    @property
+    def path(self) -> np.ndarray:
+        """How far each of n joints moves after row 0, there and back counted [rad or m]."""
+        path: np.ndarray = self.travelled[-1]
+        return path
+
+    def link_positions(self, link: str) -> np.ndarray:
+        """Returns where the origin of a link is in the robot's root, in the command before and the k rows [m]."""
+        if link not in self._link_positions:
+            self._link_positions[link] = self.robot.link_positions(self.with_start, link)
+        return self._link_positions[link]

@@ -1,0 +1,85 @@
+"""What the guard sees, for RViz: where things are nearest to each other, and the boxes that links stay in."""
+
+from collections.abc import Iterator
+from threading import Condition
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
+from safe_robot.checks.environment import Environment
+from safe_robot.checks.link_box import BoxConfig, LinkBox
+from safe_robot.checks.self_collision import SelfCollision
+from safe_robot.guard import Guard
+
+HZ = 10.0
+WITHIN_M = 0.15
+"""Pairs that are further apart are not shown [m]."""
+ENDLESS_M = 2.0
+"""Where an axis of a box has no limit, it ends here [m]."""
+NEAR, TOO_NEAR, BOX = ColorRGBA(1.0, 0.8, 0.0, 1.0), ColorRGBA(1.0, 0.0, 0.0, 1.0), ColorRGBA(0.2, 0.5, 1.0, 0.15)
+
+
+class GuardMarkers:
+    """Publishes `robot_safety/markers` while somebody listens.
+
+    Args:
+        guard: The guard.
+        lock: Held while it is asked.
+        frame: TF frame of the robot's root.
+    """
+
+    def __init__(self, guard: Guard, lock: Condition, frame: str) -> None:
+        self._guard, self._lock, self._frame = guard, lock, frame
+        self._publisher = rospy.Publisher("robot_safety/markers", MarkerArray, queue_size=10, latch=True)
+        WallTimer(HZ, self._publish)
+
+    def _publish(self) -> None:
+        if not self._publisher.get_num_connections():
+            return
+        with self._lock:
+            q = self._guard.last_command
+            markers = [] if q is None else [*self._lines(np.array(q))]
+        self._publisher.publish([self._marker("", 0, Marker.CUBE, action=Marker.DELETEALL), *markers, *self._boxes()])
+
+    def _lines(self, q: np.ndarray) -> Iterator[Marker]:
+        """Returns a line for each pair that is near, and how near."""
+        for check in self._guard.checks:
+            if not isinstance(check, (SelfCollision, Environment)):
+                continue
+            for i, (_, contact) in enumerate(check.proximity.contacts(q, WITHIN_M)):
+                color = NEAR if contact.distance > 2.0 * check.config.margin_m else TOO_NEAR
+                ends = [Point(*contact.first), Point(*contact.second)]
+                line = self._marker(check.name, 2 * i, Marker.LINE_LIST, points=ends, color=color)
+                line.scale.x = 0.004
+                yield line
+                middle = Point(*((contact.first + contact.second) / 2.0 + (0.0, 0.0, 0.03)))
+                text = self._marker(check.name, 2 * i + 1, Marker.TEXT_VIEW_FACING, color=color)
+                text.pose.position, text.scale.z, text.text = middle, 0.03, f"{1e3 * contact.distance:.0f} mm"
+                yield text
+
+    def _boxes(self) -> Iterator[Marker]:
+        boxes = [each for check in self._guard.checks if isinstance(check, LinkBox) for each in _boxes_of(check)]
+        for i, box in enumerate(boxes):
+            low, high = np.array([_ends(axis) for axis in (box.x, box.y, box.z)]).T
+            marker = self._marker("link_box", i, Marker.CUBE, color=BOX, scale=Vector3(*(high - low)))
+            marker.pose.position = Point(*((low + high) / 2.0))
+            yield marker
+
+    def _marker(self, namespace: str, number: int, kind: int, **fields: object) -> Marker:
+        marker = Marker(ns=namespace, id=number, type=kind, **fields)
+        marker.header.frame_id = self._frame
+        marker.pose = Pose(orientation=Quaternion(w=1.0))
+        return marker
+
+
+def _boxes_of(check: LinkBox) -> list[BoxConfig]:
+    return list(check.config.boxes.values())
+
+
+def _ends(axis: tuple[float | None, float | None]) -> tuple[float, float]:
+    low, high = axis
+    return -ENDLESS_M if low is None else low, ENDLESS_M if high is None else high

@@ -1,0 +1,57 @@
+"""The guard fails closed: sources that die or say nonsense, and a master that dies, move nothing any more.
+
+More and other faults: `./rpbi bench guard_faults`.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from safe_robot.ros.target_queue import TargetQueue
+
+PROGRAM = Path(__file__).resolve().parents[3] / "benchmarks/programs/guard_faults.py"
+SOON_S = 0.15
+"""Shorter than the time that the program looks on after a fault; a busy machine takes more than the guard's 20 ms."""
+
+
+def latest_s(count: int, *options: str) -> dict[str, list[float]]:
+    """Returns by fault how long after it the last motion was commanded [s]."""
+    command = [sys.executable, str(PROGRAM), str(count), *options]
+    printed = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, timeout=300.0).stdout
+    line = next(line for line in printed.splitlines() if line.startswith("result: "))
+    return json.loads(line.partition(": ")[2])
+
+
+def test_nothing_moves_after_a_fault_and_without_a_guard_much_would(ros_master):
+    faults = ("NaN", "late input", "clock jumps ahead", "kill -9", "burst, SIGSTOP", "master killed")
+    found = latest_s(len(faults), "--faults", *faults)
+    assert sorted(found) == sorted(faults)
+    assert all(each < SOON_S for (each,) in found.values()), found
+    unguarded = latest_s(2, "--unguarded", "--faults", "NaN", "late input")
+    assert all(each > SOON_S for (each,) in unguarded.values()), unguarded
+
+
+@pytest.mark.parametrize("silence_s, is_dropped", [(0.12, True), (60.0, False)])
+def test_what_a_dead_source_left_behind_is_not_sent(silence_s, is_dropped):
+    taken: list[int] = []
+    given_up = threading.Event()
+    done = threading.Event()
+
+    def take(item: int) -> bool:
+        taken.append(item)
+        if item == 9:
+            done.set()
+        return True
+
+    queue = TargetQueue(0.05, silence_s, 100, take, lambda age_s: given_up.set())
+    for item in range(10):
+        queue.put(item, 0.0)
+    assert (given_up if is_dropped else done).wait(60.0)
+    assert taken == list(range(len(taken)))
+    assert given_up.is_set() == is_dropped == (len(taken) < 10)

@@ -1,0 +1,156 @@
+"""Guards' nodes, two on one master, between a program that sends targets and one that takes commands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import rospy
+from guard_nodes import NAMES, GuardStation
+from guarded_arm import SLIDER
+from node_world import publishing
+from ros_system import wait_until
+from sensor_msgs.msg import JointState
+
+from custom_ros_tools.errors import ConfigError
+from safe_robot.check import Situation
+from safe_robot.ros.parameters import guard_of_parameters
+
+
+@pytest.fixture(scope="module")
+def stations(module_ros) -> Iterator[tuple[GuardStation, GuardStation]]:
+    """One that takes the first target's word for where the robot is, and one that asks for measured positions."""
+    patient = {"limits": {"velocity": 1.0}, "checks": {"staleness": {"timeout_s": 60.0}}}
+    left = GuardStation(module_ros, "/left", start_from="target", period_s=0.01, **patient)
+    right = GuardStation(module_ros, "/right", period_s=0.2, publish_as_joint_state=False, **patient)
+    yield left, right
+    left.close()
+    right.close()
+
+
+@pytest.fixture
+def left(stations) -> GuardStation:
+    stations[0].wait()
+    return stations[0]
+
+
+@pytest.fixture
+def right(stations) -> GuardStation:
+    stations[1].wait()
+    return stations[1]
+
+
+def same(command: JointState, sent: JointState) -> bool:
+    """Tells whether a message is another, but for its number, which ROS gives anew."""
+    command.header.seq = sent.header.seq
+    return command == sent
+
+
+@pytest.mark.quick
+def test_targets_pass_unchanged_until_one_is_unsafe_and_again_after_a_start(left):
+    sent = []
+    for k in range(5):
+        sent.append(left.send(0.001 * k, -0.002 * k))
+        assert same(left.commands.wait_for(k + 1)[k], sent[k])
+    assert all(each.is_safe for each in left.statuses.wait_for(5))
+    bad = left.send(0.5, 0.0)
+    status = left.statuses.wait_for(6)[5]
+    assert (status.is_safe, status.header.stamp) == (False, bad.header.stamp)
+    assert status.message.startswith("joint_velocity: joint 'slide' would have ")
+    violation = left.violations.wait_for()[0]
+    assert (violation.check, violation.subject, violation.limit) == ("joint_velocity", "joint 'slide'", 0.95)
+    left.send(0.004, -0.008)
+    assert left.call("start").success
+    assert not left.call("start").success
+    again = left.send(0.004, -0.008)
+    assert same(left.commands.wait_for(6)[5], again) and len(left.statuses.wait_for(7)) == 7
+    assert left.call("stop").success
+    assert not left.call("stop").success
+
+
+@pytest.mark.parametrize(
+    "fields, words",
+    [
+        ({"position": (0.0, float("nan"))}, "values must be finite"),
+        ({"name": ["slide"], "position": (0.0,)}, "no values for joint 'turn'"),
+        ({"name": ["slide", "turn", "more"], "position": (0.0, 0.0, 0.0)}, "'more' too"),
+        ({"effort": (1.0, 1.0)}, "expected no efforts"),
+        ({"velocity": (9.0, 0.0)}, "joint 'slide': expected a velocity within 0.95, got 9"),
+        ({"age_s": 100.0}, "staleness: the "),
+        ({"age_s": -100.0}, "staleness: the age of the target would have -"),
+    ],
+)
+def test_what_cannot_be_answered_for_is_refused_and_named(left, fields, words):
+    left.send(*fields.pop("position", (0.0, 0.0)), **fields)
+    status = left.statuses.wait_for()[0]
+    assert not status.is_safe and words in status.message
+    assert left.commands.messages == []
+
+
+def test_numbers_come_in_the_robots_order_a_period_apart_and_from_where_the_robot_was_measured(left, right):
+    """Late targets that come together make the robot no faster; and what one guard is told another does not hear."""
+    right.send(0.3, -0.2)
+    assert "start: measured positions" in right.statuses.wait_for()[0].message
+    with publishing("/right/joint_states/measured", JointState) as measured:
+        message = JointState(name=["turn", "slide", "more"], position=[-0.2, 0.31, 5.0])
+        measured.publish(message)
+        wait_until(
+            lambda: measured.publish(message) or right.send(0.3, -0.2) and right.commands.messages,
+            "a command comes",
+            every_s=0.25,
+        )
+    right.send(7.0, -0.2, 0.3, name=["mount", "turn", "slide"])  # that of the mount is fixed
+    for k in range(1, 4):
+        right.send(0.3 + 0.001 * k, -0.2)
+    wait_until(lambda: right.commands.messages[-1].data == (0.303, -0.2), "the last target has passed")
+    assert [each.data for each in right.commands.messages[-4:]] == [(0.3 + 0.001 * k, -0.2) for k in range(4)]
+    took_s = right.commands.arrival_s[-1] - right.commands.arrival_s[-4]
+    assert took_s >= 0.4, took_s  # 0.6 s there, and the first may have arrived late
+    assert left.statuses.messages == []
+
+
+@pytest.fixture
+def parameters(ros) -> Any:
+    """Sets private parameters of the tests' own node."""
+
+    def set_all(**values: Any) -> None:
+        rospy.set_param("~robot_description", SLIDER)
+        for name, value in values.items():
+            rospy.set_param(f"~{name}", value)
+
+    return set_all
+
+
+def test_parameters_of_the_release_are_taken(parameters):
+    parameters(
+        start_from="target",
+        period_s=0.01,
+        exotica_xml_filename="any.xml",
+        joint_velocity_limit="0.4 3",
+        joint_position_upper_limit="0.5 2",
+        joint_velocity_limit_factor=0.5,
+        checker={"jointpositionlimit": {"active": False}, "linkboxlimit": {"active": True}},
+        links="hand",
+        box_xlim="-0.1 inf",
+    )
+    guard, output = guard_of_parameters()
+    assert guard.joint_names == tuple(NAMES) and output.publish_as_joint_state
+    guard.start()
+    assert guard.decide((0.0, 0.0), Situation()).command
+    violation = guard.decide((0.0021, 0.0), Situation()).violation
+    assert "would have 0.21 m/s; the limit is 0.2" in str(violation)
+
+
+@pytest.mark.parametrize(
+    "values, words",
+    [
+        ({"checks": {"link_box": {"boxes": {"hnd": {}}}}}, "checks.link_box.boxes.hnd: unknown link 'hnd'"),
+        ({"joint_velocity_limit": "1 2 3"}, "joint_velocity_limit: expected 2 numbers"),
+        ({"polcy": "limit"}, "polcy: unknown key"),
+    ],
+)
+def test_a_parameter_that_is_wrong_is_named(parameters, values, words):
+    parameters(**values)
+    with pytest.raises(ConfigError, match=words):
+        guard_of_parameters()

@@ -1,0 +1,447 @@
+"""Every check, held to the conformance suite; and what is its own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from guarded_arm import HOME, KUKA, LIMITS, folding, slider
+
+from custom_ros_tools.errors import ConfigError
+from rpbi.geometry import Pose
+from rpbi.kinematics import Kinematics
+from safe_robot.braking import Brake
+from safe_robot.check import Situation
+from safe_robot.checks import CHECKS
+from safe_robot.conformance import CheckConformance
+from safe_robot.geometry.obstacles import Obstacle
+from safe_robot.limits import JointLimits, LimitsConfig
+from safe_robot.lookup import make_checks
+from safe_robot.motion import Motion, State
+from safe_robot.robot import GuardedRobot
+
+FOLDED = (1.8, 1.72, 0.97, -2.05, -0.24, 2.09, 0.1)
+"""The ball of the arm's tool is in its shoulder."""
+
+
+class Arm(CheckConformance):
+    """From rest at home; `step` is how far the command goes."""
+
+    urdf = KUKA
+    limits = LIMITS
+    safe_step = 1e-6
+    unsafe_step = 0.02
+
+    def by(self, step: float, q=HOME):
+        return self.motion(State.at_rest(np.array(q)), np.array(q) + step), Situation()
+
+    def safe(self):
+        return self.by(self.safe_step)
+
+    def unsafe(self):
+        return self.by(self.unsafe_step)
+
+
+class TestJointPosition(Arm):
+    check_name = "joint_position"
+
+    def unsafe(self):
+        return self.by(0.01, (0.0, 0.5, 0.0, -1.2, 0.0, 2.09, 0.0))
+
+
+class TestJointVelocity(Arm):
+    check_name = "joint_velocity"
+
+
+class TestJointAcceleration(Arm):
+    check_name = "joint_acceleration"
+
+
+class TestJointJerk(Arm):
+    check_name = "joint_jerk"
+
+
+class TestLinkBox(Arm):
+    check_name = "link_box"
+    options = {"boxes": {"lwr_arm_7_link": {"x": [-0.7, None], "z": [0.1, None]}}}
+
+    def unsafe(self):
+        return self.motion(State.at_rest(np.array(HOME)), (0.0, 1.5, 0.0, 0.0, 0.0, 0.0, 0.0)), Situation()
+
+
+class TestLinkVelocity(Arm):
+    check_name = "link_velocity"
+    options = {"links": {"lwr_arm_7_link": 0.25}}
+
+
+class TestSelfCollision(Arm):
+    check_name = "self_collision"
+
+    def unsafe(self):
+        return self.motion(State.at_rest(np.array(HOME)), FOLDED), Situation()
+
+
+TABLE = Obstacle("table", "box", (1.0, 1.0, 0.1), Pose((0.7, 0.0, 0.0)))
+
+
+class TestEnvironment(Arm):
+    check_name = "environment"
+
+    def by(self, step: float, q=HOME):
+        motion, situation = super().by(step, q)
+        return motion, situation._replace(obstacles=(TABLE,))
+
+    def unsafe(self):
+        motion = self.motion(State.at_rest(np.array(HOME)), (0.0, -2.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        return motion, Situation(obstacles=(TABLE,))
+
+
+class TestStaleness(Arm):
+    check_name = "staleness"
+    is_about_motion = False
+
+    def unsafe(self):
+        motion, _ = self.safe()
+        return motion, Situation(age_s=0.2)
+
+
+class TestTracking(Arm):
+    check_name = "tracking"
+    is_about_motion = False
+
+    def measured(self, error: float):
+        motion, _ = self.by(0.0)
+        names = GuardedRobot(KUKA).joint_names
+        return motion, Situation(measured={name: q + error for name, q in zip(names, HOME)})
+
+    def safe(self):
+        return self.measured(0.01)
+
+    def unsafe(self):
+        return self.measured(-0.2)
+
+
+class TestForce(Arm):
+    check_name = "force"
+    is_about_motion = False
+
+    def feels(self, *wrench: float):
+        return self.by(0.0)[0], Situation(wrench=wrench, wrench_age_s=0.0)
+
+    def safe(self):
+        return self.feels(30.0, 30.0, 0.0, 0.0, 5.0, 5.0)
+
+    def unsafe(self):
+        return self.feels(40.0, 40.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def test_every_check_is_held_to_the_conformance_suite():
+    held = {each.check_name for each in Arm.__subclasses__()}
+    assert held == set(CHECKS)
+
+
+def check_of(name: str, guarded: GuardedRobot, limits: dict | None = None, /, **options):
+    joint_limits = JointLimits.of(guarded, LimitsConfig(**(limits or {})), "guard.yaml")
+    return next(c for c in make_checks({name: options}, guarded, joint_limits, "guard.yaml") if c.name == name)
+
+
+@pytest.mark.parametrize("bad", ["nan", "inf", "-inf"])
+def test_a_measured_force_that_is_not_a_number_is_too_large(bad):
+    check = check_of("force", GuardedRobot(KUKA))
+    motion = Motion(check.robot, State.at_rest(np.array(HOME)), np.array(HOME), 0.01)
+    assert check.check(motion, Situation(wrench=(float(bad), 0.0, 0.0, 0.0, 0.0, 0.0), wrench_age_s=0.0)) is not None
+
+
+@pytest.mark.parametrize("name", ["force", "tracking"])
+def test_without_a_measurement_nothing_is_safe(name):
+    check = check_of(name, GuardedRobot(KUKA))
+    motion = Motion(check.robot, State.at_rest(np.array(HOME)), np.array(HOME), 0.01)
+    violation = check.check(motion, Situation())
+    assert violation is not None and "age" in violation.subject
+
+
+def test_origins_of_links_are_those_of_pybullet(tmp_path):
+    generator = np.random.default_rng(3)
+    for robot, link in ((GuardedRobot(KUKA), "lwr_arm_7_link"), (slider(tmp_path), "hand")):
+        q = generator.uniform(-1.0, 1.0, (20, len(robot.joint_names)))
+        kinematics = Kinematics(robot.urdf_path)
+        assert kinematics.joint_names == robot.joint_names
+        expected = [kinematics.forward(row.tolist(), link).position for row in q]
+        np.testing.assert_allclose(robot.link_positions(q, link), expected, atol=1e-6)
+
+
+def test_a_link_box_reaches_where_the_link_is(tmp_path):
+    robot = slider(tmp_path)
+    check = check_of("link_box", robot, boxes={"hand": {"x": [-0.5, 0.5]}})
+    start = State.at_rest(np.array((0.499, 0.0)))
+    assert check.check(Motion(robot, start, np.array((0.4999, 0.0)), 0.01), Situation()) is None
+    violation = check.check(Motion(robot, start, np.array((0.5001, 0.0)), 0.01), Situation())
+    assert (violation.subject, violation.limit) == ("x of link 'hand'", 0.5)
+    assert violation.value == pytest.approx(0.5001)
+
+
+def test_the_speed_of_a_link_is_that_of_its_origin(tmp_path):
+    robot = slider(tmp_path)
+    check = check_of("link_velocity", robot, links={"hand": 0.25})
+    for speed, is_safe in ((0.249, True), (0.251, False)):
+        motion = Motion(robot, State.at_rest(np.zeros(2)), np.array((0.01 * speed, 0.0)), 0.01)
+        violation = check.check(motion, Situation())
+        assert (violation is None) == is_safe
+    assert violation.value == pytest.approx(0.251) and violation.limit == 0.25
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_link_outside_its_box_may_only_move_inwards(tmp_path, side):
+    robot = slider(tmp_path)
+    check = check_of("link_box", robot, boxes={"hand": {"x": [-0.5, 0.5]}})
+    start = State.at_rest(np.array((side * 0.7, 0.0)))
+    for after, is_safe in ((0.69, True), (0.71, False)):
+        violation = check.check(Motion(robot, start, np.array((side * after, 0.0)), 0.01), Situation())
+        assert (violation is None) == is_safe
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_joint_stays_in_its_limits_and_outside_them_may_only_move_inwards(tmp_path, side):
+    robot = slider(tmp_path)
+    check = check_of("joint_position", robot)
+    for before, after, is_safe in ((0.99, 1.0, True), (0.99, 1.01, False), (1.2, 1.19, True), (1.2, 1.21, False)):
+        start = State.at_rest(np.array((side * before, 0.0)))
+        violation = check.check(Motion(robot, start, np.array((side * after, 0.0)), 0.01), Situation())
+        assert (violation is None) == is_safe, (before, after)
+        assert is_safe or (violation.value, violation.limit) == (side * after, side)
+
+
+@pytest.mark.parametrize("name", ["joint_velocity", "joint_acceleration", "joint_jerk"])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_both_ways_have_limits(tmp_path, name, side):
+    robot = slider(tmp_path)
+    check = check_of(name, robot, LIMITS)
+    start = State.at_rest(np.zeros(2))
+    for step, is_safe in ((1e-5, True), (0.02, False)):
+        violation = check.check(Motion(robot, start, np.array((0.0, side * step)), 0.01), Situation())
+        assert (violation is None) == is_safe
+    assert violation.subject == "joint 'turn'" and violation.value > violation.limit
+
+
+def test_the_middle_of_a_braking_is_tried_too(tmp_path):
+    """Command and end are free, and the way between them goes through the base."""
+    robot = folding(tmp_path)
+    check = check_of("self_collision", robot)
+    there_and_back = np.sin(np.linspace(0.0, np.pi, 100))[:, None] * (0.0, 1.0)
+    brake = Brake(there_and_back, *(np.zeros((100, 2)),) * 3)
+    q = np.array((0.0, 2.0))
+    assert check.check(Motion(robot, State.at_rest(q), q, 0.01), Situation()) is None
+    violation = check.check(Motion(robot, State.at_rest(q), q, 0.01, brake), Situation())
+    assert violation is not None and violation.is_while_braking
+
+
+def test_links_that_are_too_near_may_only_move_apart():
+    check = check_of("self_collision", GuardedRobot(KUKA))
+    generator = np.random.default_rng(4)
+    q = np.array(FOLDED)
+    pair = check.check(Motion(check.robot, State.at_rest(np.array(HOME)), q, 0.01), Situation()).subject
+    tried = [q + generator.normal(0.0, 0.02, 7) for _ in range(40)]
+    motions = [Motion(check.robot, State.at_rest(q), each, 0.01) for each in tried]
+    answers = [check.check(each, Situation()) for each in motions]
+    check.distances.place(q)
+    before = {each: check.distances.distance(each, 0.01) for each in check.pairs}
+    for each, answer in zip(tried, answers):
+        check.distances.place(each)
+        nearer = [p for p in check.pairs if check.distances.distance(p, 0.01) < min(before[p], 0.01) - 1e-8]
+        assert bool(nearer) == (answer is not None)
+    assert None in answers and pair and any(answers)
+
+
+def test_distances_that_are_remembered_change_no_answer():
+    robot = GuardedRobot(KUKA)
+    check = check_of("self_collision", robot)
+    generator = np.random.default_rng(5)
+    q = np.array(HOME)
+    for _ in range(300):
+        step = np.clip(q + generator.normal(0.0, 0.05, 7), -2.0, 2.0)
+        motion = Motion(robot, State.at_rest(q), step, 0.01)
+        remembered = check.check(motion, Situation())
+        check.proximity.forget(range(len(check.pairs)))
+        assert check.check(motion, Situation()) == remembered
+        q = q if remembered else step
+
+
+BALL = Obstacle("ball", "sphere", (0.2, 0.2, 0.2), Pose((0.0, 0.0, 1.0)))
+FURTHER = np.array((0.0, 1e-4))
+
+
+def stretched(tmp_path, q=(0.0, 0.0), step=FURTHER):
+    """Two boxes along x, from the middle of the base to x = 0.85."""
+    robot = folding(tmp_path)
+    return check_of("environment", robot), Motion(robot, State.at_rest(np.array(q)), np.array(q) + step, 0.01)
+
+
+@pytest.mark.parametrize(
+    "obstacle",
+    [
+        Obstacle("it", "box", (0.2, 0.2, 0.2)),
+        Obstacle("it", "sphere", (0.2, 0.2, 0.2)),
+        Obstacle("it", "cylinder", (0.2, 0.2, 0.2)),
+        Obstacle("it", "capsule", (0.2, 0.2, 0.2)),
+        Obstacle("it", "points", (1.0, 1.0, 1.0), corners=((-0.1, 0.0, 0.0), (0.1, 0.1, 0.0), (0.0, -0.1, 0.1))),
+    ],
+    ids=lambda obstacle: obstacle.kind,
+)
+def test_any_shape_is_kept_away_from(tmp_path, obstacle):
+    for x, is_safe in ((0.965, False), (0.972, True)):  # 0.85 of the arm, 0.1 of the obstacle, 0.02 between them
+        check, motion = stretched(tmp_path, step=np.array((0.0, 0.0)))
+        away = Motion(check.robot, State.at_rest(np.array((1.0, 0.0))), np.zeros(2), 0.01)
+        there = obstacle._replace(pose=Pose((x, 0.0, 0.0)))
+        violation = check.check(away, Situation(obstacles=(there,)))
+        assert (violation is None) == is_safe
+        assert check.check(motion, Situation(obstacles=(there,))) is None, "what stands comes no nearer"
+    assert check.check(away, Situation(obstacles=(there,))) is None
+    assert check.check(away, Situation(obstacles=())) is None
+
+
+def test_what_is_around_the_robot_may_come_go_and_move(tmp_path):
+    check, motion = stretched(tmp_path)
+    near, far = (BALL._replace(pose=Pose((0.6, y, 0.0))) for y in (0.14, 0.3))
+    for obstacles, is_safe in (((), True), ((near,), False), ((far,), True), ((far, near), False), ((far, BALL), True)):
+        assert (check.check(motion, Situation(obstacles=obstacles)) is None) == is_safe, obstacles
+    back = Motion(check.robot, motion.start, motion.start.position - FURTHER, 0.01)
+    assert check.check(back, Situation(obstacles=(near,))) is None, "away from what came near it may go"
+    nowhere = BALL._replace(pose=Pose((np.nan, 0.0, 0.0)))
+    with pytest.raises(ValueError, match="obstacle 'ball': expected finite numbers"):
+        check.check(motion, Situation(obstacles=(nowhere,)))
+
+
+RAIL = """<robot name="rail"><link name="base"/>
+  <link name="cart"><collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>
+  <joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
+    <limit lower="-1" upper="1" effort="1" velocity="2"/></joint>
+</robot>"""
+
+
+def test_how_far_joints_have_moved_since_a_distance_was_looked_at_counts(tmp_path):
+    path = tmp_path / "rail.urdf"
+    path.write_text(RAIL)
+    check = check_of("environment", GuardedRobot(str(path)))
+    around = Situation(obstacles=(BALL._replace(pose=Pose((0.6, 0.0, 0.0))),))  # 0.4 m away
+    for x, brake_m, is_safe in ((0.0, 0.0, True), (0.05, 0.32, True), (0.05, 0.36, False)):
+        start = State.at_rest(np.array((x,)))
+        brake = Brake(np.linspace(0.0, brake_m, 40)[:, None], *(np.zeros((40, 1)),) * 3)
+        violation = check.check(Motion(check.robot, start, start.position, 0.01, brake), around)
+        assert (violation is None) == is_safe, brake_m
+
+
+def test_a_factor_takes_as_much_of_the_range_from_both_ends(tmp_path):
+    limits = JointLimits.of(slider(tmp_path), LimitsConfig(position_factor=0.5), "guard.yaml")
+    assert limits.lower.tolist() == [-0.5, -1.0] and limits.upper.tolist() == [0.5, 1.0]
+
+
+def test_where_nobody_tells_of_the_environment_nothing_is_safe(tmp_path):
+    check, motion = stretched(tmp_path)
+    assert "nobody tells what is around" in str(check.check(motion, Situation()))
+
+
+BOX = """
+name: box
+createVisualShape: {shapeType: GEOM_BOX, halfExtents: [0.1, 0.1, 0.1]}
+createCollisionShape: {shapeType: GEOM_BOX, halfExtents: [0.1, 0.1, 0.1]}
+basePosition: [2.4, 0.5, 0.0]
+"""
+WALL = """
+name: wall
+createVisualShape: {shapeType: GEOM_PLANE}
+createCollisionShape: {shapeType: GEOM_PLANE, planeNormal: [1, 0, 0]}
+"""
+ROBOT = """
+name: arm
+loadURDF: {fileName: folding.urdf, basePosition: [2.0, 0.0, 0.0], useFixedBase: true}
+setJointMotorControlArray: {controlMode: POSITION_CONTROL}
+"""
+
+
+def world_of(folder) -> str:
+    """Returns the file of a world with the folding robot, a box beside it and a wall behind it."""
+    for name, text in (("box", BOX), ("wall", WALL), ("arm", ROBOT)):
+        (folder / f"{name}.yaml").write_text(text)
+    path = folder / "world.yaml"
+    path.write_text(
+        "{connect: {connection_mode: DIRECT}, collision_objects: [box.yaml, wall.yaml], robots: [arm.yaml]}"
+    )
+    return str(path)
+
+
+def test_a_world_file_tells_of_bodies_in_the_root_of_the_robot_that_stands_in_it(tmp_path):
+    robot = folding(tmp_path)
+    check = check_of("environment", robot, world=world_of(tmp_path))
+    box, wall = check._obstacles
+    assert (box.name, box.kind, box.size) == ("box", "box", (0.2, 0.2, 0.2))
+    assert box.pose.position == pytest.approx((0.4, 0.5, 0.0)) and wall.kind == "plane"
+    turned = Motion(robot, State.at_rest(np.array((0.0, 0.0))), np.array((0.0, 1.5)), 0.01)
+    assert check.check(turned, Situation()).subject == "link 'lower' and 'box'"
+    live = Situation(obstacles=(BALL._replace(pose=Pose((0.6, 0.12, 0.0))),))
+    assert check.check(turned, live).subject == "link 'lower' and 'box'"
+    assert check.check(Motion(robot, turned.start, FURTHER, 0.01), live).subject == "link 'lower' and 'ball'"
+    check.distances.place(np.zeros(2))
+    assert check.distances.distance(("lower", 1), 5.0) == pytest.approx(2.45, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ({"robot": "amr"}, "world.yaml: unknown robot 'amr'.*did you mean 'arm'"),
+        ({"world": "none.yaml"}, "none.yaml"),
+    ],
+)
+def test_a_world_that_cannot_be_taken_is_named(tmp_path, options, message):
+    robot, world = folding(tmp_path), world_of(tmp_path)
+    with pytest.raises(ConfigError, match=message):
+        check_of("environment", robot, **{"world": world, **options})
+
+
+def test_pairs_can_be_read_changed_and_read_again(tmp_path):
+    path = tmp_path / "pairs.yaml"
+    first = check_of("self_collision", GuardedRobot(KUKA), pairs_file=str(path))
+    assert "[lwr_arm_0_link, lwr_arm_7_link]" in path.read_text()
+    path.write_text("pairs:\n- [lwr_arm_0_link, lwr_arm_7_link]\n")
+    assert check_of("self_collision", GuardedRobot(KUKA), pairs_file=str(path)).pairs == [
+        ("lwr_arm_0_link", "lwr_arm_7_link")
+    ]
+    assert ("lwr_arm_0_link", "lwr_arm_7_link") in first.pairs
+    assert ("lwr_arm_0_link", "lwr_arm_1_link") not in first.pairs
+
+
+def test_an_srdf_says_which_pairs_are_left_out_and_one_of_another_robot_is_refused(tmp_path):
+    path = tmp_path / "arm.srdf"
+    path.write_text('<robot name="a"><disable_collisions link1="lwr_arm_7_link" link2="lwr_arm_0_link"/></robot>')
+    pairs = check_of("self_collision", GuardedRobot(KUKA), srdf=str(path)).pairs
+    assert ("lwr_arm_0_link", "lwr_arm_7_link") not in pairs and ("lwr_arm_0_link", "lwr_arm_6_link") in pairs
+    path.write_text('<robot name="b"><disable_collisions link1="panda_link7" link2="panda_link0"/></robot>')
+    with pytest.raises(ConfigError, match=r"arm.srdf: panda_link0: expected a link of .*kuka_lwr.urdf"):
+        check_of("self_collision", GuardedRobot(KUKA), srdf=str(path))
+
+
+UNKNOWN = [("link_box", {"boxes": {"hnd": {}}}), ("link_velocity", {"links": {"hnd": 1.0}})]
+
+
+@pytest.mark.parametrize("name, options", UNKNOWN)
+def test_an_unknown_link_is_named_with_the_key(tmp_path, name, options):
+    key = next(iter(options))
+    expected = f"guard.yaml: checks.{name}.{key}.hnd: unknown link 'hnd'.*did you mean 'hand'"
+    with pytest.raises(ConfigError, match=expected):
+        check_of(name, slider(tmp_path), **options)
+
+
+def test_a_box_the_wrong_way_round_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match=r"checks.link_box.boxes.hand.x: expected the least value first"):
+        check_of("link_box", slider(tmp_path), boxes={"hand": {"x": [1.0, -1.0]}})
+
+
+def test_stamps_must_go_on_and_targets_must_come_while_the_robot_moves():
+    check = check_of("staleness", GuardedRobot(KUKA))
+    still = Motion(check.robot, State.at_rest(np.array(HOME)), np.array(HOME), 0.01)
+    moving = State(np.array(HOME), np.full(7, 0.1), np.zeros(7))
+    assert check.check(still, Situation(stamp_step_s=0.01, since_command_s=60.0)) is None
+    for step_s in (0.0, -0.01, float("nan")):
+        assert check.check(still, Situation(stamp_step_s=step_s)) is not None
+    goes_on = Motion(check.robot, moving, np.array(HOME), 0.01)
+    assert check.check(goes_on, Situation(since_command_s=0.05)) is None
+    assert check.check(goes_on, Situation(since_command_s=0.15)) is not None
+    assert check.check(still, Situation(age_s=-0.2)) is not None
