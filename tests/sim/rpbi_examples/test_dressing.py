@@ -206,3 +206,30 @@ def test_the_world_is_what_the_code_takes_it_for():
     tip = next(i for i in range(len(robot.joint_indices)) if robot.link_name(i) == "panda_grasptarget")
     assert robot.link_pose(tip).position == pytest.approx(np.array(CUFF) - (0.0, RADIUS_M, 0.0), abs=2e-3)
     world.close()
+
+
+def largest_stiffness(mesh: Path, mass: float, step_s: float) -> float:
+    """Returns how stiff springs along the edges of a mesh may be [N/m] without damping.
+
+    PyBullet steps them explicitly: the fastest mode of the springs at rest must not turn faster than 2 rad a step.
+    """
+    lines = [line.split() for line in mesh.read_text().splitlines()]
+    corners = np.array([line[1:] for line in lines if line[0] == "v"], dtype=float)
+    faces = np.array([line[1:] for line in lines if line[0] == "f"], dtype=int) - 1
+    edges = np.unique(np.sort(np.concatenate((faces[:, :2], faces[:, 1:], faces[:, ::2])), axis=1), axis=0)
+    along = corners[edges[:, 1]] - corners[edges[:, 0]]
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    stretch = np.zeros((len(edges), len(corners), 3))
+    stretch[np.arange(len(edges)), edges[:, 0]], stretch[np.arange(len(edges)), edges[:, 1]] = -along, along
+    fastest = np.linalg.norm(stretch.reshape(len(edges), -1), ord=2) ** 2
+    return 4.0 * mass / len(corners) / (fastest * step_s**2)
+
+
+def test_the_cloth_is_slow_enough_for_the_tick():
+    """Stiffer, it gains energy where it catches on a wrist or an elbow, and throws the robot's hand off."""
+    folder = Path(replace_package(WORLD)).parent
+    load = yaml.safe_load((folder / "sleeve.yaml").read_text())["loadSoftBody"]
+    step_s = yaml.safe_load(Path(replace_package(WORLD)).read_text())["timeStep"]
+    assert load["springElasticStiffness"] <= largest_stiffness(
+        Path(replace_package(load["fileName"])), load["mass"], step_s
+    )

@@ -1,6 +1,7 @@
 """An arm draws a sleeve over that of a person who is in the world by their avatar."""
 
 import json
+import math
 import threading
 from collections.abc import Callable
 from functools import partial
@@ -36,7 +37,7 @@ JOINTS_OF_ARM = ("RightUpperArm", "RightForeArm", "RightHand")
 STILL_S = 1.0
 """For so long the person holds out the arm before the robot begins [s]."""
 SEES_NOTHING_S = 1.0
-"""Without news of the arm for so long, the robot waits [s]."""
+"""Without news of the arm, or of the force on it, for so long, the robot waits [s]."""
 
 
 class TelepresenceParameters(ConfigModel):
@@ -60,7 +61,7 @@ class TelepresenceNode:
         self._kinematics = Kinematics(find_file(ROBOT, ".", (pybullet_data.getDataPath(),)))
         self._solver = HandSolver(self._kinematics)
         self._tf, self._lock = TfInterface(), threading.Lock()
-        self._force_n = 0.0
+        self._force_n, self._felt_s = 0.0, -math.inf
         self._positions: tuple[float, ...] | None = None
         self._rings: Array | None = None
         self._targets = rospy.Publisher("rpbi/panda/joint_states/target", JointState, queue_size=1, tcp_nodelay=True)
@@ -80,7 +81,7 @@ class TelepresenceNode:
             now_s = rospy.get_time()
             dt, last_s = min(max(now_s - last_s, 0.0), 0.1), now_s
             arm = self._arm()
-            if arm is None or self._positions is None:
+            if arm is None or self._positions is None or now_s - self._felt_s > SEES_NOTHING_S:
                 continue
             still_s = still_s + dt if is_held_out(arm) else 0.0
             if not self._dressing.has_begun and still_s < STILL_S:
@@ -159,7 +160,8 @@ class TelepresenceNode:
     def _take_forces(self, message: SegmentForces) -> None:
         total = force_on_arm(message.segments, [(each.x, each.y, each.z) for each in message.forces])
         with self._lock:
-            self._force_n = self._forces.add(message.header.stamp.to_sec(), total)
+            self._felt_s = message.header.stamp.to_sec()
+            self._force_n = self._forces.add(self._felt_s, total)
 
 
 def _rounded(position: tuple[float, ...]) -> str:
