@@ -23,6 +23,7 @@ from rpbi_examples.dressing.way import CUFF, ArmPosition, is_held_out
 SHOULDER, ELBOW, WRIST = np.array((0.0, -0.23, 1.43)), np.array((0.32, -0.28, 1.43)), np.array((0.57, -0.27, 1.43))
 ARM = ArmPosition(SHOULDER, ELBOW, WRIST)
 DT = 0.02
+SLEEVE = "{rpbi_examples}/configs/telepresence/sleeve.yaml"
 
 
 def sleeve_at(cuff: np.ndarray) -> np.ndarray:
@@ -226,10 +227,8 @@ def largest_stiffness(mesh: Path, mass: float, step_s: float) -> float:
 
 
 def test_the_cloth_is_slow_enough_for_the_tick():
-    """Stiffer, it gains energy where it catches on a wrist or an elbow, and throws the robot's hand off."""
-    folder = Path(replace_package(WORLD)).parent
-    load = yaml.safe_load((folder / "sleeve.yaml").read_text())["loadSoftBody"]
+    """With 60 N/m it gained energy where it caught on wrist or elbow, and threw the robot's hand off."""
+    load = yaml.safe_load(Path(replace_package(SLEEVE)).read_text())["loadSoftBody"]
     step_s = yaml.safe_load(Path(replace_package(WORLD)).read_text())["timeStep"]
-    assert load["springElasticStiffness"] <= largest_stiffness(
-        Path(replace_package(load["fileName"])), load["mass"], step_s
-    )
+    largest = largest_stiffness(Path(replace_package(load["fileName"])), load["mass"], step_s)
+    assert load["springElasticStiffness"] <= largest < 60.0
