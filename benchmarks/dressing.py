@@ -10,7 +10,7 @@ from result import Result, Target
 from operator_node.avatar.anthropometry import segment_offsets
 from operator_node.avatar.retargeting import Retargeting
 from operator_node.emulators.arm_held_out import ArmHeldOut
-from rpbi_examples.dressing_trial import FORCE_LIMIT_N, run_trial
+from rpbi_examples.dressing.trial import FORCE_LIMIT_N, run_trial
 
 SEEDS, QUICK_SEEDS = 20, 2
 FRAMES = 5000

@@ -3,4 +3,4 @@
 
 from custom_ros_tools.ros.node import run_command
 
-run_command("rpbi_examples.dressing_trial:main")
+run_command("rpbi_examples.dressing.trial:main")

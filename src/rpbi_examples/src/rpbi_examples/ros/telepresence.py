@@ -1,7 +1,10 @@
 """An arm draws a sleeve over that of a person who is in the world by their avatar."""
 
 import json
+import math
 import threading
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,31 +18,26 @@ from std_msgs.msg import Float64
 from visualization_msgs.msg import Marker
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.joint_states import resolve_joint_order
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.schema import ConfigModel, Positive
 from operator_node.msg import SegmentForces
 from rpbi.config.asset_files import find_file
 from rpbi.kinematics import Kinematics
-from rpbi_examples.dressing import (
-    ARM_SEGMENTS,
-    ROBOT,
-    TARGET_HZ,
-    ArmPosition,
-    Dressing,
-    HandSolver,
-    MeanForce,
-    Outcome,
-    is_held_out,
-    outcome,
-)
+from rpbi_examples.dressing.controller import TARGET_HZ, Dressing
+from rpbi_examples.dressing.force import MeanForce, force_on_arm
+from rpbi_examples.dressing.hand import ROBOT, HandSolver
+from rpbi_examples.dressing.outcome import Outcome, outcome, rings_of
+from rpbi_examples.dressing.way import ArmPosition, Array, is_held_out
 
 JOINTS_OF_ARM = ("RightUpperArm", "RightForeArm", "RightHand")
 STILL_S = 1.0
 """For so long the person holds out the arm before the robot begins [s]."""
 SEES_NOTHING_S = 1.0
-"""Without news of the arm for so long, the robot waits [s]."""
+"""Without news of the arm, or of the force on it, for so long, the robot waits [s]."""
 
 
 class TelepresenceParameters(ConfigModel):
@@ -63,15 +61,16 @@ class TelepresenceNode:
         self._kinematics = Kinematics(find_file(ROBOT, ".", (pybullet_data.getDataPath(),)))
         self._solver = HandSolver(self._kinematics)
         self._tf, self._lock = TfInterface(), threading.Lock()
-        self._force_n = 0.0
+        self._force_n, self._felt_s = 0.0, -math.inf
         self._positions: tuple[float, ...] | None = None
-        self._corners: list[tuple[float, float, float]] = []
+        self._rings: Array | None = None
         self._targets = rospy.Publisher("rpbi/panda/joint_states/target", JointState, queue_size=1, tcp_nodelay=True)
         self._force_topic = rospy.Publisher("telepresence/force", Float64, queue_size=10)
         self._marker = rospy.Publisher("telepresence/marker", Marker, queue_size=10)
-        rospy.Subscriber("rpbi/panda/joint_states", JointState, self._take_state, queue_size=1)
-        rospy.Subscriber("rpbi/sleeve/surface", Marker, self._take_surface, queue_size=1)
-        rospy.Subscriber("avatar/segment_forces", SegmentForces, self._take_forces, queue_size=100)
+        self._warn = ThrottledWarning()
+        self._subscribe("rpbi/panda/joint_states", JointState, self._take_state, queue_size=1)
+        self._subscribe("rpbi/sleeve/surface", Marker, self._take_surface, queue_size=1)
+        self._subscribe("avatar/segment_forces", SegmentForces, self._take_forces, queue_size=100)
 
     def run(self) -> None:
         """Dresses the person, and returns when the sleeve is on, or ROS shuts down."""
@@ -82,7 +81,7 @@ class TelepresenceNode:
             now_s = rospy.get_time()
             dt, last_s = min(max(now_s - last_s, 0.0), 0.1), now_s
             arm = self._arm()
-            if arm is None or self._positions is None:
+            if arm is None or self._positions is None or now_s - self._felt_s > SEES_NOTHING_S:
                 continue
             still_s = still_s + dt if is_held_out(arm) else 0.0
             if not self._dressing.has_begun and still_s < STILL_S:
@@ -97,11 +96,14 @@ class TelepresenceNode:
         with self._lock:
             force_n = self._force_n
         assert self._positions is not None
-        found = self._solver.solve(self._dressing.target(arm, force_n, dt), self._positions)
-        if found is not None:
-            target = JointState(name=list(found), position=list(found.values()))
-            target.header.stamp = rospy.Time.now()
-            self._targets.publish(target)
+        target = self._dressing.target(arm, self._solver.cuff(self._positions), force_n, dt)
+        found = self._solver.solve(target, self._positions)
+        if found is None:
+            self._warn("waiting", f"no joint positions nearby bring the robot's hand to {_rounded(target.position)} m")
+        else:
+            message = JointState(name=list(found), position=list(found.values()))
+            message.header.stamp = rospy.Time.now()
+            self._targets.publish(message)
         self._show(arm, force_n)
 
     def _arm(self) -> ArmPosition | None:
@@ -126,9 +128,9 @@ class TelepresenceNode:
 
     def _outcome(self) -> Outcome:
         arm = self._arm()
-        if arm is None or not self._corners:
+        if arm is None or self._rings is None:
             raise InterfaceError("the sleeve or the arm has gone: rpbi/sleeve/surface or TF of rpbi/human ceased")
-        return outcome(self._corners, arm, self._forces.peak_n)
+        return outcome(self._rings, arm, self._forces.peak_n)
 
     def _tell(self, found: Outcome) -> None:
         words = "is past the elbow" if found.is_dressed else "is NOT past the elbow"
@@ -137,18 +139,33 @@ class TelepresenceNode:
             figures: dict[str, Any] = {**found._asdict(), "is_dressed": found.is_dressed}
             Path(self._config.out).write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
 
+    def _subscribe(self, topic: str, kind: type, take: Callable[[Any], None], queue_size: int) -> None:
+        rospy.Subscriber(topic, kind, partial(self._take, rospy.resolve_name(topic), take), queue_size=queue_size)
+
+    def _take(self, topic: str, take: Callable[[Any], None], message: Any) -> None:
+        try:
+            take(message)
+        except (InterfaceError, ValueError) as error:
+            self._warn(topic, f"message refused: {error}")
+
     def _take_state(self, message: JointState) -> None:
-        positions = dict(zip(message.name, message.position))
-        self._positions = tuple(positions[name] for name in self._kinematics.joint_names)
+        positions = resolve_joint_order(message, self._kinematics.joint_names).position
+        if not positions:
+            raise ValueError("expected positions of the joints, got none")
+        self._positions = tuple(positions)
 
     def _take_surface(self, message: Marker) -> None:
-        self._corners = [(point.x, point.y, point.z) for point in message.points]
+        self._rings = rings_of([(point.x, point.y, point.z) for point in message.points])
 
     def _take_forces(self, message: SegmentForces) -> None:
-        forces = dict(zip(message.segments, message.forces))
-        total = np.sum([(forces[name].x, forces[name].y, forces[name].z) for name in ARM_SEGMENTS], axis=0)
+        total = force_on_arm(message.segments, [(each.x, each.y, each.z) for each in message.forces])
         with self._lock:
-            self._force_n = self._forces.add(message.header.stamp.to_sec(), total)
+            self._felt_s = message.header.stamp.to_sec()
+            self._force_n = self._forces.add(self._felt_s, total)
+
+
+def _rounded(position: tuple[float, ...]) -> str:
+    return f"({', '.join(f'{value:.2f}' for value in position)})"
 
 
 def main() -> None:

@@ -1,0 +1,1 @@
+"""An arm draws a sleeve over that of a person."""

@@ -1,0 +1,73 @@
+"""The controller that draws the sleeve over the arm: where the hand goes, and how fast."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .hand import HandTarget, holding
+from .way import AHEAD_AT_START, ArmPosition, Array, Way
+
+TARGET_HZ = 50
+"""Targets a second."""
+SETTLING_S = 0.5
+"""For so long the cuff is held at the end of its way [s]."""
+LARGEST_LEAD_M = 0.02
+"""The next place of the cuff is so far from where it is at most; it goes no further until it has come so near [m]."""
+LARGEST_TURN_RATE = 1.5
+"""Of the cuff [rad/s]."""
+
+
+class Dressing:
+    """Leads the cuff along a person's arm, wherever that is at the moment.
+
+    The nearer the force on it is to the limit the slower is the cuff; above the limit it goes back. It waits for a hand
+    that does not follow, so that the hand has never far to go when it can again.
+
+    Args:
+        force_limit_n: Force on the arm above which the cuff goes back [N].
+        speed: Of the cuff where nothing is touched [m/s].
+    """
+
+    def __init__(self, force_limit_n: float, speed: float) -> None:
+        self._limit_n, self._speed = force_limit_n, speed
+        self._left_m: float | None = None
+        self._rested_s = 0.0
+        self._ahead = np.array(AHEAD_AT_START)
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether the cuff is led already."""
+        return self._left_m is not None
+
+    @property
+    def is_done(self) -> bool:
+        """Whether the cuff is led no further, and has had time to get there."""
+        return self._rested_s >= SETTLING_S
+
+    def target(self, arm: ArmPosition, cuff: Array, force_n: float, dt: float) -> HandTarget:
+        """Returns where the robot's hand is to be.
+
+        Args:
+            arm: Where the person's arm is.
+            cuff: Where the middle of the cuff is (3) [m].
+            force_n: Force on the arm [N].
+            dt: Time since the last target [s].
+        """
+        way = Way(arm)
+        if self._left_m is None:
+            self._left_m = way.length
+        speed = self._speed * max(-1.0, 1.0 - force_n / self._limit_n)
+        if np.linalg.norm(way.place(way.length - self._left_m) - cuff) > LARGEST_LEAD_M:
+            speed = min(speed, 0.0)
+        self._left_m = min(max(self._left_m - speed * dt, 0.0), way.length)
+        self._rested_s = 0.0 if self._left_m else self._rested_s + dt
+        done = way.length - self._left_m
+        self._ahead = _towards(self._ahead, way.ahead(done), LARGEST_TURN_RATE * dt)
+        self._ahead /= np.linalg.norm(self._ahead)
+        return holding(_towards(cuff, way.place(done), LARGEST_LEAD_M), self._ahead)
+
+
+def _towards(start: Array, end: Array, largest: float) -> Array:
+    """Returns the end if it is so near, else a point on the way to it."""
+    step = end - start
+    return start + step * min(1.0, largest / max(float(np.linalg.norm(step)), 1e-12))

@@ -1,0 +1,158 @@
+"""The telepresence example without ROS: a person of chance holds out an arm and is dressed."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from operator_node.avatar.anthropometry import segment_offsets
+from operator_node.avatar.engagement import Engagement
+from operator_node.avatar.joints import HINGES
+from operator_node.avatar.retargeting import AvatarPose, Retargeting
+from operator_node.emulators.arm_held_out import RAISING_S, ArmHeldOut
+from rpbi.geometry import Pose, Vector
+from rpbi.samples import ContactsSample, SurfaceSample
+from rpbi.world import World
+
+from .controller import TARGET_HZ, Dressing
+from .force import ARM_SEGMENTS, MeanForce
+from .hand import HandSolver
+from .outcome import Outcome, outcome, rings_of
+from .way import ArmPosition
+
+WORLD = "{rpbi_examples}/configs/telepresence/config.yaml"
+AVATAR_HEIGHT_M = 1.75
+HEIGHTS_M = (1.60, 1.90)
+"""Of the people."""
+FORCE_LIMIT_N, SPEED = 15.0, 0.1
+LONGEST_S = 30.0
+
+
+def run_trial(seed: int, force_limit_n: float = FORCE_LIMIT_N, speed: float = SPEED) -> Outcome:
+    """Runs the example as fast as it goes and returns what became of it.
+
+    Args:
+        seed: Of the person: how tall they are, and how they hold the arm.
+        force_limit_n: Force on the arm above which the cuff goes back [N].
+        speed: Of the cuff [m/s].
+    """
+    world = World.from_file(WORLD)
+    try:
+        height_m = np.random.default_rng((seed, 1)).uniform(*HEIGHTS_M)
+        trial = Trial(world, ArmHeldOut(height_m, seed), Dressing(force_limit_n, speed))
+        while not trial.is_over:
+            trial.step()
+        return trial.outcome()
+    finally:
+        world.close()
+
+
+class Trial:
+    """A person who holds out an arm in the example's world, and the controller that dresses them.
+
+    Args:
+        world: The example's, or one with more in it.
+        person: Whose segments the avatar follows.
+        dressing: The controller.
+
+    Attributes:
+        force_n: Force on the arm [N], as mean over 0.1 s.
+        cuff: Where the middle of the cuff is (3) [m].
+    """
+
+    def __init__(self, world: World, person: ArmHeldOut, dressing: Dressing) -> None:
+        self._world, self._person, self._dressing = world, person, dressing
+        human: Any = world.bodies["human"]
+        robot: Any = world.bodies["panda"]
+        self._human, self._robot = human, robot
+        self._retargeting = Retargeting(segment_offsets(AVATAR_HEIGHT_M))
+        self._engagement = Engagement(max_joint_speed=3.0, max_speed=1.0, max_angular_speed=3.0)
+        links = {human.link_name(index): index for index in range(-1, len(human.joint_indices))}
+        self._links = [links[name] for name in ("RightUpperArm", "RightForeArm", "RightHand")]
+        positions = dict(zip((joint.name for joint in human.model.moving), human.joint_positions().values()))
+        base = human.base_pose()
+        first = np.array([positions[hinge] for hinge in HINGES])
+        self._engagement.begin(AvatarPose(np.array(base.position), np.array(base.quat_xyzw), first))
+        self._solver = HandSolver(robot.kinematics)
+        self._forces = MeanForce()
+        self._corners: tuple[Vector, ...] = ()
+        self._ticks = round(1.0 / (TARGET_HZ * world.clock.dt_s))
+        self._number = 0
+        self.force_n = 0.0
+        self.cuff = self._solver.cuff(self._positions())
+
+    @property
+    def time_s(self) -> float:
+        """Time since the start [s]."""
+        return self._number / TARGET_HZ
+
+    @property
+    def peak_force_n(self) -> float:
+        """Largest force on the arm [N], as mean over 0.1 s."""
+        return self._forces.peak_n
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the cuff is led no further, or it has taken too long."""
+        return self._dressing.is_done or self.time_s >= LONGEST_S
+
+    def step(self) -> None:
+        """Goes on by the time of one target."""
+        dt = 1.0 / TARGET_HZ
+        pose = self._engagement.step(self._retargeting.pose(self._person.frame(self.time_s)), dt)
+        self._world.put("human/pose", Pose(tuple(pose.position.tolist()), tuple(pose.quat_xyzw.tolist())))
+        self._world.put("human/target", dict(zip(HINGES, pose.hinges.tolist())))
+        arm = self._arm()
+        self._world.put("elbow/pose", Pose(tuple(arm.elbow.tolist())))
+        for _ in range(self._ticks):
+            for sample in self._world.step():
+                if isinstance(sample, ContactsSample) and sample.name == "human":
+                    self.force_n = self._forces.add(self._world.clock.time_s, _on_arm(sample))
+                elif isinstance(sample, SurfaceSample):
+                    self._corners = sample.corners
+        self.cuff = self._solver.cuff(now := self._positions())
+        if self.time_s >= RAISING_S:
+            target = self._dressing.target(arm, self.cuff, self.force_n, dt)
+            if (found := self._solver.solve(target, now)) is not None:
+                self._world.put("panda/target", found)
+        self._number += 1
+
+    def outcome(self) -> Outcome:
+        """Returns what has become of it."""
+        return outcome(rings_of(self._corners), self._arm(), self.peak_force_n)
+
+    def _arm(self) -> ArmPosition:
+        return ArmPosition(*(np.array(self._human.link_pose(link).position) for link in self._links))
+
+    def _positions(self) -> tuple[float, ...]:
+        return tuple(self._robot.joint_positions().values())
+
+
+def _on_arm(sample: ContactsSample) -> np.ndarray:
+    """Returns the sum of forces on the arm [N]."""
+    return np.sum([(0.0, 0.0, 0.0), *(p.force for p in sample.points if p.link in ARM_SEGMENTS)], axis=0)
+
+
+def main() -> int:
+    """Runs the command; returns 1 if somebody is not dressed."""
+    parser = argparse.ArgumentParser(description="Dresses people of chance, as fast as it goes and without ROS.")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0], metavar="N", help="one for each person, default 0")
+    parser.add_argument("--force-limit", type=float, default=FORCE_LIMIT_N, metavar="N", help="on the arm [N]")
+    parser.add_argument("--speed", type=float, default=SPEED, help="of the sleeve [m/s]")
+    parser.add_argument("--out", type=Path, help="file for the outcomes, as JSON")
+    arguments = parser.parse_args()
+    if not (arguments.force_limit > 0.0 and arguments.speed > 0.0):
+        parser.error("--force-limit and --speed: expected numbers above 0")
+    outcomes = {}
+    for seed in arguments.seeds:
+        outcomes[seed] = found = run_trial(seed, arguments.force_limit, arguments.speed)
+        words = "past the elbow" if found.is_dressed else "NOT past the elbow"
+        print(f"seed {seed}: {words} ({found.past_elbow_m:.3f} m), peak force {found.peak_force_n:.2f} N", flush=True)
+    if arguments.out:
+        figures = {seed: {**found._asdict(), "is_dressed": found.is_dressed} for seed, found in outcomes.items()}
+        arguments.out.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+    return 0 if all(found.is_dressed for found in outcomes.values()) else 1

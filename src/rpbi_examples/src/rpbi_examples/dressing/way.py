@@ -1,0 +1,82 @@
+"""The way of the cuff along a person's arm."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+CUFF = (0.86, -0.26, 1.43)
+"""Where the middle of the cuff is at the start [m], as in `sleeve.yaml`."""
+AHEAD_AT_START = (-1.0, 0.0, 0.0)
+"""Where the cuff is drawn to at the start, as unit vector."""
+HAND_M, BEFORE_HAND_M = 0.19, 0.05
+"""Length of a hand, and how far before it the cuff is in line with the forearm [m]."""
+PAST_ELBOW_M = 0.10
+"""How far past the elbow the cuff is drawn [m]."""
+BLEND_M = 0.05
+"""Over so much of its way to either side of the elbow the cuff turns [m]."""
+HELD_OUT_M = 0.25
+"""So near the start of the cuff is the place before the hand of one who holds out the arm [m]."""
+
+
+class ArmPosition(NamedTuple):
+    """Where the joints of a person's arm are in the world (3 each) [m]."""
+
+    shoulder: Array
+    elbow: Array
+    wrist: Array
+
+
+class Way:
+    """From where the cuff is at the start to before the hand, over the hand, along the forearm and past the elbow.
+
+    Args:
+        arm: Where the person's arm is.
+
+    Attributes:
+        length: Of the way [m].
+    """
+
+    def __init__(self, arm: ArmPosition) -> None:
+        forearm = _unit(arm.wrist - arm.elbow)
+        before = arm.wrist + (HAND_M + BEFORE_HAND_M) * forearm
+        end = arm.elbow + PAST_ELBOW_M * _unit(arm.shoulder - arm.elbow)
+        self._corners = [np.array(CUFF), before, arm.wrist, arm.elbow, end]
+        self.length = sum(math.dist(a, b) for a, b in pairwise(self._corners))
+
+    def place(self, done: float) -> Array:
+        """Returns where the middle of the cuff is so far along the way (3) [m]."""
+        return _along(self._corners, done)
+
+    def ahead(self, done: float) -> Array:
+        """Returns where the cuff is drawn to there, as unit vector (3): along the forearm from the start."""
+        start = math.dist(*self._corners[:2])
+        to = self.place(min(max(done, start) + BLEND_M, self.length))
+        return _unit(to - self.place(max(done - BLEND_M, start)))
+
+
+def is_held_out(arm: ArmPosition) -> bool:
+    """Returns whether an arm is held out to the cuff."""
+    forearm = _unit(arm.wrist - arm.elbow)
+    return math.dist(arm.wrist + (HAND_M + BEFORE_HAND_M) * forearm, CUFF) < HELD_OUT_M
+
+
+def _unit(vector: Array) -> Array:
+    return vector / np.linalg.norm(vector)
+
+
+def _along(corners: Sequence[Array], distance: float) -> Array:
+    """Returns the point so far along a line with corners."""
+    for a, b in pairwise(corners):
+        length = math.dist(a, b)
+        if distance <= length:
+            return a + (b - a) * (distance / max(length, 1e-12))
+        distance -= length
+    return corners[-1]
