@@ -1,7 +1,7 @@
 """Which things come too near to each other while a robot moves."""
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from safe_robot.motion import Motion
 from safe_robot.pursuit import Bound
 
-from .distances import LinkDistances, Pair
+from .distances import Contact, LinkDistances, Pair
 
 LEAST_SPACING_M = 0.01
 """The braking is tried no more densely than this [m], however small the margin is."""
@@ -134,3 +134,11 @@ class Proximity:
                 room = max(contact.distance - self._margin_m - KEPT_M, 0.0)
                 bounds.append(Bound(self._distances.gradient(self._pairs[i], contact, end), room))
         return bounds
+
+    def contacts(self, q: np.ndarray, within_m: float) -> Iterator[tuple[Pair, Contact]]:
+        """Yields the pairs that are nearer than a distance in a configuration of n positions, and where they are."""
+        self._distances.place(q)
+        for pair in self._pairs:
+            contact = self._distances.contact(pair, within_m)
+            if contact is not None:
+                yield pair, contact

@@ -10,6 +10,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
+from rpbi.geometry import plus, scaled
 from safe_robot.checks.environment import Environment
 from safe_robot.checks.link_box import BoxConfig, LinkBox
 from safe_robot.checks.self_collision import SelfCollision
@@ -56,9 +57,13 @@ class GuardMarkers:
                 line = self._marker(check.name, 2 * i, Marker.LINE_LIST, points=ends, color=color)
                 line.scale.x = 0.004
                 yield line
-                middle = Point(*((contact.first + contact.second) / 2.0 + (0.0, 0.0, 0.03)))
+                x, y, z = scaled(0.5, plus(contact.first, contact.second))
                 text = self._marker(check.name, 2 * i + 1, Marker.TEXT_VIEW_FACING, color=color)
-                text.pose.position, text.scale.z, text.text = middle, 0.03, f"{1e3 * contact.distance:.0f} mm"
+                text.pose.position, text.scale.z, text.text = (
+                    Point(x, y, z + 0.03),
+                    0.03,
+                    f"{1e3 * contact.distance:.0f} mm",
+                )
                 yield text
 
     def _boxes(self) -> Iterator[Marker]:

@@ -1,0 +1,6 @@
+#!/usr/bin/python3
+"""Writes the JSON Schemas of what stands in for a robot anew."""
+
+from custom_ros_tools.ros.node import run_command
+
+run_command("rpbi_utils.stand_in.schemas:main")

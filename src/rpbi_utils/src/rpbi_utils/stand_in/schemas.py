@@ -1,0 +1,33 @@
+"""JSON Schemas of the YAML files of what stands in for a robot."""
+
+import argparse
+from pathlib import Path
+
+from custom_ros_tools.schema import ConfigModel
+from custom_ros_tools.schema.json_schema import explained, json_schema, schema_text
+
+from .config import RobotLimits, StandInConfig
+
+FILES: dict[str, type[ConfigModel]] = {"robot_limits": RobotLimits, "stand_in": StandInConfig}
+
+
+def schema_files(root: Path) -> dict[Path, str]:
+    """Returns what the files should have.
+
+    Args:
+        root: The workspace.
+    """
+    folder = root / "src/rpbi_utils/schema"
+    return {
+        folder / f"{name}.schema.json": schema_text(explained(json_schema(model, name)))
+        for name, model in FILES.items()
+    }
+
+
+def main() -> None:
+    """Runs the command that writes the schemas anew."""
+    parser = argparse.ArgumentParser(description="Writes schemas anew.")
+    parser.add_argument("root", type=Path, help="the workspace")
+    for path, text in schema_files(parser.parse_args().root).items():
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)
