@@ -109,5 +109,12 @@ def test_camera_by_service_goes_with_a_reset_and_a_removed_one_comes_back(ros):
     assert ros.call("/rpbi/reset", Trigger).success
     listed = ros.call("/rpbi/list_objects", ListObjects)
     assert [name for name, kind in zip(listed.names, listed.types) if kind == "rgbd_sensor"] == ["eye"]
+    # rospy's subscribers stay without a publisher that goes and comes back while they connect
+    wait_until(lambda: is_published(DEPTH) and not is_published("/rpbi/late/depth/image"), "the topics have changed")
     depth = ros.listen(DEPTH, Image).wait_for(2)[-1]
     assert np.frombuffer(depth.data, np.float32).reshape(120, 160)[60, 80] == pytest.approx(HEIGHT_M - 0.2, abs=2e-3)
+
+
+def is_published(topic: str) -> bool:
+    """Tells whether the master knows somebody who publishes a topic."""
+    return any(name == topic for name, _ in rospy.get_published_topics())

@@ -17,8 +17,9 @@ def test_lines_are_as_long_as_they_say_and_red_where_it_is_narrow(ros, tmp_path)
     guard = guard_of(folding(tmp_path), checks=checks)
     decide(guard, (0.0, 2.6))  # the elbow is folded: the lower arm is beside the base
     shown = ros.listen("/robot_safety/markers", MarkerArray)
-    GuardMarkers(guard, Condition(), "base")
+    markers = GuardMarkers(guard, Condition(), "base")
     message = wait_until(lambda: shown.messages[-1], "something is shown")
+    markers.close()
     lines = [each for each in message.markers if each.type == Marker.LINE_LIST]
     texts = [each.text for each in message.markers if each.type == Marker.TEXT_VIEW_FACING]
     assert lines and len(texts) == len(lines)

@@ -34,6 +34,7 @@ def around(ros):
     around = LiveObstacles(BASE, ["arm"])
     with publishing("rpbi/markers", MarkerArray) as markers:
         yield around, markers.publish
+    around.close()
     broadcaster.pub_tf.unregister()
 
 

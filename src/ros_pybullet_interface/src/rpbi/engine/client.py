@@ -12,6 +12,9 @@ import pybullet
 from custom_ros_tools.errors import PhysicsError
 from rpbi.geometry import Vector
 
+WINDOWS = frozenset((pybullet.GUI, pybullet.GUI_SERVER, pybullet.GUI_MAIN_THREAD))
+"""Modes in which PyBullet opens a window of its own; in others it is the server's, if there is one."""
+
 
 class Client:
     """PyBullet's functions and constants as attributes, bound to one connection.
@@ -28,7 +31,7 @@ class Client:
 
     def __init__(self, mode: int = pybullet.DIRECT, **options: Any) -> None:
         try:
-            with nullcontext() if mode == pybullet.DIRECT else _screen():
+            with _screen() if mode in WINDOWS else nullcontext():
                 self.client_id: int = pybullet.connect(mode, **(options if mode != pybullet.DIRECT else {}))
         except pybullet.error as error:
             raise PhysicsError(f"PyBullet did not connect: {error}") from error

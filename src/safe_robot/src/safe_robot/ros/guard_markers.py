@@ -36,7 +36,12 @@ class GuardMarkers:
     def __init__(self, guard: Guard, lock: Condition, frame: str) -> None:
         self._guard, self._lock, self._frame = guard, lock, frame
         self._publisher = rospy.Publisher("robot_safety/markers", MarkerArray, queue_size=10, latch=True)
-        WallTimer(HZ, self._publish)
+        self._timer = WallTimer(HZ, self._publish)
+
+    def close(self) -> None:
+        """Publishes no more."""
+        self._timer.stop()
+        self._publisher.unregister()
 
     def _publish(self) -> None:
         if not self._publisher.get_num_connections():

@@ -48,8 +48,14 @@ class LiveObstacles:
         self._warn = ThrottledWarning()
         self._buffer = tf2_ros.Buffer(debug=False)
         self._listener = TfListener(self._buffer)
-        rospy.Subscriber(TOPIC, MarkerArray, self._take, queue_size=100)
-        WallTimer(HZ, self._look)
+        self._subscriber = rospy.Subscriber(TOPIC, MarkerArray, self._take, queue_size=100)
+        self._timer = WallTimer(HZ, self._look)
+
+    def close(self) -> None:
+        """Looks no more, and leaves its topics."""
+        self._timer.stop()
+        self._subscriber.unregister()
+        self._listener.unregister()
 
     def _take(self, message: MarkerArray) -> None:
         markers = dict(self._markers)

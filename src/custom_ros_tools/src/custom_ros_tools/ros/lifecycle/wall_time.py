@@ -39,7 +39,7 @@ class WallRate:
 
 
 class WallTimer:
-    """Calls something at a rate [Hz], in a thread of its own, until ROS shuts down.
+    """Calls something at a rate [Hz], in a thread of its own, until it is stopped or ROS shuts down.
 
     An exception is logged, and the next call is made all the same.
     """
@@ -48,8 +48,12 @@ class WallTimer:
         self._rate, self._action = WallRate(hz), action
         self._warn = ThrottledWarning()
         self._ended = threading.Event()
-        rospy.on_shutdown(self._ended.set)
+        rospy.on_shutdown(self.stop)
         threading.Thread(target=self._run, name="wall timer", daemon=True).start()
+
+    def stop(self) -> None:
+        """Makes no further call; one that is being made ends by itself."""
+        self._ended.set()
 
     def _run(self) -> None:
         while not self._ended.wait(max(self._rate.left_s, 0.0)):
