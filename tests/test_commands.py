@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from ros_system import find_executable, wait_until
+from ros_system import find_executable
 from tries import tries
 from worlds import FLOOR, box, iiwa, write_world
 
