@@ -4,28 +4,23 @@ from __future__ import annotations
 
 import math
 import subprocess
-from pathlib import Path
 
 import numpy as np
 import pytest
-import rospkg
 import rospy
-from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion
+from avatar_message import HEIGHT_M, message
+from geometry_msgs.msg import PoseArray
 from node_world import Rosout, main_config, publishing
 from ros_system import find_executable, wait_until
-from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from worlds import box
 
 from operator_node.avatar.anthropometry import segment_offsets
-from operator_node.avatar.forward import segment_frame
-from operator_node.avatar.joints import HINGES
 from operator_node.avatar.urdf_offsets import urdf_offsets
 from operator_node.msg import SegmentForces
 from operator_node.mvn.segments import SEGMENTS
 
-HEIGHT_M = 1.75
 HUMAN = {
     "name": "human",
     "loadURDF": {
@@ -41,12 +36,6 @@ HUMAN = {
 HINGE = "jRightElbow_rotz"
 LOAD_KG = 0.5
 FOREARM = SEGMENTS.index("RightForeArm")
-
-
-def message(hinges: dict[str, float], position=(0.0, 0.0, 0.93)) -> PoseArray:
-    frame = segment_frame(segment_offsets(HEIGHT_M), np.array(position), np.array((0.0, 0.0, 0.0, 1.0)), hinges)
-    poses = [Pose(Point(*p), Quaternion(*q)) for p, q in zip(frame.positions.tolist(), frame.quats_xyzw.tolist())]
-    return PoseArray(poses=poses)
 
 
 @pytest.fixture(scope="module")
@@ -146,35 +135,3 @@ def test_the_command_measures_who_is_in_the_suit(avatar):
     printed, _ = process.communicate()
     assert process.returncode == 0 and "A person of 1.8 m and 55 kg" in printed
     assert urdf_offsets("printed", printed) == pytest.approx(segment_offsets(HEIGHT_M), abs=1e-5)
-
-
-def test_a_simulation_that_begins_anew_is_followed_anew(ros):
-    """And a position that is not finite is refused; the simulator's part is played by the test."""
-    folder = Path(rospkg.RosPack().get_path("rpbi_examples"))
-    rospy.set_param("/rpbi/human/robot_description", (folder / "robots/human_model.urdf").read_text())
-    rospy.set_param("/use_sim_time", True)
-    log, targets = Rosout(ros), ros.listen("rpbi/human/joint_states/target", JointState)
-    ros.start(["rosrun", "operator_node", "avatar_node.py"])
-    with (
-        publishing("/clock", Clock) as clock,
-        publishing("/mvn/segments", PoseArray) as segments,
-        publishing("/rpbi/human/joint_states", JointState) as states,
-    ):
-        now_s = 1000.0
-
-        def go_on(position: float = 0.0) -> list[float]:
-            """Lets some time pass; returns the stamps of the targets [s]."""
-            nonlocal now_s
-            now_s += 0.02
-            clock.publish(Clock(rospy.Time.from_sec(now_s)))
-            states.publish(JointState(name=HINGES, position=[position] * len(HINGES)))
-            segments.publish(message({}))
-            rospy.rostime.wallsleep(0.02)
-            return [each.header.stamp.to_sec() for each in targets.messages]
-
-        refusal = "a position is not finite"
-        wait_until(lambda: (go_on(math.nan), log.logs(refusal))[1], "it is refused", every_s=0.0)
-        assert not targets.messages
-        wait_until(lambda: len(go_on()) > 3, "it follows", every_s=0.0)
-        now_s = 0.0
-        wait_until(lambda: len([each for each in go_on() if each < 500.0]) > 3, "it follows again", every_s=0.0)

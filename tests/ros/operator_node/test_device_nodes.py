@@ -115,6 +115,7 @@ def test_keyboard_by_a_terminal_and_ctrl_c_in_it(ros):
     in_terminal = f'exec "$0" "$@" <{os.ttyname(theirs)}'
     node = ros.start(["sh", "-c", in_terminal, find_executable("operator_node", "keyboard_node.py"), *options])
     wait_until(lambda: joy.is_connected and down.is_connected, "it listens")
+    wait_until(lambda: termios.tcgetattr(theirs) != before, "it reads the terminal; what is typed before is dropped")
     os.write(ours, b"\x1b[A")
     wait_until(lambda: down.messages and joy.messages[-1].axes == (1.0,), "the key is held")
     assert down.messages[0].code == Key.KEY_UP
