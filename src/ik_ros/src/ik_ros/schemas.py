@@ -1,6 +1,5 @@
 """JSON Schemas of the YAML files that solver nodes load as their parameters."""
 
-import argparse
 from contextlib import suppress
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from custom_ros_tools.schema.json_schema import (
     json_schemas,
     schema_text,
     with_definitions,
+    write_schemas,
 )
 
 from .lookup import solver_class
@@ -71,8 +71,4 @@ def schema_files(root: Path) -> dict[Path, str]:
 
 def main() -> None:
     """Runs the command that writes the schemas anew."""
-    parser = argparse.ArgumentParser(description="Writes schemas anew.")
-    parser.add_argument("root", type=Path, help="the workspace")
-    for path, text in schema_files(parser.parse_args().root).items():
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(text)
+    write_schemas(schema_files)

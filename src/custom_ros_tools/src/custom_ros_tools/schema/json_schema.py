@@ -6,8 +6,10 @@ references to `$defs`; a description beside a reference is that of the key. The 
 usual one, the others are taken too.
 """
 
+import argparse
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel
@@ -180,3 +182,16 @@ def yaml_text(value: Any) -> str:
 def schema_text(schema: Schema) -> str:
     """Returns a schema as JSON for a file."""
     return json.dumps(schema, ensure_ascii=False, indent=1) + "\n"
+
+
+def write_schemas(schema_files: Callable[[Path], Mapping[Path, str]]) -> None:
+    """Runs a command that writes schemas anew.
+
+    Args:
+        schema_files: Returns the text of each file, given the workspace.
+    """
+    parser = argparse.ArgumentParser(description="Writes schemas anew.")
+    parser.add_argument("root", type=Path, help="the workspace")
+    for path, text in schema_files(parser.parse_args().root).items():
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)

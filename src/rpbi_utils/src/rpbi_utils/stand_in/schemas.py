@@ -1,10 +1,9 @@
 """JSON Schemas of the YAML files of what stands in for a robot."""
 
-import argparse
 from pathlib import Path
 
 from custom_ros_tools.schema import ConfigModel
-from custom_ros_tools.schema.json_schema import explained, json_schema, schema_text
+from custom_ros_tools.schema.json_schema import explained, json_schema, schema_text, write_schemas
 
 from .config import RobotLimits, StandInConfig
 
@@ -26,8 +25,4 @@ def schema_files(root: Path) -> dict[Path, str]:
 
 def main() -> None:
     """Runs the command that writes the schemas anew."""
-    parser = argparse.ArgumentParser(description="Writes schemas anew.")
-    parser.add_argument("root", type=Path, help="the workspace")
-    for path, text in schema_files(parser.parse_args().root).items():
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(text)
+    write_schemas(schema_files)
