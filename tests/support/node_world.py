@@ -85,14 +85,15 @@ def resident_mb(process_id: int) -> float:
 
 
 class Rosout:
-    """What the simulator says on /rosout."""
+    """What nodes say on /rosout, the tests' own process apart."""
 
     def __init__(self, ros: Any) -> None:
         self._listener = ros.listen("/rosout", Log)
 
     def logs(self, containing: str = "") -> list[Log]:
         """Returns the messages that contain a text."""
-        return [log for log in list(self._listener.messages) if containing in log.msg]
+        logs = list(self._listener.messages)
+        return [log for log in logs if containing in log.msg and log.name != rospy.get_name()]
 
     def wait_for(self, texts: Sequence[str], timeout_s: float = 60.0) -> None:
         """Waits until messages that contain these texts have come."""

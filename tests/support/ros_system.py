@@ -18,8 +18,12 @@ from xmlrpc.client import ServerProxy, Transport
 import rosgraph
 import roslib.packages
 import rospy
+import tf2_ros
 import yaml
 
+from custom_ros_tools.ros.lifecycle.master_watch import Registrations
+from custom_ros_tools.ros.rospy_internals import registry
+from custom_ros_tools.ros.tf_listener import TfListener
 from ros_pybullet_interface.srv import ListObjects
 
 SUPPORT = Path(__file__).resolve().parent
@@ -138,9 +142,11 @@ class RosSystem:
         self.folder = folder
         self.processes: list[subprocess.Popen] = []
         self._listeners: list[Listener] = []
+        self._tf_listeners: list[TfListener] = []
         self._lock = threading.Lock()
         if not rospy.core.is_initialized():
             rospy.init_node("tests", anonymous=True, disable_rostime=True, disable_signals=True)
+            Registrations(registry())  # rospy's own part would leave a subscriber alone now and then
         rospy.set_param("/use_sim_time", False)
         self._parameters = set(rospy.get_param_names())
 
@@ -202,6 +208,12 @@ class RosSystem:
         self._listeners.append(listener)
         return listener
 
+    def listen_to_tf(self) -> tf2_ros.Buffer:
+        """Returns a buffer that TF comes into until the test ends."""
+        buffer = tf2_ros.Buffer(debug=False)
+        self._tf_listeners.append(TfListener(buffer))
+        return buffer
+
     def call(self, service: str, service_type: type, *arguments: Any, **fields: Any) -> Any:
         """Calls a service."""
         rospy.wait_for_service(service, timeout=60.0)
@@ -217,6 +229,8 @@ class RosSystem:
         """Ends all that was started; a program that does not end by itself fails the test."""
         for listener in self._listeners:
             listener.close()
+        for tf_listener in self._tf_listeners:
+            tf_listener.unregister()
         late = []
         for process in reversed(self.processes):
             try:

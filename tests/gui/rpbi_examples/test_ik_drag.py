@@ -8,11 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rospy
-import tf2_ros
 from ros_system import RosSystem, wait_until
 from rviz_view import RvizView, find_view, launch_with_rviz
-
-from custom_ros_tools.ros.tf_listener import TfListener
 
 CONFIG_FILE = Path(__file__).resolve().parents[3] / "src/rpbi_examples/rviz/kuka_lwr_ik_example.rviz"
 TARGET, TIP = "rpbi/figure_eight", "rpbi/kuka_lwr/end_effector_ball"
@@ -39,16 +36,14 @@ def example(ros_master, screen, tmp_path_factory):
 @pytest.fixture(scope="module")
 def position(example):
     """Where a frame is in the world [m]."""
-    buffer = tf2_ros.Buffer(debug=False)
-    listener = TfListener(buffer)
+    buffer = example.listen_to_tf()
 
     def position(frame):
         found = buffer.lookup_transform("rpbi/world", frame, rospy.Time(0)).transform.translation
         return np.array([found.x, found.y, found.z])
 
     wait_until(lambda: all(buffer.can_transform("rpbi/world", each, rospy.Time(0)) for each in (TARGET, TIP)), "TF")
-    yield position
-    listener.unregister()
+    return position
 
 
 class Mouse:

@@ -12,12 +12,10 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 import rospy
-import tf2_ros
 from ros_system import RosSystem, stop_group, wait_until
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Float64MultiArray
 
-from custom_ros_tools.ros.tf_listener import TfListener
 from operator_node.emulators.spacenavd import SpacenavDaemon
 
 SLOW_S = 60.0
@@ -42,18 +40,16 @@ def example(ros_master, screen, tmp_path_factory) -> Iterator[RosSystem]:
 
 
 @pytest.fixture(scope="module")
-def position(example) -> Iterator[Callable[[str], np.ndarray]]:
+def position(example) -> Callable[[str], np.ndarray]:
     """Where a frame is in the world [m]."""
-    buffer = tf2_ros.Buffer(debug=False)
-    listener = TfListener(buffer)
+    buffer = example.listen_to_tf()
 
     def position(frame: str) -> np.ndarray:
         found = buffer.lookup_transform("rpbi/world", frame, rospy.Time(0)).transform.translation
         return np.array([found.x, found.y, found.z])
 
     wait_until(lambda: all(buffer.can_transform("rpbi/world", each, rospy.Time(0)) for each in (TARGET, TIP)), "TF")
-    yield position
-    listener.unregister()
+    return position
 
 
 @pytest.fixture

@@ -15,7 +15,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 from std_srvs.srv import SetBool
 
-from custom_ros_tools.ros.tf_listener import TfListener
 from ik_ros.msg import IKProblem
 
 TARGET = Pose(Point(0.3, -0.2, 0.5), Quaternion(0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5)))
@@ -229,8 +228,7 @@ def test_simulated_robot_is_asked_itself(ros, target):
         }
         rospy.set_param("/ik_setup_node", {"config": config, "start_on_init": True})
         ros.start(["rosrun", "ik_ros", "ik_setup_node.py", "pybullet", "__name:=ik_setup_node", "ik:=rpbi/arm/ik"])
-        buffer = tf2_ros.Buffer(debug=False)
-        TfListener(buffer)
+        buffer = ros.listen_to_tf()
 
         def is_there():
             try:

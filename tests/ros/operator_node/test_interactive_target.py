@@ -11,8 +11,6 @@ from node_world import publishing
 from ros_system import wait_until
 from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit
 
-from custom_ros_tools.ros.tf_listener import TfListener
-
 TARGET = Pose(Point(0.3, -0.2, 0.5), Quaternion(0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5)))
 
 
@@ -23,8 +21,7 @@ def test_frame_that_is_dragged_in_rviz_is_broadcast_where_the_handles_are(ros):
     ros.start(["rosrun", "ik_ros", "interactive_target_node.py", "__name:=interactive_target_node"])
     shown = ros.listen("ik_target/update_full", InteractiveMarkerInit).wait_for()[-1].markers[0]
     assert (shown.header.frame_id, shown.name, len(shown.controls)) == ("foot", "dragged", 6)
-    buffer = tf2_ros.Buffer(debug=False)
-    TfListener(buffer)
+    buffer = ros.listen_to_tf()
 
     def position():
         try:

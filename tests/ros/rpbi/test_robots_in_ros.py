@@ -15,7 +15,6 @@ from ros_system import wait_until
 from sensor_msgs.msg import JointState
 from worlds import iiwa
 
-from custom_ros_tools.ros.tf_listener import TfListener
 from ros_pybullet_interface.msg import PybulletObject
 
 FIRST = "lbr_iiwa_joint_1"
@@ -56,8 +55,7 @@ def test_robot_state_publisher_gives_the_same_link_frames(ros, tmp_path):
             "joint_states:=/rpbi/iiwa/joint_states",
         ]
     )
-    buffer = tf2_ros.Buffer(debug=False)
-    TfListener(buffer)
+    buffer = ros.listen_to_tf()
 
     def pose(parent: str, child: str):
         transform = buffer.lookup_transform(parent, child, rospy.Time(0)).transform
@@ -93,8 +91,7 @@ def test_two_worlds_share_a_master_and_a_tf_tree(ros, tmp_path):
         target.publish(JointState(name=[FIRST], position=[0.5]))
         wait_until(lambda: left.messages and left.messages[-1].position[0] > 0.45, "the left arm moves")
     assert abs(right.wait_for(1)[-1].position[0]) < 0.01, "the right arm does not"
-    buffer = tf2_ros.Buffer(debug=False)
-    TfListener(buffer)
+    buffer = ros.listen_to_tf()
     for side in ("left", "right"):
         frames = (f"{side}/rpbi/world", f"{side}/rpbi/iiwa/lbr_iiwa_link_7")
         wait_until(lambda frames=frames: buffer.can_transform(*frames, rospy.Time(0)), f"{frames} are on TF")

@@ -14,7 +14,6 @@ from ros_system import wait_until
 from visualization_msgs.msg import MarkerArray
 from worlds import FLOOR, box, write_world
 
-from custom_ros_tools.ros.tf_listener import TfListener
 from ros_pybullet_interface.msg import SimulationState
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -57,10 +56,9 @@ def come_up(ros, process, namespace):
     return found
 
 
-def places():
+def places(ros):
     """Returns what waits for a transform between two frames."""
-    buffer = tf2_ros.Buffer(debug=False)
-    listener = TfListener(buffer)
+    buffer = ros.listen_to_tf()
 
     def look(parent, child):
         try:
@@ -69,7 +67,6 @@ def places():
             return None
 
     def place(parent, child):
-        assert listener is not None  # it lives as long as this function
         return wait_until(lambda: look(parent, child), f"there is TF from {parent} to {child}")
 
     return place
@@ -79,7 +76,7 @@ def test_two_of_one_file_run_on_one_master_each_with_its_own_frames(ros, folder)
     left = launch(ros, folder, RPBI, ns="left", tf_prefix="left", use_sim_time="false")
     more = {"use_sim_time": "false", "real_time_factor": 0.5}
     right = launch(ros, folder, ROSLAUNCH, ns="right", tf_prefix="right", **more)
-    place = places()
+    place = places(ros)
     for name, process, factor in (("left", left, 1.0), ("right", right, 0.5)):
         assert come_up(ros, process, f"/{name}/") == {"floor": "collision", "table": "collision", "cup": "dynamic"}
         state = ros.listen(f"/{name}/rpbi/state", SimulationState)

@@ -17,7 +17,6 @@ from ros_system import wait_until
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from custom_ros_tools.ros.tf_listener import TfListener
 from ros_pybullet_interface.msg import Contacts, ControllerState
 from ros_pybullet_interface.srv import ResetJointState, SwitchControllers
 from rpbi_examples.motions import CIRCLE_CENTRE, CIRCLE_RADIUS
@@ -42,10 +41,9 @@ def _serves(name: str) -> bool:
 
 
 @pytest.fixture
-def position() -> Callable[[str], tuple[float, float, float] | None]:
+def position(ros) -> Callable[[str], tuple[float, float, float] | None]:
     """Tells where a frame is in the world [m]."""
-    buffer = tf2_ros.Buffer(debug=False)
-    TfListener(buffer)
+    buffer = ros.listen_to_tf()
 
     def look(frame: str) -> tuple[float, float, float] | None:
         try:

@@ -118,10 +118,8 @@ class Registry:
         kinds = registration.Registration
         if (kinds.SUB, kinds.PUB, kinds.SRV) != ("sub", "pub", "srv"):
             raise TypeError("other kinds of registrations")
-        self.connect = self._rospys.publisher_update
-        """Connects a subscription, by name, to the URIs of publishers that it is not connected to yet."""
-        with self.entries():
-            pass  # else it cannot be done either when it is needed
+        with self.entries(), self._rospys.cond:
+            self._rospys.updates[:] = self._rospys.updates  # else it cannot be done either when it is needed
 
     @contextmanager
     def entries(self) -> Iterator[list[tuple[str, str, str]]]:
@@ -132,6 +130,20 @@ class Registry:
                 *(("pub", *each) for each in self._topics.get_publications()),
                 *(("srv", *each) for each in self._services.get_services()),
             ]
+
+    def connect(self, name: str, publishers: list[str]) -> None:
+        """Connects a subscription to publishers that the master named when it registered the subscription.
+
+        One that came right after is told by the master in another call, which may arrive before; rospy would connect to
+        those alone of whom it is told last. This comes before whatever waits to be done.
+
+        Args:
+            name: The topic.
+            publishers: Their URIs; whoever is connected already stays so.
+        """
+        with self._rospys.cond:
+            self._rospys.updates.insert(0, (name, publishers))
+            self._rospys.cond.notify_all()
 
     def hand_over(self, listener: Any) -> None:
         """Has somebody else register what comes and goes, in the place of rospy, by `reg_added` and `reg_removed`."""
