@@ -8,7 +8,8 @@ import numpy as np
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.transforms import quat_of
 from rpbi.geometry import Vector
-from rpbi.urdf.document import UrdfDocument, UrdfJoint
+from rpbi.urdf.document import UrdfDocument
+from rpbi.urdf.elements import UrdfJoint
 
 
 class GuardedRobot:

@@ -5,7 +5,9 @@ from typing import NamedTuple
 
 from custom_ros_tools.errors import UnknownNameError
 from rpbi.kinematics.limits import Limits
-from rpbi.urdf.document import UrdfDocument, UrdfJoint, chain_urdf
+from rpbi.urdf.copies import chain_urdf
+from rpbi.urdf.document import UrdfDocument
+from rpbi.urdf.elements import UrdfJoint
 
 
 class Drive(NamedTuple):

@@ -10,7 +10,9 @@ from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from ik_ros.shape import ShapeConfig
 from rpbi.geometry import Pose
 from rpbi.kinematics.limits import Limits
-from rpbi.urdf.document import MOVING, UrdfDocument
+from rpbi.urdf.copies import with_limited_joints
+from rpbi.urdf.document import UrdfDocument
+from rpbi.urdf.elements import MOVING
 
 from .clearance import RobotShape
 
@@ -69,7 +71,7 @@ class Robot:
             _known("link", base, document.links)
         try:
             root = [pin.JointModelFreeFlyer()] if floating else []
-            self.model = pin.buildModelFromXML(document.with_limited_joints(base), *root)
+            self.model = pin.buildModelFromXML(with_limited_joints(document, base), *root)
         except ValueError as error:
             raise ConfigError([Problem(urdf_path, "", f"Pinocchio cannot load it: {error}")]) from None
         self.data = self.model.createData()

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from ik_ros.chain.description import ChainDescription
 from ik_ros.shape import ShapeConfig
-from rpbi.urdf.document import UrdfJoint
+from rpbi.urdf.elements import UrdfJoint
 
 SMALL = 1e-12
 """Keeps roots smooth at 0 [m^2]."""

@@ -14,7 +14,9 @@ from custom_ros_tools.schema import ConfigModel, Positive, Seconds, Unit
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose, Twist
 from rpbi.plain_values import as_tuple
-from rpbi.urdf.document import UrdfDocument, UrdfJoint
+from rpbi.urdf.copies import mounted_on
+from rpbi.urdf.document import UrdfDocument
+from rpbi.urdf.elements import UrdfJoint
 from rpbi.urdf.files import resolve_meshes, write_description
 
 PLANAR_JOINTS = (0, 1, 2)
@@ -119,7 +121,7 @@ def with_planar_joints(path: str) -> str:
         UrdfJoint(y, "prismatic", x, y, axis=(0.0, 1.0, 0.0)),
         UrdfJoint(yaw, "continuous", y, document.root_link(), axis=(0.0, 0.0, 1.0)),
     )
-    return write_description(document.mounted_on(chain))
+    return write_description(mounted_on(document, chain))
 
 
 class PlanarBase:

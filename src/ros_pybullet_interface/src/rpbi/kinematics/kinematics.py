@@ -12,7 +12,9 @@ import pybullet
 from custom_ros_tools.errors import ConfigError, PhysicsError, Problem, UnknownNameError
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose, normalized
-from rpbi.urdf.document import MOVING, UrdfDocument
+from rpbi.urdf.copies import without_shapes
+from rpbi.urdf.document import UrdfDocument
+from rpbi.urdf.elements import MOVING
 from rpbi.urdf.files import write_description
 from rpbi.urdf.joints import Joint
 from rpbi.urdf.loading import flags_for
@@ -135,7 +137,7 @@ class Kinematics:
         """Returns all joints in the order in which PyBullet loads them."""
         pb = self._pb
         body_id = pb.loadURDF(
-            write_description(self._document.bare()),
+            write_description(without_shapes(self._document)),
             useFixedBase=True,
             globalScaling=self._scaling,
             flags=flags_for(self._document, flags),
@@ -163,6 +165,6 @@ class Kinematics:
                     only = "only revolute and prismatic ones are solved for"
                     raise ValueError(f"link_name: '{link_name}' hangs on '{joint}', a {kind} joint; {only}")
                 links.append(parent)
-            urdf = self._document.bare(links)
+            urdf = without_shapes(self._document, links)
             self._chains[link_name] = Chain(self._pb, urdf, self._scaling, link_name, self.joint_names)
         return self._chains[link_name]

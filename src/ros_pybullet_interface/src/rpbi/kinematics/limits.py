@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rpbi.geometry import Vector
-from rpbi.urdf.document import UrdfJoint
+from rpbi.urdf.elements import UrdfJoint
 from rpbi.urdf.joints import LIMIT_ROUNDING, Joint
 
 from .residual import POSITION_TOLERANCE_M

@@ -15,7 +15,7 @@ from custom_ros_tools.schema.type_names import shown
 from rpbi.engine.client import Client
 from rpbi.plain_values import joint_values
 
-from .document import Mimic
+from .elements import Mimic
 
 _TYPES = ("JOINT_REVOLUTE", "JOINT_PRISMATIC", "JOINT_SPHERICAL", "JOINT_PLANAR", "JOINT_FIXED")
 _TYPE_NAMES = {getattr(pybullet, name): name for name in _TYPES}

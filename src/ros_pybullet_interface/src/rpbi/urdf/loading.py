@@ -15,6 +15,7 @@ from rpbi.engine.client import Client
 from rpbi.meshes.checks import mesh_file_problem
 from rpbi.meshes.trial import Mesh, Use, faults_in
 
+from .copies import for_window
 from .document import UrdfDocument
 from .files import PACKAGE, beside_or_above, mesh_file, resolve_meshes, write_description
 from .structure import structure_problems, texts_for_numbers
@@ -118,7 +119,7 @@ def load_urdf(
         document = UrdfDocument(prepared)
         if texts := texts_for_numbers(document):
             log.warning("%s: expected numbers, PyBullet takes these for 0: %s", name, ", ".join(texts[:3]))
-        if pb.has_window and (text := document.for_window()) is not None:
+        if pb.has_window and (text := for_window(document)) is not None:
             prepared = write_description(text)
         flags = arguments.get("flags") or 0
         flags = flags_for(document, flags)

@@ -25,7 +25,7 @@ from rpbi.control.controllers.entry import ControllerEntry
 from rpbi.control.controllers.impedance import JointSprings
 from rpbi.control.planar_base import PlanarBaseConfig
 from rpbi.control.trajectories.config import JointTrajectoryControllerConfig
-from rpbi.urdf.document import Mimic
+from rpbi.urdf.elements import Mimic
 
 _NOT_VISUAL = {
     "controllers": "a visual robot has no motors to drive",
