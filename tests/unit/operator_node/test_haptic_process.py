@@ -65,6 +65,10 @@ def test_a_loop_that_dies_is_told_of_and_comes_back_without_a_jump(tmp_path):
         died = next(index for index, each in enumerate(reports) if "SIGKILL" in each.trouble)
         assert reports[died].force == (0.0, 0.0, 0.0) and not reports[died].is_connected
         wait_until(lambda: way(reports[-1]) > 0.039, "the hand, which has begun anew, moves it on from where it was")
+        os.kill(client.process_id, signal.SIGSTOP)
+        client.reset()
+        os.kill(client.process_id, signal.SIGKILL)
+        wait_until(lambda: way(reports[-1]) < 0.021, "a reset that it dies without reaches the next one")
         client.reset()
         wait_until(lambda: way(reports[-1]) < 1e-3, "a reset reaches it")
         snapshots = [each.snapshot for each in reports if each.snapshot]

@@ -129,7 +129,7 @@ class HapticController:
         self._velocity = ZERO
         self._seen_s = -math.inf
         self._tool_way: Vector | None = None
-        self._is_reset = False
+        self.awaits_reset = False
 
     def take_wrench(self, force: Vector, now_s: float, delay_s: float = 0.0) -> None:
         """Takes the force on the tool, in its axes [N], finite."""
@@ -144,7 +144,7 @@ class HapticController:
 
     def reset(self) -> None:
         """Has the target go back to its start, and the handle go on from there."""
-        self._is_reset = True
+        self.awaits_reset = True
 
     def lose(self) -> None:
         """Takes note that the device has gone."""
@@ -227,8 +227,8 @@ class HapticController:
         return turned((x, y, z), -self._yaw)
 
     def _engage(self, position: Vector, buttons: tuple[int, ...], now_s: float) -> None:
-        if self._is_reset:
-            self._is_reset = False
+        if self.awaits_reset:
+            self.awaits_reset = False
             self._clutch.set_way(ZERO)
         if self.coupling.freshness(now_s) == 0.0 and self._config.mode == "coupling":
             self._clutch.release()  # else the spring would be stretched when the tool is back

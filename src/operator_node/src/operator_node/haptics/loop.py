@@ -145,6 +145,7 @@ class HapticLoop:
             faults["force not finite"] = controller.not_finite
         self._reported_s = max(self._reported_s + self._report_s, now_s - self._report_s)
         self._report = self._report._replace(
+            resets=self._report.resets if controller.awaits_reset else self._orders.resets,
             samples=self._samples,
             lateness_s=self._lateness_s,
             force=controller.force,

@@ -50,6 +50,8 @@ class LoopClient:
         self.report, self.failure = Report(), ""
         self.ended = threading.Event()
         self._orders, self._lock = setup.orders, threading.Lock()
+        self._resets = 0
+        """How many of those that were asked for the loop has done."""
         self._news = threading.Condition()
         self._is_closing = False
         self._start()
@@ -124,9 +126,10 @@ class LoopClient:
                 start_new_session=True,
                 env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
             )
-        self._started_s = self._said_s = time.monotonic()
+        self._started_s = time.monotonic()
         self._link = Link(ours)
-        self._link.send(self._setup._replace(orders=self._orders))
+        self._link.send(self._setup._replace(orders=self._orders._replace(resets=self._resets)))
+        self._send(self._orders)
 
     def _run(self) -> None:
         """Hands reports on, and starts the process again when it has ended, until the client is closed."""
@@ -137,6 +140,7 @@ class LoopClient:
                 with self._lock:
                     self._send(self._orders)
             for report in self._link.receive():
+                self._resets = report.resets
                 self._hand_on(report)
             if not self._link.is_closed:
                 continue

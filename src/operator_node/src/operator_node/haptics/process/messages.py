@@ -66,6 +66,7 @@ class Report(NamedTuple):
 
     Attributes:
         obeyed: `Orders.switched` of what is so already.
+        resets: `Orders.resets` of what is done already.
         is_connected: Whether the device is open.
         has_ended: Whether the person is done with it, or a library is missing.
         trouble: Why it is not open; empty if it is.
@@ -82,6 +83,7 @@ class Report(NamedTuple):
     """
 
     obeyed: int = 0
+    resets: int = 0
     is_connected: bool = False
     has_ended: bool = False
     trouble: str = "not opened yet"
