@@ -72,7 +72,7 @@ def test_newest_state_is_kept_in_order_and_handed_to_the_callback(topic):
 
 
 def test_faulty_states_are_named_and_the_last_sound_one_stays(ros, topic):
-    rosout = Rosout(ros)
+    rosout = Rosout(ros, own=True)
     heard = JointStateSubscriber(topic.resolved_name, ["a"], ns="arm")
     topic.publish(JointState(name=["arm/a"], position=[1.0]))
     wait_until(heard.received, "it is heard")
