@@ -2,10 +2,45 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import pytest
 from keyboard.msg import Key
 from ros_system import stop_group, wait_until
 from sensor_msgs.msg import Joy
+
+KEEPS_AN_ERROR = """
+import gc, sys, threading
+from operator_node.device import DeviceError
+from operator_node.devices.window import Window
+
+def use():
+    window = Window("mouse", "mouse", 100, 100)
+    window._note_closed()
+    try:
+        window.wait(0.01)
+    except DeviceError as error:
+        kept = error
+        kept.itself = kept  # only the garbage collector frees it, later
+    else:
+        sys.exit("no error")
+    window.close()
+
+gc.disable()
+use()
+collector = threading.Thread(target=gc.collect)
+collector.start()
+collector.join()
+"""
+
+
+def test_an_error_of_a_window_that_is_kept_does_not_keep_the_window(screen):
+    """Tcl aborts the process when another thread than the window's frees it, as a garbage collector may."""
+    program = [sys.executable, "-c", KEEPS_AN_ERROR]
+    ended = subprocess.run(program, env={**os.environ, **screen.environment}, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
 
 
 def test_keyboard_of_the_release_tells_keys_and_lets_go_at_the_end(ros, screen):

@@ -57,6 +57,15 @@ class Window:
             DeviceClosedError: If the person has closed the window.
             DeviceError: If the window has gone otherwise.
         """
+        # Errors that a caller keeps must keep no frame that knows the interpreter, see `close`.
+        failure = self._failure_of_waiting(timeout_s)
+        if failure:
+            raise DeviceError(self._device, f"its window has gone: {failure}")
+        if self._is_closed:
+            raise DeviceClosedError(self._device, "its window was closed")
+
+    def _failure_of_waiting(self, timeout_s: float) -> str:
+        """Deals with events; returns why that cannot be, empty if it can."""
         interpreter = self._root.tk
         try:
             is_over: list[bool] = []
@@ -68,9 +77,8 @@ class Window:
             while interpreter.dooneevent(tkinter._tkinter.DONT_WAIT):  # type: ignore[attr-defined]
                 pass
         except tkinter.TclError as error:
-            raise DeviceError(self._device, f"its window has gone: {error}") from None
-        if self._is_closed:
-            raise DeviceClosedError(self._device, "its window was closed")
+            return str(error) or "no reason was given"
+        return ""
 
     def close(self) -> None:
         """Closes the window; once."""
