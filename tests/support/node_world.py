@@ -85,15 +85,19 @@ def resident_mb(process_id: int) -> float:
 
 
 class Rosout:
-    """What nodes say on /rosout, the tests' own process apart."""
+    """What nodes say on /rosout: all others, or the tests' own process alone."""
 
-    def __init__(self, ros: Any) -> None:
-        self._listener = ros.listen("/rosout", Log)
+    def __init__(self, ros: Any, own: bool = False) -> None:
+        self._listener, self._own = ros.listen("/rosout", Log), own
 
     def logs(self, containing: str = "") -> list[Log]:
-        """Returns the messages that contain a text."""
-        logs = list(self._listener.messages)
-        return [log for log in logs if containing in log.msg and log.name != rospy.get_name()]
+        """Returns the messages that contain a text; one that is published while we connect comes again, as latched."""
+        logs = {
+            (log.name, log.header.stamp.to_nsec(), log.msg): log
+            for log in list(self._listener.messages)
+            if containing in log.msg and (log.name == rospy.get_name()) == self._own
+        }
+        return list(logs.values())
 
     def wait_for(self, texts: Sequence[str], timeout_s: float = 60.0) -> None:
         """Waits until messages that contain these texts have come."""

@@ -24,7 +24,7 @@ def test_toggle_service_calls_the_right_handler_and_answers_what_it_returns(ros)
 
 def test_handler_waits_for_its_service_and_says_so_after_a_while(ros, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(service_proxies, "PATIENCE_S", 0.1)
-    rosout = Rosout(ros)
+    rosout = Rosout(ros, own=True)
     got: list[rospy.ServiceProxy] = []
     waiting = threading.Thread(target=lambda: got.append(get_srv_handler("late", Trigger)), daemon=True)
     waiting.start()
