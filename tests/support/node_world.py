@@ -119,6 +119,10 @@ class Rosout:
         }
         return list(logs.values())
 
+    def is_throttled(self, text: str) -> bool:
+        """Whether a warning came once; one that comes after the 5 s of its throttle says how many were kept back."""
+        return all("more like it since the last warning" in log.msg for log in self.logs(text)[1:])
+
     def wait_for(self, texts: Sequence[str], timeout_s: float = 60.0) -> None:
         """Waits until messages that contain these texts have come."""
         wait_until(

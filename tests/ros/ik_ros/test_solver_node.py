@@ -147,7 +147,7 @@ def test_continuity_holds_the_velocities_of_the_joints(ros):
     far_away = np.add(HOME, 0.4)
     with publishing("ik", IKProblem) as ik:
         wait_until(lambda: targets.is_connected and solutions.is_connected, "answers would be heard")
-        for number in range(200):
+        for number in range(120):
             asked = problem_at(far_away)
             asked.header.stamp = rospy.Time(100) + rospy.Duration.from_sec(0.01 * number)
             ik.publish(asked)
