@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from xmlrpc.client import ServerProxy
 
 import rosgraph
 import rospy
@@ -65,6 +66,16 @@ def publishing(topic: str, message_type: type) -> Iterator[rospy.Publisher]:
         yield publisher
     finally:
         publisher.unregister()
+
+
+def count_taken(publisher: rospy.Publisher) -> int:
+    """Returns how many messages of a publisher each of those who listen has read; services may answer sooner."""
+    master, topic = rosgraph.Master(rospy.get_name()), publisher.resolved_name
+    counts = []
+    for node in dict(master.getSystemState()[1]).get(topic, []):
+        _, _, (_, subscriptions, *_) = ServerProxy(master.lookupNode(node)).getBusStats(rospy.get_name())
+        counts += [read for name, connections in subscriptions if name == topic for _, _, read, *_ in connections]
+    return min(counts, default=0)
 
 
 def _is_taken_for_connected(topic: str) -> bool:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 import rospy
-from node_world import Rosout, publishing
+from node_world import Rosout, count_taken, publishing
 from ros_system import Listener, stop_group, support_on_path, wait_until
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Float64MultiArray
@@ -87,7 +87,9 @@ class TestScaleNode:
         assert switch(ros, False) == (True, "operator node is off")
         wait_until(lambda: zeros(signals), "it says zero")
         said = len(signals.messages)
+        taken = count_taken(joy)
         joy.publish(Joy(axes=[1.0, 1.0]))
+        wait_until(lambda: count_taken(joy) > taken, "it has taken it")
         assert switch(ros, False) == (False, "operator node is already off")
         assert switch(ros, True) == (True, "operator node is on")
         send(joy, signals, [0.0, 1.0], (0.5, 0.0))

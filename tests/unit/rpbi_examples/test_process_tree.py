@@ -11,7 +11,7 @@ from rpbi_examples.process_tree import kill_with_children
 PARENT = """
 import signal, subprocess, sys
 signal.signal(signal.SIGINT, signal.SIG_IGN)
-subprocess.Popen(["sleep", "60"], start_new_session=True)
+subprocess.Popen(["sleep", "300"], start_new_session=True)
 print("ready", flush=True)
 signal.pause()
 """
