@@ -76,9 +76,7 @@ def send_until(publisher: rospy.Publisher, message: Any, listener: Any, count: i
     without one is given its own.
     """
     message.header.stamp = message.header.stamp or rospy.Time(next(_stamps))
-    wait_until(
-        lambda: publisher.publish(message) or len(answers(listener, message)) >= count, "an answer to it comes"
-    )
+    wait_until(lambda: publisher.publish(message) or len(answers(listener, message)) >= count, "an answer to it comes")
     return answers(listener, message)[0]
 
 
