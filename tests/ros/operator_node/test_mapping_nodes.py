@@ -100,8 +100,9 @@ class TestScaleNode:
         rosout = Rosout(ros)
         told = "/joy: message refused: expected at least 2 axes (axes_idx has 1), got 1"
         for axes in ([1.0], [1.0, math.nan]):
+            send(joy, signals, [0.0, 0.0], (0.0, 0.0))  # which ends the last test's signal
+            before = zeros(signals)
             send(joy, signals, [0.0, 1.0], (0.5, 0.0))
-            before = zeros(signals)  # the end of the last test's signal may have come here
             for _ in range(20):
                 joy.publish(Joy(axes=axes))
             wait_until(lambda: zeros(signals) > before, "the signal ends")  # noqa: B023 (it waits here)
