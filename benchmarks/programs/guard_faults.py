@@ -171,7 +171,7 @@ class Experiment:
             self._master = self._start_master()
             if self._is_guarded:
                 self._until(lambda: rosgraph.Master("/judge").lookupService(START), "the guard is registered again")
-        return moved[-1] - fault_s
+        return max(moved, default=-math.inf) - fault_s  # a slow source may be halted before it moves anything
 
     @property
     def position(self) -> tuple[float, float]:

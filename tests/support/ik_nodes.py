@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -65,11 +66,23 @@ def start_at(positions: Any) -> JointState:
     return JointState(name=JOINTS, position=positions)
 
 
+_stamps = itertools.count(1000)
+
+
 def send_until(publisher: rospy.Publisher, message: Any, listener: Any, count: int = 1) -> Any:
-    """Publishes a message until so many more messages have come; returns the first of them."""
-    before = len(listener.messages)
-    wait_until(lambda: publisher.publish(message) or len(listener.messages) >= before + count, "an answer comes")
-    return listener.messages[before]
+    """Publishes a problem until so many answers to it have come; returns the first of them.
+
+    Answers have the stamp of their problem, by which those to problems of an earlier test are told apart; a problem
+    without one is given its own.
+    """
+    message.header.stamp = message.header.stamp or rospy.Time(next(_stamps))
+    wait_until(lambda: publisher.publish(message) or len(answers(listener, message)) >= count, "an answer to it comes")
+    return answers(listener, message)[0]
+
+
+def answers(listener: Any, message: Any) -> list[Any]:
+    """Returns what has come in answer to a problem."""
+    return [each for each in list(listener.messages) if each.header.stamp == message.header.stamp]
 
 
 @contextlib.contextmanager

@@ -7,13 +7,14 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from xmlrpc.client import ServerProxy
 
 import rosgraph
 import rospy
 import yaml
 from cob_srvs.srv import SetString
 from diagnostic_msgs.msg import DiagnosticArray
-from ros_system import wait_until
+from ros_system import connections_of, wait_until
 from rosgraph_msgs.msg import Log
 from worlds import write_world
 
@@ -48,15 +49,45 @@ def objects(ros: Any, ns: str = "/") -> dict[str, str]:
     return dict(zip(answer.names, answer.types, strict=True))
 
 
+_published: set[str] = set()
+"""Topics that the tests' own process has published."""
+
+
 @contextmanager
 def publishing(topic: str, message_type: type) -> Iterator[rospy.Publisher]:
     """Publishes a topic that somebody listens to."""
+    name = rospy.resolve_name(topic)
+    if name in _published:
+        wait_until(lambda: not _is_taken_for_connected(name), f"who listened to {name} has noticed that it ended")
+    _published.add(name)
     publisher = rospy.Publisher(topic, message_type, queue_size=100)
     wait_until(publisher.get_num_connections, f"somebody listens to {topic}")
     try:
         yield publisher
     finally:
         publisher.unregister()
+
+
+def count_taken(publisher: rospy.Publisher) -> int:
+    """Returns how many messages of a publisher each of those who listen has read; services may answer sooner."""
+    master, topic = rosgraph.Master(rospy.get_name()), publisher.resolved_name
+    counts = []
+    for node in dict(master.getSystemState()[1]).get(topic, []):
+        _, _, (_, subscriptions, *_) = ServerProxy(master.lookupNode(node)).getBusStats(rospy.get_name())
+        counts += [read for name, connections in subscriptions if name == topic for _, _, read, *_ in connections]
+    return min(counts, default=0)
+
+
+def _is_taken_for_connected(topic: str) -> bool:
+    """Whether a node has not noticed yet that we publish a topic no more; rospy would not connect it to us again."""
+    published, subscribed, _ = rosgraph.Master(rospy.get_name()).getSystemState()
+    if rospy.get_name() in dict(published).get(topic, []):
+        return False  # another publisher of ours goes on
+    return any(
+        (publisher, direction, name) == (rospy.get_node_uri(), "i", topic)
+        for connections in connections_of(topic, subscribed)
+        for _, publisher, direction, _, name, *_ in connections
+    )
 
 
 def registrations(node: str = "/ros_pybullet_interface") -> list[tuple[str, ...]]:
@@ -85,15 +116,23 @@ def resident_mb(process_id: int) -> float:
 
 
 class Rosout:
-    """What nodes say on /rosout, or the tests' own process."""
+    """What nodes say on /rosout: all others, or the tests' own process alone."""
 
     def __init__(self, ros: Any, own: bool = False) -> None:
         self._listener, self._own = ros.listen("/rosout", Log), own
 
     def logs(self, containing: str = "") -> list[Log]:
-        """Returns the messages that contain a text."""
-        logs = list(self._listener.messages)
-        return [log for log in logs if containing in log.msg and (log.name == rospy.get_name()) == self._own]
+        """Returns the messages that contain a text; one that is published while we connect comes again, as latched."""
+        logs = {
+            (log.name, log.header.stamp.to_nsec(), log.msg): log
+            for log in list(self._listener.messages)
+            if containing in log.msg and (log.name == rospy.get_name()) == self._own
+        }
+        return list(logs.values())
+
+    def is_throttled(self, text: str) -> bool:
+        """Whether a warning came once; one that comes after the 5 s of its throttle says how many were kept back."""
+        return all("more like it since the last warning" in log.msg for log in self.logs(text)[1:])
 
     def wait_for(self, texts: Sequence[str], timeout_s: float = 60.0) -> None:
         """Waits until messages that contain these texts have come."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -91,6 +92,15 @@ class LimitedTransport(Transport):
         return connection
 
 
+def connections_of(topic: str, registered: list[tuple[str, list[str]]]) -> list[list[Any]]:
+    """Returns the connections of each living node that is registered for a topic; the killed stay registered."""
+    master, found = rosgraph.Master(rospy.get_name()), []
+    for node in dict(registered).get(topic, []):
+        with contextlib.suppress(ConnectionRefusedError):
+            found.append(ServerProxy(master.lookupNode(node), LimitedTransport()).getBusInfo(rospy.get_name())[2])
+    return found
+
+
 class Listener:
     """Keeps the messages of a topic with the wall time of their arrival [s]."""
 
@@ -116,14 +126,11 @@ class Listener:
     @property
     def is_connected(self) -> bool:
         """Whether somebody publishes it, and all who do send to us: a subscriber counts connections not made yet."""
-        master, name = rosgraph.Master(rospy.get_name()), rospy.get_name()
-        publishers = dict(master.getSystemState()[0]).get(self.topic, [])
-
-        def sends_to_us(node: str) -> bool:
-            _, _, connections = ServerProxy(master.lookupNode(node), LimitedTransport()).getBusInfo(name)
-            return any((to, topic) == (name, self.topic) for _, to, _, _, topic, *_ in connections)
-
-        return bool(publishers) and all(map(sends_to_us, publishers))
+        name = rospy.get_name()
+        publishers = connections_of(self.topic, rosgraph.Master(name).getSystemState()[0])
+        return bool(publishers) and all(
+            any((to, topic) == (name, self.topic) for _, to, _, _, topic, *_ in each) for each in publishers
+        )
 
     @property
     def stamps_ns(self) -> list[int]:

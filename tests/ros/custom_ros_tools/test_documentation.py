@@ -29,7 +29,7 @@ def test_all_launch_snippets_together_come_up(ros, tmp_path):
     assert ros.call("remap_joint_state/toggle", SetBool, True).success
     assert not ros.call("remap_joint_state_to_floatarray/toggle", SetBool, True).success, "it is the same switch"
     assert not ros.call("/robot/remap_joint_state/toggle", SetBool, True).success, "it is on from the start"
-    rospy.wait_for_service("reset_tf", 20.0)
+    rospy.wait_for_service("reset_tf", 60.0)
     transforms, markers = ros.listen("/tf", TFMessage), ros.listen("/cup/marker", Marker)
     wait_until(
         lambda: {m.transforms[0].child_frame_id for m in transforms.messages} == {"box", "cup"}, "both frames are told"

@@ -78,7 +78,8 @@ def test_message_that_cannot_be_remapped_is_refused_and_the_topic_named(ros, sta
         repeat(states, message, lambda: rosout.logs(told), "it is refused")
         repeat(states, STATE, lambda: numbers.messages, "numbers come")
     assert {number.data for number in numbers.messages} == {(2.0, 1.0)}
-    assert [log.msg for log in rosout.logs(told)] == [f"/joint_states: message refused: {told}"], "once, not each time"
+    assert rosout.logs(told)[0].msg == f"/joint_states: message refused: {told}"
+    assert rosout.is_throttled(told), "once, not each time"
 
 
 def test_not_a_number_in_another_quantity_does_not_matter(ros, start):
@@ -154,13 +155,19 @@ def test_it_is_not_switched_on_while_the_robot_is_elsewhere(ros, start):
     )
     states.publish(STATE)
     robot.publish(JointState(name=["b", "A1"], position=[2.05, 60.0]))
-    assert toggle(ros, True) == (True, "remapping is on")
+
+    def switched_on() -> tuple[bool, str] | None:
+        """Returns the answer, None if a state took longer than 2 s, as it may on a busy machine."""
+        answer = toggle(ros, True)
+        return None if "no joint states came on" in answer[1] else answer
+
+    assert wait_until(switched_on, "states come") == (True, "remapping is on")
     toggle(ros, False)
     robot.publish(JointState(name=["b", "A1"], position=[2.05, 70.0]))
     where = "joint 'a' of the robot is at 1.222 and would be commanded to 1: expected them within 0.1"
-    assert toggle(ros, True) == (False, f"{stays_off}{where}")
+    assert wait_until(switched_on, "states come") == (False, f"{stays_off}{where}")
     robot.publish(JointState(name=["b"], position=[2.05]))
-    assert "no values for joint 'A1'" in toggle(ros, True)[1]
+    assert "no values for joint 'A1'" in wait_until(switched_on, "states come")[1]
     states.unregister()
     robot.unregister()
 

@@ -49,7 +49,7 @@ def test_arm_tracks_the_figure(ros, solver):
         found = places()
         return found and min(np.ptp(each[:, 1]) if len(each) else 0.0 for each in found) > SPAN_M and found
 
-    target, tip = wait_until(drawn, "target and tip move from end to end", 120.0, every_s=1.0)
+    target, tip = wait_until(drawn, "target and tip move from end to end", 300.0, every_s=1.0)
     off_m = np.linalg.norm(tip[:, None] - target[None], axis=-1).min(axis=1)
     assert np.median(off_m) < NEAR_M
     assert rosgraph.Master("/tests").lookupService(f"/ik/solver/{solver}/solve")

@@ -41,7 +41,7 @@ def test_6d_mouse_is_found_later_moves_and_ends_at_rest(ros, tmp_path):
     assert diagnostics.messages[-1].status[0].level == DiagnosticStatus.ERROR
 
     daemon = SpacenavDaemon(path)
-    wait_until(lambda: joy.is_connected and own.is_connected and twist.is_connected, "all are connected")
+    wait_until(lambda: all(each.is_connected for each in (joy, own, twist, offset)), "all are connected")
     wait_until(lambda: diagnostics.messages[-1].status[0].level == DiagnosticStatus.OK, "it is well")
     wait_until(lambda: _moved(daemon, joy), "it moves")
     moved = next(message for message in joy.messages if any(message.axes))
@@ -52,7 +52,7 @@ def test_6d_mouse_is_found_later_moves_and_ends_at_rest(ros, tmp_path):
     assert (moved.linear.x, moved.linear.y, moved.linear.z) == pytest.approx((0.6, -0.3, 0.8))
     assert (moved.angular.x, moved.angular.y, moved.angular.z) == pytest.approx((0.0, 0.0, 0.5))
     wait_until(lambda: any(any(message.axes) for message in own.messages), "its own topic has it, too")
-    assert offset.messages
+    wait_until(lambda: offset.messages, "and so has that of the offset")
 
     daemon.press(1)
     wait_until(lambda: joy.messages[-1].buttons == (0, 1), "it is pressed")

@@ -68,7 +68,8 @@ def test_haply_moves_a_frame_and_is_sent_forces_that_end_when_the_simulator_stop
         ros, "haply", options, target_frame_id="target", energy_allowance_j=0.1, energy_refill_w=0.1
     )
     wrenches = Wrenches(ros, 2.0)
-    wait_until(lambda: max(map(abs, haply.force)) > 1.0, "the hand feels the force, by the key that the service knows")
+    words = "the hand feels the force, by the key that the service knows"
+    wait_until(lambda: max(map(abs, haply.force)) > 1.0, words, every_s=0.001)  # on a busy machine it is so for moments
     wait_until(lambda: min(each.pose.position.z for each in pose.wait_for()) < -0.02, "the handle goes down")
     wait_until(lambda: max(abs(each.axes[2]) for each in joy.wait_for()) > 0.15, "and joy says so")
     assert max(abs(value) for each in joy.messages for value in each.axes) <= 1.0
@@ -89,7 +90,7 @@ def test_haply_moves_a_frame_and_is_sent_forces_that_end_when_the_simulator_stop
         wait_until(lambda: max(map(abs, haply.force)) == 0.0, "no force without the simulator", every_s=0.001)
         wait_until(lambda: state.messages[-1].delay > 0.05, "the state says how long the tool has been silent")
         wrenches.go_on()
-        wait_until(lambda: max(map(abs, haply.force)) > 0.5, "the force is back with it")
+        wait_until(lambda: max(map(abs, haply.force)) > 0.5, "the force is back with it", every_s=0.001)
     assert all(math.hypot(f.x, f.y, f.z) <= 8.0 for f in (each.wrench.force for each in force.messages))
 
 
@@ -102,13 +103,15 @@ def test_a_haply_that_hangs_up_is_back_by_itself_and_nothing_jumps(ros):
     port = emulator.port
     emulator.stop()
     wait_until(lambda: not state.messages[-1].connected, "it is gone")
-    assert str(port) in state.messages[-1].message
+    gone = next(each for each in state.messages[::-1] if not each.connected)
+    assert str(port) in gone.message
     there = HaplyEmulator(lambda time_s: (0.0, 0.0, 0.0), port=port)
-    before = len(joy.messages)
     there.start()
     try:
         wait_until(lambda: state.messages[-1].connected, "it is back")
-        first = joy.wait_for(before + 1)[before]
+        first = wait_until(
+            lambda: [each for each in joy.messages if each.header.stamp > gone.header.stamp], "it moves"
+        )[0]
         assert first.axes == pytest.approx((0.0, 0.0, 0.0), abs=0.05), "the handle is elsewhere, the tool goes on"
     finally:
         there.stop()
@@ -127,13 +130,14 @@ def test_touch_is_sent_zero_when_the_simulator_stops_and_when_the_node_ends(ros)
     process, state = start_haptic_node(ros, "touch", {}, energy_allowance_j=0.1, energy_refill_w=0.1)
     joy = ros.listen("/joy", Joy)
     wrenches = Wrenches(ros, 2.0)
-    wait_until(lambda: felt.messages and felt.messages[-1].z > 1.0, "the hand feels the force")
+    wait_until(lambda: strongest_n(felt.messages) > 1.0, "the hand feels the force")
     wait_until(lambda: min(each.axes[2] for each in joy.wait_for()) < -0.1, "the handle goes down")
-    assert state.messages[-1].fault_names == []
+    assert {*state.messages[-1].fault_names} <= {"jump"}, "as a machine that stands still makes them"
     wrenches.fall_silent()
     wait_until(lambda: felt.messages[-1].z == 0.0, "zero is sent", every_s=0.001)
+    before = len(felt.messages)
     wrenches.go_on()
-    wait_until(lambda: felt.messages[-1].z > 0.5, "the force is back")
+    wait_until(lambda: strongest_n(felt.messages[before:]) > 0.5, "the force is back")
     os.killpg(process.pid, signal.SIGINT)
     wait_until(lambda: process.poll() is not None, "the node ends")
     wait_until(lambda: felt.messages[-1].z == 0.0, "with zero")
@@ -151,12 +155,20 @@ def test_touch_is_sent_zero_by_the_node_when_the_loop_is_killed_and_by_the_loop_
     wait_until(lambda: any("SIGKILL" in each.message and not each.connected for each in state.messages), "it is told")
     wait_until(lambda: state.messages[-1].connected, "it is back by itself")
     assert "touch: the process of its loop ended with signal SIGKILL, and is started again" in ros.output(process)
+    before = len(felt.messages)
     Wrenches(ros, 2.0)
-    wait_until(lambda: felt.messages[-1].z > 1.0, "the hand feels the force")
+    wait_until(lambda: strongest_n(felt.messages[before:]) > 1.0, "the hand feels the force")
     loop = loop_of(process)
+    for thread in os.listdir(f"/proc/{loop}/task"):  # with a real-time priority one of them could starve the others
+        os.sched_setaffinity(int(thread), {min(os.sched_getaffinity(0))})
     os.killpg(process.pid, signal.SIGKILL)
     wait_until(lambda: not is_running(loop), "the loop ends by itself")
     wait_until(lambda: felt.messages[-1].z == 0.0, "with zero")
+
+
+def strongest_n(felt: list[Vector3]) -> float:
+    """Returns the strongest force upwards [N]; on a busy machine it may be felt for moments only."""
+    return max((each.z for each in felt), default=0.0)
 
 
 def senders(messages: list[OmniFeedback]) -> set[str]:

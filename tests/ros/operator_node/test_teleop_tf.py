@@ -9,7 +9,7 @@ import pytest
 import rospy
 from custom_srvs.srv import SetTransform
 from geometry_msgs.msg import Quaternion, Transform, Vector3
-from node_world import Rosout, publishing
+from node_world import Rosout, count_taken, publishing
 from ros_system import wait_until
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import SetBool, Trigger
@@ -25,6 +25,10 @@ class Frame:
 
     def __init__(self, ros: Any) -> None:
         self._heard = ros.listen("/tf", TFMessage)
+
+    def wait(self) -> None:
+        """Waits until what is said would be heard."""
+        wait_until(lambda: self._heard.is_connected, "the frame would be heard of")
 
     @property
     def transforms(self) -> list[Transform]:
@@ -42,6 +46,7 @@ def start(ros, start_on_init: bool = True, timeout_s: float = 0.5, **config: Any
     frame = Frame(ros)
     ros.start(["rosrun", "teleop", "teleop_tf_node.py"])
     rospy.wait_for_service("teleop_box_limits", timeout=60.0)
+    frame.wait()
     return frame
 
 
@@ -88,6 +93,7 @@ def test_it_is_switched_and_reset_and_stays_within_its_box(ros):
     with publishing("operator_node/signal", Float64MultiArray) as signal:
         for _ in range(5):
             signal.publish(Float64MultiArray(data=[0.0, 1.0, 0.0]))
+        wait_until(lambda: count_taken(signal) == 5, "it has taken them")
         assert ros.call("toggle_teleop_tf", SetBool, True).success
         wait_until(lambda: len(frame.positions) > 10, "it is broadcast")
         assert set(frame.positions) == {(0.1, 0.5, 3.0)}, "what came while it was off counts for nothing"

@@ -26,8 +26,9 @@ SOON_S = 10.0
 
 
 @pytest.fixture
-def mvn():
-    device = Mvn(MvnConfig(port=0, timeout_s=0.05))
+def mvn(request):
+    """The device; who stands still for a minute has gone, or after as long as a test says."""
+    device = Mvn(MvnConfig(port=0, timeout_s=getattr(request, "param", 60.0)))
     device.open()
     yield device
     device.close()
@@ -61,13 +62,14 @@ def test_frames_come_through_the_socket_and_hands_count_from_the_first_one(mvn, 
     assert 0.02 < max(map(abs, reading.axes)) <= 1.0
 
 
+@pytest.mark.parametrize("mvn", [0.3], indirect=True)
 def test_silence_gives_zeros_once_and_the_hands_count_anew(mvn, sender):
     for sample in (150, 165):
         sender.send(*suit().datagrams(sample, sample / HZ))
         reading, _ = read_frame(mvn)
     assert any(reading.axes)
     silent = mvn.read(SOON_S)
-    assert silent == ((0.0,) * 6, (), (Silence(0, 0.05),), *silent[3:])
+    assert silent == ((0.0,) * 6, (), (Silence(0, 0.3),), *silent[3:])
     assert mvn.receiver.people == []
     assert mvn.read(0.0) is None
     sender.send(*suit().datagrams(10, 200 / HZ))  # elsewhere, and from an earlier sample
@@ -283,6 +285,7 @@ class TestRecording:
             assert_same(frame, truth(sample, moves=WALKER))
 
 
+@pytest.mark.parametrize("mvn", [0.3], indirect=True)
 def test_one_person_may_leave_while_another_stays(mvn, sender):
     sender.send(*suit(0).datagrams(150, 2.5))
     read_frame(mvn)
@@ -293,5 +296,5 @@ def test_one_person_may_leave_while_another_stays(mvn, sender):
         left += [event for event in reading.events if isinstance(event, Silence)]
         if left:
             break
-    assert left == [Silence(0, 0.05)] and not any(reading.axes)
+    assert left == [Silence(0, 0.3)] and not any(reading.axes)
     assert mvn.receiver.people == [1]

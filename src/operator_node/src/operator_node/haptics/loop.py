@@ -60,6 +60,12 @@ class HapticLoop:
     def run(self) -> None:
         """Has the device open while the node wants it, until the node has gone."""
         _prefer_this_process()
+        try:
+            self._run()
+        finally:
+            _prefer_no_longer()
+
+    def _run(self) -> None:
         while not self._link.is_closed:
             self._listen()
             if self._orders.switched != self._report.obeyed:
@@ -168,3 +174,14 @@ def _prefer_this_process() -> None:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
     except OSError:
         return
+
+
+def _prefer_no_longer() -> None:
+    """Lets all threads of this process be ordinary ones again.
+
+    While ROS shuts down, a thread of rospy's spins until the process has ended; with a real-time priority it would keep
+    the thread that ends it from the only processor.
+    """
+    for thread in os.listdir("/proc/self/task"):
+        with contextlib.suppress(OSError):  # it has just ended
+            os.sched_setscheduler(int(thread), os.SCHED_OTHER, os.sched_param(0))

@@ -98,7 +98,7 @@ def run_node(
             _log_fatal_lines([f"the ROS master at {uri} has gone while the node was starting: {error}"])
             sys.exit(1)
         except rospy.ServiceException as error:
-            if not ended.wait(INTERRUPTED_TOO_S):
+            if not ended.wait(INTERRUPTED_TOO_S) and not rospy.core.is_shutdown_requested():
                 _log_fatal_lines([f"{error}: its node has gone, or cannot be reached"])
                 sys.exit(1)
         except MemoryError as error:
