@@ -91,6 +91,29 @@ class LimitedTransport(Transport):
         return connection
 
 
+def sends_to_us(topic: str) -> bool:
+    """Returns whether somebody publishes a topic, and all who do send to us: rospy counts connections not made yet."""
+    master, name = rosgraph.Master(rospy.get_name()), rospy.get_name()
+    publishers = dict(master.getSystemState()[0]).get(topic, [])
+
+    def sends(node: str) -> bool:
+        _, _, connections = ServerProxy(master.lookupNode(node), LimitedTransport()).getBusInfo(name)
+        return any((to, sent) == (name, topic) for _, to, _, _, sent, *_ in connections)
+
+    return bool(publishers) and all(map(sends, publishers))
+
+
+class PatientRegistrations(Registrations):
+    """Asks a master again that was too slow to answer: a node's `MasterWatch` would, which the tests' process lacks."""
+
+    def reg_added(self, name: str, type_or_uri: str, kind: str) -> None:
+        for _ in range(30):
+            self.are_complete = True
+            super().reg_added(name, type_or_uri, kind)
+            if self.are_complete:
+                return
+
+
 class Listener:
     """Keeps the messages of a topic with the wall time of their arrival [s]."""
 
@@ -108,6 +131,14 @@ class Listener:
         wait_until(lambda: len(self.messages) >= count, f"{count} messages came on {self.topic}", timeout_s)
         return self.messages
 
+    def wait_for_stamp(self, stamp: rospy.Time) -> Any:
+        """Waits until a message with a stamp, or a later one, has come and returns the first such."""
+
+        def found() -> Any:
+            return next((each for each in list(self.messages) if each.header.stamp >= stamp), None)
+
+        return wait_until(found, f"{self.topic} has come to {stamp.to_sec():.9f}")
+
     @property
     def topic(self) -> str:
         """The topic's full name."""
@@ -115,15 +146,8 @@ class Listener:
 
     @property
     def is_connected(self) -> bool:
-        """Whether somebody publishes it, and all who do send to us: a subscriber counts connections not made yet."""
-        master, name = rosgraph.Master(rospy.get_name()), rospy.get_name()
-        publishers = dict(master.getSystemState()[0]).get(self.topic, [])
-
-        def sends_to_us(node: str) -> bool:
-            _, _, connections = ServerProxy(master.lookupNode(node), LimitedTransport()).getBusInfo(name)
-            return any((to, topic) == (name, self.topic) for _, to, _, _, topic, *_ in connections)
-
-        return bool(publishers) and all(map(sends_to_us, publishers))
+        """Whether somebody publishes it, and all who do send to us."""
+        return sends_to_us(self.topic)
 
     @property
     def stamps_ns(self) -> list[int]:
@@ -146,7 +170,7 @@ class RosSystem:
         self._lock = threading.Lock()
         if not rospy.core.is_initialized():
             rospy.init_node("tests", anonymous=True, disable_rostime=True, disable_signals=True)
-            Registrations(registry())  # rospy's own part would leave a subscriber alone now and then
+            PatientRegistrations(registry())  # rospy's own part would leave a subscriber alone now and then
         rospy.set_param("/use_sim_time", False)
         self._parameters = set(rospy.get_param_names())
 
