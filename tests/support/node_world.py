@@ -91,9 +91,9 @@ class Rosout:
         self._listener = ros.listen("/rosout", Log)
 
     def logs(self, containing: str = "") -> list[Log]:
-        """Returns the messages that contain a text."""
-        logs = list(self._listener.messages)
-        return [log for log in logs if containing in log.msg and log.name != rospy.get_name()]
+        """Returns the messages that contain a text; each once, since rospy may send a latched one twice."""
+        logs = {(log.name, log.header.stamp.to_nsec(), log.msg): log for log in list(self._listener.messages)}
+        return [log for log in logs.values() if containing in log.msg and log.name != rospy.get_name()]
 
     def wait_for(self, texts: Sequence[str], timeout_s: float = 60.0) -> None:
         """Waits until messages that contain these texts have come."""

@@ -91,10 +91,10 @@ class LimitedTransport(Transport):
         return connection
 
 
-def sends_to_us(topic: str) -> bool:
-    """Returns whether somebody publishes a topic, and all who do send to us: rospy counts connections not made yet."""
+def sends_to_us(topic: str, publisher: str | None = None) -> bool:
+    """Returns whether a node, or whoever publishes a topic, sends it to us: rospy counts connections not made yet."""
     master, name = rosgraph.Master(rospy.get_name()), rospy.get_name()
-    publishers = dict(master.getSystemState()[0]).get(topic, [])
+    publishers = [publisher] if publisher else dict(master.getSystemState()[0]).get(topic, [])
 
     def sends(node: str) -> bool:
         _, _, connections = ServerProxy(master.lookupNode(node), LimitedTransport()).getBusInfo(name)
