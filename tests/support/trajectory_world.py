@@ -67,7 +67,7 @@ def begin_anew(robot: SimpleNamespace) -> None:
     assert answer.success, answer.message
     robot.ros.call("/rpbi/start", Trigger)
     assert robot.client.wait_for_server(rospy.Duration(60.0))
-    robot.states.wait_for_stamp(robot.ros.call("/rpbi/get_state_hash", GetStateHash).stamp)
+    robot.states.wait_for_stamp(now(robot))
     robot.states.messages.clear()  # none from before the reset is under way any more
     robot.states.wait_for(1)
 
@@ -130,7 +130,22 @@ def tolerance(name: str, **limits: float) -> Any:
     return JointTolerance(name=name, **limits)
 
 
-def stands(states: Any, count: int = 100) -> bool:
-    """Tells whether the robot has not moved over the last messages [1 kHz]."""
-    last = states.messages[-count:]
-    return len(last) == count and all(abs(v) < 1e-3 for message in last for v in message.velocity)
+def now(robot: SimpleNamespace) -> rospy.Time:
+    """Returns the stamp of the world; messages of later ones tell what has come of all before the call."""
+    return robot.ros.call("/rpbi/get_state_hash", GetStateHash).stamp
+
+
+def stands(messages: list[JointState]) -> bool:
+    """Tells whether the robot does not move in any of some messages."""
+    return all(abs(v) < 1e-3 for message in messages for v in message.velocity)
+
+
+def wait_until_it_stands(robot: SimpleNamespace, count: int = 100) -> None:
+    """Waits until the robot has not moved over so many messages [1 kHz], all from after the call."""
+    called = now(robot)
+
+    def has_stood() -> bool:
+        last = robot.states.messages[-count:]
+        return len(last) == count and last[0].header.stamp > called and stands(last)
+
+    wait_until(has_stood, "the arm stands")

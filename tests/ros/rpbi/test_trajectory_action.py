@@ -13,7 +13,19 @@ from ros_system import wait_until
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
-from trajectory_world import CONTROLLER, JOINTS, START, Goal, far_away, moved, stands, tolerance, trajectory
+from trajectory_world import (
+    CONTROLLER,
+    JOINTS,
+    START,
+    Goal,
+    far_away,
+    moved,
+    now,
+    stands,
+    tolerance,
+    trajectory,
+    wait_until_it_stands,
+)
 
 from ros_pybullet_interface.msg import JointTrajectoryControllerState
 from ros_pybullet_interface.srv import StepN
@@ -64,7 +76,7 @@ def test_cancelled_goal_makes_the_arm_hold(robot):
     goal.handle.cancel()
     status, _, text = goal.wait()
     assert status == GoalStatus.PREEMPTED and "cancelled" in text
-    wait_until(lambda: stands(robot.states), "the arm stands")
+    wait_until_it_stands(robot)
     assert 0.0 < robot.states.messages[-1].position[0] < 2.0
 
 
@@ -73,7 +85,7 @@ def test_arm_stops_when_it_is_off_its_path_and_says_so(robot):
     status, code, text = goal.wait()
     assert (status, code) == (GoalStatus.ABORTED, -4)
     assert "'lbr_iiwa_joint_1'" in text and "stop and hold" in text
-    wait_until(lambda: stands(robot.states), "the arm stands")
+    wait_until_it_stands(robot)
     assert robot.states.messages[-1].position[0] < 0.5
 
 
@@ -105,13 +117,15 @@ def test_goal_that_is_missed_for_its_time_is_aborted(robot):
     ids=["unknown", "missing", "limit", "nan", "times", "length", "speed", "no time", "old"],
 )
 def test_bad_goal_is_refused_before_anything_moves(robot, message, code, text):
-    wait_until(lambda: stands(robot.states), "the arm stands")
+    wait_until_it_stands(robot)
+    begin = len(robot.states.messages)
     goal = Goal(robot, message)
     status, error_code, error_string = goal.wait()
     assert (status, error_code) == (GoalStatus.REJECTED, code)
     assert text in error_string
     assert goal.handle.get_goal_status_text() == error_string
-    assert stands(robot.states)
+    robot.states.wait_for_stamp(now(robot))
+    assert stands(robot.states.messages[begin:])
 
 
 def test_command_replaces_a_goal_and_an_empty_one_makes_the_arm_hold(robot):
@@ -123,7 +137,7 @@ def test_command_replaces_a_goal_and_an_empty_one_makes_the_arm_hold(robot):
         assert status == GoalStatus.PREEMPTED and "newer trajectory" in text
         wait_until(lambda: robot.states.messages[-1].velocity[0] < -0.05, "it moves back")
         command.publish(JointTrajectory())
-        wait_until(lambda: stands(robot.states), "the arm stands")
+        wait_until_it_stands(robot)
     assert -2.0 < robot.states.messages[-1].position[0]
 
 
