@@ -146,7 +146,8 @@ def test_a_tick_listener_waits_for_all_of_a_tick(ros, stopped):
     listener = TickListener({"/rpbi/iiwa/joint_states": JointState})
     for _ in range(20):
         answer = ros.call("/rpbi/step_n", StepN, 10)
-        assert listener.wait_for_tick(answer.stamp, timeout_s=60.0)["/rpbi/iiwa/joint_states"].header.stamp == answer.stamp
+        newest = listener.wait_for_tick(answer.stamp, timeout_s=60.0)
+        assert newest["/rpbi/iiwa/joint_states"].header.stamp == answer.stamp
     with pytest.raises(TimeoutError, match="/rpbi/iiwa/joint_states"):
         listener.wait_for_tick(answer.stamp + type(answer.stamp - answer.stamp)(1), timeout_s=0.2)
     listener.close()
