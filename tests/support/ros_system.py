@@ -240,7 +240,7 @@ class RosSystem:
 
     def call(self, service: str, service_type: type, *arguments: Any, **fields: Any) -> Any:
         """Calls a service."""
-        rospy.wait_for_service(service, timeout=60.0)
+        rospy.wait_for_service(service, timeout=120.0)
         return rospy.ServiceProxy(service, service_type)(*arguments, **fields)
 
     def write_yaml(self, name: str, data: dict[str, Any]) -> str:

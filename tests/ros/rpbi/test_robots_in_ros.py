@@ -133,7 +133,7 @@ def test_a_robot_starts_where_another_one_is(ros, tmp_path):
 def test_a_robot_to_start_at_that_says_nothing_is_named(ros, tmp_path):
     robot = iiwa(initial_joint_state_topic="/nobody/joint_states")
     node = ros.simulator(main_config(tmp_path, robots=(robot,)), wait=False)
-    assert node.wait(60.0) == 1
+    assert node.wait(120.0) == 1
     assert "initial_joint_state_topic: no joint states came on /nobody/joint_states within 5 s" in ros.output(node)
 
 
