@@ -8,6 +8,7 @@ import math
 import statistics
 import threading
 import time
+from collections.abc import Callable
 
 import rospy
 from processes import handles, memory_mb, process_of
@@ -18,6 +19,8 @@ NODES = {"simulator": "/ros_pybullet_interface", "camera": "/ros_pybullet_interf
 TARGET_HZ = 50.0
 WARM_UP_SHARE = 0.1
 """Share of the time after which memory and handles count; buffers fill and caches grow before."""
+WARM_UP_MESSAGES = 10
+"""Of each topic before that time begins, however slow the machine is."""
 
 
 class Count:
@@ -53,7 +56,7 @@ def main() -> None:
         "images": Count("rpbi/camera/colour/image", Image),
     }
     threading.Thread(target=_control, args=(arguments.robot, arguments.joint), daemon=True).start()
-    while not all(count.number for count in counts.values()):
+    while not all(count.number >= WARM_UP_MESSAGES for count in counts.values()):
         time.sleep(0.01)
     processes = {name: process_of(node) for name, node in NODES.items()}
     held: dict[str, list[float]] = {name: [] for name in processes}
@@ -68,12 +71,12 @@ def main() -> None:
         handle_counts.append(sum(map(handles, processes.values())))
         time.sleep(min(1.0, arguments.seconds / 100))
     wall_s = time.monotonic() - start_s
-    first, last = _ends(handle_counts)
+    first, last = _ends(handle_counts, min)  # a call to the master takes one for a moment, once a second
     found = {
         "wall_s": wall_s,
         "memory_mb": {name: statistics.median(values) for name, values in held.items()},
         "growth": {name: _growth(values) for name, values in held.items()},
-        "new_handles": last - first,  # a call to the master takes one for a moment, once a second
+        "new_handles": last - first,
         **{name: count.number for name, count in counts.items()},
         "longest_gaps_s": {name: count.longest_gap_s for name, count in counts.items()},
     }
@@ -87,10 +90,10 @@ def _control(robot: str, joint: str) -> None:
         time.sleep(1.0 / TARGET_HZ)
 
 
-def _ends(values: list[float]) -> tuple[float, float]:
-    """Returns the medians of the first and of the last tenth."""
+def _ends(values: list[float], of: Callable[[list[float]], float] = statistics.median) -> tuple[float, float]:
+    """Returns the medians, or something else, of the first and of the last tenth."""
     tenth = max(1, len(values) // 10)
-    return statistics.median(values[:tenth]), statistics.median(values[-tenth:])
+    return of(values[:tenth]), of(values[-tenth:])
 
 
 def _growth(values: list[float]) -> float:

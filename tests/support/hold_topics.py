@@ -8,10 +8,12 @@ import rospy
 
 
 def main() -> None:
-    """Subscribes to all topics that are named as arguments."""
+    """Subscribes to all topics that are named as arguments, and says so once something has come on each."""
     rospy.init_node("hold_topics", anonymous=True, disable_rostime=True)
-    subscribers = [rospy.Subscriber(topic, rospy.AnyMsg, lambda message: None) for topic in sys.argv[1:]]
-    while not all(subscriber.get_num_connections() for subscriber in subscribers):
+    silent = set(sys.argv[1:])
+    for topic in sys.argv[1:]:
+        rospy.Subscriber(topic, rospy.AnyMsg, lambda _, topic=topic: silent.discard(topic))
+    while silent:  # a subscriber counts connections not made yet
         rospy.rostime.wallsleep(0.02)
     print("listening", flush=True)
     rospy.spin()

@@ -22,8 +22,7 @@ import rospy
 import tf2_ros
 import yaml
 
-from custom_ros_tools.ros.lifecycle.master_watch import Registrations
-from custom_ros_tools.ros.rospy_internals import registry
+from custom_ros_tools.ros.lifecycle.master_watch import MasterWatch
 from custom_ros_tools.ros.tf_listener import TfListener
 from ros_pybullet_interface.srv import ListObjects
 
@@ -101,6 +100,16 @@ def connections_of(topic: str, registered: list[tuple[str, list[str]]]) -> list[
     return found
 
 
+def sends_to_us(topic: str, publisher: str | None = None) -> bool:
+    """Returns whether a node, or whoever publishes a topic, sends it to us: rospy counts connections not made yet."""
+    name = rospy.get_name()
+    registered = [(topic, [publisher])] if publisher else rosgraph.Master(name).getSystemState()[0]
+    publishers = connections_of(topic, registered)
+    return bool(publishers) and all(
+        any((to, sent) == (name, topic) for _, to, _, _, sent, *_ in each) for each in publishers
+    )
+
+
 class Listener:
     """Keeps the messages of a topic with the wall time of their arrival [s]."""
 
@@ -118,6 +127,14 @@ class Listener:
         wait_until(lambda: len(self.messages) >= count, f"{count} messages came on {self.topic}", timeout_s)
         return self.messages
 
+    def wait_for_stamp(self, stamp: rospy.Time) -> Any:
+        """Waits until a message with a stamp, or a later one, has come and returns the first such."""
+
+        def found() -> Any:
+            return next((each for each in list(self.messages) if each.header.stamp >= stamp), None)
+
+        return wait_until(found, f"{self.topic} has come to {stamp.to_sec():.9f}")
+
     @property
     def topic(self) -> str:
         """The topic's full name."""
@@ -125,12 +142,8 @@ class Listener:
 
     @property
     def is_connected(self) -> bool:
-        """Whether somebody publishes it, and all who do send to us: a subscriber counts connections not made yet."""
-        name = rospy.get_name()
-        publishers = connections_of(self.topic, rosgraph.Master(name).getSystemState()[0])
-        return bool(publishers) and all(
-            any((to, topic) == (name, self.topic) for _, to, _, _, topic, *_ in each) for each in publishers
-        )
+        """Whether somebody publishes it, and all who do send to us."""
+        return sends_to_us(self.topic)
 
     @property
     def stamps_ns(self) -> list[int]:
@@ -153,7 +166,7 @@ class RosSystem:
         self._lock = threading.Lock()
         if not rospy.core.is_initialized():
             rospy.init_node("tests", anonymous=True, disable_rostime=True, disable_signals=True)
-            Registrations(registry())  # rospy's own part would leave a subscriber alone now and then
+            MasterWatch()  # rospy's own part would leave a subscriber alone now and then
         rospy.set_param("/use_sim_time", False)
         self._parameters = set(rospy.get_param_names())
 
@@ -223,7 +236,7 @@ class RosSystem:
 
     def call(self, service: str, service_type: type, *arguments: Any, **fields: Any) -> Any:
         """Calls a service."""
-        rospy.wait_for_service(service, timeout=60.0)
+        rospy.wait_for_service(service, timeout=120.0)
         return rospy.ServiceProxy(service, service_type)(*arguments, **fields)
 
     def write_yaml(self, name: str, data: dict[str, Any]) -> str:

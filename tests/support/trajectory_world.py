@@ -11,12 +11,15 @@ from typing import Any
 
 import actionlib
 import rospy
+from actionlib_msgs.msg import GoalStatus
 from node_world import main_config
-from ros_system import wait_until
+from ros_system import sends_to_us, wait_until
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from worlds import iiwa
+
+from ros_pybullet_interface.srv import GetStateHash
 
 JOINTS = [f"lbr_iiwa_joint_{number}" for number in range(1, 8)]
 CONTROLLER = "/rpbi/iiwa/joint_trajectory_controller"
@@ -51,6 +54,9 @@ def open_world(
     rospy.set_param("actionlib_client_pub_queue_size", 1000)  # else a burst of more than 10 goals loses some
     client = actionlib.ActionClient(f"{CONTROLLER}/follow_joint_trajectory", FollowJointTrajectoryAction)
     assert client.wait_for_server(rospy.Duration(60.0))
+    for part in ("result", "feedback"):  # which the client counts as connected before the server sends to it
+        topic = f"{CONTROLLER}/follow_joint_trajectory/{part}"
+        wait_until(lambda topic=topic: sends_to_us(topic), f"{topic} is connected")
     states.wait_for(1)
     return SimpleNamespace(ros=ros, states=states, client=client, process=process)
 
@@ -61,7 +67,8 @@ def begin_anew(robot: SimpleNamespace) -> None:
     assert answer.success, answer.message
     robot.ros.call("/rpbi/start", Trigger)
     assert robot.client.wait_for_server(rospy.Duration(60.0))
-    robot.states.messages.clear()
+    robot.states.wait_for_stamp(now(robot))
+    robot.states.messages.clear()  # none from before the reset is under way any more
     robot.states.wait_for(1)
 
 
@@ -86,6 +93,9 @@ class Goal:
         result = self.handle.get_result()
         return self.handle.get_terminal_state(), result.error_code, result.error_string
 
+    def wait_until_accepted(self) -> None:
+        wait_until(lambda: self.handle.get_goal_status() == GoalStatus.ACTIVE, "the goal is accepted")
+
     def wait_until_it_moves(self) -> None:
         wait_until(lambda: len(self.feedback) > 3, "the goal is being followed")
 
@@ -109,13 +119,33 @@ def moved(by: float, joint: int = 0) -> list[float]:
     return [position + by * (index == joint) for index, position in enumerate(START)]
 
 
+def far_away() -> JointTrajectory:
+    """Returns a trajectory that takes longer than whatever a test does meanwhile."""
+    return trajectory((10.0, moved(2.5)))
+
+
 def tolerance(name: str, **limits: float) -> Any:
     from control_msgs.msg import JointTolerance
 
     return JointTolerance(name=name, **limits)
 
 
-def stands(states: Any, count: int = 100) -> bool:
-    """Tells whether the robot has not moved over the last messages [1 kHz]."""
-    last = states.messages[-count:]
-    return len(last) == count and all(abs(v) < 1e-3 for message in last for v in message.velocity)
+def now(robot: SimpleNamespace) -> rospy.Time:
+    """Returns the stamp of the world; messages of later ones tell what has come of all before the call."""
+    return robot.ros.call("/rpbi/get_state_hash", GetStateHash).stamp
+
+
+def stands(messages: list[JointState]) -> bool:
+    """Tells whether the robot does not move in any of some messages."""
+    return all(abs(v) < 1e-3 for message in messages for v in message.velocity)
+
+
+def wait_until_it_stands(robot: SimpleNamespace, count: int = 100) -> None:
+    """Waits until the robot has not moved over so many messages [1 kHz], all from after the call."""
+    called = now(robot)
+
+    def has_stood() -> bool:
+        last = robot.states.messages[-count:]
+        return len(last) == count and last[0].header.stamp > called and stands(last)
+
+    wait_until(has_stood, "the arm stands")

@@ -7,11 +7,11 @@ import re
 import threading
 
 import pytest
+import rospy
 from cob_srvs.srv import SetString
 from custom_srvs.srv import SetTransform
-from node_world import add, main_config, publishing, remove
+from node_world import Rosout, add, main_config, publishing, remove
 from ros_system import wait_until
-from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from worlds import box, iiwa
@@ -21,6 +21,8 @@ from ros_pybullet_interface.srv import CalculateInverseKinematics, ResetEffState
 
 FIRST, FOURTH = "lbr_iiwa_joint_1", "lbr_iiwa_joint_4"
 JOINTS = [f"lbr_iiwa_joint_{i}" for i in range(1, 8)]
+FAR, LONG_S, UNDER_WAY = 2.5, 20.0, 0.01
+"""A goal of the first joint [rad], a duration that outlasts whatever a test does meanwhile, where it is soon [rad]."""
 BENT = dict(zip(JOINTS, [0.0, 30.0, 0.0, -60.0, 0.0, 40.0, 0.0]))
 
 
@@ -68,9 +70,13 @@ def in_background(call):
 
 
 def now(states) -> dict[str, float]:
-    seen = len(states.messages)
-    message = states.wait_for(seen + 2)[-1]
+    """Returns where the joints are, by a message that was made after the call."""
+    message = states.wait_for_stamp(rospy.Time.now())
     return dict(zip(message.name, message.position))
+
+
+def wait_until_under_way(states):
+    wait_until(lambda: now(states)[FIRST] > UNDER_WAY, "the move is under way")
 
 
 @pytest.mark.quick
@@ -140,18 +146,18 @@ def test_a_goal_that_cannot_be_is_refused_before_anything_moves(ros, states, cas
 
 
 def test_of_two_moves_at_once_the_later_wins_and_the_earlier_says_where_it_got(ros, states):
-    first = in_background(lambda: move(ros, 4.0, j1=1.0))
-    wait_until(lambda: now(states)[FIRST] > 0.05, "the first is under way")
+    first = in_background(lambda: move(ros, LONG_S, j1=FAR))
+    wait_until_under_way(states)
     assert move(ros, 0.5, j1=-0.2).success
     answer = first()
     assert not answer.success
     assert "a newer motion replaced it before the goal" in answer.message
-    assert 0.05 < float(re.search(rf"{FIRST}=(\S+)", answer.message)[1]) < 1.0
+    assert UNDER_WAY < float(re.search(rf"{FIRST}=(\S+)", answer.message)[1]) < FAR
 
 
 def test_a_stop_in_the_middle_is_answered_and_while_stopped_moves_are_refused(ros, states):
-    moving = in_background(lambda: move(ros, 4.0, j1=1.0))
-    wait_until(lambda: now(states)[FIRST] > 0.05, "it is under way")
+    moving = in_background(lambda: move(ros, LONG_S, j1=FAR))
+    wait_until_under_way(states)
     assert ros.call("/rpbi/stop", Trigger).success
     answer = moving()
     assert not answer.success
@@ -169,9 +175,9 @@ def test_removal_in_the_middle_is_answered(ros, node):
     load = {"fileName": "kuka_iiwa/model.urdf", "useFixedBase": True, "basePosition": [0.0, 3.0, 0.0]}
     assert add(ros, PybulletObject.ROBOT, iiwa("guest", loadURDF=load)).success
     states = ros.listen("/rpbi/guest/joint_states", JointState)
-    goal = JointState(name=[FIRST], position=[1.0])
-    moving = in_background(lambda: ros.call("/rpbi/guest/move_to_joint_state", ResetJointState, goal, 5.0))
-    wait_until(lambda: now(states)[FIRST] > 0.05, "it is under way")
+    goal = JointState(name=[FIRST], position=[FAR])
+    moving = in_background(lambda: ros.call("/rpbi/guest/move_to_joint_state", ResetJointState, goal, LONG_S))
+    wait_until_under_way(states)
     assert remove(ros, "guest").success
     answer = moving()
     assert not answer.success
@@ -179,12 +185,12 @@ def test_removal_in_the_middle_is_answered(ros, node):
 
 
 def test_modes_are_switched_and_targets_for_another_mode_named_once(ros, states):
-    rosout = ros.listen("/rosout", Log)
+    rosout = Rosout(ros)
     assert ros.call("/rpbi/iiwa/set_control_mode", SetString, "VELOCITY_CONTROL").success
     with publishing("/rpbi/iiwa/joint_states/target", JointState) as target:
         for _ in range(40):
             target.publish(JointState(name=[FIRST], position=[0.1]))
-        wait_until(lambda: [log for log in rosout.messages if "expected velocity" in log.msg], "it is named")
+        rosout.wait_for(["expected velocity"])
 
         def goes():
             target.publish(JointState(name=[FIRST], velocity=[0.3]))
@@ -192,13 +198,13 @@ def test_modes_are_switched_and_targets_for_another_mode_named_once(ros, states)
 
         wait_until(goes, "it has the velocity that is asked for")
     wait_until(lambda: abs(states.messages[-1].velocity[0]) < 1e-3, "it stops when nobody sends any more")
-    assert len([log for log in rosout.messages if "expected velocity" in log.msg]) == 1
+    assert len(rosout.logs("expected velocity")) == 1
 
 
 def test_torque_control_lets_an_arm_fall_and_moves_are_refused_in_it(ros, states):
+    before = now(states)[JOINTS[1]]
     assert ros.call("/rpbi/iiwa/set_control_mode", SetString, "TORQUE_CONTROL").success
     assert "TORQUE_CONTROL" in move(ros, 1.0, j1=0.5).message
-    before = now(states)[JOINTS[1]]
     wait_until(lambda: abs(now(states)[JOINTS[1]] - before) > 0.05, "it falls")
 
 
@@ -229,8 +235,8 @@ def test_bodies_are_put_somewhere_at_once_and_nonsense_is_refused(ros, node):
 
 
 def test_a_motion_is_stopped_by_service_and_stopping_nothing_says_so(ros, states):
-    moving = in_background(lambda: move(ros, 4.0, j1=1.0))
-    wait_until(lambda: now(states)[FIRST] > 0.05, "it is under way")
+    moving = in_background(lambda: move(ros, LONG_S, j1=FAR))
+    wait_until_under_way(states)
     assert ros.call("/rpbi/iiwa/stop_motion", Trigger).success
     assert "it was stopped before the goal" in moving().message
     answer = ros.call("/rpbi/iiwa/stop_motion", Trigger)
@@ -239,8 +245,8 @@ def test_a_motion_is_stopped_by_service_and_stopping_nothing_says_so(ros, states
 
 
 def test_a_base_that_is_put_elsewhere_ends_the_motion(ros, states):
-    moving = in_background(lambda: move(ros, 4.0, j1=1.0))
-    wait_until(lambda: now(states)[FIRST] > 0.05, "it is under way")
+    moving = in_background(lambda: move(ros, LONG_S, j1=FAR))
+    wait_until_under_way(states)
     transform = SetTransform._request_class().transform
     transform.rotation.w = 1.0
     assert ros.call("/rpbi/iiwa/set_pose", SetTransform, transform).success

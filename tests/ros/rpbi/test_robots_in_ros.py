@@ -18,6 +18,7 @@ from worlds import iiwa
 from ros_pybullet_interface.msg import PybulletObject
 
 FIRST = "lbr_iiwa_joint_1"
+START_AT_REAL = {"initial_joint_state_topic": "/real/joint_states", "initial_joint_state_timeout_s": 60.0}
 
 
 def test_each_robot_has_a_description_that_rviz_can_read_as_long_as_it_is_there(ros, tmp_path):
@@ -35,7 +36,6 @@ def test_each_robot_has_a_description_that_rviz_can_read_as_long_as_it_is_there(
 
 def test_robot_state_publisher_gives_the_same_link_frames(ros, tmp_path):
     """With our own link poses beside it under another prefix, both agree."""
-    rospy.set_param("/publisher/robot_description", "")
     ros.simulator(
         main_config(
             tmp_path,
@@ -120,7 +120,7 @@ def _saying(topic, message):
 
 def test_a_robot_starts_where_another_one_is(ros, tmp_path):
     message = JointState(name=["gripper", FIRST, "lbr_iiwa_joint_4"], position=[0.02, 0.7, -1.1])
-    robot = iiwa(initial_joint_state_topic="/real/joint_states", initial_joint_position={"lbr_iiwa_joint_2": 20.0})
+    robot = iiwa(**START_AT_REAL, initial_joint_position={"lbr_iiwa_joint_2": 20.0})
     with _saying("/real/joint_states", message):
         ros.simulator(main_config(tmp_path, robots=(robot,)))
         state = ros.listen("/rpbi/iiwa/joint_states", JointState).wait_for(1)[-1]
@@ -133,15 +133,15 @@ def test_a_robot_starts_where_another_one_is(ros, tmp_path):
 def test_a_robot_to_start_at_that_says_nothing_is_named(ros, tmp_path):
     robot = iiwa(initial_joint_state_topic="/nobody/joint_states")
     node = ros.simulator(main_config(tmp_path, robots=(robot,)), wait=False)
-    assert node.wait(60.0) == 1
+    assert node.wait(120.0) == 1
     assert "initial_joint_state_topic: no joint states came on /nobody/joint_states within 5 s" in ros.output(node)
 
 
 def test_half_a_message_to_start_from_is_refused_whole(ros, tmp_path):
-    robot = iiwa(initial_joint_state_topic="/real/joint_states")
+    robot = iiwa(**START_AT_REAL)
     with _saying("/real/joint_states", JointState(name=[FIRST, "lbr_iiwa_joint_4"], position=[0.7])):
         node = ros.simulator(main_config(tmp_path, robots=(robot,)), wait=False)
-        assert node.wait(60.0) == 1
+        assert node.wait(120.0) == 1
     complaint = "expected a position for each name on /real/joint_states, got 2 names, 1 positions"
     assert f"initial_joint_state_topic: {complaint}" in ros.output(node)
 

@@ -18,7 +18,7 @@ def test_memory_and_handles_stay_flat_while_it_runs_with_a_camera():
         cwd=BENCHMARKS,
         capture_output=True,
         text=True,
-        timeout=180.0,
+        timeout=270.0,
         start_new_session=True,
     )
     assert done.returncode == 0, done.stdout + done.stderr

@@ -42,6 +42,7 @@ def test_its_surface_is_a_list_of_triangles_in_the_world(ros, node):
 
 def test_it_can_be_put_somewhere_and_tells_when_it_cannot(ros, node):
     surface = ros.listen("/rpbi/jelly/surface", Marker)
+    surface.wait_for(1)
     up = Transform(Vector3(0.0, 0.0, 3.0), Quaternion(0.0, 0.0, 0.0, 1.0))
     assert ros.call("/rpbi/jelly/set_pose", SetTransform, up).success
     wait_until(lambda: any(heights(each).min() > 2.0 for each in list(surface.messages)), "it is up there")

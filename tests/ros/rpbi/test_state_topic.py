@@ -26,10 +26,9 @@ def start(ros, tmp_path):
 @pytest.mark.quick
 def test_it_tells_where_the_world_is_and_how_fast(ros, start):
     states = start(real_time_factor=0.5)
-    state = wait_until(lambda: [each for each in states.messages if each.real_time_factor], "the factor is known")[-1]
+    state = wait_until(lambda: _at_half_pace(states), "it goes at the pace that is asked for")
     assert state.running and not state.stepping
     assert state.real_time_factor_asked == 0.5
-    assert 0.1 < state.real_time_factor < 0.6
     assert state.simulated_time == pytest.approx(state.tick * 0.001)
     assert state.header.stamp.to_nsec() == (state.tick + 1) * 1_000_000
     ros.call("/rpbi/stop", Trigger)
@@ -59,6 +58,11 @@ def test_it_can_be_switched_off(ros, start):
     states = start(state_hz=0, state_hash_hz=10.0)
     states.wait_for(5)
     assert all(message.state_hash for message in states.messages)
+
+
+def _at_half_pace(states):
+    """Returns a message from a second of that pace; what a busy machine is late for is caught up with in the next."""
+    return next((each for each in list(states.messages) if 0.4 < each.real_time_factor < 0.6), None)
 
 
 def _hashed(states):

@@ -13,9 +13,22 @@ from ros_system import wait_until
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
-from trajectory_world import CONTROLLER, JOINTS, START, Goal, moved, stands, tolerance, trajectory
+from trajectory_world import (
+    CONTROLLER,
+    JOINTS,
+    START,
+    Goal,
+    far_away,
+    moved,
+    now,
+    stands,
+    tolerance,
+    trajectory,
+    wait_until_it_stands,
+)
 
 from ros_pybullet_interface.msg import JointTrajectoryControllerState
+from ros_pybullet_interface.srv import StepN
 
 
 def test_types_are_the_public_ones(control_msgs):
@@ -45,8 +58,8 @@ def test_goal_is_reached_with_joints_in_any_order(robot):
 
 
 def test_new_goal_preempts_the_old_one_and_goes_on_without_a_jerk(robot):
-    first = Goal(robot, trajectory((4.0, moved(1.2))))
-    first.wait_until_it_moves()
+    first = Goal(robot, far_away())
+    wait_until(lambda: robot.states.messages[-1].velocity[0] > 0.08, "a jerk would be seen")
     second = Goal(robot, trajectory((2.0, moved(-0.3))))
     status, _, text = first.wait()
     assert status == GoalStatus.PREEMPTED and "newer trajectory" in text
@@ -58,13 +71,13 @@ def test_new_goal_preempts_the_old_one_and_goes_on_without_a_jerk(robot):
 
 
 def test_cancelled_goal_makes_the_arm_hold(robot):
-    goal = Goal(robot, trajectory((4.0, moved(1.2))))
+    goal = Goal(robot, far_away())
     goal.wait_until_it_moves()
     goal.handle.cancel()
     status, _, text = goal.wait()
     assert status == GoalStatus.PREEMPTED and "cancelled" in text
-    wait_until(lambda: stands(robot.states), "the arm stands")
-    assert 0.0 < robot.states.messages[-1].position[0] < 1.0
+    wait_until_it_stands(robot)
+    assert 0.0 < robot.states.messages[-1].position[0] < 2.0
 
 
 def test_arm_stops_when_it_is_off_its_path_and_says_so(robot):
@@ -72,7 +85,7 @@ def test_arm_stops_when_it_is_off_its_path_and_says_so(robot):
     status, code, text = goal.wait()
     assert (status, code) == (GoalStatus.ABORTED, -4)
     assert "'lbr_iiwa_joint_1'" in text and "stop and hold" in text
-    wait_until(lambda: stands(robot.states), "the arm stands")
+    wait_until_it_stands(robot)
     assert robot.states.messages[-1].position[0] < 0.5
 
 
@@ -104,45 +117,55 @@ def test_goal_that_is_missed_for_its_time_is_aborted(robot):
     ids=["unknown", "missing", "limit", "nan", "times", "length", "speed", "no time", "old"],
 )
 def test_bad_goal_is_refused_before_anything_moves(robot, message, code, text):
-    wait_until(lambda: stands(robot.states), "the arm stands")
+    wait_until_it_stands(robot)
+    begin = len(robot.states.messages)
     goal = Goal(robot, message)
     status, error_code, error_string = goal.wait()
     assert (status, error_code) == (GoalStatus.REJECTED, code)
     assert text in error_string
     assert goal.handle.get_goal_status_text() == error_string
-    assert stands(robot.states)
+    robot.states.wait_for_stamp(now(robot))
+    assert stands(robot.states.messages[begin:])
 
 
 def test_command_replaces_a_goal_and_an_empty_one_makes_the_arm_hold(robot):
-    goal = Goal(robot, trajectory((5.0, moved(1.2))))
+    goal = Goal(robot, far_away())
     goal.wait_until_it_moves()
     with publishing(f"{CONTROLLER}/command", JointTrajectory) as command:
-        command.publish(trajectory((4.0, moved(-1.2))))
+        command.publish(trajectory((10.0, moved(-2.5))))
         status, _, text = goal.wait()
         assert status == GoalStatus.PREEMPTED and "newer trajectory" in text
-        wait_until(lambda: robot.states.messages[-1].velocity[0] < -0.1, "it moves back")
+        wait_until(lambda: robot.states.messages[-1].velocity[0] < -0.05, "it moves back")
         command.publish(JointTrajectory())
-        wait_until(lambda: stands(robot.states), "the arm stands")
-    assert -1.0 < robot.states.messages[-1].position[0]
+        wait_until_it_stands(robot)
+    assert -2.0 < robot.states.messages[-1].position[0]
+
+
+def _goal_that_waits(robot, message):
+    """Returns a goal of a world that stands still until the test starts it, so that nothing comes after its end."""
+    assert robot.ros.call("/rpbi/stop", Trigger).success
+    goal = Goal(robot, message)
+    goal.wait_until_accepted()
+    return goal
 
 
 def test_bad_command_is_named_and_changes_nothing(robot):
     log = Rosout(robot.ros)
-    goal = Goal(robot, trajectory((1.5, moved(0.5))))
-    goal.wait_until_it_moves()
+    goal = _goal_that_waits(robot, trajectory((1.5, moved(0.5))))
     with publishing(f"{CONTROLLER}/command", JointTrajectory) as command:
         command.publish(trajectory((1.0, moved(9.0))))
         log.wait_for([f"{CONTROLLER}/command", "'lbr_iiwa_joint_1' must be within"])
+    assert robot.ros.call("/rpbi/start", Trigger).success
     assert goal.wait()[0] == GoalStatus.SUCCEEDED
 
 
 def test_targets_of_joints_that_a_trajectory_drives_are_refused_until_it_has_ended(robot):
     log = Rosout(robot.ros)
-    goal = Goal(robot, trajectory((1.5, moved(0.5))))
-    goal.wait_until_it_moves()
+    goal = _goal_that_waits(robot, trajectory((1.5, moved(0.5))))
     with publishing("/rpbi/iiwa/joint_states/target", JointState) as target:
         target.publish(JointState(name=["lbr_iiwa_joint_1"], position=[-1.0]))
         log.wait_for(["a motion drives lbr_iiwa_joint_1"])
+        assert robot.ros.call("/rpbi/start", Trigger).success
         assert goal.wait()[0] == GoalStatus.SUCCEEDED
         target.publish(JointState(name=["lbr_iiwa_joint_1"], position=[-0.2]))
         wait_until(lambda: robot.states.messages[-1].position[0] < -0.19, "it follows targets again")
@@ -158,17 +181,18 @@ def test_each_of_many_goals_has_its_answer(robot):
 
 
 def test_stopped_world_freezes_the_goal(robot):
-    goal = Goal(robot, trajectory((1.5, moved(0.6))))
+    goal = Goal(robot, trajectory((5.0, moved(2.0))))
     goal.wait_until_it_moves()
     assert robot.ros.call("/rpbi/stop", Trigger).success
-    frozen = robot.states.messages[-1].position[0]
-    fed = len(goal.feedback)
+    stopped = robot.ros.call("/rpbi/step_n", StepN, 0).stamp
+    frozen = robot.states.wait_for_stamp(stopped).position[0]
     steps = [robot.ros.call("/rpbi/step", Trigger).success for _ in range(20)]
     assert all(steps)
     wait_until(lambda: robot.states.messages[-1].position[0] > frozen, "it moves by steps")
     assert robot.states.messages[-1].position[0] < frozen + 0.03
-    assert len(goal.feedback) <= fed + 2
+    assert sum(message.header.stamp > stopped for message in goal.feedback) <= 2
     assert goal.handle.get_goal_status() == GoalStatus.ACTIVE
+    assert robot.ros.call("/rpbi/step_n", StepN, 4000).success  # sooner done than by the wall clock
     assert robot.ros.call("/rpbi/start", Trigger).success
     status, code, text = goal.wait()
     assert (status, code) == (GoalStatus.SUCCEEDED, 0), text
@@ -183,9 +207,8 @@ def test_status_and_results_have_the_stamps_of_the_world(robot):
 def test_query_tells_where_the_joints_will_be(robot):
     from control_msgs.srv import QueryTrajectoryState
 
-    stamp = robot.states.messages[-1].header.stamp + rospy.Duration.from_sec(2.0)
-    goal = Goal(robot, trajectory((2.0, moved(0.8)), stamp=stamp))
-    wait_until(lambda: goal.handle.get_goal_status() == GoalStatus.ACTIVE, "the goal is accepted")
+    stamp = robot.states.messages[-1].header.stamp + rospy.Duration.from_sec(60.0)
+    Goal(robot, trajectory((2.0, moved(0.8)), stamp=stamp)).wait_until_accepted()
     answer = robot.ros.call(f"{CONTROLLER}/query_state", QueryTrajectoryState, stamp + rospy.Duration.from_sec(1.0))
     assert list(answer.name) == JOINTS
     assert answer.position[0] == pytest.approx(0.4, abs=2e-3)  # the middle of a cubic from rest to rest
@@ -201,7 +224,7 @@ def test_goal_is_refused_under_torque_control(robot):
 
 
 def test_changing_the_control_mode_aborts_the_goal(robot):
-    goal = Goal(robot, trajectory((5.0, moved(0.3))))
+    goal = Goal(robot, far_away())
     goal.wait_until_it_moves()
     assert robot.ros.call("/rpbi/iiwa/set_control_mode", SetString, "VELOCITY_CONTROL").success
     status, code, text = goal.wait()
