@@ -21,8 +21,7 @@ import rospy
 import tf2_ros
 import yaml
 
-from custom_ros_tools.ros.lifecycle.master_watch import Registrations
-from custom_ros_tools.ros.rospy_internals import registry
+from custom_ros_tools.ros.lifecycle.master_watch import MasterWatch
 from custom_ros_tools.ros.tf_listener import TfListener
 from ros_pybullet_interface.srv import ListObjects
 
@@ -146,7 +145,7 @@ class RosSystem:
         self._lock = threading.Lock()
         if not rospy.core.is_initialized():
             rospy.init_node("tests", anonymous=True, disable_rostime=True, disable_signals=True)
-            Registrations(registry())  # rospy's own part would leave a subscriber alone now and then
+            MasterWatch()  # rospy's own part would leave a subscriber alone now and then, or wait for ever
         rospy.set_param("/use_sim_time", False)
         self._parameters = set(rospy.get_param_names())
 
