@@ -61,7 +61,8 @@ def test_everybody_is_found_again_and_connections_last(ros, tmp_path, second_mas
     nodes = (NODE, CAMERA_NODE, REMAP_NODE)
     images = {("publishes", f"/{name}") for name in camera_topics("camera", pointcloud=False)}
     wait_until(lambda: images <= set(master.registrations(CAMERA_NODE)), "the camera is up")
-    wait_until(lambda: ("subscribes", JOINT_STATES) in master.registrations(REMAP_NODE), "it listens")
+    toggles = {("serves", f"{REMAP_NODE}/toggle"), ("serves", "/remap_joint_state/toggle")}  # opened last
+    wait_until(lambda: toggles <= set(master.registrations(REMAP_NODE)), "it listens")
     wait_until(lambda: len(_connected(master, JOINT_STATES)) == 1, "they are connected")
     before = {node: master.registrations(node) for node in nodes}
     connections = _connected(master, JOINT_STATES)
@@ -79,7 +80,7 @@ def test_everybody_is_found_again_and_connections_last(ros, tmp_path, second_mas
     assert master.api.getParam("/use_sim_time") is True
 
     visitor = ros.start_program("visitor.py", **master.environment)
-    assert visitor.wait(60.0) == 0, ros.output(visitor)
+    assert visitor.wait(120.0) == 0, ros.output(visitor)
     said = ros.output(visitor)
     assert "moved" in said and "slept until" in said and "stopped" in said and "tick " in said, said
     wait_until(lambda: _connected(master, JOINT_STATES) == connections, "the old connection is there, once")
