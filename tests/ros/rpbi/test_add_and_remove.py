@@ -74,7 +74,8 @@ def _info(ros, name):
 
 def _frames(ros):
     tf = ros.listen("/tf", TFMessage)
-    messages = tf.wait_for(3)  # who listens from now on hears nothing older
+    messages = list(tf.wait_for(3))
+    tf.close()  # else the next one would have this one's connection, with what is on its way there
     return sorted({transform.child_frame_id for message in messages for transform in message.transforms})
 
 
