@@ -85,7 +85,7 @@ def test_everybody_is_found_again_and_connections_last(ros, tmp_path, second_mas
     assert "moved" in said and "slept until" in said and "stopped" in said and "tick " in said, said
     wait_until(lambda: _connected(master, JOINT_STATES) == connections, "the old connection is there, once")
     # Of a master that takes two seconds to answer it is said too
-    wait_until(lambda: _times_gone(ros, simulator) == ros.output(simulator).count(BACK), "it is said once for each time")
+    wait_until(lambda: _times_gone(ros, simulator) == ros.output(simulator).count(BACK), "it is said once each time")
 
 
 def _times_gone(ros, simulator):
