@@ -106,7 +106,7 @@ def test_sigterm_and_a_second_ctrl_c_are_no_worse(ros, tmp_path):
 
 def test_rosnode_kill_ends_it(ros, tmp_path):
     process = ros.simulator(_config(tmp_path))
-    subprocess.run(["rosnode", "kill", NODE], check=True, capture_output=True, timeout=60.0)
+    subprocess.run(["rosnode", "kill", NODE], check=True, capture_output=True, timeout=120.0)
     assert process.wait(ENDS_WITHIN_S) == 0, ros.output(process)
     assert "Traceback" not in ros.output(process), ros.output(process)
 
@@ -115,7 +115,7 @@ def test_a_camera_whose_node_is_killed_comes_back(ros, tmp_path):
     process = ros.simulator(_config(tmp_path, rgbd_sensor=CAMERA))
     published = ("publishes", "/rpbi/camera/colour/image")
     wait_until(lambda: published in registrations(f"{NODE}_camera"), "the camera is up")
-    subprocess.run(["rosnode", "kill", f"{NODE}_camera"], check=True, capture_output=True, timeout=60.0)
+    subprocess.run(["rosnode", "kill", f"{NODE}_camera"], check=True, capture_output=True, timeout=120.0)
     wait_until(lambda: "it is started again" in ros.output(process), "the simulator sees that it has gone")
     wait_until(lambda: published in registrations(f"{NODE}_camera"), "the camera is up again")
 
