@@ -16,6 +16,7 @@ from workplace import Workplace
 WORKPLACE = Workplace()
 
 import rosgraph  # noqa: E402
+import rospy  # noqa: E402
 from careful_master import path_with  # noqa: E402
 from ros_system import RosSystem, stop_group, wait_until  # noqa: E402
 from second_master import SecondMaster  # noqa: E402
@@ -65,6 +66,7 @@ def ros_master(no_process_is_left: None) -> Iterator[str]:
     except TimeoutError as error:
         raise TimeoutError(f"{error}:\n{log_path.read_text()}") from None
     yield port.uri
+    rospy.signal_shutdown("the tests are over")  # else this process would say that it misses its master
     stop_group(roscore)
 
 

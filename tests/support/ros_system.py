@@ -166,7 +166,7 @@ class RosSystem:
         self._lock = threading.Lock()
         if not rospy.core.is_initialized():
             rospy.init_node("tests", anonymous=True, disable_rostime=True, disable_signals=True)
-            MasterWatch()  # rospy's own part would leave a subscriber alone now and then
+            MasterWatch()  # rospy's own part would leave a subscriber alone now and then, or wait for ever
         rospy.set_param("/use_sim_time", False)
         self._parameters = set(rospy.get_param_names())
 

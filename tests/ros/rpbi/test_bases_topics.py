@@ -114,6 +114,9 @@ def test_the_root_frame_alone_is_on_tf_where_the_state_says(ros):
     transforms = ros.listen("/tf", TFMessage)
     with publishing("/rpbi/mobile/cmd_vel", Twist) as commands:
         wait_until(lambda: commands.publish(_twist(x=0.3, yaw=0.5)) or _speed(states.messages[-1]) > 0.29, "it drives")
+    transforms.wait_for(len(transforms.messages) + HZ)
+    last = transforms.messages[-1].transforms[0].header.stamp
+    wait_until(lambda: states.messages[-1].header.stamp >= last, "the states of these times have come")
     ros.call("/rpbi/stop", Trigger)
     told = [one for message in list(transforms.messages) for one in message.transforms]
     assert {(one.header.frame_id, one.child_frame_id) for one in told} == {("rpbi/world", "rpbi/mobile/base_link")}
@@ -134,6 +137,7 @@ def test_it_can_be_put_elsewhere_by_service(ros):
     request.transform.translation.x, request.transform.translation.y = 2.0, -3.0
     request.transform.rotation.z = 1.0
     assert ros.call("/rpbi/mobile/set_pose", SetTransform, request).success
+    wait_until(lambda: states.messages[-1].pose.pose.position.x > 1.0, "it is there")
     count = len(states.messages)
     state = states.wait_for(count + HZ)[-1]
     assert (state.pose.pose.position.x, state.pose.pose.position.y) == pytest.approx((2.0, -3.0), abs=1e-6)

@@ -65,7 +65,7 @@ def test_several_cameras_have_their_own_topics_sizes_and_rates(ros):
     first, second = ros.listen(DEPTH, Image), ros.listen("/rpbi/small/depth/image", Image)
     info = ros.listen("/rpbi/third/camera_info", CameraInfo)
     ros.simulator(main, use_sim_time=True)
-    second.wait_for(5)
+    first.wait_for(2), second.wait_for(5)
     assert (first.messages[0].width, second.messages[0].width, info.wait_for(1)[0].width) == (160, 80, 80)
     assert second.messages[0].header.frame_id == "rpbi/other"
     assert all(step_ns % 100_000_000 == 0 for step_ns in np.diff(second.stamps_ns))
@@ -105,7 +105,9 @@ def test_camera_by_service_goes_with_a_reset_and_a_removed_one_comes_back(ros):
     ros.simulator(box_world(ros, rgbd_sensor=CAMERA), use_sim_time=True)
     late = {**CAMERA, "name": "late"}
     assert ros.call("/rpbi/add_rgbd_sensor", SetString, yaml.safe_dump(late)).success
+    wait_until(lambda: is_published("/rpbi/late/depth/image"), "the renderer has added it")
     assert ros.call("/rpbi/remove_pybullet_object", SetString, "eye").success
+    wait_until(lambda: not is_published(DEPTH), "the renderer has removed it")
     assert ros.call("/rpbi/reset", Trigger).success
     listed = ros.call("/rpbi/list_objects", ListObjects)
     assert [name for name, kind in zip(listed.names, listed.types) if kind == "rgbd_sensor"] == ["eye"]

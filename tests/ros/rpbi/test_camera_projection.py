@@ -97,14 +97,17 @@ def frames(listeners):
                 stamps.append(stamp)
         return stamps if len(stamps) >= FRAMES else None
 
-    stamps = wait_until(chosen, "there are enough frames", 120.0)
+    def still():
+        return [one for message in list(listeners["tf_static"].messages) for one in message.transforms]
+
+    wait_until(lambda: any(one.child_frame_id == "rpbi/camera" for one in still()), "TF has the camera")
+    stamps = wait_until(chosen, "there are enough frames")
     by_stamp = {topic: dict(zip(listeners[topic].stamps_ns, listeners[topic].messages)) for topic in TOPICS}
-    still = [one for message in listeners["tf_static"].messages for one in message.transforms]
     links = with_links()
     return [
         Frame(
             {topic: messages[stamp] for topic, messages in by_stamp.items()},
-            {one.child_frame_id: pose_matrix(one.transform) for one in [*still, *links[stamp].transforms]},
+            {one.child_frame_id: pose_matrix(one.transform) for one in [*still(), *links[stamp].transforms]},
         )
         for stamp in stamps[:FRAMES]
     ]
@@ -156,8 +159,8 @@ def seen_points(frame, generator):
 
 def test_images_of_a_frame_share_the_stamp_of_a_tick_at_which_the_camera_was_due(frames, listeners):
     stamps = [set(listeners[topic].stamps_ns) for topic in TOPICS]
-    # A slow listener misses images, the queues being short; but there are no stamps of their own on any topic.
-    assert len(set.intersection(*stamps)) > len(set.union(*stamps)) / 2
+    # A slow listener misses images, the queues being short
+    assert len(set.intersection(*stamps)) >= FRAMES
     for stamp in set.union(*stamps):
         assert stamp % DT_NS == 0
         time_ns = stamp - DT_NS  # the first tick, time 0, has the stamp dt

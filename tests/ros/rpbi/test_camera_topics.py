@@ -45,10 +45,12 @@ def test_images_of_a_frame_share_stamp_frame_and_intrinsics(ros, placed):
         for topic in (COLOUR, DEPTH, SEGMENTATION, COLOUR_INFO, DEPTH_INFO)
     }
     ros.simulator(world(ros), use_sim_time=True)
-    for listener in listeners.values():
-        listener.wait_for(20)
-    shared = set.intersection(*(set(listener.stamps_ns) for listener in listeners.values()))
-    assert len(shared) >= 10
+
+    def shared_stamps():
+        return set.intersection(*(set(listener.stamps_ns) for listener in listeners.values()))
+
+    wait_until(lambda: len(shared_stamps()) >= 10, "ten frames have come")
+    shared = shared_stamps()
     assert {message.header.frame_id for each in listeners.values() for message in each.messages} == {"rpbi/eye"}
     assert all(stamp % 10_000_000 == 0 for stamp in shared)  # stamps of ticks
     colour, depth, segmentation = (listeners[topic].messages[-1] for topic in (COLOUR, DEPTH, SEGMENTATION))
@@ -68,11 +70,9 @@ def test_images_of_a_frame_share_stamp_frame_and_intrinsics(ros, placed):
 def test_jpegs_are_the_colour_images_of_their_stamps_with_a_fraction_of_the_bytes(ros, placed):
     colour, jpeg = ros.listen(COLOUR, Image), ros.listen(f"{COLOUR}/compressed", CompressedImage)
     ros.simulator(world(ros), use_sim_time=True)
-    colour.wait_for(10), jpeg.wait_for(10)
+    wait_until(lambda: len(set(colour.stamps_ns) & set(jpeg.stamps_ns)) >= 5, "five images have come as both")
     raw = {image.header.stamp: pixels(image, np.uint8, 3) for image in list(colour.messages)}
-    shared = [image for image in list(jpeg.messages) if image.header.stamp in raw]
-    assert len(shared) >= 5
-    for image in shared:
+    for image in [image for image in list(jpeg.messages) if image.header.stamp in raw]:
         assert (image.header.frame_id, image.format) == ("rpbi/eye", "rgb8; jpeg compressed bgr8")
         decoded = np.asarray(Picture.open(io.BytesIO(image.data)).convert("RGB"), float)
         assert np.abs(decoded - raw[image.header.stamp]).mean() < 3.0
@@ -128,7 +128,8 @@ def test_idle_renderer_that_is_killed_comes_back_and_no_joint_state_is_missing(r
     for thread in os.listdir(f"/proc/{killed}/task"):
         with contextlib.suppress(ProcessLookupError):  # one that has just ended
             policies.add(os.sched_getscheduler(int(thread)))
-    assert policies == {os.SCHED_IDLE}, "physics goes first"
+    if policies != {os.SCHED_IDLE}:  # physics goes first, unless others leave an idle process nothing
+        wait_until(lambda: "runs at nice 19 instead of idle priority" in ros.output(simulator), "it was starved", 20.0)
     os.kill(killed, signal.SIGKILL)
     wait_until(lambda: renderers(simulator) not in ([], [killed]), "there is another renderer")
     before = len(colour.messages)
@@ -141,13 +142,14 @@ def test_idle_renderer_that_is_killed_comes_back_and_no_joint_state_is_missing(r
 def test_stopped_viewer_holds_up_neither_physics_nor_other_viewers(ros, placed):
     joint_states = ros.listen("/rpbi/iiwa/joint_states", JointState)
     colour = ros.listen(COLOUR, Image)
-    ros.simulator(world(ros, timeStep=0.002), use_sim_time=True)
+    large = {**CAMERA, "intrinsics": {**CAMERA["intrinsics"], "width": 640, "height": 480}}
+    ros.simulator(world(ros, timeStep=0.002, rgbd_sensor=large), use_sim_time=True)
     viewer = ros.start(["rostopic", "hz", COLOUR])
     wait_until(lambda: "average rate" in ros.output(viewer), "the other viewer sees images")
     os.killpg(viewer.pid, signal.SIGSTOP)
     try:
         count = len(colour.messages)
-        colour.wait_for(count + 200, timeout_s=60.0)
+        colour.wait_for(count + 20)  # 18 MB, more than sockets keep
     finally:
         os.killpg(viewer.pid, signal.SIGCONT)
     assert set(np.diff(joint_states.stamps_ns)) == {20_000_000}

@@ -64,8 +64,8 @@ def test_a_urdf_object_comes_by_service_with_its_contacts_and_goes(ros, node):
     assert answer.success, answer.message
     assert objects(ros)["crate"] == "urdf"
     messages = ros.listen("/rpbi/crate/contacts", Contacts)
-    wait_until(lambda: messages.messages and messages.messages[-1].points, "it touches the floor")
-    assert {point.link for point in messages.messages[-1].points} == {"body"}
+    points = wait_until(lambda: messages.messages[-1].points, "it touches the floor")
+    assert {point.link for point in points} == {"body"}
     assert remove(ros, "crate").success
     assert "crate" not in objects(ros)
 

@@ -32,7 +32,7 @@ from ros_pybullet_interface.msg import PybulletObject
 NODE = "/ros_pybullet_interface"
 CALLS, MESSAGES = 400, 100
 FILES_EACH = 4
-LONGEST_ANSWER_S = 60.0
+LONGEST_ANSWER_S = 120.0
 FLOATS = (math.nan, math.inf, -math.inf, -1.0, 0.0, 0.5, 1e300, -1e300, 1e-300)
 BOMB = "k0: &a0 {y: 1}\n" + "\n".join(f"k{n}: &a{n} {{<<: [*a{n - 1}, *a{n - 1}]}}" for n in range(1, 30))
 TEXTS = (

@@ -106,7 +106,7 @@ def test_sigterm_and_a_second_ctrl_c_are_no_worse(ros, tmp_path):
 
 def test_rosnode_kill_ends_it(ros, tmp_path):
     process = ros.simulator(_config(tmp_path))
-    subprocess.run(["rosnode", "kill", NODE], check=True, capture_output=True, timeout=60.0)
+    subprocess.run(["rosnode", "kill", NODE], check=True, capture_output=True, timeout=120.0)
     assert process.wait(ENDS_WITHIN_S) == 0, ros.output(process)
     assert "Traceback" not in ros.output(process), ros.output(process)
 
@@ -115,7 +115,7 @@ def test_a_camera_whose_node_is_killed_comes_back(ros, tmp_path):
     process = ros.simulator(_config(tmp_path, rgbd_sensor=CAMERA))
     published = ("publishes", "/rpbi/camera/colour/image")
     wait_until(lambda: published in registrations(f"{NODE}_camera"), "the camera is up")
-    subprocess.run(["rosnode", "kill", f"{NODE}_camera"], check=True, capture_output=True, timeout=60.0)
+    subprocess.run(["rosnode", "kill", f"{NODE}_camera"], check=True, capture_output=True, timeout=120.0)
     wait_until(lambda: "it is started again" in ros.output(process), "the simulator sees that it has gone")
     wait_until(lambda: published in registrations(f"{NODE}_camera"), "the camera is up again")
 
@@ -153,7 +153,7 @@ def test_services_that_wait_when_it_ends_get_an_answer_or_an_error(ros, tmp_path
         while True:
             try:
                 call(*arguments)
-            except (rospy.ROSException, rospy.ServiceException, OSError) as error:
+            except Exception as error:  # rospy raises exceptions of many kinds when a node goes
                 outcomes.append(error)
                 return
 
@@ -181,6 +181,7 @@ def test_a_world_that_breaks_stands_still_and_says_so_once(ros, tmp_path):
         wait_until(lambda: status.messages[-1].data == 0, "it stands still")
         time.sleep(0.5)
         assert process.poll() is None, ros.output(process)
+    rosout.wait_for(["simulation stopped"])
     said = [log.msg for log in rosout.logs("simulation stopped")]
     assert 1 <= len(said) <= 4 and "fast: pose is not finite any more" in said[0], said
     step = ros.call("/rpbi/step", Trigger)

@@ -15,7 +15,19 @@ from rpbi.samples import SceneSample
 
 from .channel import Channel
 from .frame import NO_DEMAND, Camera, Demand
-from .messages import CameraAdded, CameraRemoved, Demanded, Ready, Report, Scene, SetUp, Shown, Taken, WorldChanged
+from .messages import (
+    CameraAdded,
+    CameraRemoved,
+    Demanded,
+    GaveWay,
+    Ready,
+    Report,
+    Scene,
+    SetUp,
+    Shown,
+    Taken,
+    WorldChanged,
+)
 from .priority import raise_from_idle
 
 log = logging.getLogger(__name__)
@@ -71,6 +83,7 @@ class RenderClient:
         self._forget()
         self._do: dict[type, Callable[[Any], None]] = {
             Ready: self._take_ready,
+            GaveWay: self._take_gave_way,
             Taken: self._take_taken,
             Shown: self._take_shown,
             Demanded: self._take_demands,
@@ -195,7 +208,7 @@ class RenderClient:
                 env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
             )
         self._started_s = self._heard_s = time.monotonic()
-        self._may_starve = "--keep-priority" not in self._command
+        self._may_starve = False
         self._channel = Channel(ours)
         self._channel.send(SetUp(tuple(self._cameras.values()), self._use_egl))
         self._send_log()
@@ -259,6 +272,9 @@ class RenderClient:
     def _take_ready(self, message: Ready) -> None:
         self.renderer = message.renderer
         log.info("camera: images are drawn by %s", message.renderer)
+
+    def _take_gave_way(self, message: GaveWay) -> None:
+        self._may_starve = True
 
     def _take_taken(self, message: Taken) -> None:
         self._under_way.discard(message.camera)

@@ -52,6 +52,10 @@ class Ready(NamedTuple):
     renderer: str
 
 
+class GaveWay(NamedTuple):
+    """To the simulator: from now on the renderer runs at idle priority."""
+
+
 class Taken(NamedTuple):
     """To the simulator: the scene of this camera is being drawn, the next one may come."""
 

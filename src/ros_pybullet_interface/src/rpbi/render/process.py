@@ -10,7 +10,19 @@ from typing import Any
 from .channel import Channel
 from .egl import EglError
 from .frame import NO_DEMAND, Camera, Demand, Sink
-from .messages import CameraAdded, CameraRemoved, Demanded, Ready, Report, Scene, SetUp, Shown, Taken, WorldChanged
+from .messages import (
+    CameraAdded,
+    CameraRemoved,
+    Demanded,
+    GaveWay,
+    Ready,
+    Report,
+    Scene,
+    SetUp,
+    Shown,
+    Taken,
+    WorldChanged,
+)
 from .mirror import Mirror
 from .priority import give_way, take_part
 from .renderers import Renderer, open_renderer
@@ -54,6 +66,7 @@ class RenderProcess:
                 faulthandler.dump_traceback_later(STUCK_AFTER_S, exit=True)
                 messages = self._channel.receive()
                 if self._gives_way and self._sink is not None and not self._channel.closed:
+                    self._channel.send(GaveWay())
                     give_way()  # not before it is up: on a busy machine that would take minutes
                     self._gives_way = False
                 for message in messages:

@@ -12,6 +12,7 @@ import logging
 import os
 import resource
 import signal
+import socket
 import sys
 import threading
 import time
@@ -35,8 +36,9 @@ LONGEST_FAREWELL_S = 10.0
 MASTER_PERIOD_S = 0.2
 ROSOUT = "/rosout"
 LOG_PARAMETER = "/rosout_disable_topics_generation"
-LONGEST_WAIT_S = 2.0
+LONGEST_WAIT_S = 10.0
 """How long to wait for those who listen to /rosout; a node that has just begun is not connected to them yet."""
+LONGEST_LOOK_S = 1.0
 SENDING_S = 0.2
 INTERRUPTED_TOO_S = 1.0
 """How much later than the node of a service an interrupt may reach this one, where it goes to both [s]."""
@@ -221,8 +223,16 @@ def _log_fatal_lines(lines: Iterable[str]) -> None:
 
 
 def _listeners() -> int:
-    """Returns how many nodes listen to /rosout."""
+    """Returns how many nodes listen to /rosout; those that were killed do so by the master's word only."""
     with contextlib.suppress(OSError, rosgraph.MasterException):
-        subscribed = rosgraph.Master(rospy.get_name()).getSystemState()[1]
-        return len(dict(subscribed).get(ROSOUT, ()))
+        master = rosgraph.Master(rospy.get_name())
+        nodes = dict(master.getSystemState()[1]).get(ROSOUT, ())
+        return sum(map(_takes_connections, map(master.lookupNode, nodes)))
     return 0
+
+
+def _takes_connections(uri: str) -> bool:
+    with contextlib.suppress(OSError, ValueError):
+        socket.create_connection(rosgraph.network.parse_http_host_and_port(uri), LONGEST_LOOK_S).close()
+        return True
+    return False
