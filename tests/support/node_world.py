@@ -90,6 +90,10 @@ class Rosout:
     def __init__(self, ros: Any) -> None:
         self._listener = ros.listen("/rosout", Log)
 
+    def wait_to_hear(self, node: str) -> None:
+        """Waits until what a node says is heard: what it says before is lost."""
+        wait_until(lambda: self._listener.hears(node), f"/rosout of {node} is heard")
+
     def logs(self, containing: str = "") -> list[Log]:
         """Returns the messages that contain a text."""
         logs = list(self._listener.messages)

@@ -30,7 +30,7 @@ _OUTBOUND = "o"
 _POLL_S = 0.02
 _QUIET_TURNS, _TURN_S, _MOST_GRACE_S = 20, 0.01, 10.0
 """For what was published just before the end and is on its way: so often the recorder is seen without anything to do,
-so long apart, and so long it is looked for [s]. Turns rather than a time, which may pass while the machine stands still.
+so long apart, and so long it is looked at [s]. Not one time for all: it might pass while the machine stands still.
 """
 _NOT_WRITING = ("Disabling recording", "Error writing", "Unknown exception")
 _DECORATION = re.compile(r"^(\x1b\[[\d;]*m)?\[ *[A-Z]+\] \[[\d., ]+\]: |\x1b\[[\d;]*m", re.MULTILINE)
