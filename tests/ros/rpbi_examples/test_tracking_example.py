@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import pytest
-import rospy
 from geometry_msgs.msg import TransformStamped
 from node_world import Rosout
 from ros_system import RosSystem, wait_until
@@ -26,13 +25,13 @@ def example(ros_master, tmp_path_factory):
         system.close()
 
 
-def frames(tf, parent, child, since=rospy.Time(0)):
-    """Returns the translations of a frame on TF so far, from a time on."""
+def frames(tf, parent, child, since_s=0.0):
+    """Returns the translations of a frame on TF so far, from a time on [s]."""
     return [
         one.transform.translation
         for message in list(tf.messages)
         for one in message.transforms
-        if (one.header.frame_id, one.child_frame_id) == (parent, child) and one.header.stamp >= since
+        if (one.header.frame_id, one.child_frame_id) == (parent, child) and one.header.stamp.to_sec() >= since_s
     ]
 
 
@@ -56,6 +55,6 @@ def test_the_twin_has_the_box_where_vicon_sees_it_and_drops_it_where_it_does_not
     assert (seen.header.frame_id, seen.child_frame_id) == ("lab/rpbi/world", "lab/vicon/box/box")
     assert frames(tf, "lab/rpbi/world", "lab/vicon/box/box"), "on TF too"
     path = [message.transform.translation for message in vicon.messages]
-    since = seen.header.stamp  # TF may be heard before
-    tracked = frames(tf, "twin/rpbi/world", "tracked/box", since)
+    since_s = seen.header.stamp.to_sec()  # TF may be heard before
+    tracked = frames(tf, "twin/rpbi/world", "tracked/box", since_s)
     assert tracked and all(min(math.dist((p.x, p.y), (q.x, q.y)) for q in path) < 0.02 for p in tracked[::20])
