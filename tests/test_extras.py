@@ -36,7 +36,7 @@ def test_extras_go_together():
 
 
 def test_an_unknown_extra_is_refused_with_the_known_ones():
-    answer = subprocess.run([str(ROOT / "rpbi"), "setup", "ikk"], capture_output=True, text=True, timeout=60.0)
+    answer = subprocess.run([str(ROOT / "rpbi"), "setup", "ikk"], capture_output=True, text=True, timeout=300.0)
     assert answer.returncode == 2
     assert "There is no extra 'ikk'; there are: assets ik mpc tags." in answer.stderr
 
@@ -78,7 +78,7 @@ def test_what_is_installed_is_known_with_and_without_extras(tmp_path, wanted):
     if wanted:
         (tmp_path / "extras").write_text("\n".join(wanted) + "\n")
     command = f"set -o pipefail; root={ROOT}; state={tmp_path}\n{functions}\nvenv_inputs"
-    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60.0)
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=300.0)
     assert done.returncode == 0, done.stderr
     files = [ROOT / "requirements.txt", *(ROOT / f"requirements-{extra}.txt" for extra in wanted)]
     assert done.stdout == "".join(file.read_text() for file in files)

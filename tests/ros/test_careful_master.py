@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 from ros_system import wait_until
+from workplace import Port
 
 NODE = """
 import sys, rospy
@@ -17,21 +18,22 @@ rospy.spin()
 """
 
 
-def start(ros, name: str, port: int = 0) -> tuple[subprocess.Popen, int]:
-    """Returns a node and its port."""
+def start(ros, name: str, port: int = 0) -> subprocess.Popen:
+    """Returns a node."""
     process = ros.start([sys.executable, "-c", NODE, name, str(port)])
     wait_until(lambda: "up at" in ros.output(process), "the node is up")
-    return process, int(ros.output(process).split("up at ")[1].split()[0].rstrip("/").rsplit(":", 1)[1])
+    return process
 
 
 def test_a_node_whose_name_is_taken_ends_and_one_that_has_come_to_its_address_does_not(ros):
-    first, _ = start(ros, "twin")
-    second, port = start(ros, "twin")
+    first = start(ros, "twin")
+    port = Port()  # one that the kernel gives to nobody else when it is free again
+    second = start(ros, "twin", port.number)
     assert first.wait(60.0) == 0
     os.killpg(second.pid, signal.SIGKILL)
     second.wait()
-    stranger, _ = start(ros, "stranger", port)
-    third, _ = start(ros, "twin")
+    stranger = start(ros, "stranger", port.number)
+    third = start(ros, "twin")
     start(ros, "twin")
     assert third.wait(60.0) == 0, "by then the master has also seen to the second"
     assert stranger.poll() is None

@@ -85,10 +85,10 @@ def test_an_example_runs_with_its_camera(ros, installed):
     images = ros.listen("/rpbi/camera/colour/image", Image)
     line = "exec roslaunch rpbi_examples basic_example_kuka_lwr.launch headless:=true"
     process = ros.start(in_clean_shell(line, installed / "setup.bash"))
-    states.wait_for(50, timeout_s=60.0)
+    states.wait_for(50)
     assert states.messages[0].name[0] == "base_joint"
     wait_until(lambda: states.messages[-1].position != states.messages[0].position, "the arm moves")
-    assert images.wait_for(1, timeout_s=60.0)[0].width == 640
+    assert images.wait_for(1)[0].width == 640
     assert "Traceback" not in ros.output(process)
 
 
@@ -101,7 +101,7 @@ def test_worlds_are_checked_and_bags_tabulated(installed):
 def test_the_template_runs_from_an_install_space_over_this_one(ros, installed_lab):
     ranges = ros.listen("/rpbi/belt/end/range", Range)
     process = ros.start(in_clean_shell("exec roslaunch my_robot_lab lab.launch", installed_lab / "setup.bash"))
-    wait_until(lambda: any(message.range < message.max_range for message in ranges.messages), "the parcel comes", 60.0)
+    wait_until(lambda: any(message.range < message.max_range for message in ranges.messages), "the parcel comes")
     assert "Traceback" not in ros.output(process)
     where = "import my_robot_lab.conveyor as it; print(it.__file__)"
     assert _do(installed_lab, f"/usr/bin/python3 -c '{where}'").split("\n")[-2].startswith(f"{installed_lab}/lib/")

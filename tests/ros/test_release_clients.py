@@ -54,7 +54,7 @@ def client(tmp_path: Path) -> Path:
 def test_client_in_cpp_knows_all_types_and_is_served(ros, tmp_path, client):
     ros.simulator(main_config(tmp_path, robots=(iiwa(),), setGravity={"gravZ": -9.81}))
     process = ros.start([str(client)])
-    assert process.wait(60.0) == 0, ros.output(process)
+    assert process.wait(200.0) == 0, ros.output(process)
     lines = ros.output(process).splitlines()
     count = len(MESSAGES) + len(SERVICES)
     assert dict(line.split() for line in lines[:count]) == {**MESSAGES, **SERVICES}
@@ -97,12 +97,12 @@ tf = TfInterface()
 frames = dict(parent_frame_id="world", child_frame_id="box")
 pose = dict(pos=[1, 2, 3], orientation=[0, 0, 90], eul_deg=True)
 sending = node.Timer(node.Duration(0.02), lambda event: tf.set_tf(**frames, **pose))
-position, _ = tf.wait_for_tf(**frames, timeout=30.0)
+position, _ = tf.wait_for_tf(**frames, timeout=60.0)
 assert position.tolist() == [1, 2, 3]
-message = tf.wait_for_tf_msg(**frames, timeout=30.0)
+message = tf.wait_for_tf_msg(**frames, timeout=60.0)
 assert tf.get_tf_msg(**frames).header.stamp >= message.header.stamp
 assert tf.get_tf(**frames)[0].tolist() == [1, 2, 3]
-assert node.wait_for_tf(**frames, timeout=30.0)[0].tolist() == [1, 2, 3]
+assert node.wait_for_tf(**frames, timeout=60.0)[0].tolist() == [1, 2, 3]
 sending.shutdown()
 tf.set_matrix(**frames, T=np.eye(4))
 packed = tf.pack_tf_msg(**frames, pos=[1, 0, 0], rot=[0, 0, 0, 1])
@@ -125,7 +125,7 @@ while not subscriber.recieved():
     node.sleep(0.02)
 assert subscriber.get_position().tolist() == [2.0, 1.0]
 timer = node.Timer(node.Duration(0.02), lambda event: publisher.publish(q=[1.0, 2.0]))
-state = get_joint_state(timeout=30.0, joint_names=["b"], ns="")
+state = get_joint_state(timeout=60.0, joint_names=["b"], ns="")
 assert state.position == [2.0]
 assert resolve_joint_order(msg=state, joint_names=["b"], ns="").position == [2.0]
 timer.shutdown()
@@ -139,5 +139,5 @@ print("all calls are known")
 @pytest.mark.quick
 def test_python_is_called_with_the_keywords_of_the_release(ros):
     process = ros.start([sys.executable, "-c", SCRIPT])
-    assert process.wait(60.0) == 0, ros.output(process)
+    assert process.wait(200.0) == 0, ros.output(process)
     assert "all calls are known" in ros.output(process)

@@ -17,7 +17,7 @@ SETUP = ROOT / "devel" / "setup.bash"
 def test_sourcing_setup_bash_is_enough_for_roslaunch(ros):
     states = ros.listen("/rpbi/kuka_lwr/joint_states", JointState)
     ros.start(in_clean_shell("exec roslaunch rpbi_examples basic_example_kuka_lwr.launch headless:=true", SETUP))
-    states.wait_for(50, timeout_s=60.0)
+    states.wait_for(50)
     assert states.messages[0].name[0] == "base_joint"
 
 

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import os
 import threading
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
 import rosmaster
 from rosmaster import registrations
 
+ANSWER_S = 60.0
+"""So long a node that was asked who it is may take to answer; one that takes longer hangs, and is not shut down."""
 SCRIPT = "#!/usr/bin/python3\nimport sys\n\nsys.path.insert(0, {!r})\nimport careful_master\n\ncareful_master.main()\n"
 
 
@@ -31,21 +34,18 @@ def main() -> None:
     """Runs the master."""
     manager = registrations.RegistrationManager
     register, shut_down = manager._register_node_api, registrations.shutdown_node_task
-    processes: dict[tuple[str, str], str | None] = {}
+    processes: dict[tuple[str, str], Future[str | None]] = {}
 
     def register_and_remember(self: Any, caller_id: str, caller_api: str) -> Any:
         known = (caller_id, caller_api)
         if known not in processes:
-            processes[known] = None
-
-            def remember() -> None:
-                processes[known] = _process_at(caller_api)
-
-            threading.Thread(target=remember, daemon=True).start()
+            processes[known] = process = Future()
+            asking = threading.Thread(target=lambda: process.set_result(_process_at(caller_api)), daemon=True)
+            asking.start()
         return register(self, caller_id, caller_api)
 
     def shut_down_the_same(api: str, caller_id: str, reason: str) -> None:
-        before = processes.get((caller_id, api))
+        before = processes[caller_id, api].result(ANSWER_S)
         if before is not None and before == _process_at(api):
             shut_down(api, caller_id, reason)
 

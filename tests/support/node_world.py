@@ -121,6 +121,10 @@ class Rosout:
     def __init__(self, ros: Any, own: bool = False) -> None:
         self._listener, self._own = ros.listen("/rosout", Log), own
 
+    def wait_to_hear(self, node: str) -> None:
+        """Waits until what a node says is heard: what it says before is lost."""
+        wait_until(lambda: self._listener.hears(node), f"/rosout of {node} is heard")
+
     def logs(self, containing: str = "") -> list[Log]:
         """Returns the messages that contain a text; one that is published while we connect comes again, as latched."""
         logs = {

@@ -18,6 +18,7 @@ from xmlrpc.client import ServerProxy, Transport
 
 import rosgraph
 import roslib.packages
+import rosnode
 import rospy
 import tf2_ros
 import yaml
@@ -145,6 +146,10 @@ class Listener:
         """Whether somebody publishes it, and all who do send to us."""
         return sends_to_us(self.topic)
 
+    def hears(self, node: str) -> bool:
+        """Whether a node that publishes it sends to us."""
+        return sends_to_us(self.topic, node)
+
     @property
     def stamps_ns(self) -> list[int]:
         """Stamps of the messages' headers [ns]."""
@@ -260,6 +265,8 @@ class RosSystem:
         rospy.set_param("/use_sim_time", False)
         for name in set(rospy.get_param_names()) - self._parameters:  # launch files leave theirs behind
             rospy.delete_param(name)
+        if any(process.returncode == -signal.SIGKILL for process in self.processes):
+            forget_dead_nodes()
         if late:
             raise AssertionError("\n".join(late))
 
@@ -268,6 +275,18 @@ class RosSystem:
 def find_executable(package: str, name: str) -> str:
     """Returns the path of what `rosrun` would run, without the processes by which `rosrun` finds it."""
     return str(roslib.packages.find_node(package, name)[0])
+
+
+def forget_dead_nodes() -> None:
+    """Takes from the master what nodes have there that were killed; later tests would wait for them, or find them."""
+    master = rosgraph.Master("/tests")
+    for node in {node for kind in master.getSystemState() for _, nodes in kind for node in nodes}:
+        try:
+            ServerProxy(master.lookupNode(node), LimitedTransport()).getPid("/tests")
+        except ConnectionRefusedError:
+            rosnode.cleanup_master_blacklist(master, [node])
+        except (OSError, rosgraph.MasterException):  # it hangs, or has just ended
+            continue
 
 
 def _provider(service: str) -> str | None:

@@ -69,7 +69,8 @@ def test_mouse_moves_joy(ros, screen):
     joy = ros.listen("joy", Joy)
     node = ros.start(["rosrun", "operator_node", "mouse_node.py"], **screen.environment)
     joy.wait_for(1)
-    (place,) = wait_until(lambda: [each for each in screen.windows() if each.title == "mouse"], "its window is there")
+    screen.run("xdotool", "search", "--sync", "--onlyvisible", "--name", "^mouse$")  # before, it gets no mouse
+    (place,) = (each for each in screen.windows() if each.title == "mouse")
     x, y = place.x + place.width // 2, place.y + place.height // 2
     wait_until(lambda: joy.messages and joy.is_connected, "it is connected")
     screen.run("xdotool", "mousemove", str(x), str(y), "mousedown", "1", "mousemove", str(x + 100), str(y - 50))

@@ -6,6 +6,7 @@ import os
 import pty
 import sys
 
+import numpy as np
 import pytest
 from keyboard.msg import Key
 from tries import tries
@@ -153,14 +154,19 @@ def test_what_is_held_when_it_closes_goes_up(screen, keyboard):
 
 def test_the_window_shows_what_is_held(screen, keyboard):
     reader = keyboard(axes=AXES, buttons=["1"])
-    reader.feed.step(0.0)
     (place,) = (each for each in screen.windows() if each.title == "keyboard")
-    before = screen.grab(place)
+
+    def shown():
+        """Returns the parts for what is held, and for what there is."""
+        picture = screen.grab(place)
+        return picture[:50], picture[60:]
+
+    reader.until(lambda: [np.ptp(part) > 0 for part in shown()] == [False, True], "it shows that nothing is held")
+    _, before = shown()
     screen.run("xdotool", "keydown", "a")
     reader.until(lambda: len(reader.events) == 1, "it is held")
-    for _ in range(3):
-        reader.feed.step(0.02)
-    assert (screen.grab(place)[:50] != before[:50]).any() and (screen.grab(place)[60:] == before[60:]).all()
+    reader.until(lambda: np.ptp(shown()[0]) > 0, "it shows what is held")
+    assert (shown()[1] == before).all()
 
 
 @pytest.fixture
@@ -174,7 +180,7 @@ def terminal(monkeypatch):
 
 
 def test_a_key_of_a_terminal_is_held_for_a_time(terminal, keyboard):
-    reader = keyboard(terminal=True, terminal_hold_s=0.05, axes=[["LEFT", "RIGHT"]], buttons=["a"])
+    reader = keyboard(terminal=True, terminal_hold_s=1e-6, axes=[["LEFT", "RIGHT"]], buttons=["a"])
     reader.until(lambda: bool(reader.feed.free_axes), "it is at rest")
     os.write(terminal, b"\x1b[Ca")
     reader.until(lambda: len(reader.events) == 4, "both are over")

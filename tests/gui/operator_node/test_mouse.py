@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import pytest
 from ros_system import wait_until
+from tries import tries
 
 from operator_node.conformance import DeviceConformance, Reader
 from operator_node.device import DeviceClosedError, DeviceError
@@ -59,11 +62,22 @@ class TestMouse(DeviceConformance):
 
 
 @pytest.fixture
-def reader():
-    reader = Reader("mouse", make_device("mouse", {}))
-    reader.until(lambda: len(reader.feed.free_axes) == 3, "it is open")
-    yield reader
-    reader.feed.close()
+def open_mouse():
+    """Opens a mouse with options."""
+    with contextlib.ExitStack() as opened:
+
+        def open_mouse(**options):
+            reader = Reader("mouse", make_device("mouse", options))
+            opened.callback(reader.feed.close)
+            reader.until(lambda: len(reader.feed.free_axes) == 3, "it is open")
+            return reader
+
+        yield open_mouse
+
+
+@pytest.fixture
+def reader(open_mouse):
+    return open_mouse()
 
 
 def test_a_drag_counts_as_a_share_of_half_the_window_from_where_it_began(screen, reader):
@@ -79,12 +93,28 @@ def test_a_drag_counts_as_a_share_of_half_the_window_from_where_it_began(screen,
     reader.until(lambda: reader.is_at_rest, "it is let go")
 
 
-def test_the_wheel_returns_by_itself(screen, reader):
+def test_notches_of_the_wheel_add_up(screen, open_mouse):
+    reader = open_mouse(wheel_return_s=600.0)
     place = window(screen)
     screen.run("xdotool", "mousemove", str(place.x + 60), str(place.y + 80), "click", "5", "click", "5")
     reader.until(lambda: reader.axis("wheel") < -0.4, "it turns")
     assert reader.last.axes == (0.0, 0.0, -0.5)
-    reader.until(lambda: reader.is_at_rest, "it returns")
+
+
+def test_the_wheel_returns_by_itself_once_it_was_told(screen):
+    """Though the time is over before anybody asks."""
+    device = make_device("mouse", {"wheel_return_s": 1e-6})
+    device.open()
+    with contextlib.closing(device):
+        wait_until(lambda: device.read(0.01), "its window is open")
+        place = window(screen)
+        screen.run("xdotool", "mousemove", str(place.x + 60), str(place.y + 80), "click", "5")
+        told = []
+        for _ in tries("it turns and returns"):
+            reading = device.read(0.01)
+            told += [reading.axes] if reading else []
+            if told[-2:] == [(0.0, 0.0, -0.25), (0.0, 0.0, 0.0)]:
+                break
 
 
 def test_a_window_that_is_hidden_lets_go(screen, reader):

@@ -27,6 +27,8 @@ def device(screen, monkeypatch):
 
 
 def find_window(screen):
+    """Returns the device's window once it is mapped: before, it gets no mouse."""
+    screen.run("xdotool", "search", "--sync", "--onlyvisible", "--name", TITLE)
     return next((window for window in screen.windows() if window.title == TITLE), None)
 
 
@@ -90,8 +92,8 @@ def test_a_handle_that_returns_goes_back_when_it_is_let_go(screen, monkeypatch):
         wait_until(lambda: height() > 0.025, "it is lifted")
         screen.run("xdotool", "mouseup", "3")
         wait_until(lambda: (r := device.read()) and abs(r.position[2]) < 1e-3, "it is back")
-        screen.run("xdotool", "click", "--repeat", "9", "4")
-        wait_until(lambda: height() > 0.01, "the wheel lifts it")
+        turn = ("click", "--repeat", "9", "--delay", "10", "4")  # it goes back soon
+        wait_until(lambda: screen.run("xdotool", *turn) or height() > 0.01, "the wheel lifts it")
         wait_until(lambda: (r := device.read()) and abs(r.position[2]) < 1e-3, "and lets it down")
     finally:
         device.close()

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import re
 import signal
 import subprocess
-import time
 from pathlib import Path
 
 from pybullet_window import HEIGHT, SLOW_S, WIDTH, floating_ball, window
 from ros_system import wait_until
+
+
+def taken_by_ffmpeg(node: subprocess.Popen) -> int:
+    """Returns how many bytes the program that makes a node's video has read."""
+    for path in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):  # it has just ended
+            name, _, stat = (path / "stat").read_text().rpartition(")")
+            if name.endswith("(ffmpeg") and int(stat.split()[2]) == node.pid:
+                return int(re.search(r"^rchar: (\d+)$", (path / "io").read_text(), re.MULTILINE)[1])
+    return 0
 
 
 def test_window_is_recorded_and_the_video_plays(ros, screen, start):
@@ -19,7 +30,7 @@ def test_window_is_recorded_and_the_video_plays(ros, screen, start):
         options=f"--mp4={video}",
         visual_objects=[floating_ball(ros, "red", [1.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0])],
     )
-    time.sleep(2.0)
+    wait_until(lambda: taken_by_ffmpeg(node) > 10 * WIDTH * HEIGHT * 3, "there are pictures for it", SLOW_S)
     os.killpg(node.pid, signal.SIGINT)
     assert node.wait(SLOW_S) == 0
     wait_until(lambda: window(screen) is None, "the window has gone", SLOW_S)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import time
 from pathlib import Path
@@ -131,7 +132,15 @@ def shipped(example, screen, cloud):
         return differs(picture, background)[view.paint(*cloud, point_size())[1]].mean() > 0.95
 
     _, window = settled(screen, is_shown, "the cloud is shown")
-    panels, printed = screen.grab()[:, : window.x], example.output(example.processes[-1])
+    panels = [screen.grab()[:, : window.x]]
+
+    def has_no_complaint():  # it may have one until all have come up
+        panels.append(screen.grab()[:, : window.x])
+        return complaining_pixels(panels[-1]) < 10
+
+    with contextlib.suppress(TimeoutError):
+        wait_until(has_no_complaint, "no display complains", every_s=0.5)
+    panels, printed = panels[-1], example.output(example.processes[-1])
     rosnode.kill_nodes(["/rviz"])
     wait_until(lambda: not screen.windows(), "RViz has closed", SLOW_S)
     return panels, printed
@@ -188,6 +197,11 @@ def settled(screen, is_shown, what):
     return seen[-1]
 
 
+def complaining_pixels(panels):
+    """Returns how many pixels have a colour of names of displays that complain, of the colour that has the most."""
+    return max((panels == colour).all(axis=-1).sum() for colour in COMPLAINING.values())
+
+
 def point_size():
     return next(each for each in CONFIG["Displays"] if each["Class"] == "rviz/DepthCloud")["Size (Pixels)"]
 
@@ -206,8 +220,7 @@ def grown(mask, by_px):
 
 def test_rviz_of_the_example_shows_the_cloud_and_has_nothing_to_complain_of(shipped):
     panels, printed = shipped
-    for colour in COMPLAINING.values():
-        assert (panels == colour).all(axis=-1).sum() < 10
+    assert complaining_pixels(panels) < 10
     complaints = [line for line in printed.splitlines() if re.search(r"\[ *(WARN|ERROR|FATAL)\]", line)]
     assert [line for line in complaints if not HARMLESS.search(line)] == []
 

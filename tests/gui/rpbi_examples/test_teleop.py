@@ -18,7 +18,7 @@ from std_msgs.msg import Float64MultiArray
 
 from operator_node.emulators.spacenavd import SpacenavDaemon
 
-SLOW_S = 60.0
+SLOW_S = 120.0
 TARGET, TIP = "rpbi/teleop_tip", "rpbi/kuka_lwr/end_effector_ball"
 AWAY, RIGHT, UP = np.array([-1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 """Directions of a person who stands behind the arm, in the world."""

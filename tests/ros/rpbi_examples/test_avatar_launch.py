@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-import socket
 
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
+from workplace import Port
 
 
 def test_the_avatar_walks(ros, own_tf):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    ros.start(["roslaunch", "rpbi_examples", "avatar.launch", "headless:=true", f"port:={port}"])
+    port = Port()
+    ros.start(["roslaunch", "rpbi_examples", "avatar.launch", "headless:=true", f"port:={port.number}"])
     states = ros.listen("rpbi/human/joint_states", JointState)
     bends: list[float] = []
 

@@ -24,7 +24,7 @@ def example(ros_master, tmp_path):
 
 def test_the_box_is_placed_within_two_millimetres(example):
     rosout, states = example
-    rosout.wait_for(["from its place (0.50, 0.20)"])
+    rosout.wait_for(["from its place (0.50, 0.20)"], timeout_s=300.0)
     said = rosout.logs("from its place (0.50, 0.20)")[0].msg
     assert float(re.search(r"the box is ([\d.]+) mm", said)[1]) < 2.0
     for state in list(states.messages):

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import shlex
-import socket
 import subprocess
 
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseArray
 from tries import tries
+from workplace import Port
 
 
 def test_a_person_stands_in_a_t_pose_and_then_walks(ros):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = Port()
     poses = ros.listen("/mvn/segments", PoseArray)
-    options = ["headless:=true", "people:=2", "speed:=0.6", f"port:={port}"]
+    options = ["headless:=true", "people:=2", "speed:=0.6", f"port:={port.number}"]
     ros.start(["roslaunch", "rpbi_examples", "mvn.launch", *options])
     first = poses.wait_for(1)[0]
     assert first.header.frame_id == "rpbi/world" and len(first.poses) == 23

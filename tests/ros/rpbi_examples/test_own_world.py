@@ -99,7 +99,7 @@ def test_two_of_one_file_run_on_one_master_each_with_its_own_frames(ros, folder)
 def test_a_world_that_cannot_be_built_ends_the_launch_with_all_that_is_wrong(ros, folder):
     (folder / "cup.yaml").write_text("name: cup\n")
     process = launch(ros, folder, RPBI)
-    process.wait(60.0)
+    process.wait(120.0)
     printed = ros.output(process)
     assert "cup.yaml: baseMass: missing" in printed and "cup.yaml: createVisualShape: missing" in printed
     assert "Traceback" not in printed

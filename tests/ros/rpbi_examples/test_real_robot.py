@@ -39,14 +39,20 @@ def test_the_real_robot_follows_the_simulated_one_and_a_jump_stops_it_until_it_i
         wait_until(lambda: abs(stands_at() - position) < 0.005, f"the real robot is at {position} rad")
 
     comes("it follows", lambda message: message.mode == DriverState.MOVE)
-    assert real.messages[0].name == [f"A{i}" for i in range(1, 8)]
-    begin = dict(zip(target.messages[0].name, target.messages[0].position))
-    assert begin["lwr_arm_3_joint"] == pytest.approx(math.radians(real.messages[0].position[3]), abs=0.003)
+    stands, commanded = real.wait_for()[0], target.wait_for()[0]
+    assert stands.name == [f"A{i}" for i in range(1, 8)]
+    begin = dict(zip(commanded.name, commanded.position))
+    assert begin["lwr_arm_3_joint"] == pytest.approx(math.radians(stands.position[3]), abs=0.003)
     move(0.15)
     (last,) = state.messages[-1:]
     assert (last.mode, last.reflexes, last.ignored) == (DriverState.MOVE, 0, 0), last.message
     assert 0.1 < last.peak_velocity < 1.0 and 0.0 < last.peak_acceleration < 1.0
-    assert dict(zip(shown.messages[-1].name, shown.messages[-1].position))[JOINT] == pytest.approx(0.15, abs=0.005)
+
+    def is_shown() -> bool:
+        last = shown.messages[-1]
+        return dict(zip(last.name, last.position))[JOINT] == pytest.approx(0.15, abs=0.005)
+
+    wait_until(is_shown, "it is shown there")
 
     with publishing("/stand_in/joint_group_position_controller/command", Float64MultiArray) as commands:
         commands.publish(Float64MultiArray(data=[math.degrees(0.4), *real.messages[-1].position[1:]]))

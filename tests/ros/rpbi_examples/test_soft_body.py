@@ -11,7 +11,7 @@ from visualization_msgs.msg import Marker
 
 from ros_pybullet_interface.msg import Contacts
 
-SLOW_S = 60.0
+SLOW_S = 120.0
 
 
 @pytest.fixture(scope="module")

@@ -25,7 +25,8 @@ BAD = (
 def test_bad_messages_are_refused_by_name_and_the_node_goes_on(ros):
     rosout = Rosout(ros)
     process = ros.start(["rosrun", "rpbi_examples", "telepresence_node.py"])
-    rosout.wait_for(["waiting for the person"])
+    rosout.wait_to_hear("/telepresence")
+    wait_until(lambda: "waiting for the person" in ros.output(process), "it runs")
 
     def refuses(topic: str, message: Any, why: str) -> None:
         with publishing(topic, type(message)) as publisher:

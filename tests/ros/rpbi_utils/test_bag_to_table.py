@@ -18,7 +18,7 @@ NODE = Path(__file__).resolve().parents[3] / "src/rpbi_utils/nodes/bag_to_table"
 
 def _run(*arguments: object) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, str(NODE), *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60)
+    return subprocess.run(command, capture_output=True, text=True, timeout=300)
 
 
 def _read(path: Path) -> pd.DataFrame:

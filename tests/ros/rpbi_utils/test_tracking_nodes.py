@@ -50,6 +50,7 @@ def test_what_drivers_send_becomes_frames_and_what_is_wrong_is_named(ros) -> Non
     objects = [{"name": "box", "vicon": "box/box", "unit": "mm", **turn}, {"name": "tag", "april_tag": [2, 1]}]
     start_tracking(ros, objects)
     tf, rosout = ros.listen("/tf", TFMessage), Rosout(ros)
+    rosout.wait_to_hear("/tracked_object")
     camera = sent(0.0, CAMERA.position, "rpbi/world", x=1.0)
     camera.child_frame_id = "camera"
     bundle = AprilTagDetection(id=[1, 2], size=[0.1, 0.1])
@@ -109,12 +110,13 @@ def test_a_tag_before_the_simulated_camera_is_found_and_followed(ros, tmp_path) 
     remaps = [f"image_rect:={images}/image", f"camera_info:={images}/camera_info"]
     ros.start(["rosrun", "rpbi_utils", "apriltag_node.py", *remaps])
     tf, detections = ros.listen("/tf", TFMessage), ros.listen("tag_detections", AprilTagDetectionArray)
-    wait_until(lambda: newest(tf, "found") and newest(tf, "tag_7") and detections.messages, "the tag is found")
+    wait_until(lambda: newest(tf, "found") and newest(tf, "tag_7"), "the tag is found")
+    seen = wait_until(lambda: [each for each in detections.messages if each.detections], "its detection comes")[0]
     parent, found = newest(tf, "found")
     assert parent == "rpbi/world"
     assert found.position == pytest.approx(truth.position, abs=0.004)
     assert math.hypot(*rotation_between(found.quat_xyzw, truth.quat_xyzw)) < 0.03
     assert newest(tf, "tag_7")[0] == "camera"
-    (one,) = next(message for message in detections.messages if message.detections).detections
+    (one,) = seen.detections
     assert (one.id, one.size, one.pose.header.frame_id) == ((7,), (0.1,), "camera")
     assert set(one.pose.pose.covariance) == {0.0}

@@ -57,7 +57,7 @@ def position(ros, name: str) -> tuple[float, float, float]:
 
 def in_process(*words: str) -> subprocess.CompletedProcess[str]:
     command = [find_executable("rpbi_utils", "world"), *words]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60.0)
+    return subprocess.run(command, capture_output=True, text=True, timeout=300.0)
 
 
 def test_an_object_comes_under_another_name_at_another_place_and_goes(ros, say):

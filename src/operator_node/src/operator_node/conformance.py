@@ -12,7 +12,7 @@ from .device import Device, DeviceClosedError, DeviceError, Reading
 from .device_feed import DeviceFeed, FeedConfig, problem_of
 from .lookup import make_device
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 """How long something that is to happen may take on a busy computer [s]."""
 STEP_S = 0.01
 READINGS_TO_SEE = 20

@@ -78,7 +78,9 @@ class KeyTerminal:
         """
         due_s = min(self._until_s.values(), default=float("inf"))
         timeout_s = max(0.0, min(timeout_s, due_s - time.monotonic()))
-        if select.select([self._file], [], [], timeout_s)[0]:
+        is_typed = select.select([self._file], [], [], timeout_s)[0]
+        now_s = time.monotonic()  # for both: what is typed now is held once at least, however long this takes
+        if is_typed:
             try:
                 typed = os.read(self._file, MOST_BYTES)
             except OSError as error:
@@ -87,8 +89,7 @@ class KeyTerminal:
                 raise DeviceError("keyboard", "its terminal has gone")
             for code in codes_in(typed.decode(errors="replace")):
                 self._keys.press(code)
-                self._until_s[code] = time.monotonic() + self._hold_s
-        now_s = time.monotonic()
+                self._until_s[code] = now_s + self._hold_s
         for code, until_s in [*self._until_s.items()]:
             if now_s >= until_s:
                 del self._until_s[code]

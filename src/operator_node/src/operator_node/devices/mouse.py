@@ -63,7 +63,7 @@ class Mouse(Device):
         if self._window is None:
             raise DeviceError("mouse", "it is not open")
         self._window.wait(max(0.0, min(timeout_s, self._wheel_over_s - time.monotonic())))
-        if time.monotonic() >= self._wheel_over_s:
+        if not self._is_new and time.monotonic() >= self._wheel_over_s:  # each turn of the wheel is told before
             self._wheel, self._wheel_over_s, self._is_new = 0.0, math.inf, True
         if not self._is_new:
             return None

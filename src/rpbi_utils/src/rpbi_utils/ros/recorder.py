@@ -28,7 +28,10 @@ _CALLER = "/rpbi_utils"
 _ANSWER_S = 1.0
 _OUTBOUND = "o"
 _POLL_S = 0.02
-_GRACE_S = 0.2  # for what was published just before the end and is on its way
+_QUIET_TURNS, _TURN_S, _MOST_GRACE_S = 20, 0.01, 10.0
+"""For what was published just before the end and is on its way: so often the recorder is seen without anything to do,
+so long apart, and so long it is looked at [s]. Not one time for all: it might pass while the machine stands still.
+"""
 _NOT_WRITING = ("Disabling recording", "Error writing", "Unknown exception")
 _DECORATION = re.compile(r"^(\x1b\[[\d;]*m)?\[ *[A-Z]+\] \[[\d., ]+\]: |\x1b\[[\d;]*m", re.MULTILINE)
 _numbers = itertools.count()
@@ -124,7 +127,7 @@ class Recorder:
         """
         if self._process is None:
             raise RecordingError(self.path, "has not been started")
-        time.sleep(_GRACE_S if self.is_running else 0.0)
+        self._wait_until_quiet()
         died = not self.is_running
         closed = self._end()
         active = self.path.with_name(self.path.name + ".active")
@@ -165,6 +168,13 @@ class Recorder:
             raise RecordingError(self.path, f"no subscription to {', '.join(missing)} after {self._timeout_s} s")
         _log.warning("recording %s: not connected to %s", self.path, ", ".join(silent))
 
+    def _wait_until_quiet(self) -> None:
+        assert self._process is not None
+        deadline, turns = time.monotonic() + _MOST_GRACE_S, 0
+        while self.is_running and turns < _QUIET_TURNS and time.monotonic() < deadline:
+            time.sleep(_TURN_S)
+            turns += _is_asleep(self._process.pid)
+
     def _end(self) -> bool:
         """Ends the process; returns whether it did so by itself."""
         assert self._process is not None
@@ -191,6 +201,15 @@ class Recorder:
         file = self._output.fileno()  # the recorder shares its position, so that it must not be moved
         text = os.pread(file, os.fstat(file).st_size, 0).decode("utf-8", "replace")
         return [line for line in _DECORATION.sub("", text).splitlines() if line.strip()]
+
+
+def _is_asleep(process_id: int) -> bool:
+    """Tells whether all threads of a process wait for something: none works, wants to or is stopped."""
+    try:
+        threads = [path.read_text() for path in Path(f"/proc/{process_id}/task").glob("*/stat")]
+    except OSError:  # one has just ended
+        return False
+    return all(stat.rpartition(")")[2].split()[0] == "S" for stat in threads)
 
 
 def _what_is_left(active: Path) -> str:
