@@ -9,7 +9,7 @@ from .braking import Brake
 from .robot import GuardedRobot
 
 
-WAYPOINT_SPACING = 0.3
+WAYPOINT_SPACING = 0.15
 """Between two waypoints all joints together move no further [rad or m], if a period is not longer."""
 
 
@@ -89,6 +89,11 @@ class Motion:
         marks = np.arange(WAYPOINT_SPACING, travelled[-1], WAYPOINT_SPACING)
         rows = np.searchsorted(travelled, marks).tolist()
         return np.array(list(dict.fromkeys((0, *rows, len(travelled) - 1))))
+
+    @cached_property
+    def waypoint_frames(self) -> np.ndarray:
+        """Where links are at the waypoints, see `LinkFrames`."""
+        return self.robot.frames.at(self.position[self.waypoints])
 
     @property
     def path(self) -> np.ndarray:

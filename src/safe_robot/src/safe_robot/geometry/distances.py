@@ -16,7 +16,7 @@ from rpbi.urdf.joints import Joint
 from rpbi.urdf.loading import load_urdf
 from safe_robot.robot import GuardedRobot
 
-from .hulls import Solid, solid_of
+from .hulls import Solid, solids_of
 from .obstacles import Obstacle
 
 Pair = tuple[str, str | int]
@@ -40,12 +40,14 @@ class Contact(NamedTuple):
         direction: Unit vector from one to the other, in the robot's root.
         first: Where one of them is nearest, in the root [m].
         second: The same for the other.
+        directions: The same as `direction` for each two of their shapes.
     """
 
     distance: float
     direction: Vector
     first: Vector
     second: Vector
+    directions: tuple[Vector, ...]
 
 
 class LinkDistances:
@@ -78,7 +80,7 @@ class LinkDistances:
         self.links = tuple(self._index)
         self.place(np.zeros(len(robot.joint_names)))
         self.radius_m = {link: self._radius(link) for link in self.links}
-        self._solids: dict[str | int, Solid] = {link: self._solid(link) for link in self.links}
+        self._solids: dict[str | int, list[Solid]] = {link: self._solids_of(link) for link in self.links}
 
     def place(self, q: np.ndarray) -> None:
         """Puts the robot into a configuration of n positions [rad or m]."""
@@ -100,7 +102,7 @@ class LinkDistances:
                 if body >= 0:
                     self._pb.removeBody(body)
                 body = obstacle.add_to(self._pb)
-                self._solids[i] = solid_of(self._pb, body, -1)
+                self._solids[i] = solids_of(self._pb, body, -1)
                 changed.append(i)
             elif old.pose != obstacle.pose:
                 self._pb.resetBasePositionAndOrientation(body, *obstacle.pose)
@@ -111,11 +113,12 @@ class LinkDistances:
         self._obstacles = tuple(now)
         return changed
 
-    def solid(self, thing: str | int) -> Solid:
-        """Returns the convex hull of a link, or of an obstacle where it was put."""
+    def solids(self, thing: str | int) -> list[Solid]:
+        """Returns the shapes of a link, or of an obstacle where it was put."""
         if isinstance(thing, str):
             return self._solids[thing]
-        return self._solids[thing].moved(0, matrix_of(*self._obstacles[thing][0].pose))
+        pose = matrix_of(*self._obstacles[thing][0].pose)
+        return [solid.moved(0, pose) for solid in self._solids[thing]]
 
     def frames(self, q: np.ndarray) -> np.ndarray:
         """Returns where links are, in k configurations of n positions, see `LinkFrames`."""
@@ -131,7 +134,7 @@ class LinkDistances:
         if not points:
             return None
         point = min(points, key=lambda each: each[8])
-        return Contact(point[8], point[7], point[5], point[6])
+        return Contact(point[8], point[7], point[5], point[6], tuple(each[7] for each in points))
 
     def gradient(self, pair: Pair, contact: Contact, q: np.ndarray) -> np.ndarray:
         """Returns how fast two things go apart as each of n joints moves, by where `contact` found them [m/rad or 1].
@@ -203,11 +206,11 @@ class LinkDistances:
         """Returns the link above each that a joint moves."""
         return {joint.child: joint.parent for joint in self._robot.document.joints.values() if joint.is_moving}
 
-    def _solid(self, link: str) -> Solid:
+    def _solids_of(self, link: str) -> list[Solid]:
         frame, pose = self._robot.frames.place(link)
         index = self._index[link]
         mass = pose @ matrix_of(*self._pb.getDynamicsInfo(self._body, index)[3:5])
-        return solid_of(self._pb, self._body, index).moved(frame, mass)
+        return [solid.moved(frame, mass) for solid in solids_of(self._pb, self._body, index)]
 
     def _radius(self, link: str) -> float:
         """Returns how far the shape of a link goes from the link's origin, at most [m]."""

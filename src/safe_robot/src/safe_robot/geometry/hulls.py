@@ -1,8 +1,7 @@
-"""Few balls whose convex hull holds the collision shapes of a link."""
+"""Few balls whose convex hull holds a collision shape."""
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import pybullet
@@ -17,29 +16,24 @@ COARSE_M = 2e-3
 """So far corners of a mesh may be outside the hull of those that are kept; the balls are that much larger [m]."""
 AABB_MARGIN_M = 4e-3
 """By so much PyBullet's boxes around shapes are too wide, at most [m]."""
-SIDES = 16
+SIDES = 32
 """Of the prism that is put around a cylinder."""
+CUBE = 2.0 * ((np.arange(8)[:, None] >> np.arange(3)) & 1) - 1.0
+"""The corners of a cube from -1 to 1."""
 
 
-@dataclass(frozen=True)
-class Solid:
-    """A thing that moves in one piece.
+class Solid(NamedTuple):
+    """A convex shape that moves with a frame.
 
     Attributes:
         frame: The frame that it moves with, see `LinkFrames`.
-        balls: v x 4: x, y and z in that frame, and a radius [m]. The convex hull of the balls holds the thing.
+        balls: v x 4: x, y and z in that frame, and a radius [m]. The convex hull of the balls holds the shape.
         normal: Of a half-space that ends at the first ball, the way out of it; None for everything else.
     """
 
     frame: int
     balls: np.ndarray
     normal: np.ndarray | None = None
-
-    @cached_property
-    def middle(self) -> np.ndarray:
-        """A point inside, x, y, z [m]."""
-        middle: np.ndarray = self.balls[:, :3].mean(axis=0)
-        return middle
 
     def moved(self, frame: int, pose: np.ndarray) -> "Solid":
         """Returns it in another frame, in which its own one has a pose, 4 x 4."""
@@ -48,59 +42,48 @@ class Solid:
         return Solid(frame, balls, None if self.normal is None else turn @ self.normal)
 
 
-def solid_of(pb: Client, body: int, link: int) -> Solid:
-    """Returns the collision shapes of a link as one solid, in the frame of its centre of mass.
+def solids_of(pb: Client, body: int, link: int) -> list[Solid]:
+    """Returns the collision shapes of a link, in the frame of its centre of mass.
 
-    What PyBullet does not tell the corners of counts as the box around it, as it lies now.
+    If PyBullet does not tell the corners of one, the link counts as the box around it, as it lies now.
     """
     shapes = pb.getCollisionShapeData(body, link)
     if any(shape[2] == pybullet.GEOM_PLANE for shape in shapes):
-        return Solid(0, np.zeros((1, 4)), np.array((0.0, 0.0, 1.0)))
+        return [Solid(0, np.zeros((1, 4)), np.array((0.0, 0.0, 1.0)))]
     pose = matrix_of(*(pb.getLinkState(body, link)[:2] if link >= 0 else pb.getBasePositionAndOrientation(body)))
     lower, upper = pb.getAABB(body, link)
-    found = [_balls(*shape[2:4], matrix_of(*shape[5:7])) for shape in shapes if shape[2] != pybullet.GEOM_MESH]
-    meshes = [i for i, shape in enumerate(shapes) if shape[2] == pybullet.GEOM_MESH]
-    corners = [corner for i in meshes for corner in pb.getMeshData(body, link, collisionShapeIndex=i)[1]]
-    if corners:
-        found.append(_few(np.array(corners)))
-    balls = np.concatenate(found) if found else np.empty((0, 4))
-    in_world = Solid(0, balls).moved(0, pose).balls
-    is_known = len(balls) > 0 and np.isfinite(balls).all()
-    if is_known:
-        least = (in_world[:, :3] - in_world[:, 3:]).min(axis=0) - AABB_MARGIN_M
-        most = (in_world[:, :3] + in_world[:, 3:]).max(axis=0) + AABB_MARGIN_M
-        is_known = bool((least <= lower).all() and (most >= upper).all())
-    if is_known:
-        return Solid(0, balls)
+    solids = []
+    for i, shape in enumerate(shapes):
+        if shape[2] == pybullet.GEOM_MESH:
+            corners = np.array(pb.getMeshData(body, link, collisionShapeIndex=i)[1]).reshape(-1, 3)
+            solids.append(Solid(0, _few(corners)))
+        else:
+            solids.append(Solid(0, _balls(*shape[2:4])).moved(0, matrix_of(*shape[5:7])))
+    if solids and all(len(solid.balls) for solid in solids):
+        balls = np.concatenate([solid.moved(0, pose).balls for solid in solids])
+        least = (balls[:, :3] - balls[:, 3:]).min(axis=0) - AABB_MARGIN_M
+        most = (balls[:, :3] + balls[:, 3:]).max(axis=0) + AABB_MARGIN_M
+        if (least <= lower).all() and (most >= upper).all():
+            return solids
     middle, half = np.add(lower, upper) / 2.0, np.subtract(upper, lower) / 2.0
-    box = np.column_stack((_signs(8) * half + middle, np.zeros(8)))
-    return Solid(0, box).moved(0, np.linalg.inv(pose))
+    box = Solid(0, np.column_stack((CUBE * half + middle, np.zeros(8))))
+    return [box.moved(0, np.linalg.inv(pose))]
 
 
-def _balls(kind: int, size: tuple[float, ...], pose: np.ndarray) -> np.ndarray:
-    """Returns balls of a shape that is no mesh, v x 4; none of an unknown one. PyBullet has it in a pose, 4 x 4."""
+def _balls(kind: int, size: tuple[float, ...]) -> np.ndarray:
+    """Returns balls of a shape that is no mesh, v x 4; none of an unknown one."""
     if kind == pybullet.GEOM_BOX:
-        balls = np.column_stack((_signs(8) * size / 2.0, np.zeros(8)))
-    elif kind == pybullet.GEOM_SPHERE:
-        balls = np.array(((0.0, 0.0, 0.0, size[0]),))
-    elif kind == pybullet.GEOM_CAPSULE:
-        balls = np.array([(0.0, 0.0, z * size[0] / 2.0, size[1]) for z in (-1.0, 1.0)])
-    elif kind == pybullet.GEOM_CYLINDER:
-        radius = size[1] / math.cos(math.pi / SIDES)
+        return np.column_stack((CUBE * size / 2.0, np.zeros(8)))
+    if kind == pybullet.GEOM_SPHERE:
+        return np.array(((0.0, 0.0, 0.0, size[0]),))
+    if kind == pybullet.GEOM_CAPSULE:
+        return np.array([(0.0, 0.0, z * size[0] / 2.0, size[1]) for z in (-1.0, 1.0)])
+    if kind == pybullet.GEOM_CYLINDER:
         angles = 2.0 * math.pi / SIDES * np.arange(SIDES)
-        balls = np.array([(x, y, z * size[0] / 2.0, 0.0) for z in (-1.0, 1.0) for x, y in _circle(radius, angles)])
-    else:
-        return np.full((1, 4), np.nan)
-    return Solid(0, balls).moved(0, pose).balls
-
-
-def _circle(radius: float, angles: np.ndarray) -> np.ndarray:
-    return radius * np.column_stack((np.cos(angles), np.sin(angles)))
-
-
-def _signs(count: int) -> np.ndarray:
-    """Returns the corners of a cube from -1 to 1."""
-    return 2.0 * ((np.arange(count)[:, None] >> np.arange(3)) & 1) - 1.0
+        x, y = size[1] / math.cos(math.pi / SIDES) * np.array((np.cos(angles), np.sin(angles)))
+        ends = [np.column_stack((x, y, np.full(SIDES, z), np.zeros(SIDES))) for z in (-size[0] / 2.0, size[0] / 2.0)]
+        return np.concatenate(ends)
+    return np.empty((0, 4))
 
 
 def _few(corners: np.ndarray) -> np.ndarray:
@@ -108,6 +91,8 @@ def _few(corners: np.ndarray) -> np.ndarray:
 
     The one that is furthest from all lines between those that are kept is kept next.
     """
+    if not len(corners):
+        return np.empty((0, 4))
     try:
         corners = corners[ConvexHull(corners).vertices]
     except QhullError:  # a flat one
@@ -123,7 +108,7 @@ def _few(corners: np.ndarray) -> np.ndarray:
 
 
 def _from_line(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Returns how far v points are from a line between two."""
+    """Returns how far v points are from a line between two others."""
     way = end - start
     share = np.clip((points - start) @ way / (way @ way), 0.0, 1.0)
     distance: np.ndarray = np.linalg.norm(points - start - share[:, None] * way, axis=1)

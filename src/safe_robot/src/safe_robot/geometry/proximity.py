@@ -9,7 +9,6 @@ from safe_robot.motion import Motion
 from safe_robot.pursuit import Bound
 
 from .distances import Contact, LinkDistances, Pair
-from .hulls import Solid
 from .separation import Separation
 
 LEAST_SPACING_M = 0.01
@@ -18,7 +17,7 @@ ROUNDING_M = 1e-9
 """Distances that differ by less are equal [m]."""
 KEPT_M = 1e-4
 """So much more than the margin is kept where a command is chosen, since distances are taken to be linear there [m]."""
-LOOSE_M = 0.001
+LOOSE_M = 0.01
 """A bound that is that much below the distance is made anew [m]."""
 FAR_M = 10.0
 """Distances are not looked at beyond this [m]."""
@@ -54,15 +53,15 @@ class Proximity:
         self._distances, self._pairs, self._margin_m = distances, pairs, margin_m
         self._reach = np.array([distances.reach(pair) for pair in pairs])
         self._furthest = self._reach.max(axis=0, initial=0.0)
-        self._separation = Separation([self._solids(pair) for pair in pairs])
-        self._known_at = np.zeros_like(self._reach)
-        self._known_m = np.full(len(pairs), -np.inf)  # no pair is nearer there
+        self._separation = Separation([(distances.solids(a), distances.solids(b)) for a, b in pairs])
+        self._known_at = np.zeros((2, *self._reach.shape))  # for each pair the ends of a motion
+        self._known_m = np.full((2, len(pairs)), -np.inf)  # it is no nearer there
 
     def forget(self, indices: Sequence[int]) -> None:
         """Looks at some pairs anew, since what moved are not the joints."""
-        self._known_m[list(indices)] = -np.inf
+        self._known_m[:, list(indices)] = -np.inf
         for i in indices:
-            self._separation.replace(i, self._distances.solid(self._pairs[i][1]))
+            self._separation.replace(i, self._distances.solids(self._pairs[i][1]))
 
     def first(self, motion: Motion) -> TooNear | None:
         """Returns the first pair that comes too near in a motion.
@@ -72,14 +71,13 @@ class Proximity:
         if not len(self._pairs):
             return None
         least_m, reach = self._margin_m + ROUNDING_M, self._reach
-        lost = (np.abs(motion.position[0] - self._known_at) * reach).sum(axis=1)
-        near = np.flatnonzero(~(self._known_m - lost - least_m > reach @ motion.path))
+        known = self._known_near(motion.position[[0, -1]])
+        near = np.flatnonzero(~(known[0] + known[1] - reach @ motion.path > 2.0 * least_m))
         if not len(near):
             return None
         rows = motion.waypoints
-        frames = self._distances.frames(motion.position[rows])
-        bounds = self._separation.lower_bounds(frames, near)
-        self._known_m[near], self._known_at[near] = bounds[0], motion.position[0]
+        bounds = self._separation.lower_bounds(motion.waypoint_frames, near)
+        self._known_m[:, near], self._known_at[:, near] = bounds[[0, -1]], motion.position[[0, -1], None]
         steps = np.diff(motion.travelled[rows], axis=0) @ reach[near].T
         between = (bounds[:-1] + bounds[1:] - steps) / 2.0 if len(rows) > 1 else bounds  # no less on the way
         is_unsure = ~(between > least_m)  # NaN is, too
@@ -111,16 +109,16 @@ class Proximity:
             distance = contact.distance
             if not distance >= self._margin_m and not self._is_further(motion, i, distance, row):
                 return TooNear(self._pairs[i], distance, row > 0)
+            if not (distance < bounds[at, k] + LOOSE_M or free_to[k] > -np.inf):
+                self._separation.learn(i, contact.directions, frames[at])
             free_to[k] = travelled[at, k] + distance - self._margin_m - ROUNDING_M
-            if not distance < bounds[at, k] + LOOSE_M:
-                self._separation.learn(i, contact.direction, frames[at])
         return None
 
-    def _solids(self, pair: Pair) -> tuple[Solid, Solid]:
-        """Returns what a pair is of; of two links first that of fewer balls, which is less to compute."""
-        first, second = map(self._distances.solid, pair)
-        is_second_less = isinstance(pair[1], str) and len(second.balls) < len(first.balls)
-        return (first, second)
+    def _known_near(self, q: np.ndarray) -> np.ndarray:
+        """Returns lower bounds of the distances in two configurations, or twice in one: 2 x pairs [m]."""
+        moved = np.abs(q.reshape(-1, 1, q.shape[-1]) - self._known_at)
+        known: np.ndarray = self._known_m - np.einsum("epn,pn->ep", moved, self._reach)
+        return known
 
     def _sparse(self, travelled: np.ndarray, spacing_m: float) -> np.ndarray:
         """Returns rows, the first and the last among them, between which nothing moves further than a spacing."""
@@ -140,8 +138,7 @@ class Proximity:
         if not len(self._pairs):
             return []
         within_m = self._margin_m + KEPT_M + self._reach @ spread
-        lost = (np.abs(end - self._known_at) * self._reach).sum(axis=1)
-        near = np.flatnonzero(~(self._known_m - lost > within_m))
+        near = np.flatnonzero(~(self._known_near(end).max(axis=0) > within_m))
         if not len(near):
             return []
         frames = self._distances.frames(end[None])
@@ -156,7 +153,7 @@ class Proximity:
             if contact is None:
                 continue
             if not contact.distance < least[k] + LOOSE_M:
-                self._separation.learn(i, contact.direction, frames[0])
+                self._separation.learn(i, contact.directions, frames[0])
             if contact.distance <= within_m[i]:
                 room = max(contact.distance - self._margin_m - KEPT_M, 0.0)
                 bounds.append(Bound(self._distances.gradient(self._pairs[i], contact, end), room))

@@ -1,6 +1,5 @@
-"""Lower bounds of distances: how far a plane can be moved between two things."""
+"""Lower bounds of distances: how far apart planes can be that go between two things."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,62 +13,93 @@ ROUNDING_M = 1e-4
 class Separation:
     """Bounds the distances of p pairs from below, without measuring them.
 
-    The distance of two convex things is at least their gap along any direction, and it is just that along the
-    direction in which they were measured. So a direction is remembered for each pair, in the frame of the second thing.
-    As long as none is, the bound is -inf.
+    The distance of two convex shapes is at least their gap along any direction, and it is just that along the line on
+    which they are nearest. So for each two shapes of a pair one direction is remembered, in the frame of the second
+    thing. As long as there is none, the bound is -inf.
 
     Args:
-        pairs: The two things of each pair.
+        pairs: The shapes of both things of each pair.
     """
 
-    def __init__(self, pairs: Sequence[tuple[Solid, Solid]]) -> None:
-        firsts, self._seconds = [first for first, _ in pairs], [second for _, second in pairs]
-        size = max((len(solid.balls) for solid in firsts), default=1)
-        self._balls = np.array([np.pad(each.balls, ((0, size - len(each.balls)), (0, 0)), "edge") for each in firsts])
-        self._first_frame = np.array([each.frame for each in firsts], int)
-        self._second_frame = np.array([each.frame for each in self._seconds], int)
-        self._middle = np.array([each.middle for each in firsts]).reshape(-1, 3)
-        self._direction = np.zeros((len(firsts), 3))
-        self._edge = np.full(len(firsts), np.inf)  # how far the second thing goes along its direction
-        for i, solid in enumerate(self._seconds):
-            self.replace(i, solid)
+    def __init__(self, pairs: Sequence[tuple[Sequence[Solid], Sequence[Solid]]]) -> None:
+        both = [(first, second) for firsts, seconds in pairs for first in firsts for second in seconds]
+        counts = [len(firsts) * len(seconds) for firsts, seconds in pairs]
+        self._counts = np.array(counts, int)
+        ends = np.cumsum(self._counts)
+        self._rows = [np.arange(end - count, end) for end, count in zip(ends.tolist(), counts)]
+        self._pair = np.repeat(np.arange(len(pairs)), counts)
+        self._first, self._second = (_balls([each[side] for each in both]) for side in (0, 1))
+        frames = np.array([(first.frame, second.frame) for first, second in both], int).reshape(-1, 2)
+        self._first_frame, self._second_frame = frames.T.copy()
+        self._direction = np.zeros((len(both), 3))
+        self._edge = np.full(len(both), np.inf)  # how far the second shape goes along its direction
+        for i, (_, seconds) in enumerate(pairs):
+            self.replace(i, seconds)
 
-    def replace(self, i: int, second: Solid) -> None:
-        """Puts another thing into the place of the second one of a pair."""
-        self._seconds[i] = second
-        if second.normal is not None:
-            self._turn(i, second.normal)
-        elif self._direction[i].any():
-            self._turn(i, self._direction[i])
+    def replace(self, i: int, seconds: Sequence[Solid]) -> None:
+        """Puts as many other shapes into the place of the second thing of a pair."""
+        rows = self._rows[i]
+        for row, solid in zip(rows.tolist(), list(seconds) * (len(rows) // len(seconds))):
+            more = len(solid.balls) - self._second.shape[1]
+            if more > 0:
+                self._second = np.pad(self._second, ((0, 0), (0, more), (0, 0)), "edge")
+            self._second[row] = _balls([solid], self._second.shape[1])[0]
+            if solid.normal is not None:
+                self._direction[row] = solid.normal
+            if self._direction[row].any():
+                self._edge[row] = (self._second[row] @ (*self._direction[row], 1.0)).max()
 
-    def learn(self, i: int, direction: Sequence[float], frames: np.ndarray) -> None:
-        """Takes a direction for a pair: a line on which it is nearest, in the root, with its m frames, m x 4 x 4."""
-        second = self._seconds[i]
-        length = math.hypot(*direction)
-        if second.normal is not None or not length > 0.0:
-            return
-        one, other = frames[self._first_frame[i]], frames[second.frame]
-        apart = one[:3, :3] @ self._middle[i] + one[:3, 3] - other[:3, :3] @ second.middle - other[:3, 3]
-        way = np.array(direction) / length
-        self._turn(i, (way if way @ apart >= 0.0 else -way) @ other[:3, :3])
+    def learn(self, i: int, directions: Sequence[Sequence[float]], frames: np.ndarray) -> None:
+        """Takes directions for a pair, for each two shapes that which puts them furthest apart.
 
-    def _turn(self, i: int, direction: np.ndarray) -> None:
-        self._direction[i] = direction
-        balls = self._seconds[i].balls
-        self._edge[i] = (balls[:, :3] @ direction + balls[:, 3]).max()
+        Args:
+            i: Number of the pair.
+            directions: Unit vectors on lines on which its shapes are near each other, either way, in the root.
+            frames: m frames, m x 4 x 4.
+        """
+        rows = self._rows[i]
+        first, second = frames[self._first_frame[rows[0]]], frames[self._second_frame[rows[0]]]
+        ways = np.array(directions)
+        ways /= np.sqrt((ways * ways).sum(axis=1))[:, None]
+        at_first, at_second = ways @ first[:3, :3], ways @ second[:3, :3]
+        low, high = _extent(self._first[rows], at_first)
+        low_other, high_other = _extent(self._second[rows], at_second)
+        shift = ways @ (first[:3, 3] - second[:3, 3])
+        gaps = np.concatenate((low + shift - high_other, low_other - shift - high), axis=1)
+        best = np.where(np.isnan(gaps), -np.inf, gaps).argmax(axis=1)
+        self._direction[rows] = np.concatenate((at_second, -at_second))[best]
+        self._edge[rows] = np.concatenate((high_other, -low_other), axis=1)[np.arange(len(rows)), best]
 
     def lower_bounds(self, frames: np.ndarray, which: np.ndarray) -> np.ndarray:
         """Returns lower bounds of the distances of some pairs, in k configurations with m frames: k x len(which) [m].
 
         Args:
             frames: k x m x 4 x 4.
-            which: Numbers of the pairs.
+            which: Numbers of the pairs, one at least, in ascending order.
         """
-        first, second = frames[:, self._first_frame[which]], frames[:, self._second_frame[which]]
-        way = np.einsum("kpij,pj->kpi", second[..., :3, :3], self._direction[which])
-        local = np.full((len(which), 4, len(frames)), -1.0)
-        local[:, :3] = np.einsum("kpij,kpi->pjk", first[..., :3, :3], way)
-        nearest = (self._balls[which] @ local).min(axis=1).T  # of the first thing, along its way, from its frame
-        shift = first[..., :3, 3] - second[..., :3, 3]
-        bounds: np.ndarray = nearest + np.einsum("kpi,kpi->kp", way, shift) - self._edge[which] - ROUNDING_M
+        is_asked = np.zeros(len(self._counts), bool)
+        is_asked[which] = True
+        rows = np.flatnonzero(is_asked[self._pair])
+        first, second = frames.take(self._first_frame[rows], axis=1), frames.take(self._second_frame[rows], axis=1)
+        way = np.einsum("kpij,pj->kpi", second[..., :3, :3], self._direction[rows])
+        local = np.full((len(rows), len(frames), 4), -1.0)
+        local[..., :3] = np.einsum("kpij,kpi->pkj", first[..., :3, :3], way)
+        nearest = (local @ self._first[rows].transpose(0, 2, 1)).min(axis=2).T  # of the first shape along the direction
+        shift = np.einsum("kpi,kpi->kp", way, first[..., :3, 3] - second[..., :3, 3])
+        gaps = nearest + shift - (self._edge[rows] + ROUNDING_M)
+        starts = np.cumsum(self._counts[which]) - self._counts[which]
+        bounds: np.ndarray = np.minimum.reduceat(gaps, starts, axis=1)
         return bounds
+
+
+def _balls(solids: Sequence[Solid], size: int = 1) -> np.ndarray:
+    """Returns the balls of p solids, as many of each: p x v x 4."""
+    size = max([size, *(len(solid.balls) for solid in solids)])
+    balls = [np.pad(solid.balls, ((0, size - len(solid.balls)), (0, 0)), "edge") for solid in solids]
+    return np.array(balls).reshape(-1, size, 4)
+
+
+def _extent(balls: np.ndarray, ways: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns from where to where p x v balls go along d unit vectors, each p x d."""
+    along, radius = balls[:, :, :3] @ ways.T, balls[:, :, 3:]
+    return (along - radius).min(axis=1), (along + radius).max(axis=1)
