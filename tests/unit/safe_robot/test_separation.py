@@ -124,9 +124,11 @@ BENT = """<robot name="bent"><link name="base"/>
   <joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/><origin xyz="0 0 0.2" rpy="0 0.3 0"/>
     <axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="1" velocity="2"/></joint>
   <link name="cart">
-    <collision><origin xyz="0 0 -0.3" rpy="1 1 0.5"/><geometry><mesh filename="{mesh}" scale="1 0.5 1"/></geometry></collision>
+    <collision><origin xyz="0 0 -0.3" rpy="1 1 0.5"/>
+      <geometry><mesh filename="{mesh}" scale="1 0.5 1"/></geometry></collision>
   </link>
-  <joint name="plate" type="fixed"><parent link="cart"/><child link="plate"/><origin xyz="0.1 0 0" rpy="0.2 0 0.4"/></joint>
+  <joint name="plate" type="fixed"><parent link="cart"/><child link="plate"/>
+    <origin xyz="0.1 0 0" rpy="0.2 0 0.4"/></joint>
   <link name="plate"/>
   <joint name="turn" type="continuous"><parent link="plate"/><child link="hand"/><origin rpy="0 0.3 0.2"/>
     <axis xyz="0.6 0 0.8"/></joint>

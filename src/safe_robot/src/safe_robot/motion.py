@@ -8,7 +8,6 @@ import numpy as np
 from .braking import Brake
 from .robot import GuardedRobot
 
-
 WAYPOINT_SPACING = 0.15
 """Between two waypoints all joints together move no further [rad or m], if a period is not longer."""
 

@@ -66,7 +66,8 @@ class Proximity:
     def first(self, motion: Motion) -> TooNear | None:
         """Returns the first pair that comes too near in a motion.
 
-        From where a pair is so far apart, the braking is followed to where it might be too near, and so on.
+        A pair that is d and e away at two rows, between which it moves by m, is (d + e - m) / 2 away between them.
+        Where that is not enough, rows are tried one by one.
         """
         if not len(self._pairs):
             return None
@@ -90,7 +91,7 @@ class Proximity:
         return self._measured(motion, near[suspects], marks[is_unsure.any(axis=1)[section]])
 
     def _measured(self, motion: Motion, suspects: np.ndarray, rows: np.ndarray) -> TooNear | None:
-        """Returns the first of some pairs that comes too near in some rows of a motion; what is unsure is measured."""
+        """Returns the first of some pairs that comes too near in some rows of a motion, by measuring if need be."""
         frames = self._distances.frames(motion.position[rows])
         bounds = self._separation.lower_bounds(frames, suspects)
         travelled = motion.travelled[rows] @ self._reach[suspects].T
