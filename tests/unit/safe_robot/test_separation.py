@@ -118,7 +118,8 @@ BENT = """<robot name="bent"><link name="base"/>
     <inertial><origin xyz="0.1 -0.2 0.3" rpy="0.4 0.5 0.6"/><mass value="1"/>
       <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
     <collision><origin xyz="0.2 0 0.1" rpy="0.3 0.7 -0.5"/><geometry><box size="0.4 0.1 0.1"/></geometry></collision>
-    <collision><origin xyz="0 0.3 0" rpy="1 -1 0.5"/><geometry><cylinder radius="0.05" length="0.4"/></geometry></collision>
+    <collision><origin xyz="0 0.3 0" rpy="1 -1 0.5"/>
+      <geometry><cylinder radius="0.05" length="0.4"/></geometry></collision>
     <collision><origin xyz="-0.3 0 -0.3"/><geometry><sphere radius="0.08"/></geometry></collision>
   </link>
   <joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/><origin xyz="0 0 0.2" rpy="0 0.3 0"/>
