@@ -322,11 +322,15 @@ def test_how_far_joints_have_moved_since_a_distance_was_looked_at_counts(tmp_pat
     path.write_text(RAIL)
     check = check_of("environment", GuardedRobot(str(path)))
     around = Situation(obstacles=(BALL._replace(pose=Pose((0.6, 0.0, 0.0))),))  # 0.4 m away
-    for x, brake_m, is_safe in ((0.0, 0.0, True), (0.05, 0.32, True), (0.05, 0.36, False)):
+    still, there, too_far = (np.linspace(0.0, brake_m, 40) for brake_m in (0.0, 0.32, 0.36))
+    too_far_and_back = np.concatenate((np.linspace(0.0, 0.41, 40), np.linspace(0.41, 0.0, 40)))
+    motions = ((0.0, still, True), (0.0, too_far_and_back, False), (0.05, there, True), (0.05, too_far, False))
+    for x, way, is_safe in motions:
+        check.check(Motion(check.robot, State.at_rest(np.zeros(1)), np.zeros(1), 0.01), around)  # distances are known
         start = State.at_rest(np.array((x,)))
-        brake = Brake(np.linspace(0.0, brake_m, 40)[:, None], *(np.zeros((40, 1)),) * 3)
+        brake = Brake(way[:, None], *(np.zeros((len(way), 1)),) * 3)
         violation = check.check(Motion(check.robot, start, start.position, 0.01, brake), around)
-        assert (violation is None) == is_safe, brake_m
+        assert (violation is None) == is_safe, way.max()
 
 
 def test_a_factor_takes_as_much_of_the_range_from_both_ends(tmp_path):

@@ -119,7 +119,8 @@ class Braking:
 
     def _fits(self, state: np.ndarray) -> np.ndarray:
         """Returns for which of l lengths each of m x n states keeps the limits; 2 x m x n, in periods."""
-        first, slope, first_jerk, last_jerk, first_acceleration = np.tensordot(self._lines, state, 1)  # l x m x n
+        products = self._lines.reshape(-1, 2) @ state.reshape(2, -1)
+        first, slope, first_jerk, last_jerk, first_acceleration = products.reshape(5, -1, *state.shape[1:])  # l x m x n
         length = self._lengths[:, None, None]
         jerk = np.maximum(np.abs(first_jerk), np.abs(last_jerk))
         slope_or_1 = np.where(slope != 0.0, slope, 1.0)

@@ -8,6 +8,9 @@ import numpy as np
 from .braking import Brake
 from .robot import GuardedRobot
 
+WAYPOINT_SPACING = 0.15
+"""Between two waypoints all joints together move no further [rad or m], if a period is not longer."""
+
 
 class State(NamedTuple):
     """Where n joints were commanded to last, and how they moved there: backward differences of the commands.
@@ -77,6 +80,19 @@ class Motion:
         travelled = np.zeros_like(self.position)
         np.cumsum(np.abs(self.position[1:] - self.position[:-1]), axis=0, out=travelled[1:])
         return travelled
+
+    @cached_property
+    def waypoints(self) -> np.ndarray:
+        """Rows not far from each other, the first one and the last one among them."""
+        travelled = self.travelled.sum(axis=1)
+        marks = np.arange(WAYPOINT_SPACING, travelled[-1], WAYPOINT_SPACING)
+        rows = np.searchsorted(travelled, marks).tolist()
+        return np.array(list(dict.fromkeys((0, *rows, len(travelled) - 1))))
+
+    @cached_property
+    def waypoint_frames(self) -> np.ndarray:
+        """Where links are at the waypoints, see `LinkFrames`."""
+        return self.robot.frames.at(self.position[self.waypoints])
 
     @property
     def path(self) -> np.ndarray:

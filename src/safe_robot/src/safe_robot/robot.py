@@ -11,6 +11,8 @@ from rpbi.geometry import Vector
 from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.elements import UrdfJoint
 
+from .frames import LinkFrames
+
 
 class GuardedRobot:
     """The joints of a robot that commands move, in the order in which they are checked, and its kinematics.
@@ -28,6 +30,7 @@ class GuardedRobot:
         joints: What the description says of them.
         links: Names of all links.
         still: Names of the joints that do not move, which joint states may have too.
+        frames: Where its links are.
 
     Raises:
         ConfigError: If the description cannot be read or a joint makes no sense.
@@ -55,6 +58,7 @@ class GuardedRobot:
         self._above = {joint.child: joint for joint in self._all.values()}
         self._index = {name: i for i, name in enumerate(self.joint_names)}
         self._turns = {joint.name: _Turn(joint) for joint in self._all.values()}
+        self.frames = LinkFrames(self._all.values(), self.coupling)
 
     def check_link(self, name: str) -> str:
         """Returns the name of a link.

@@ -9,12 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import pybullet
 
+from custom_ros_tools.transforms import matrix_of
 from rpbi.engine.client import Client
 from rpbi.geometry import Vector, cross, dot, minus, rotated
 from rpbi.urdf.joints import Joint
 from rpbi.urdf.loading import load_urdf
 from safe_robot.robot import GuardedRobot
 
+from .hulls import Solid, solids_of
 from .obstacles import Obstacle
 
 Pair = tuple[str, str | int]
@@ -38,12 +40,14 @@ class Contact(NamedTuple):
         direction: Unit vector from one to the other, in the robot's root.
         first: Where one of them is nearest, in the root [m].
         second: The same for the other.
+        directions: The same as `direction` for each two of their shapes.
     """
 
     distance: float
     direction: Vector
     first: Vector
     second: Vector
+    directions: tuple[Vector, ...]
 
 
 class LinkDistances:
@@ -76,6 +80,7 @@ class LinkDistances:
         self.links = tuple(self._index)
         self.place(np.zeros(len(robot.joint_names)))
         self.radius_m = {link: self._radius(link) for link in self.links}
+        self._solids: dict[str | int, list[Solid]] = {link: self._solids_of(link) for link in self.links}
 
     def place(self, q: np.ndarray) -> None:
         """Puts the robot into a configuration of n positions [rad or m]."""
@@ -97,6 +102,7 @@ class LinkDistances:
                 if body >= 0:
                     self._pb.removeBody(body)
                 body = obstacle.add_to(self._pb)
+                self._solids[i] = solids_of(self._pb, body, -1)
                 changed.append(i)
             elif old.pose != obstacle.pose:
                 self._pb.resetBasePositionAndOrientation(body, *obstacle.pose)
@@ -106,6 +112,17 @@ class LinkDistances:
             self._pb.removeBody(body)
         self._obstacles = tuple(now)
         return changed
+
+    def solids(self, thing: str | int) -> list[Solid]:
+        """Returns the shapes of a link, or of an obstacle where it was put."""
+        if isinstance(thing, str):
+            return self._solids[thing]
+        pose = matrix_of(*self._obstacles[thing][0].pose)
+        return [solid.moved(0, pose) for solid in self._solids[thing]]
+
+    def frames(self, q: np.ndarray) -> np.ndarray:
+        """Returns where links are, in k configurations of n positions, see `LinkFrames`."""
+        return self._robot.frames.at(q)
 
     def distance(self, pair: Pair, most_m: float) -> float:
         """Returns how far two things are apart where they were put [m]; inf if that is more than some distance."""
@@ -117,7 +134,7 @@ class LinkDistances:
         if not points:
             return None
         point = min(points, key=lambda each: each[8])
-        return Contact(point[8], point[7], point[5], point[6])
+        return Contact(point[8], point[7], point[5], point[6], tuple(each[7] for each in points))
 
     def gradient(self, pair: Pair, contact: Contact, q: np.ndarray) -> np.ndarray:
         """Returns how fast two things go apart as each of n joints moves, by where `contact` found them [m/rad or 1].
@@ -188,6 +205,12 @@ class LinkDistances:
     def _parents(self) -> dict[str, str]:
         """Returns the link above each that a joint moves."""
         return {joint.child: joint.parent for joint in self._robot.document.joints.values() if joint.is_moving}
+
+    def _solids_of(self, link: str) -> list[Solid]:
+        frame, pose = self._robot.frames.place(link)
+        index = self._index[link]
+        mass = pose @ matrix_of(*self._pb.getDynamicsInfo(self._body, index)[3:5])
+        return [solid.moved(frame, mass) for solid in solids_of(self._pb, self._body, index)]
 
     def _radius(self, link: str) -> float:
         """Returns how far the shape of a link goes from the link's origin, at most [m]."""

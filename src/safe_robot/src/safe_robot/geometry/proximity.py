@@ -1,6 +1,5 @@
 """Which things come too near to each other while a robot moves."""
 
-from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -10,6 +9,7 @@ from safe_robot.motion import Motion
 from safe_robot.pursuit import Bound
 
 from .distances import Contact, LinkDistances, Pair
+from .separation import Separation
 
 LEAST_SPACING_M = 0.01
 """The braking is tried no more densely than this [m], however small the margin is."""
@@ -17,9 +17,9 @@ ROUNDING_M = 1e-9
 """Distances that differ by less are equal [m]."""
 KEPT_M = 1e-4
 """So much more than the margin is kept where a command is chosen, since distances are taken to be linear there [m]."""
-STALE = 0.25
-"""A distance is looked at anew when joints have moved so much of it."""
-FAR_M = 0.5
+LOOSE_M = 0.01
+"""A bound that is that much below the distance is made anew [m]."""
+FAR_M = 10.0
 """Distances are not looked at beyond this [m]."""
 
 
@@ -37,22 +37,11 @@ class TooNear(NamedTuple):
     is_while_braking: bool
 
 
-def _onward(travelled: list[float], mark: int, to_m: float, last: int) -> int:
-    """Returns the first mark beyond a way, or one before it where pairs often meet; above the last one: none is."""
-    found = bisect_right(travelled, to_m)
-    if found > last:
-        return found
-    for coarse in (8, 4, 2):
-        if found // coarse * coarse > mark:
-            return found // coarse * coarse
-    return found
-
-
 class Proximity:
     """Finds out which pairs come nearer than a margin, and nearer than they were.
 
-    Distances are looked at anew only when joints have moved so far since that a pair might be too near. So most
-    commands need few of them.
+    Most pairs are so far apart that how far joints may move them is enough, or a plane between them. Only those that
+    are left are measured.
 
     Args:
         distances: Where shapes are.
@@ -63,52 +52,80 @@ class Proximity:
     def __init__(self, distances: LinkDistances, pairs: Sequence[Pair], margin_m: float) -> None:
         self._distances, self._pairs, self._margin_m = distances, pairs, margin_m
         self._reach = np.array([distances.reach(pair) for pair in pairs])
-        self._known_at = np.zeros_like(self._reach)  # where each pair's distance was looked at last
-        self._known_m = np.full(len(pairs), -np.inf)
+        self._furthest = self._reach.max(axis=0, initial=0.0)
+        self._separation = Separation([(distances.solids(a), distances.solids(b)) for a, b in pairs])
+        self._known_at = np.zeros((2, *self._reach.shape))  # for each pair the ends of a motion
+        self._known_m = np.full((2, len(pairs)), -np.inf)  # it is no nearer there
 
     def forget(self, indices: Sequence[int]) -> None:
         """Looks at some pairs anew, since what moved are not the joints."""
-        self._known_m[list(indices)] = -np.inf
+        self._known_m[:, list(indices)] = -np.inf
+        for i in indices:
+            self._separation.replace(i, self._distances.solids(self._pairs[i][1]))
 
     def first(self, motion: Motion) -> TooNear | None:
         """Returns the first pair that comes too near in a motion.
 
-        From where a pair is so far apart, the braking is followed to where it might be too near, and so on.
+        A pair that is d and e away at two rows, between which it moves by m, is (d + e - m) / 2 away between them.
+        Where that is not enough, rows are tried one by one.
         """
         if not len(self._pairs):
             return None
-        margin_m, reach = self._margin_m, self._reach
-        lost = (np.abs(motion.position[0] - self._known_at) * reach).sum(axis=1)
-        room = self._known_m - lost - (margin_m + ROUNDING_M)
-        near = np.flatnonzero(~(room > reach @ motion.path))
+        least_m, reach = self._margin_m + ROUNDING_M, self._reach
+        known = self._known_near(motion.position[[0, -1]])
+        near = np.flatnonzero(~(known[0] + known[1] - reach @ motion.path > 2.0 * least_m))
         if not len(near):
             return None
-        room = np.where(lost[near] <= STALE * (self._known_m[near] - margin_m), room[near], -1.0)
-        least = max(2.0 * margin_m, LEAST_SPACING_M)
-        rows = self._sparse(motion.travelled @ reach[near].max(axis=0), least)
-        travelled = (motion.travelled[rows] @ reach[near].T).T.tolist()  # of each pair, from the command on
-        last = len(rows) - 1
-        due = [_onward(one, -1, each, last) if each > 0.0 else 0 for one, each in zip(travelled, room.tolist())]
-        while (mark := min(due)) <= last:
-            self._distances.place(motion.position[rows[mark]])
-            for k in [k for k, each in enumerate(due) if each == mark]:
-                i = int(near[k])
-                distance = self._distances.distance(self._pairs[i], FAR_M)
-                if not distance >= margin_m and not self._is_further(motion, i, distance, rows[mark]):
-                    return TooNear(self._pairs[i], distance, mark > 0)
-                distance = min(distance, FAR_M)
-                if mark == 0:
-                    self._known_m[i], self._known_at[i] = distance, motion.position[0]
-                room_m = distance - margin_m - ROUNDING_M
-                to_m = travelled[k][mark] + room_m
-                due[k] = mark + 1 if room_m <= least else max(_onward(travelled[k], mark, to_m, last), mark + 1)
+        rows = motion.waypoints
+        bounds = self._separation.lower_bounds(motion.waypoint_frames, near)
+        self._known_m[:, near], self._known_at[:, near] = bounds[[0, -1]], motion.position[[0, -1], None]
+        steps = np.diff(motion.travelled[rows], axis=0) @ reach[near].T
+        between = (bounds[:-1] + bounds[1:] - steps) / 2.0 if len(rows) > 1 else bounds  # no less on the way
+        is_unsure = ~(between > least_m)  # NaN is, too
+        suspects = np.flatnonzero(is_unsure.any(axis=0))
+        if not len(suspects):
+            return None
+        spacing_m = max(2.0 * self._margin_m, LEAST_SPACING_M)
+        marks = self._sparse(motion.travelled @ self._furthest, spacing_m)
+        section = np.clip(np.searchsorted(rows, marks, side="right") - 1, 0, len(is_unsure) - 1)
+        return self._measured(motion, near[suspects], marks[is_unsure.any(axis=1)[section]])
+
+    def _measured(self, motion: Motion, suspects: np.ndarray, rows: np.ndarray) -> TooNear | None:
+        """Returns the first of some pairs that comes too near in some rows of a motion, by measuring if need be."""
+        frames = self._distances.frames(motion.position[rows])
+        bounds = self._separation.lower_bounds(frames, suspects)
+        travelled = motion.travelled[rows] @ self._reach[suspects].T
+        free_to = np.full(len(suspects), -np.inf)  # how far a pair can go without being too near
+        placed = -1
+        for at, k in np.argwhere(~(bounds > self._margin_m + ROUNDING_M)).tolist():
+            if travelled[at, k] < free_to[k]:
+                continue
+            i, row = int(suspects[k]), int(rows[at])
+            if placed != row:
+                self._distances.place(motion.position[row])
+                placed = row
+            contact = self._distances.contact(self._pairs[i], FAR_M)
+            if contact is None:
+                continue
+            distance = contact.distance
+            if not distance >= self._margin_m and not self._is_further(motion, i, distance, row):
+                return TooNear(self._pairs[i], distance, row > 0)
+            if not (distance < bounds[at, k] + LOOSE_M or free_to[k] > -np.inf):
+                self._separation.learn(i, contact.directions, frames[at])
+            free_to[k] = travelled[at, k] + distance - self._margin_m - ROUNDING_M
         return None
 
-    def _sparse(self, travelled: np.ndarray, spacing_m: float) -> list[int]:
+    def _known_near(self, q: np.ndarray) -> np.ndarray:
+        """Returns lower bounds of the distances in two configurations, or twice in one: 2 x pairs [m]."""
+        moved = np.abs(q.reshape(-1, 1, q.shape[-1]) - self._known_at)
+        known: np.ndarray = self._known_m - np.einsum("epn,pn->ep", moved, self._reach)
+        return known
+
+    def _sparse(self, travelled: np.ndarray, spacing_m: float) -> np.ndarray:
         """Returns rows, the first and the last among them, between which nothing moves further than a spacing."""
         marks = np.arange(spacing_m, travelled[-1], spacing_m)
         rows = np.searchsorted(travelled, marks, side="right").tolist()
-        return list(dict.fromkeys((0, *rows, len(travelled) - 1)))
+        return np.array(list(dict.fromkeys((0, *rows, len(travelled) - 1))))
 
     def _is_further(self, motion: Motion, i: int, distance: float, row: int) -> bool:
         """Returns whether a pair that is too near was no further apart before the motion."""
@@ -121,16 +138,24 @@ class Proximity:
         """Returns what keeps pairs apart near a configuration, see `Check.bounds`."""
         if not len(self._pairs):
             return []
-        moved = np.abs(end - self._known_at) + spread
-        nearest = self._known_m - (moved * self._reach).sum(axis=1)
-        near = np.flatnonzero(~(nearest > self._margin_m + KEPT_M)).tolist()
-        if near:
+        within_m = self._margin_m + KEPT_M + self._reach @ spread
+        near = np.flatnonzero(~(self._known_near(end).max(axis=0) > within_m))
+        if not len(near):
+            return []
+        frames = self._distances.frames(end[None])
+        least = self._separation.lower_bounds(frames, near)[0]
+        found = np.flatnonzero(~(least > within_m[near])).tolist()
+        if found:
             self._distances.place(end)
         bounds = []
-        for i in near:
-            within_m = self._margin_m + KEPT_M + float(spread @ self._reach[i])
-            contact = self._distances.contact(self._pairs[i], within_m)
-            if contact is not None:
+        for k in found:
+            i = int(near[k])
+            contact = self._distances.contact(self._pairs[i], FAR_M)
+            if contact is None:
+                continue
+            if not contact.distance < least[k] + LOOSE_M:
+                self._separation.learn(i, contact.directions, frames[0])
+            if contact.distance <= within_m[i]:
                 room = max(contact.distance - self._margin_m - KEPT_M, 0.0)
                 bounds.append(Bound(self._distances.gradient(self._pairs[i], contact, end), room))
         return bounds

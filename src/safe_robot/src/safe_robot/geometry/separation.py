@@ -1,0 +1,105 @@
+"""Lower bounds of distances: how far apart planes can be that go between two things."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .hulls import Solid
+
+ROUNDING_M = 1e-4
+"""PyBullet's distances may be that much too small [m]."""
+
+
+class Separation:
+    """Bounds the distances of p pairs from below, without measuring them.
+
+    The distance of two convex shapes is at least their gap along any direction, and it is just that along the line on
+    which they are nearest. So for each two shapes of a pair one direction is remembered, in the frame of the second
+    thing. As long as there is none, the bound is -inf.
+
+    Args:
+        pairs: The shapes of both things of each pair.
+    """
+
+    def __init__(self, pairs: Sequence[tuple[Sequence[Solid], Sequence[Solid]]]) -> None:
+        both = [(first, second) for firsts, seconds in pairs for first in firsts for second in seconds]
+        counts = [len(firsts) * len(seconds) for firsts, seconds in pairs]
+        self._counts = np.array(counts, int)
+        ends = np.cumsum(self._counts)
+        self._rows = [np.arange(end - count, end) for end, count in zip(ends.tolist(), counts)]
+        self._pair = np.repeat(np.arange(len(pairs)), counts)
+        self._first, self._second = (_balls([each[side] for each in both]) for side in (0, 1))
+        frames = np.array([(first.frame, second.frame) for first, second in both], int).reshape(-1, 2)
+        self._first_frame, self._second_frame = frames.T.copy()
+        self._direction = np.zeros((len(both), 3))
+        self._edge = np.full(len(both), np.inf)  # how far the second shape goes along its direction
+        for i, (_, seconds) in enumerate(pairs):
+            self.replace(i, seconds)
+
+    def replace(self, i: int, seconds: Sequence[Solid]) -> None:
+        """Puts as many other shapes into the place of the second thing of a pair."""
+        rows = self._rows[i]
+        for row, solid in zip(rows.tolist(), list(seconds) * (len(rows) // len(seconds))):
+            more = len(solid.balls) - self._second.shape[1]
+            if more > 0:
+                self._second = np.pad(self._second, ((0, 0), (0, more), (0, 0)), "edge")
+            self._second[row] = _balls([solid], self._second.shape[1])[0]
+            if solid.normal is not None:
+                self._direction[row] = solid.normal
+            if self._direction[row].any():
+                self._edge[row] = (self._second[row] @ (*self._direction[row], 1.0)).max()
+
+    def learn(self, i: int, directions: Sequence[Sequence[float]], frames: np.ndarray) -> None:
+        """Takes directions for a pair, for each two shapes that which puts them furthest apart.
+
+        Args:
+            i: Number of the pair.
+            directions: Unit vectors on lines on which its shapes are near each other, either way, in the root.
+            frames: m frames, m x 4 x 4.
+        """
+        rows = self._rows[i]
+        first, second = frames[self._first_frame[rows[0]]], frames[self._second_frame[rows[0]]]
+        ways = np.array(directions)
+        ways /= np.sqrt((ways * ways).sum(axis=1))[:, None]
+        at_first, at_second = ways @ first[:3, :3], ways @ second[:3, :3]
+        low, high = _extent(self._first[rows], at_first)
+        low_other, high_other = _extent(self._second[rows], at_second)
+        shift = ways @ (first[:3, 3] - second[:3, 3])
+        gaps = np.concatenate((low + shift - high_other, low_other - shift - high), axis=1)
+        best = np.where(np.isnan(gaps), -np.inf, gaps).argmax(axis=1)
+        self._direction[rows] = np.concatenate((at_second, -at_second))[best]
+        self._edge[rows] = np.concatenate((high_other, -low_other), axis=1)[np.arange(len(rows)), best]
+
+    def lower_bounds(self, frames: np.ndarray, which: np.ndarray) -> np.ndarray:
+        """Returns lower bounds of the distances of some pairs, in k configurations with m frames: k x len(which) [m].
+
+        Args:
+            frames: k x m x 4 x 4.
+            which: Numbers of the pairs, one at least, in ascending order.
+        """
+        is_asked = np.zeros(len(self._counts), bool)
+        is_asked[which] = True
+        rows = np.flatnonzero(is_asked[self._pair])
+        first, second = frames.take(self._first_frame[rows], axis=1), frames.take(self._second_frame[rows], axis=1)
+        way = np.einsum("kpij,pj->kpi", second[..., :3, :3], self._direction[rows])
+        local = np.full((len(rows), len(frames), 4), -1.0)
+        local[..., :3] = np.einsum("kpij,kpi->pkj", first[..., :3, :3], way)
+        nearest = (local @ self._first[rows].transpose(0, 2, 1)).min(axis=2).T  # of the first shape along the direction
+        shift = np.einsum("kpi,kpi->kp", way, first[..., :3, 3] - second[..., :3, 3])
+        gaps = nearest + shift - (self._edge[rows] + ROUNDING_M)
+        starts = np.cumsum(self._counts[which]) - self._counts[which]
+        bounds: np.ndarray = np.minimum.reduceat(gaps, starts, axis=1)
+        return bounds
+
+
+def _balls(solids: Sequence[Solid], size: int = 1) -> np.ndarray:
+    """Returns the balls of p solids, as many of each: p x v x 4."""
+    size = max([size, *(len(solid.balls) for solid in solids)])
+    balls = [np.pad(solid.balls, ((0, size - len(solid.balls)), (0, 0)), "edge") for solid in solids]
+    return np.array(balls).reshape(-1, size, 4)
+
+
+def _extent(balls: np.ndarray, ways: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns from where to where p x v balls go along d unit vectors, each p x d."""
+    along, radius = balls[:, :, :3] @ ways.T, balls[:, :, 3:]
+    return (along - radius).min(axis=1), (along + radius).max(axis=1)
