@@ -53,6 +53,17 @@ def test_a_joint_does_not_go_past_a_target_that_stops(tmp_path):
     assert worst_shares([(0.0, 0.0), *commands], LIMITS, PERIOD_S)["velocity"] > 0.7, "it went as fast as it may"
 
 
+@pytest.mark.parametrize(("measured", "begin"), [(0.01, 0.0), (0.2, 0.2)])
+def test_a_motion_begins_at_the_last_command_or_where_the_robot_was_moved_to(tmp_path, measured, begin):
+    guard = guard_of(slider(tmp_path), shape={}, start_from="measured")
+    assert decide(guard, (0.0, 0.0), measured={"slide": 0.0, "turn": 0.0}).command == (0.0, 0.0)
+    guard.halt()
+    guard.start()
+    target, there = (measured + 0.02, 0.0), {"slide": measured, "turn": 0.0}
+    commands = [(begin, 0.0), *(decide(guard, target, measured=there).command for _ in range(100))]
+    assert worst_shares(commands, LIMITS, PERIOD_S)["jerk"] <= 1.0 + 1e-6 and commands[-1] == target
+
+
 @pytest.mark.parametrize(
     ("target", "check"),
     [((0.3, 1.9), "joint_velocity"), ((float("nan"), 1.9), "input"), ((0.0, 2.01), "joint_position")],

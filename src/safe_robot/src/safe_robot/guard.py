@@ -213,10 +213,16 @@ class Guard:
         for check in self.checks:
             if violation := check.check(slow, situation):
                 return violation
-        self._state = State.at_rest(position)
+        self._state = State.at_rest(position if self._shaper is None else self._begin(there))
         self._stop = self._state.position[None]
         self._is_first = False
         return None
+
+    def _begin(self, there: np.ndarray) -> np.ndarray:
+        """Returns from where a smoothed motion begins: the last command, unless the robot has been moved away."""
+        if self._state is None or (np.abs(self._state.position - there) > self.config.start_tolerance).any():
+            return there
+        return self._state.position
 
     def _whereabouts(self, target: np.ndarray, situation: Situation) -> np.ndarray | None:
         if all(name in situation.measured for name in self.joint_names):
