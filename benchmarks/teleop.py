@@ -31,6 +31,8 @@ REFUSING = {"period_s": 0.009, "start_from": "target", "limits": {"acceleration"
 REFUSING |= {"start_tolerance": 10.0}  # it is started again wherever the target is
 TARGETS = {True: "/guarded/joint_states/target", False: "/rpbi/kuka_lwr/joint_states/target"}
 """Where inverse kinematics publishes, with and without guards."""
+LATE = ("staleness", "source", "master", "command_rate", "command_timeout")
+"""How reasons begin that tell of the machine, not of the motion."""
 ROW = "{:<9} {:>4}  {:<5} {:>7} {:>7}  {}"
 HEADING = ROW.format("device", "seed", "guard", "time", "targets", "stopped by")
 
@@ -49,12 +51,17 @@ def run(quick: bool) -> list[Result]:
             smooth += stops_at(recorded, shape={})
     control = [teleoperate(device, 0, min(seconds, CONTROL_SECONDS), False)[0] for device in DEVICES]
     minutes = sum(found["seconds"] for found in runs) / 60.0
-    decisions, unsafe = (sum(map(count, runs)) for count in (_decisions, _unsafe))
+    decisions = sum(found["decisions"] for found in runs)
+    reasons = [reason for found in runs for reason in (*found["unsafe"], found["reflex"]) if reason]
+    late = sum(reason.startswith(LATE) for reason in reasons)
+    unsafe = sum(not reason.startswith(LATE) for found in runs for reason in found["unsafe"])
+    stops = sum(bool(found["reflex"]) and not found["reflex"].startswith(LATE) for found in runs)
     peaks = {each: max(found[f"peak_{each}"] for found in runs) for each in ("velocity", "acceleration", "jerk")}
     reflexes = sum(bool(found["reflex"]) for found in control)
     return [
         Result("teleop", f"decisions not safe, in {minutes:.0f} min", 100 * unsafe / decisions, "%", None, Target(0.1)),
-        Result("teleop", "reflexes of the stand-in", sum(bool(found["reflex"]) for found in runs), "", None, Target(0)),
+        Result("teleop", "reflexes of the stand-in at motions", stops, "", None, Target(0)),
+        Result("teleop", "stops since the machine was too busy", late, ""),
         *(Result("teleop", f"largest {name}, share of the driver's limit", each, "") for name, each in peaks.items()),
         Result("teleop", "guard `reject`: targets that halt it", 100 * rough / targets, "%"),
         Result("teleop", "guard `reject` with `shape`", 100 * smooth / targets, "%", None, Target(0.1)),
@@ -103,11 +110,3 @@ def stops_at(targets: np.ndarray, **options: Any) -> int:
             guard.start()
         stops += guard.decide(target, Situation()).is_halted
     return stops
-
-
-def _decisions(found: dict[str, Any]) -> int:
-    return int(found["decisions"])
-
-
-def _unsafe(found: dict[str, Any]) -> int:
-    return len(found["unsafe"])
