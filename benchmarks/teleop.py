@@ -31,8 +31,8 @@ REFUSING = {"period_s": 0.009, "start_from": "target", "limits": {"acceleration"
 REFUSING |= {"start_tolerance": 10.0}  # it is started again wherever the target is
 TARGETS = {True: "/guarded/joint_states/target", False: "/rpbi/kuka_lwr/joint_states/target"}
 """Where inverse kinematics publishes, with and without guards."""
-LATE = ("staleness", "source", "master", "command_rate", "command_timeout")
-"""How reasons begin that tell of the machine, not of the motion."""
+LATE = ("staleness", "source", "master", "command_rate", "command_timeout", "following_error", "torque")
+"""How reasons begin that depend on how busy the machine is, too; others follow from the commands alone."""
 ROW = "{:<9} {:>4}  {:<5} {:>7} {:>7}  {}"
 HEADING = ROW.format("device", "seed", "guard", "time", "targets", "stopped by")
 
@@ -60,8 +60,8 @@ def run(quick: bool) -> list[Result]:
     reflexes = sum(bool(found["reflex"]) for found in control)
     return [
         Result("teleop", f"decisions not safe, in {minutes:.0f} min", 100 * unsafe / decisions, "%", None, Target(0.1)),
-        Result("teleop", "reflexes of the stand-in at motions", stops, "", None, Target(0)),
-        Result("teleop", "stops since the machine was too busy", late, ""),
+        Result("teleop", "reflexes of the stand-in at commands", stops, "", None, Target(0)),
+        Result("teleop", "stops that depend on how busy the machine is", late, ""),
         *(Result("teleop", f"largest {name}, share of the driver's limit", each, "") for name, each in peaks.items()),
         Result("teleop", "guard `reject`: targets that halt it", 100 * rough / targets, "%"),
         Result("teleop", "guard `reject` with `shape`", 100 * smooth / targets, "%", None, Target(0.1)),

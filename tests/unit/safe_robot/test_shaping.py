@@ -9,6 +9,8 @@ from guarded_arm import HOME, KUKA, LIMITS, PERIOD_S, decide, folding, guard_of,
 from safe_robot.guard import Decision
 from safe_robot.robot import GuardedRobot
 
+QUICK_LIMITS = {"acceleration": 10.0, "jerk": 1000.0}
+SMOOTHING = ({}, {"policy": "limit"}, {"shape": {}})
 SWING = 0.3 * np.array((1.0, 0.5, 0.8, 0.6, 1.2, 0.9, 1.1))
 
 
@@ -32,25 +34,31 @@ def test_targets_that_joints_can_follow_pass_to_the_last_bit():
 
 def test_trembling_targets_are_followed_smoothly_and_without_a_stop():
     targets = list(map(tuple, trembling().tolist()))
-    rough, smooth = guard_of(GuardedRobot(KUKA)), guard_of(GuardedRobot(KUKA), shape={})
-    assert any(decide(rough, target).violation for target in targets), "there was nothing to smooth"
-    decisions = [decide(smooth, target) for target in targets]
+    options = {"limits": QUICK_LIMITS, "checks": {"self_collision": {"active": False}}}
+    guards = [guard_of(GuardedRobot(KUKA), **options, **each) for each in SMOOTHING]
+    rough, limited, decisions = ([decide(guard, target) for target in targets] for guard in guards)
+    assert any(decision.is_halted for decision in rough), "there was nothing to smooth"
     assert not any(decision.violation for decision in decisions)
     commands = np.array([decision.command for decision in decisions])
-    shares = worst_shares(commands, LIMITS, PERIOD_S)
+    shares = worst_shares(commands, {"velocity": 1.92, **QUICK_LIMITS}, PERIOD_S)
     assert max(shares.values()) <= 1.0 + 1e-6, shares
+    followed = np.array([decision.command for decision in limited])
+    assert np.diff(commands, 2, axis=0).std() < 0.5 * np.diff(followed, 2, axis=0).std(), "limits alone tremble on"
     assert np.abs(commands - targets).max() < 0.05
     assert decisions[-1] == Decision(targets[-1]), "at rest it is where it was to be, to the last bit"
     assert any(decision.is_shaped for decision in decisions)
 
 
-def test_a_joint_does_not_go_past_a_target_that_stops(tmp_path):
-    guard = guard_of(slider(tmp_path), shape={"time_s": 0.01, "reach": 2.0})
+@pytest.mark.parametrize("jerk", [LIMITS["jerk"], 1e6])
+def test_a_joint_does_not_go_past_a_target_that_stops(tmp_path, jerk):
+    limits = {**LIMITS, "jerk": jerk}
+    guard = guard_of(slider(tmp_path), limits=limits, shape={"time_s": 0.01, "reach": 2.0})
     decide(guard, (0.0, 0.0))
     commands = [decide(guard, (0.5, -0.4)).command for _ in range(300)]
     assert commands[-1] == (0.5, -0.4)
     assert max(slide for slide, _ in commands) <= 0.5 + 1e-9 and min(turn for _, turn in commands) >= -0.4 - 1e-9
-    assert worst_shares([(0.0, 0.0), *commands], LIMITS, PERIOD_S)["velocity"] > 0.7, "it went as fast as it may"
+    shares = worst_shares([(0.0, 0.0), *commands], limits, PERIOD_S)
+    assert max(shares.values()) <= 1.0 + 1e-6 and shares["velocity"] > 0.7, shares
 
 
 @pytest.mark.parametrize(("measured", "begin"), [(0.01, 0.0), (0.2, 0.2)])
@@ -82,3 +90,11 @@ def test_what_is_smoothed_is_judged(tmp_path):
     assert decisions[1].is_shaped and decisions[1].violation is None
     (refused,) = [decision for decision in decisions if decision.violation]
     assert refused.violation.check == "self_collision" and refused.command is None
+
+
+def test_who_is_too_fast_is_followed_at_the_limit_of_speed(tmp_path):
+    guard = guard_of(slider(tmp_path), shape={})
+    decisions = [decide(guard, (1.2 * (k * PERIOD_S) ** 3, 0.0)) for k in range(60)]
+    assert not any(decision.violation for decision in decisions)
+    speed = np.diff([decision.command[0] for decision in decisions]) / PERIOD_S
+    assert 0.9 < speed.max() <= 0.95
