@@ -17,6 +17,14 @@ def test_the_newest_value_of_a_slot_wins_and_is_taken_once():
     assert dict(mailbox.take()) == {}
 
 
+def test_what_was_taken_from_an_empty_mailbox_stays_empty():
+    mailbox = Mailbox()
+    taken = mailbox.take()
+    mailbox.put("a", 1)
+    assert dict(taken) == {}
+    assert dict(mailbox.take()) == {"a": 1}
+
+
 def test_partial_values_that_wait_are_merged():
     mailbox = Mailbox()
     mailbox.put("target", {1: 0.1, 2: 0.2}, dict.__or__)

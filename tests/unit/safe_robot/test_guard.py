@@ -10,6 +10,7 @@ from guarded_arm import HOME, KUKA, LIMITS, PERIOD_S, decide, folding, guard_of,
 
 from custom_ros_tools.errors import ConfigError
 from safe_robot.check import Check, Situation, Violation
+from safe_robot.guard import Decision
 from safe_robot.robot import GuardedRobot
 
 ROUNDING = 1e-6
@@ -31,7 +32,7 @@ def test_safe_targets_pass_to_the_last_bit(policy):
     guard = guard_of(robot, policy=policy)
     for target in smooth(robot, 3.0, at=HOME):
         decision = decide(guard, target)
-        assert decision == (target, None, False)
+        assert decision == Decision(target)
 
 
 def test_reject_sends_nothing_from_the_first_unsafe_target_on_until_it_is_started(tmp_path):
@@ -41,7 +42,7 @@ def test_reject_sends_nothing_from_the_first_unsafe_target_on_until_it_is_starte
     assert decision.command is None and decision.is_halted
     assert decision.violation == Violation("joint_velocity", "joint 'slide'", pytest.approx(10.0), 0.95, "m/s")
     assert str(decision.violation) == "joint_velocity: joint 'slide' would have 10 m/s; the limit is 0.95"
-    assert decide(guard, (0.0, 0.0)) == (None, None, True)
+    assert decide(guard, (0.0, 0.0)) == Decision(None, is_halted=True)
     guard.start()
     assert decide(guard, (0.0, 0.0)).command == (0.0, 0.0)
 

@@ -4,9 +4,10 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from custom_ros_tools.schema import ConfigModel, ListOf, NonNegative, Seconds, Switch, Text
+from custom_ros_tools.schema import ConfigModel, ListOf, NonNegative, Seconds, Switch, Text, optional
 
 from .limits import LimitsConfig
+from .shaping import ShapingConfig
 
 
 class GuardConfig(ConfigModel):
@@ -24,6 +25,9 @@ class GuardConfig(ConfigModel):
     )
     joint_names: ListOf[Text] = Field((), description="The joints that are guarded; by default all of the robot.")
     limits: LimitsConfig = Field(LimitsConfig(), description="Limits of the joints.")
+    shape: ShapingConfig | None = optional(
+        "How targets that joints cannot follow are smoothed, before they are judged; without it they are not."
+    )
     start_from: Literal["measured", "target"] = Field(
         "measured", description="Where the robot is before the first command: as measured, or as the first target says."
     )
@@ -38,6 +42,10 @@ class NodeConfig(ConfigModel):
 
     publish_as_joint_state: Switch = Field(
         True, description="Whether commands are joint states; else bare numbers in the order of the joints."
+    )
+    targets_are_states: Switch = Field(
+        False,
+        description="Whether targets are joint states that are measured; only the positions of guarded joints count.",
     )
     silence_s: Seconds = Field(
         0.02,

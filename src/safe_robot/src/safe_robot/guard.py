@@ -15,6 +15,7 @@ from .lookup import make_checks
 from .motion import Motion, State
 from .pursuit import Ends, can_keep_bounds, pursue, within_bounds
 from .robot import GuardedRobot
+from .shaping import Shaper
 
 log = logging.getLogger(__name__)
 
@@ -22,6 +23,8 @@ SHARES = (1.0, 0.5, 0.2)
 """How much of the way from braking to what is wanted is tried."""
 SLOW_S = 1e6
 """How long the way from where the robot is to the first target is taken to last [s]: it is not judged by speed."""
+MENDED = ("joint_velocity", "joint_acceleration", "joint_jerk", "joint_position", "braking")
+"""What braking for a period may mend where a smoothed command, whose steps are finite, just misses it."""
 MEASURED = "measured positions"
 """What a start waits for."""
 
@@ -33,11 +36,13 @@ class Decision(NamedTuple):
         command: n positions to be commanded [rad or m]; the target's own ones if it is safe, None: nothing is sent.
         violation: Why the target is not safe; None if it is.
         is_halted: Whether nothing is sent from now on until `Guard.start`.
+        is_shaped: Whether the target was smoothed.
     """
 
     command: tuple[float, ...] | None
     violation: Violation | None = None
     is_halted: bool = False
+    is_shaped: bool = False
 
 
 class _Safe(NamedTuple):
@@ -56,6 +61,8 @@ class Guard:
 
     The reference is what was commanded before, never what is measured. Every command counts as one period, whatever
     stamps say, so that they cannot make the robot faster; that no command follows sooner is up to who sends them.
+
+    With `shape`, what is judged is the command on the way to a target that joints cannot follow.
 
     Args:
         config: What to guard and how.
@@ -80,6 +87,8 @@ class Guard:
         self.limits = JointLimits.of(robot, config.limits, file)
         self.checks: Sequence[Check] = make_checks(config.checks, robot, self.limits, file)
         self._braking = Braking(self.limits.velocity, self.limits.acceleration, self.limits.jerk, config.period_s)
+        shape = (self.limits, self._braking, config.period_s)
+        self._shaper = None if config.shape is None else Shaper(config.shape, *shape)
         self._watches = {check.name for check in self.checks if check.watches}
         self._keeps_bounds = config.policy == "limit" and can_keep_bounds()
         if config.policy == "limit" and not self._keeps_bounds:
@@ -158,10 +167,21 @@ class Guard:
             return self._refused(violation)
         if self._is_first and (violation := self._take_start(target, situation)):
             return Decision(None, violation, violation.subject != MEASURED)
-        found = self._judged(target, situation)
+        assert self._state is not None
+        wanted = target if self._shaper is None else self._shaper.shaped(target, self._state)
+        found = self._judged(wanted, situation)
+        if isinstance(found, Violation) and wanted != target and found.check in MENDED:
+            wanted = tuple(self._next_stop.tolist())
+            found = self._judged(wanted, situation)
         if isinstance(found, Violation):
             return self._instead(target, found, situation)
-        return Decision(self._sent(found))
+        return Decision(self._sent(found), is_shaped=wanted != target)
+
+    @property
+    def _next_stop(self) -> np.ndarray:
+        """The next command of the braking that is known to be safe."""
+        assert self._state is not None
+        return self._stop[0] if len(self._stop) else self._state.position
 
     def _refused(self, violation: Violation) -> Decision:
         if self.config.policy == "reject" or self._is_first:
@@ -193,10 +213,16 @@ class Guard:
         for check in self.checks:
             if violation := check.check(slow, situation):
                 return violation
-        self._state = State.at_rest(position)
+        self._state = State.at_rest(position if self._shaper is None else self._begin(there))
         self._stop = self._state.position[None]
         self._is_first = False
         return None
+
+    def _begin(self, there: np.ndarray) -> np.ndarray:
+        """Returns from where a smoothed motion begins: the last command, unless the robot has been moved away."""
+        if self._state is None or (np.abs(self._state.position - there) > self.config.start_tolerance).any():
+            return there
+        return self._state.position
 
     def _whereabouts(self, target: np.ndarray, situation: Situation) -> np.ndarray | None:
         if all(name in situation.measured for name in self.joint_names):
@@ -235,7 +261,7 @@ class Guard:
         assert self._state is not None
         if self.config.policy == "reject" or violation.check in self._watches:  # no other command mends these
             return self._refused(violation)
-        next_stop = self._stop[0] if len(self._stop) else self._state.position
+        next_stop = self._next_stop
         wanted = self._nearest(target)
         for share in SHARES:
             found = self._judged(tuple((next_stop + share * (wanted - next_stop)).tolist()), situation)

@@ -45,16 +45,24 @@ def can_keep_bounds() -> bool:
     return find_spec("daqp") is not None
 
 
-def pursue(target: np.ndarray, state: State, limits: JointLimits, braking: Braking, period_s: float) -> Pursuit:
+def pursue(
+    target: np.ndarray,
+    state: State,
+    limits: JointLimits,
+    braking: Braking,
+    period_s: float,
+    acceleration: np.ndarray | None = None,
+) -> Pursuit:
     """Returns what comes nearest to n targets, a period later, without any joint having to go past its.
 
-    It keeps the limits of joints; whether the command is safe is for checks to say.
+    It keeps the limits of joints; whether the command is safe is for checks to say. What comes nearest to
+    n accelerations [rad/s^2 or m/s^2], if they are given, takes the place of what comes nearest to the targets.
     """
     target = np.clip(target, limits.lower, limits.upper)
-    exact = ((target - state.position) / period_s - state.velocity) / period_s
-    jerk, acceleration, speed = (INSIDE * each for each in (limits.jerk, limits.acceleration, limits.velocity))
-    low = np.maximum(-acceleration, state.acceleration - jerk * period_s)
-    high = np.minimum(acceleration, state.acceleration + jerk * period_s)
+    exact = state.then(target, period_s).acceleration if acceleration is None else acceleration
+    jerk, hardest, speed = (INSIDE * each for each in (limits.jerk, limits.acceleration, limits.velocity))
+    low = np.maximum(-hardest, state.acceleration - jerk * period_s)
+    high = np.minimum(hardest, state.acceleration + jerk * period_s)
     low = np.maximum((-speed - state.velocity) / period_s, low)
     high = np.minimum((speed - state.velocity) / period_s, high)
     low, high = np.where(np.isfinite(low), low, exact), np.where(np.isfinite(high), high, exact)
@@ -65,9 +73,9 @@ def pursue(target: np.ndarray, state: State, limits: JointLimits, braking: Braki
     joints = np.arange(len(target))
     for width in (1.0, 1.0 / STEPS):
         shares = np.minimum(at + width * (np.arange(STEPS + 1.0) / STEPS)[:, None], 1.0)
-        acceleration = slowest + shares * (fastest - slowest)
-        velocity = state.velocity + period_s * acceleration
-        way_on, fastest_on = braking.ends(velocity, acceleration)
+        tried = slowest + shares * (fastest - slowest)
+        velocity = state.velocity + period_s * tried
+        way_on, fastest_on = braking.ends(velocity, tried)
         end = state.position + period_s * velocity + way_on
         stays = (way * (end - target) <= ROUNDING) & (fastest_on <= speed)
         last = np.where(stays.any(axis=0), STEPS - stays[::-1].argmax(axis=0), 0)

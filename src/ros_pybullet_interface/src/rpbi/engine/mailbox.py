@@ -4,9 +4,11 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 T = TypeVar("T")
+NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class ClosedError(RuntimeError):
@@ -45,7 +47,7 @@ class Mailbox:
     def take(self) -> Mapping[str, Any]:
         """Empties all slots and returns what was in them, by slot name."""
         if not self._slots:  # the usual case, and the one that must cost nothing
-            return self._slots
+            return NOTHING  # not the slots themselves: other threads may put something there while the caller reads
         with self._lock:
             taken, self._slots = self._slots, {}
         return taken

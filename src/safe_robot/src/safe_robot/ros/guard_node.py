@@ -45,6 +45,7 @@ class GuardNode:
     def __init__(self) -> None:
         self._guard, config = guard_of_parameters()
         self._as_joint_state = config.publish_as_joint_state
+        self._targets_are_states = config.targets_are_states
         self._silence_s = config.silence_s
         self._around = None if config.base_frame is None else LiveObstacles(config.base_frame, config.left_out)
         self._warn = ThrottledWarning()
@@ -62,8 +63,9 @@ class GuardNode:
         self._status = rospy.Publisher("robot_safety/status", Status, queue_size=QUEUE_SIZE, latch=True)
         self._violation = rospy.Publisher("robot_safety/violation", ViolationMessage, queue_size=QUEUE_SIZE, latch=True)
         self._guard.start()
-        # what limits can skip targets that are late; a skipped one would make the next a jump, which `reject` halts at
-        size = 1 if self._guard.config.policy == "limit" else QUEUE_SIZE
+        # what limits or shapes can skip late targets; a skipped one makes the next a jump, at which `reject` halts
+        can_skip = self._guard.config.policy == "limit" or self._guard.config.shape
+        size = 1 if can_skip else QUEUE_SIZE
         self._queue = TargetQueue(self._guard.config.period_s, self._silence_s, size, self._take, self._end_wait)
         GuardMarkers(self._guard, self._queue.lock, config.base_frame or self._guard.robot.document.root_link())
         self._master = MasterConnection(self._lose_master)
@@ -77,6 +79,9 @@ class GuardNode:
 
     def _receive(self, message: JointState) -> None:
         stamp = message.header.stamp
+        if self._targets_are_states:
+            guarded = [each for each in zip(message.name, message.position) if each[0] in self._guard.joint_names]
+            message = JointState(message.header, [name for name, _ in guarded], [q for _, q in guarded], [], [])
         self._queue.put(message, (_now() - stamp).to_sec() if stamp else 0.0)
 
     def _take(self, message: JointState) -> bool:
@@ -167,7 +172,7 @@ class GuardNode:
         self._sent_s = time.monotonic()
         if not self._as_joint_state:
             self._command.publish(Float64MultiArray(data=decision.command))
-        elif decision.violation is None:
+        elif decision.violation is None and not decision.is_shaped:
             self._command.publish(message)  # to the last bit as it came
         else:
             names = self._guard.joint_names

@@ -1,0 +1,87 @@
+"""Rough targets become a motion within the limits of joints, before they are judged."""
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel, Positive, Seconds, Unit
+
+from .braking import Braking
+from .limits import JointLimits
+from .motion import State
+from .pursuit import pursue
+
+CAUGHT_UP = 0.05
+"""A joint has caught up with its target when going there takes at most this share of its acceleration and jerk."""
+
+
+class ShapingConfig(ConfigModel):
+    """How targets are smoothed that joints cannot follow."""
+
+    time_s: Seconds = Field(0.03, description="Time constant: smoothed commands are about twice as far behind.")
+    reach: Annotated[Positive, Unit("rad or m")] = Field(
+        0.25, description="How far from the last command a target may be; one further away is a jump, and not smoothed."
+    )
+
+
+class Shaper:
+    """Follows the targets of n joints within their limits of velocity, acceleration and jerk.
+
+    Targets within these limits are commands, to the last bit. From one on that is not, each command follows the
+    targets as a critically damped filter of second order does, as far as limits allow and no joint has to go past its
+    target, until all joints have caught up. So targets that tremble do not make the robot tremble.
+
+    Args:
+        config: How it smooths.
+        limits: Limits of the joints.
+        braking: How they come to rest.
+        period_s: Time between two commands [s].
+    """
+
+    def __init__(self, config: ShapingConfig, limits: JointLimits, braking: Braking, period_s: float) -> None:
+        self._reach, self._rate = config.reach, 1.0 / config.time_s
+        self._limits, self._braking, self._period_s = limits, braking, period_s
+        self._is_behind = False
+
+    def shaped(self, target: tuple[float, ...], state: State) -> tuple[float, ...]:
+        """Returns what comes after a state on the way to n positions [rad or m].
+
+        Positions that can be commanded are returned themselves, and so are those that are a jump or outside limits.
+        """
+        position = np.array(target)
+        limits = self._limits
+        is_near = np.abs(position - state.position) <= self._reach
+        if not (is_near & (position >= limits.lower) & (position <= limits.upper)).all():
+            return target
+        if self._can_be(position, state):
+            self._is_behind = False
+            return target
+        self._is_behind = True
+        acceleration = self._smooth(position, state)
+        wanted = pursue(position, state, self._limits, self._braking, self._period_s, acceleration).wanted
+        return tuple(wanted.tolist())
+
+    def _can_be(self, position: np.ndarray, state: State) -> bool:
+        """Returns whether joints may be commanded to positions: they can stop from there, and have caught up."""
+        limits, share = self._limits, CAUGHT_UP if self._is_behind else 1.0
+        after = state.then(position, self._period_s)
+        jerk = (after.acceleration - state.acceleration) / self._period_s
+        way, fastest = self._braking.ends(after.velocity[None], after.acceleration[None])
+        end = position + way[0]  # NaN, which is within nothing, where there is no braking
+        return bool(
+            (
+                (fastest[0] <= limits.velocity)
+                & (np.abs(after.acceleration) <= share * limits.acceleration)
+                & (np.abs(jerk) <= share * limits.jerk)
+                & (end >= limits.lower)
+                & (end <= limits.upper)
+            ).all()
+        )
+
+    def _smooth(self, position: np.ndarray, state: State) -> np.ndarray:
+        """Returns n accelerations [rad/s^2 or m/s^2] of the filter, by the implicit Euler method."""
+        rate, period_s = self._rate, self._period_s
+        way = position - state.position - period_s * state.velocity
+        acceleration: np.ndarray = (rate * rate * way - 2.0 * rate * state.velocity) / (1.0 + rate * period_s) ** 2
+        return acceleration
