@@ -110,7 +110,7 @@ class Check(ABC):
         What is not a number is never safe. A robot that is outside a limit of where it may be, may go further in.
         """
 
-    def bounds(self, end: np.ndarray, spread: np.ndarray) -> Sequence[Bound]:
+    def bounds(self, end: np.ndarray, spread: np.ndarray, before: np.ndarray) -> Sequence[Bound]:
         """Returns what keeps the robot safe near where it would come to rest; only for the policy `limit`.
 
         It helps to find a command that `check` will let pass, and judges nothing. It is called after `check`.
@@ -118,6 +118,7 @@ class Check(ABC):
         Args:
             end: n positions where the robot would come to rest [rad or m].
             spread: How far from there joints may come to rest instead; what is out of their reach may be left out.
+            before: n positions where it is: what is not safe there may not become worse.
         """
         return ()
 

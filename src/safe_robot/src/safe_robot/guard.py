@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,13 +13,17 @@ from .config import GuardConfig
 from .limits import JointLimits
 from .lookup import make_checks
 from .motion import Motion, State
-from .pursuit import Ends, can_keep_bounds, pursue, within_bounds
+from .pursuit import Bound, Detour, Stop, can_keep_bounds, pursue
 from .robot import GuardedRobot
 
 log = logging.getLogger(__name__)
 
-SHARES = (1.0, 0.5, 0.2)
+SHARES = (0.5, 0.2)
 """How much of the way from braking to what is wanted is tried."""
+DETOURS = 4
+"""So many commands are tried that keep bounds, each with those that the one before did not keep."""
+OVER = 0.5, 1e-8
+"""Where a bound was not kept, it is asked for more: by a share of what is missing, and by so much."""
 SLOW_S = 1e6
 """How long the way from where the robot is to the first target is taken to last [s]: it is not judged by speed."""
 MEASURED = "measured positions"
@@ -235,31 +239,49 @@ class Guard:
         assert self._state is not None
         if self.config.policy == "reject" or violation.check in self._watches:  # no other command mends these
             return self._refused(violation)
-        next_stop = self._stop[0] if len(self._stop) else self._state.position
-        wanted = self._nearest(target)
-        for share in SHARES:
-            found = self._judged(tuple((next_stop + share * (wanted - next_stop)).tolist()), situation)
+        for wanted in self._nearest(target):
+            found = self._judged(tuple(wanted.tolist()), situation)
             if not isinstance(found, Violation):
                 return Decision(self._sent(found), violation)
         return Decision(self._brake_on(), violation)
 
-    def _nearest(self, target: tuple[float, ...]) -> np.ndarray:
-        """Returns the command that is nearest to what the joints alone can do, and which checks may let pass."""
+    def _nearest(self, target: tuple[float, ...]) -> Iterator[np.ndarray]:
+        """Yields commands that are near to what the joints alone can do, and which checks may let pass, the best first."""
         assert self._state is not None
         state, period_s = self._state, self.config.period_s
+        next_stop = self._stop[0] if len(self._stop) else state.position
         wanted, slowest = pursue(np.array(target), state, self.limits, self._braking, period_s)
-        if not self._keeps_bounds:
-            return wanted
-        there = self._stop[-1] if len(self._stop) else state.position
-        ends = Ends(wanted, state, self._braking, period_s)
-        spread = np.abs(ends.of(wanted) - there)
-        bounds = [bound for check in self.checks for bound in check.bounds(there, spread)]
-        if not bounds:
-            return wanted
-        other = np.where(self._may_rest(ends.of(slowest)), slowest, self._stop[0] if len(self._stop) else there)
-        least, most = np.minimum(wanted, other), np.maximum(wanted, other)
-        found = within_bounds(wanted, least, most, bounds, ends, there)
-        return wanted if found is None else found
+        if self._keeps_bounds:
+            there = self._stop[-1] if len(self._stop) else state.position
+            stop = Stop(wanted, state, self._braking, period_s)
+            detour = Detour(wanted, np.where(self._may_rest(stop.of(slowest)[-1]), slowest, next_stop))
+            spread = np.abs(stop.of(wanted)[-1] - there)
+            detour.add(self._bounds(there, spread), there, stop, -1)
+            for _ in range(DETOURS):
+                found = detour.command()
+                if found is None:
+                    break
+                yield found
+                wanted, stop = found, Stop(found, state, self._braking, period_s)
+                is_bad = False
+                for moment, at in enumerate(stop.of(found)):
+                    bounds = [
+                        Bound(gradient, (1.0 + OVER[0]) * room - OVER[1])
+                        for gradient, room in self._bounds(at, 0.0 * spread)
+                        if room < 0.0
+                    ]
+                    detour.add(bounds, at, stop, moment)
+                    is_bad |= bool(bounds)
+                if not is_bad:
+                    break
+        else:
+            yield wanted
+        for share in SHARES:
+            yield next_stop + share * (wanted - next_stop)
+
+    def _bounds(self, end: np.ndarray, spread: np.ndarray) -> list[Bound]:
+        assert self._state is not None
+        return [bound for check in self.checks for bound in check.bounds(end, spread, self._state.position)]
 
     def _may_rest(self, end: np.ndarray) -> np.ndarray:
         return (end >= self.limits.lower) & (end <= self.limits.upper)

@@ -73,9 +73,9 @@ class Environment(Check):
         subject = f"link '{link}' and '{self._obstacles[int(number)].name}'"
         return Violation(self.name, subject, found.distance, margin_m, unit, found.is_while_braking)
 
-    def bounds(self, end: np.ndarray, spread: np.ndarray) -> list[Bound]:
+    def bounds(self, end: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
         """See `Check`."""
-        return self.proximity.bounds(end, spread)
+        return self.proximity.bounds(end, spread, before)
 
     def _take(self, live: tuple[Obstacle, ...]) -> None:
         """Puts obstacles where they are; what has not moved is not looked at anew."""

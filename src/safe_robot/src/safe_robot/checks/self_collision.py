@@ -52,9 +52,9 @@ class SelfCollision(Check):
         subject, margin_m = "links '{}' and '{}'".format(*found.pair), self.config.margin_m
         return Violation(self.name, subject, found.distance, margin_m, "m of distance", found.is_while_braking)
 
-    def bounds(self, end: np.ndarray, spread: np.ndarray) -> list[Bound]:
+    def bounds(self, end: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
         """See `Check`."""
-        return self.proximity.bounds(end, spread)
+        return self.proximity.bounds(end, spread, before)
 
     def _pairs(self) -> list[tuple[str, str]]:
         path = self.config.pairs_file

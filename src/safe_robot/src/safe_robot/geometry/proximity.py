@@ -117,7 +117,7 @@ class Proximity:
         self._distances.place(motion.position[row])
         return distance >= before - ROUNDING_M
 
-    def bounds(self, end: np.ndarray, spread: np.ndarray) -> list[Bound]:
+    def bounds(self, end: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
         """Returns what keeps pairs apart near a configuration, see `Check.bounds`."""
         if not len(self._pairs):
             return []
@@ -131,8 +131,13 @@ class Proximity:
             within_m = self._margin_m + KEPT_M + float(spread @ self._reach[i])
             contact = self._distances.contact(self._pairs[i], within_m)
             if contact is not None:
-                room = max(contact.distance - self._margin_m - KEPT_M, 0.0)
-                bounds.append(Bound(self._distances.gradient(self._pairs[i], contact, end), room))
+                gradient = self._distances.gradient(self._pairs[i], contact, end)
+                room = contact.distance - self._margin_m - KEPT_M
+                if room < 0.0:
+                    self._distances.place(before)
+                    room = max(room, contact.distance - self._distances.distance(self._pairs[i], FAR_M))
+                    self._distances.place(end)
+                bounds.append(Bound(gradient, room))
         return bounds
 
     def contacts(self, q: np.ndarray, within_m: float) -> Iterator[tuple[Pair, Contact]]:
