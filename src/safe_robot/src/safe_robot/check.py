@@ -50,6 +50,26 @@ class Violation(NamedTuple):
         return f"{self.check}: {self.subject} would have {value}; the limit is {self.limit:.6g}"
 
 
+class Inside(NamedTuple):
+    """Two things that are nearer to each other than their margin.
+
+    Attributes:
+        check: Name of the check.
+        pair: Which they are, in the check's own terms.
+        subject: Which they are, for messages.
+        distance_m: How near [m].
+        margin_m: How near they may be [m].
+        gradient: How fast they go apart as each of n joints moves [m/rad or 1].
+    """
+
+    check: str
+    pair: tuple[str, str | int]
+    subject: str
+    distance_m: float
+    margin_m: float
+    gradient: np.ndarray
+
+
 class Situation(NamedTuple):
     """What a target is judged by, beside the motion.
 
@@ -120,6 +140,10 @@ class Check(ABC):
             spread: How far from there joints may come to rest instead; what is out of their reach may be left out.
             before: n positions where it is: what is not safe there may not become worse.
         """
+        return ()
+
+    def inside(self, q: np.ndarray) -> Sequence[Inside]:
+        """Returns what is nearer than its margin in a configuration of n positions; it is called after `check`."""
         return ()
 
     def first_above(self, values: np.ndarray, limit: np.ndarray, unit: tuple[str, str]) -> Violation | None:

@@ -8,13 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from .braking import Braking
-from .check import Check, Situation, Violation
+from .check import Check, Inside, Situation, Violation
 from .config import GuardConfig
 from .limits import JointLimits
 from .lookup import make_checks
 from .motion import Motion, State
 from .pursuit import Bound, Detour, Stop, can_keep_bounds, pursue
 from .robot import GuardedRobot
+from .way_out import WayOut, find_way_out
 
 log = logging.getLogger(__name__)
 
@@ -107,6 +108,12 @@ class Guard:
     def stop_commands(self) -> np.ndarray:
         """The commands that bring the robot to rest from now on, k x n [rad or m], as they were found safe."""
         return self._stop.copy()
+
+    def way_out(self) -> WayOut | None:
+        """Returns how the robot, where it was commanded to last, leaves the margins that it is in; None if in none."""
+        if self._state is None or self._is_first:
+            return None
+        return find_way_out(self._state.position, self.limits, self._inside)
 
     def start(self) -> None:
         """Lets targets pass again; the first one has to be near where the robot is."""
@@ -278,6 +285,9 @@ class Guard:
             yield wanted
         for share in SHARES:
             yield next_stop + share * (wanted - next_stop)
+
+    def _inside(self, q: np.ndarray) -> list[Inside]:
+        return [each for check in self.checks for each in check.inside(q)]
 
     def _bounds(self, end: np.ndarray, spread: np.ndarray) -> list[Bound]:
         assert self._state is not None
