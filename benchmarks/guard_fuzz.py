@@ -257,7 +257,7 @@ class Leaving(NamedTuple):
     Attributes:
         straight: States with a straight way on which no pair that is inside its margin comes nearer, and none comes in.
         curved: States without, which the robot left by the ways that the guard told of, or along what is in the way.
-        locked: States without, from where these ways led to where the guard says that there is none, and the oracle, too.
+        locked: States from where these ways led to where the guard says that there is none, and so does the oracle.
         stuck: What should not be, in words.
         slowest: The least share of the speed that the robot has without things around it, on straight ways.
     """
@@ -305,6 +305,8 @@ def leave_margin(guard: Guard, free: Guard, oracle: Oracle, count: int, generato
         else:
             stuck.append(f"{q} to {commands[-1]}: {fault or 'stood'}")
     return Leaving(straight, curved, locked, stuck, slowest)
+
+
 def _drive(guard: Guard, start: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Returns what is commanded when a robot that stands is sent to a target, from the first command to the last."""
     guard.halt()
@@ -426,8 +428,8 @@ def main() -> int:
     guard, free = guard_of(str(path), "limit"), guard_of(str(path), "limit", around=False)
     left = leave_margin(guard, free, oracle, options.states, np.random.default_rng(options.seed))
     print(
-        f"{options.states} states inside the margin: {left.straight} left it on straight ways, at {left.slowest:.1%} of the"
-        f" speed or more, {left.curved} on others; {left.locked} are locked; {len(left.stuck)} stuck",
+        f"{options.states} states inside the margin: {left.straight} left it on straight ways, at {left.slowest:.1%} of"
+        f" the speed or more, {left.curved} on others; {left.locked} are locked; {len(left.stuck)} stuck",
         *left.stuck[:20],
         sep="\n",
     )

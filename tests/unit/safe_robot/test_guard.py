@@ -203,7 +203,8 @@ class TestInsideTheMargin:
         out = guard.way_out()
         assert out.direction[1] == pytest.approx(-1.0) and not out.is_locked
         assert re.fullmatch(
-            r"inside the margin of self_collision \(links 'base' and 'lower': [\d.]+ of 100.0 mm\): .*elbow -1.00 leads away",
+            r"inside the margin of self_collision \(links 'base' and 'lower': [\d.]+ of 100.0 mm\): "
+            r".*elbow -1.00 leads away",
             out.words(guard.joint_names),
         )
         for _ in range(100):

@@ -21,10 +21,10 @@ log = logging.getLogger(__name__)
 
 SHARES = (0.5, 0.2)
 """How much of the way from braking to what is wanted is tried."""
-DETOURS = 4
-"""So many commands are tried that keep bounds, each with those that the one before did not keep."""
-OVER = 0.5, 1e-8
-"""Where a bound was not kept, it is asked for more: by a share of what is missing, and by so much."""
+DETOURS = 3
+"""So often bounds that a command does not keep are added, and another one is tried."""
+OVER, OVER_M = 0.5, 1e-8
+"""Where a bound was not kept, it is asked for more: by this share of what is missing, and by so much."""
 SLOW_S = 1e6
 """How long the way from where the robot is to the first target is taken to last [s]: it is not judged by speed."""
 MEASURED = "measured positions"
@@ -253,38 +253,45 @@ class Guard:
         return Decision(self._brake_on(), violation)
 
     def _nearest(self, target: tuple[float, ...]) -> Iterator[np.ndarray]:
-        """Yields commands that are near to what the joints alone can do, and which checks may let pass, the best first."""
+        """Yields commands near to what the joints alone can do, and which checks may let pass, the best ones first."""
         assert self._state is not None
         state, period_s = self._state, self.config.period_s
         next_stop = self._stop[0] if len(self._stop) else state.position
-        wanted, slowest = pursue(np.array(target), state, self.limits, self._braking, period_s)
-        if self._keeps_bounds:
-            there = self._stop[-1] if len(self._stop) else state.position
-            stop = Stop(wanted, state, self._braking, period_s)
-            detour = Detour(wanted, np.where(self._may_rest(stop.of(slowest)[-1]), slowest, next_stop))
-            spread = np.abs(stop.of(wanted)[-1] - there)
-            detour.add(self._bounds(there, spread), there, stop, -1)
-            for _ in range(DETOURS):
-                found = detour.command()
-                if found is None:
-                    break
-                yield found
-                wanted, stop = found, Stop(found, state, self._braking, period_s)
-                is_bad = False
-                for moment, at in enumerate(stop.of(found)):
-                    bounds = [
-                        Bound(gradient, (1.0 + OVER[0]) * room - OVER[1])
-                        for gradient, room in self._bounds(at, 0.0 * spread)
-                        if room < 0.0
-                    ]
-                    detour.add(bounds, at, stop, moment)
-                    is_bad |= bool(bounds)
-                if not is_bad:
-                    break
-        else:
-            yield wanted
+        best, slowest = pursue(np.array(target), state, self.limits, self._braking, period_s)
+        for wanted in self._detours(best, slowest, next_stop) if self._keeps_bounds else [best]:
+            best = wanted
+            yield best
         for share in SHARES:
-            yield next_stop + share * (wanted - next_stop)
+            yield next_stop + share * (best - next_stop)
+
+    def _detours(self, wanted: np.ndarray, slowest: np.ndarray, next_stop: np.ndarray) -> Iterator[np.ndarray]:
+        """Yields the command nearest to one that is wanted with which bounds are kept, and each time a better one."""
+        assert self._state is not None
+        state, period_s = self._state, self.config.period_s
+        there = self._stop[-1] if len(self._stop) else state.position
+        stop = Stop(wanted, state, self._braking, period_s)
+        spread = np.abs(stop.of(wanted)[-1] - there)
+        detour = Detour(wanted, np.where(self._may_rest(stop.of(slowest)[-1]), slowest, next_stop))
+        detour.add(self._bounds(there, spread), there, stop, -1)
+        found = detour.command()
+        yield wanted if found is None else found
+        for _ in range(DETOURS):
+            if found is None or not self._add_missed(detour, found):
+                return
+            found = detour.command()
+            if found is not None:
+                yield found
+
+    def _add_missed(self, detour: Detour, command: np.ndarray) -> bool:
+        """Adds the bounds that are not kept on the way to rest after a command; returns whether there are any."""
+        assert self._state is not None
+        stop, is_missed = Stop(command, self._state, self._braking, self.config.period_s), False
+        for moment, at in enumerate(stop.of(command)):
+            missed = [bound for bound in self._bounds(at, np.zeros_like(at)) if bound.room < 0.0]
+            more = [Bound(gradient, (1.0 + OVER) * room - OVER_M) for gradient, room in missed]
+            detour.add(more, at, stop, moment)
+            is_missed |= bool(missed)
+        return is_missed
 
     def _inside(self, q: np.ndarray) -> list[Inside]:
         return [each for check in self.checks for each in check.inside(q)]

@@ -79,7 +79,7 @@ def pursue(target: np.ndarray, state: State, limits: JointLimits, braking: Braki
 
 
 class Stop:
-    """How n joints come to rest after a command: where they are at some moments, which near the command is linear in it.
+    """How n joints come to rest after a command: where they are at some moments, near the command linear in it.
 
     Args:
         command: n positions [rad or m].
@@ -133,7 +133,7 @@ class Detour:
         wanted, n = self._wanted, len(self._wanted)
         if not self._rows:
             return wanted
-        scale = np.maximum(self._most - self._least, 1e-9)  # of joints, so that a quadratic program has ordinary numbers
+        scale = np.maximum(self._most - self._least, 1e-9)  # of joints, so that the program has ordinary numbers
         matrix = np.ascontiguousarray(np.array(self._rows) * scale)
         upper = np.concatenate(((self._most - wanted) / scale, np.full(len(matrix), 1e30)))
         lower = np.concatenate(((self._least - wanted) / scale, -np.array(self._rooms)))

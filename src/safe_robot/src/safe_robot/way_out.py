@@ -40,22 +40,23 @@ class WayOut(NamedTuple):
     def words(self, joint_names: Sequence[str]) -> str:
         """Returns it in a sentence."""
         each = ", ".join(
-            f"{one.check} ({one.subject}: {1e3 * one.distance_m:.1f} of {1e3 * one.margin_m:.1f} mm)" for one in self.inside
+            f"{one.check} ({one.subject}: {1e3 * one.distance_m:.1f} of {1e3 * one.margin_m:.1f} mm)"
+            for one in self.inside
         )
         if self.direction is None:
             return f"locked inside the margin of {each}: no motion takes all of them further apart"
-        way = ", ".join(f"{name} {speed:+.2f}" for name, speed in zip(joint_names, self.direction) if abs(speed) > 0.005)
+        way = ", ".join(
+            f"{name} {speed:+.2f}" for name, speed in zip(joint_names, self.direction) if abs(speed) > 0.005
+        )
         return f"inside the margin of {each}: {way} leads away"
 
 
-def find_way_out(
-    q: np.ndarray, limits: JointLimits, inside: Callable[[np.ndarray], Sequence[Inside]]
-) -> WayOut | None:
+def find_way_out(q: np.ndarray, limits: JointLimits, inside: Callable[[np.ndarray], Sequence[Inside]]) -> WayOut | None:
     """Returns how n joints leave the margins that they are in; None if they are in none.
 
-    It is a linear program: the largest t with `gradient @ direction >= t |gradient|` for all pairs, no joint faster than
-    1, none further out of its limits. If t is at most `SLIGHT` there is no way. Distances have kinks, for instance where
-    another corner becomes the nearest: so the motion is tried, and what comes nearer on it is one more row.
+    It is a linear program: the largest t with `gradient @ direction >= t |gradient|` for all pairs, no joint faster
+    than 1, none further out of its limits. If t is at most `SLIGHT` there is no way. Distances have kinks, for instance
+    where another corner becomes the nearest: so the motion is tried, and what comes nearer on it is one more row.
 
     Args:
         q: n positions.
@@ -80,11 +81,11 @@ def find_way_out(
             break
         direction = found.x[:-1] / np.abs(found.x[:-1]).max()
         gain = KEPT * STEP * found.x[-1]
-        nearer = [
-            one
-            for one in inside(q + STEP * direction)
-            if one.distance_m < before.get((one.check, one.pair), one.margin_m) + gain * float(np.linalg.norm(one.gradient))
-        ]
+        nearer = []
+        for one in inside(q + STEP * direction):
+            expected_m = gain * float(np.linalg.norm(one.gradient))
+            if one.distance_m < before.get((one.check, one.pair), one.margin_m) + expected_m:
+                nearer.append(one)
         if not nearer:
             return WayOut(now, direction)
         gradients += [one.gradient for one in nearer]
