@@ -32,6 +32,8 @@ ROUNDING = 1e-6
 """Relative, of the oracle's differences."""
 NEARER_M = 1e-7
 """Two things that come nearer by no more than this do not, for the oracle [m]."""
+BETWEEN_M = 0.002
+"""What was outside its margin may come into it by so much, since a braking is not tried everywhere [m]."""
 LEG, MOST_LEGS, MOST_COMMANDS = 0.1, 60, 400
 """How far the robot is sent on a way out at once [rad], how often, and how many commands it is given for it."""
 CLEAR = 2.5
@@ -377,10 +379,11 @@ def _distances_on(oracle: Oracle, rows: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _fault(oracle: Oracle, commands: np.ndarray) -> str | None:
-    """Returns by how much a pair that is inside its margin comes nearer than it was at first, None if none does."""
+    """Returns by how much a pair comes nearer than it was at first and than its margin, None if none does."""
     distances = _distances_on(oracle, commands)
-    nearer = float((distances - distances[0]).min())
-    return f"nearer by {1e6 * -nearer:.3g} um" if nearer < -NEARER_M else None
+    nearer = distances[0] - distances
+    is_allowed = nearer <= np.where(distances[0] < MARGIN_M, NEARER_M, BETWEEN_M)
+    return None if is_allowed.all() else f"nearer by {1e6 * nearer[~is_allowed].max():.3g} um"
 
 
 def _is_locked(oracle: Oracle, q: np.ndarray) -> bool:
