@@ -36,7 +36,7 @@ BETWEEN_M = 0.002
 """What was outside its margin may come into it by so much, since a braking is not tried everywhere [m]."""
 LEG, MOST_LEGS, MOST_COMMANDS = 0.1, 60, 400
 """How far the robot is sent on a way out at once [rad], how often, and how many commands it is given for it."""
-CLEAR = 2.5
+CLEAR = 1.5
 AROUND = 16
 """Where the ways that the guard tells of lead nowhere, targets in so many directions are tried."""
 URDF = """<robot name="fuzzed">

@@ -12,7 +12,7 @@ from .limits import JointLimits
 
 STEP = 1e-3
 """A motion counts if things are further apart when the joint that moves most has moved so much [rad or m]."""
-SLIGHT = 0.02
+SLIGHT = 0.05
 """A motion counts if each pair goes apart by at least this share of how fast it can go apart by itself."""
 KEPT = 0.1
 """So much of what is expected of a motion has to come of it."""
