@@ -23,12 +23,22 @@ from safe_robot.config import GuardConfig
 from safe_robot.geometry.obstacles import Obstacle
 from safe_robot.guard import Guard
 from safe_robot.robot import GuardedRobot
+from safe_robot.way_out import SLIGHT, STEP
 
 PERIOD_S = 0.01
 LIMITS = {"velocity": 1.0, "acceleration": 8.0, "jerk": 200.0}
 MARGIN_M = 0.02
 ROUNDING = 1e-6
 """Relative, of the oracle's differences."""
+NEARER_M = 1e-7
+"""Two things that come nearer by no more than this do not, for the oracle [m]."""
+BETWEEN_M = 0.002
+"""What was outside its margin may come into it by so much, since a braking is not tried everywhere [m]."""
+LEG, MOST_LEGS, MOST_COMMANDS = 0.1, 60, 400
+"""How far the robot is sent on a way out at once [rad], how often, and how many commands it is given for it."""
+CLEAR = 1.5
+AROUND = 16
+"""Where the ways that the guard tells of lead nowhere, targets in so many directions are tried."""
 URDF = """<robot name="fuzzed">
   <link name="base"><collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>
   <link name="upper">
@@ -89,18 +99,18 @@ class Oracle:
         """Judges where a command puts the robot; returns how near it is to anything [m]."""
         if not (np.isfinite(q).all() and (q >= LOWER - 1e-12).all() and (q <= UPPER + 1e-12).all()):
             self.faults.append(f"outside the limits of position: {q}")
-        for joint, position in enumerate(q):
-            pybullet.resetJointState(self._robot, joint, position, physicsClientId=self._client)
-        nearest = math.inf
-        for a, b in PAIRS:
-            nearest = min(nearest, self._distance(self._robot, a, b))
-        for box in self._boxes:
-            for link in (0, 1):
-                nearest = min(nearest, self._distance(box, link, -1))
+        nearest = float(self.distances(q).min())
         if nearest <= 0.0:
             self.faults.append(f"in collision: {q}, {nearest:.3g} m")
         self.nearest_m = min(self.nearest_m, nearest)
         return nearest
+
+    def distances(self, q: Sequence[float]) -> np.ndarray:
+        """Returns how far the things of each pair are apart, more than 50 mm as 50 mm [m]."""
+        for joint, position in enumerate(q):
+            pybullet.resetJointState(self._robot, joint, position, physicsClientId=self._client)
+        own = [self._distance(self._robot, a, b) for a, b in PAIRS]
+        return np.array([*own, *(self._distance(box, link, -1) for box in self._boxes for link in (0, 1))])
 
     def _distance(self, other: int, a: int, b: int) -> float:
         points = pybullet.getClosestPoints(
@@ -175,9 +185,13 @@ def adversary(generator: np.random.Generator, count: int, calm: float) -> Genera
                 at = np.where(generator.random(2) < 0.5, LOWER, UPPER) + generator.normal(0.0, 1e-6, 2)
 
 
-def guard_of(urdf: str, policy: str, **limits: float) -> Guard:
-    """Returns a guard of the robot, with all checks of joints and shapes; limits other than `LIMITS` are wrong."""
-    checks: dict[str, Any] = {"environment": {"margin_m": MARGIN_M}, "self_collision": {"margin_m": MARGIN_M}}
+def guard_of(urdf: str, policy: str, around: bool = True, **limits: float) -> Guard:
+    """Returns a guard of the robot, with all checks of joints and, unless `around` is off, of shapes.
+
+    Limits other than `LIMITS` are wrong.
+    """
+    shapes = {"margin_m": MARGIN_M, "active": around}
+    checks: dict[str, Any] = {"environment": shapes, "self_collision": shapes}
     options = {
         "policy": policy,
         "period_s": PERIOD_S,
@@ -239,42 +253,152 @@ def fuzz(guard: Guard, oracle: Oracle, count: int, generator: np.random.Generato
     return Report(count, commands, refused, oracle.worst, oracle.nearest_m, brakings, oracle.faults)
 
 
-def ways_out(guard: Guard, oracle: Oracle, count: int, generator: np.random.Generator) -> tuple[int, int]:
+class Leaving(NamedTuple):
+    """What came of states inside the margin: of how many there was which way out.
+
+    Attributes:
+        straight: States with a straight way on which no pair that is inside its margin comes nearer, and none comes in.
+        curved: States without, which the robot left by the ways that the guard told of, or along what is in the way.
+        locked: States from where these ways led to where the guard says that there is none, and so does the oracle.
+        stuck: What should not be, in words.
+        slowest: The least share of the speed that the robot has without things around it, on straight ways.
+    """
+
+    straight: int
+    curved: int
+    locked: int
+    stuck: list[str]
+    slowest: float
+
+
+def leave_margin(guard: Guard, free: Guard, oracle: Oracle, count: int, generator: np.random.Generator) -> Leaving:
     """Starts in configurations that are nearer to something than the margin, and tries to get away.
 
-    Returns:
-        In how many it was tried, and in how many it did not get away.
+    Straight ways are asked for at once, by a target at their end; on the others, the robot follows `Guard.way_out`.
+
+    Args:
+        guard: A guard of the policy `limit`.
+        free: The same without checks of distances.
+        count: How many configurations.
     """
-    tried = stuck = 0
-    while tried < count:
+    straight = curved = locked = 0
+    stuck, slowest = list[str](), 1.0
+    while straight + curved + locked + len(stuck) < count:
         q = generator.uniform(LOWER, UPPER)
-        nearest, oracle.nearest_m = oracle.place(q), math.inf
-        if not 0.0 < nearest < MARGIN_M or not (way := _way_out(oracle, q)).any():
+        distances = oracle.distances(q)
+        if not 0.0 < distances.min() < MARGIN_M:
             continue
-        tried += 1
-        guard.halt()
-        guard.start()
-        names = guard.joint_names
-        situation = Situation(measured=dict(zip(names, q.tolist())), obstacles=OBSTACLES)
-        decision = guard.decide(tuple(q.tolist()), situation)
-        for share in np.minimum(np.arange(150) / 100.0, 1.0):
-            decision = guard.decide(tuple((q + share * way).tolist()), situation)
-        is_away = decision.command is not None and oracle.place(decision.command) > MARGIN_M
-        stuck += not is_away
-        oracle.faults.clear()
-    return tried, stuck
+        way = _straight_way(oracle, q, generator)
+        if way is not None:
+            commands, speed = (_drive(each, q, q + way) for each in (guard, free))
+            share = float(np.abs(np.diff(commands, axis=0)).max() / np.abs(np.diff(speed, axis=0)).max())
+            slowest = min(slowest, share)
+            fault = _fault(oracle, commands)
+            if fault or not oracle.distances(commands[-1]).min() > MARGIN_M:
+                stuck.append(f"{q} along {way}: {fault or 'stood'}")
+            straight += fault is None and oracle.distances(commands[-1]).min() > MARGIN_M
+            continue
+        commands = _follow(guard, q)
+        fault = _fault(oracle, commands)
+        if fault is None and _gets_out(guard, oracle, commands):
+            curved += 1
+        elif fault is None and (out := guard.way_out()) and out.is_locked and _is_locked(oracle, commands[-1]):
+            locked += 1
+        else:
+            stuck.append(f"{q} to {commands[-1]}: {fault or 'stood'}")
+    return Leaving(straight, curved, locked, stuck, slowest)
 
 
-def _way_out(oracle: Oracle, q: np.ndarray) -> np.ndarray:
-    """Returns a short way on which distances grow until they are more than the margin; zeros if none is found."""
-    for length in (0.05, 0.1, 0.15, 0.2, 0.3):
-        for angle in np.arange(32) * math.pi / 16.0:
-            way = length * np.array((math.cos(angle), math.sin(angle)))
-            if (q + way > LOWER).all() and (q + way < UPPER).all():
-                distances = [oracle.place(q + share * way) for share in np.linspace(0.0, 1.0, 11)]
-                if distances[-1] > 1.1 * MARGIN_M and (np.diff(distances) >= 0.0).all():
-                    return way
-    return np.zeros(2)
+def _drive(guard: Guard, start: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Returns what is commanded when a robot that stands is sent to a target, from the first command to the last."""
+    guard.halt()
+    guard.start()
+    situation = Situation(measured=dict(zip(guard.joint_names, start.tolist())), obstacles=OBSTACLES)
+    guard.decide(tuple(start.tolist()), situation)
+    return np.array([start, *_until_rest(guard, target)])
+
+
+def _until_rest(guard: Guard, target: np.ndarray) -> list[tuple[float, ...]]:
+    situation, commands = Situation(obstacles=OBSTACLES), list[tuple[float, ...]]()
+    for _ in range(MOST_COMMANDS):
+        decision = guard.decide(tuple(target.tolist()), situation)
+        assert decision.command is not None
+        if commands and decision.command == commands[-1]:
+            break
+        commands.append(decision.command)
+    return commands
+
+
+def _follow(guard: Guard, start: np.ndarray) -> np.ndarray:
+    """Returns what is commanded when a robot is sent where the guard says that the way out is."""
+    commands = list(_drive(guard, start, start))
+    for _ in range(MOST_LEGS):
+        out = guard.way_out()
+        if out is None or out.direction is None:
+            break
+        target = np.clip(commands[-1] + LEG * out.direction, LOWER, UPPER)
+        commands += [np.array(command) for command in _until_rest(guard, target)]
+    return np.array(commands)
+
+
+def _gets_out(guard: Guard, oracle: Oracle, commands: np.ndarray) -> bool:
+    """Returns whether the robot got out of the margin, or does so along what is in the way to targets all around."""
+    if oracle.distances(commands[-1]).min() > MARGIN_M:
+        return True
+    for angle in np.arange(AROUND) * 2.0 * math.pi / AROUND:
+        target = np.clip(commands[0] + 0.5 * np.array((math.cos(angle), math.sin(angle))), LOWER, UPPER)
+        others = _drive(guard, commands[0], target)
+        if oracle.distances(others[-1]).min() > MARGIN_M and _fault(oracle, others) is None:
+            return True
+    _drive(guard, commands[-1], commands[-1])
+    return False
+
+
+def _straight_way(oracle: Oracle, q: np.ndarray, generator: np.random.Generator) -> np.ndarray | None:
+    """Returns a straight way out on which no pair that is inside its margin comes nearer, and no other one comes in.
+
+    Of those that are found it is the one that leads away the least at first.
+    """
+    angles = generator.uniform(-math.pi, math.pi, 96)
+    ways = np.repeat((0.1, 0.2, 0.4, 0.8), 24)[:, None] * np.stack((np.cos(angles), np.sin(angles)), axis=1)
+    ways = ways[((q + ways > LOWER) & (q + ways < UPPER)).all(axis=1)]
+    now = _distances_on(oracle, [q])
+    first = _distances_on(oracle, q + 0.002 * ways / np.linalg.norm(ways, axis=1)[:, None]) - now
+    order = np.argsort(first.sum(axis=1))
+    for way in ways[[i for i in order if first[i].min() >= 0.0]]:
+        if oracle.distances(q + way).min() >= 1.1 * MARGIN_M:
+            shares = np.linspace(0.0, 1.0, 1 + math.ceil(np.abs(way).max() / 0.005))
+            if (np.diff(_distances_on(oracle, q + shares[:, None] * way), axis=0) >= 0.0).all():
+                return way
+    return None
+
+
+def _distances_on(oracle: Oracle, rows: Sequence[np.ndarray]) -> np.ndarray:
+    """Returns distances in k configurations, those beyond the margin as the margin [m]."""
+    return np.minimum([oracle.distances(row) for row in rows], MARGIN_M)
+
+
+def _fault(oracle: Oracle, commands: np.ndarray) -> str | None:
+    """Returns by how much a pair comes nearer than it was at first and than its margin, None if none does."""
+    distances = _distances_on(oracle, commands)
+    nearer = distances[0] - distances
+    is_allowed = nearer <= np.where(distances[0] < MARGIN_M, NEARER_M, BETWEEN_M)
+    return None if is_allowed.all() else f"nearer by {1e6 * nearer[~is_allowed].max():.3g} um"
+
+
+def _is_locked(oracle: Oracle, q: np.ndarray) -> bool:
+    """Returns whether a small motion in none of many directions takes all that is inside the margin further apart.
+
+    It is as `safe_robot.way_out` has it: by a share of how fast each can go apart by itself, and nothing else comes in.
+    Since both measure that over a step, the oracle asks for some more.
+    """
+    now = oracle.distances(q)
+    is_inside = now < MARGIN_M
+    angles = np.arange(720) * math.pi / 360.0
+    after = np.array([oracle.distances(q + STEP * way) for way in np.stack((np.cos(angles), np.sin(angles)), axis=1)])
+    gains = (after - now)[:, is_inside]
+    is_good = (gains > CLEAR * SLIGHT * gains.max(axis=0)).all(axis=1) & (after[:, ~is_inside] >= MARGIN_M).all(axis=1)
+    return not is_good.any()
 
 
 def main() -> int:
@@ -304,9 +428,15 @@ def main() -> int:
         )
         is_safe &= not report.faults
     oracle = Oracle(str(path))
-    tried, stuck = ways_out(guard_of(str(path), "limit"), oracle, options.states, np.random.default_rng(options.seed))
-    print(f"{tried} states inside the margin; from {stuck} of them the robot did not get away")
-    return 0 if is_safe and not stuck else 1
+    guard, free = guard_of(str(path), "limit"), guard_of(str(path), "limit", around=False)
+    left = leave_margin(guard, free, oracle, options.states, np.random.default_rng(options.seed))
+    print(
+        f"{options.states} states inside the margin: {left.straight} left it on straight ways, at {left.slowest:.1%} of"
+        f" the speed or more, {left.curved} on others; {left.locked} are locked; {len(left.stuck)} stuck",
+        *left.stuck[:20],
+        sep="\n",
+    )
+    return 0 if is_safe and not left.stuck else 1
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import rospy
 from guard_nodes import NAMES, GuardStation
-from guarded_arm import SLIDER
+from guarded_arm import FOLDING, SLIDER
 from node_world import publishing
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
@@ -114,6 +114,23 @@ def test_numbers_come_in_the_robots_order_a_period_apart_and_from_where_the_robo
 
     wait_until(came_apart, "three periods of 0.2 s lie between the first command and the last")
     assert left.statuses.messages == []
+
+
+def test_a_robot_that_stands_too_near_to_itself_is_told_which_way_leads_away(module_ros):
+    checks = {"self_collision": {"margin_m": 0.1}, "staleness": {"timeout_s": 60.0}}
+    near = GuardStation(
+        module_ros, "/near", robot_description=FOLDING, start_from="target", period_s=0.01, checks=checks
+    )
+    near.wait()
+    folded = {"name": ["shoulder", "elbow"]}
+    near.send(0.0, 2.6, **folded)
+    near.commands.wait_for()
+    near.send(0.0, 2.7, **folded)
+    message = near.statuses.wait_for(2)[1].message
+    near.close()
+    assert message.startswith("joint_velocity: joint 'elbow' would have 10 rad/s")
+    assert "; inside the margin of self_collision (links 'base' and 'lower': " in message
+    assert message.endswith("elbow -1.00 leads away")
 
 
 @pytest.fixture

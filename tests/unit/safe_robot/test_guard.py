@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -188,6 +189,36 @@ def test_it_goes_along_what_is_in_the_way(tmp_path):
     guard = guard_of(folding(tmp_path), policy="limit", limits=LIMITS, checks={"self_collision": {"margin_m": 0.05}})
     commands = [decide(guard, target).command for target in [(0.0, 2.0), *[(1.0, 2.9)] * 300]]
     assert commands[-1][0] == pytest.approx(1.0, abs=1e-2) and commands[-1][1] > 2.3
+
+
+class TestInsideTheMargin:
+    """A robot that starts too near to something."""
+
+    START = (0.0, 2.60)
+    CHECKS = {"self_collision": {"margin_m": 0.1}}
+
+    def test_it_is_told_which_way_leads_away(self, tmp_path):
+        guard = guard_of(folding(tmp_path), policy="limit", limits=LIMITS, checks=self.CHECKS)
+        assert guard.way_out() is None, "nobody knows where it is"
+        decide(guard, self.START)
+        out = guard.way_out()
+        assert out.direction[1] == pytest.approx(-1.0) and not out.is_locked
+        assert re.fullmatch(
+            r"inside the margin of self_collision \(links 'base' and 'lower': [\d.]+ of 100.0 mm\): "
+            r".*elbow -1.00 leads away",
+            out.words(guard.joint_names),
+        )
+        for _ in range(100):
+            decide(guard, (0.0, 1.5))
+        assert guard.way_out() is None
+
+    def test_a_joint_at_its_limit_leads_no_further(self, tmp_path):
+        """The elbow is at its limit and the shoulder alone hardly moves what is near."""
+        limits = {**LIMITS, "lower": {"elbow": 2.6}}
+        guard = guard_of(folding(tmp_path), policy="limit", limits=limits, checks=self.CHECKS)
+        decide(guard, self.START)
+        out = guard.way_out()
+        assert out.is_locked or out.direction[1] == pytest.approx(0.0, abs=1e-9)
 
 
 class TestBadConfiguration:

@@ -43,5 +43,34 @@ def test_the_oracle_finds_what_a_bad_guard_lets_through(urdf, bad):
 
 
 def test_from_inside_the_margin_the_robot_gets_away(urdf):
+    pytest.importorskip("daqp")
+    guard, free = guard_fuzz.guard_of(urdf, "limit"), guard_fuzz.guard_of(urdf, "limit", around=False)
+    left = guard_fuzz.leave_margin(guard, free, guard_fuzz.Oracle(urdf), 5, np.random.default_rng(2))
+    assert left.straight == 5 and not left.stuck and left.slowest >= 0.95, left
+
+
+@pytest.mark.parametrize(
+    "start, way", [((1.1155416, -0.26635), (-0.00841, 0.19982)), ((0.79484, -1.74236), (0.003, -0.2))]
+)
+def test_a_target_that_leads_away_at_a_slant_is_reached(urdf, start, way):
+    """Joints that rest at different times do not go straight; the bend may not hold the robot where it is."""
+    pytest.importorskip("daqp")
     guard, oracle = guard_fuzz.guard_of(urdf, "limit"), guard_fuzz.Oracle(urdf)
-    assert guard_fuzz.ways_out(guard, oracle, 5, np.random.default_rng(2)) == (5, 0)
+    target = np.add(start, way)
+    commands = guard_fuzz._drive(guard, np.array(start), target)
+    assert commands[-1] == pytest.approx(target, abs=2e-3) and guard_fuzz._fault(oracle, commands) is None
+
+
+def test_what_holds_a_robot_between_two_margins_is_named_and_the_oracle_agrees(urdf):
+    """The arm is folded onto its base and flat above the table: what leads from one brings it nearer to the other."""
+    pytest.importorskip("daqp")
+    guard, oracle = guard_fuzz.guard_of(urdf, "limit"), guard_fuzz.Oracle(urdf)
+    commands = guard_fuzz._follow(guard, np.array((1.055, -2.642)))
+    out = guard.way_out()
+    assert out.is_locked and guard_fuzz._is_locked(oracle, commands[-1])
+    words = out.words(guard.joint_names)
+    assert words.startswith("locked inside the margin of self_collision (links 'base' and 'lower': ")
+    assert "environment (link 'lower' and 'table': " in words and words.endswith(
+        "no motion takes all of them further apart"
+    )
+    assert not guard_fuzz._is_locked(oracle, np.array((0.0, -2.642))), "the oracle finds a way where there is one"

@@ -111,11 +111,16 @@ class Braking:
         speed: np.ndarray = v + m * (a + (m + 1.0) * (first / 2.0 + slope * (m + 2.0) / 6.0))
         return speed
 
-    def end_factors(self, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns how far n joints go until they rest, by velocity and by acceleration: it is linear."""
+    def factors(self, velocity: np.ndarray, acceleration: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Returns how far n joints go, by velocity and by acceleration, since it is linear; each count x n.
+
+        Rows are moments, evenly from the beginning to where all joints rest.
+        """
         state = np.stack((velocity * self._period_s, acceleration * self._period_s**2))
-        end = self._ends[self._fits(state[:, None])[:, 0].argmax(axis=0)]
-        return end[:, 0] * self._period_s, end[:, 1] * self._period_s**2
+        shortest = self._fits(state[:, None])[:, 0].argmax(axis=0)
+        rows = np.linspace(0.0, self._lengths[shortest].max(), count).round().astype(int)
+        way = np.where(rows[:, None] > 0, self._tables[shortest, 0][:, rows - 1].T, 0.0)  # 2 x count x n
+        return way[0] * self._period_s, way[1] * self._period_s**2
 
     def _fits(self, state: np.ndarray) -> np.ndarray:
         """Returns for which of l lengths each of m x n states keeps the limits; 2 x m x n, in periods."""

@@ -50,6 +50,26 @@ class Violation(NamedTuple):
         return f"{self.check}: {self.subject} would have {value}; the limit is {self.limit:.6g}"
 
 
+class Inside(NamedTuple):
+    """Two things that are nearer to each other than their margin.
+
+    Attributes:
+        check: Name of the check.
+        pair: Which they are, in the check's own terms.
+        subject: Which they are, for messages.
+        distance_m: How near [m].
+        margin_m: How near they may be [m].
+        gradient: How fast they go apart as each of n joints moves [m/rad or 1].
+    """
+
+    check: str
+    pair: tuple[str, str | int]
+    subject: str
+    distance_m: float
+    margin_m: float
+    gradient: np.ndarray
+
+
 class Situation(NamedTuple):
     """What a target is judged by, beside the motion.
 
@@ -110,7 +130,7 @@ class Check(ABC):
         What is not a number is never safe. A robot that is outside a limit of where it may be, may go further in.
         """
 
-    def bounds(self, end: np.ndarray, spread: np.ndarray) -> Sequence[Bound]:
+    def bounds(self, end: np.ndarray, spread: np.ndarray, before: np.ndarray) -> Sequence[Bound]:
         """Returns what keeps the robot safe near where it would come to rest; only for the policy `limit`.
 
         It helps to find a command that `check` will let pass, and judges nothing. It is called after `check`.
@@ -118,7 +138,12 @@ class Check(ABC):
         Args:
             end: n positions where the robot would come to rest [rad or m].
             spread: How far from there joints may come to rest instead; what is out of their reach may be left out.
+            before: n positions where it is: what is not safe there may not become worse.
         """
+        return ()
+
+    def inside(self, q: np.ndarray) -> Sequence[Inside]:
+        """Returns what is nearer than its margin in a configuration of n positions; it is called after `check`."""
         return ()
 
     def first_above(self, values: np.ndarray, limit: np.ndarray, unit: tuple[str, str]) -> Violation | None:

@@ -2,25 +2,30 @@
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from .braking import Braking
-from .check import Check, Situation, Violation
+from .check import Check, Inside, Situation, Violation
 from .config import GuardConfig
 from .limits import JointLimits
 from .lookup import make_checks
 from .motion import Motion, State
-from .pursuit import Ends, can_keep_bounds, pursue, within_bounds
+from .pursuit import Bound, Detour, Stop, can_keep_bounds, pursue
 from .robot import GuardedRobot
 from .shaping import Shaper
+from .way_out import WayOut, find_way_out
 
 log = logging.getLogger(__name__)
 
-SHARES = (1.0, 0.5, 0.2)
+SHARES = (0.5, 0.2)
 """How much of the way from braking to what is wanted is tried."""
+DETOURS = 3
+"""So often bounds that a command does not keep are added, and another one is tried."""
+OVER, OVER_M = 0.5, 1e-8
+"""Where a bound was not kept, it is asked for more: by this share of what is missing, and by so much."""
 SLOW_S = 1e6
 """How long the way from where the robot is to the first target is taken to last [s]: it is not judged by speed."""
 MENDED = ("joint_velocity", "joint_acceleration", "joint_jerk", "joint_position", "braking")
@@ -112,6 +117,12 @@ class Guard:
     def stop_commands(self) -> np.ndarray:
         """The commands that bring the robot to rest from now on, k x n [rad or m], as they were found safe."""
         return self._stop.copy()
+
+    def way_out(self) -> WayOut | None:
+        """Returns how the robot, where it was commanded to last, leaves the margins that it is in; None if in none."""
+        if self._state is None or self._is_first:
+            return None
+        return find_way_out(self._state.position, self.limits, self._inside)
 
     def start(self) -> None:
         """Lets targets pass again; the first one has to be near where the robot is."""
@@ -261,31 +272,59 @@ class Guard:
         assert self._state is not None
         if self.config.policy == "reject" or violation.check in self._watches:  # no other command mends these
             return self._refused(violation)
-        next_stop = self._next_stop
-        wanted = self._nearest(target)
-        for share in SHARES:
-            found = self._judged(tuple((next_stop + share * (wanted - next_stop)).tolist()), situation)
+        for wanted in self._nearest(target):
+            found = self._judged(tuple(wanted.tolist()), situation)
             if not isinstance(found, Violation):
                 return Decision(self._sent(found), violation)
         return Decision(self._brake_on(), violation)
 
-    def _nearest(self, target: tuple[float, ...]) -> np.ndarray:
-        """Returns the command that is nearest to what the joints alone can do, and which checks may let pass."""
+    def _nearest(self, target: tuple[float, ...]) -> Iterator[np.ndarray]:
+        """Yields commands near to what the joints alone can do, and which checks may let pass, the best ones first."""
         assert self._state is not None
         state, period_s = self._state, self.config.period_s
-        wanted, slowest = pursue(np.array(target), state, self.limits, self._braking, period_s)
-        if not self._keeps_bounds:
-            return wanted
+        next_stop = self._next_stop
+        best, slowest = pursue(np.array(target), state, self.limits, self._braking, period_s)
+        for wanted in self._detours(best, slowest, next_stop) if self._keeps_bounds else [best]:
+            best = wanted
+            yield best
+        for share in SHARES:
+            yield next_stop + share * (best - next_stop)
+
+    def _detours(self, wanted: np.ndarray, slowest: np.ndarray, next_stop: np.ndarray) -> Iterator[np.ndarray]:
+        """Yields the command nearest to one that is wanted with which bounds are kept, and each time a better one."""
+        assert self._state is not None
+        state, period_s = self._state, self.config.period_s
         there = self._stop[-1] if len(self._stop) else state.position
-        ends = Ends(wanted, state, self._braking, period_s)
-        spread = np.abs(ends.of(wanted) - there)
-        bounds = [bound for check in self.checks for bound in check.bounds(there, spread)]
-        if not bounds:
-            return wanted
-        other = np.where(self._may_rest(ends.of(slowest)), slowest, self._stop[0] if len(self._stop) else there)
-        least, most = np.minimum(wanted, other), np.maximum(wanted, other)
-        found = within_bounds(wanted, least, most, bounds, ends, there)
-        return wanted if found is None else found
+        stop = Stop(wanted, state, self._braking, period_s)
+        spread = np.abs(stop.of(wanted)[-1] - there)
+        detour = Detour(wanted, np.where(self._may_rest(stop.of(slowest)[-1]), slowest, next_stop))
+        detour.add(self._bounds(there, spread), there, stop, -1)
+        found = detour.command()
+        yield wanted if found is None else found
+        for _ in range(DETOURS):
+            if found is None or not self._add_missed(detour, found):
+                return
+            found = detour.command()
+            if found is not None:
+                yield found
+
+    def _add_missed(self, detour: Detour, command: np.ndarray) -> bool:
+        """Adds the bounds that are not kept on the way to rest after a command; returns whether there are any."""
+        assert self._state is not None
+        stop, is_missed = Stop(command, self._state, self._braking, self.config.period_s), False
+        for moment, at in enumerate(stop.of(command)):
+            missed = [bound for bound in self._bounds(at, np.zeros_like(at)) if bound.room < 0.0]
+            more = [Bound(gradient, (1.0 + OVER) * room - OVER_M) for gradient, room in missed]
+            detour.add(more, at, stop, moment)
+            is_missed |= bool(missed)
+        return is_missed
+
+    def _inside(self, q: np.ndarray) -> list[Inside]:
+        return [each for check in self.checks for each in check.inside(q)]
+
+    def _bounds(self, end: np.ndarray, spread: np.ndarray) -> list[Bound]:
+        assert self._state is not None
+        return [bound for check in self.checks for bound in check.bounds(end, spread, self._state.position)]
 
     def _may_rest(self, end: np.ndarray) -> np.ndarray:
         return (end >= self.limits.lower) & (end <= self.limits.upper)

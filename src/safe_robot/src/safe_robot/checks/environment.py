@@ -7,8 +7,8 @@ from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import NonNegativeMetres, Text
-from safe_robot.check import Check, CheckConfig, Situation, Violation
-from safe_robot.geometry.distances import LinkDistances
+from safe_robot.check import Check, CheckConfig, Inside, Situation, Violation
+from safe_robot.geometry.distances import LinkDistances, Pair
 from safe_robot.geometry.obstacles import Obstacle, obstacles_of_world
 from safe_robot.geometry.proximity import Proximity
 from safe_robot.limits import JointLimits
@@ -69,13 +69,22 @@ class Environment(Check):
         found = self.proximity.first(motion)
         if found is None:
             return None
-        link, number = found.pair
-        subject = f"link '{link}' and '{self._obstacles[int(number)].name}'"
-        return Violation(self.name, subject, found.distance, margin_m, unit, found.is_while_braking)
+        return Violation(self.name, self._subject(found.pair), found.distance, margin_m, unit, found.is_while_braking)
 
-    def bounds(self, end: np.ndarray, spread: np.ndarray) -> list[Bound]:
+    def bounds(self, end: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
         """See `Check`."""
-        return self.proximity.bounds(end, spread)
+        return self.proximity.bounds(end, spread, before)
+
+    def inside(self, q: np.ndarray) -> list[Inside]:
+        """See `Check`."""
+        inside, margin_m = list[Inside](), self.config.margin_m
+        for pair, contact in self.proximity.contacts(q, margin_m):
+            gradient = self.distances.gradient(pair, contact, q)
+            inside.append(Inside(self.name, pair, self._subject(pair), contact.distance, margin_m, gradient))
+        return inside
+
+    def _subject(self, pair: Pair) -> str:
+        return f"link '{pair[0]}' and '{self._obstacles[int(pair[1])].name}'"
 
     def _take(self, live: tuple[Obstacle, ...]) -> None:
         """Puts obstacles where they are; what has not moved is not looked at anew."""

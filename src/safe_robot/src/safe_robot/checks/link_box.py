@@ -73,14 +73,15 @@ class LinkBox(Check):
                 return Violation(self.name, f"{'xyz'[axis]} of link '{link}'", value, limit, "m", row > 1)
         return None
 
-    def bounds(self, end: np.ndarray, spread: np.ndarray) -> list[Bound]:
+    def bounds(self, end: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
         """See `Check`."""
         bounds = []
-        rows = np.concatenate((end[None], end + STEP * np.eye(len(end))))
+        rows = np.concatenate((end[None], before[None], end + STEP * np.eye(len(end))))
         for link, (low, high) in self._boxes.items():
             position = self.robot.link_positions(rows, link)
-            slopes = (position[1:] - position[0]).T / STEP  # 3 x n
+            slopes = (position[2:] - position[0]).T / STEP  # 3 x n
+            low, high = np.minimum(low + KEPT_M, position[1]), np.maximum(high - KEPT_M, position[1])
             for slope, room in ((slopes, position[0] - low), (-slopes, high - position[0])):
-                near = np.flatnonzero(np.abs(slope) @ spread > room - KEPT_M)
-                bounds += [Bound(slope[axis], max(float(room[axis]) - KEPT_M, 0.0)) for axis in near.tolist()]
+                near = np.flatnonzero(np.abs(slope) @ spread > room)
+                bounds += [Bound(slope[axis], float(room[axis])) for axis in near.tolist()]
         return bounds

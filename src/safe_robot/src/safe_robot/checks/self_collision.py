@@ -10,8 +10,8 @@ from pydantic import Field
 from custom_ros_tools.errors import ConfigError, Problem, hint
 from custom_ros_tools.schema import NonNegativeMetres, Text
 from rpbi.urdf.document import disabled_collisions
-from safe_robot.check import Check, CheckConfig, Situation, Violation
-from safe_robot.geometry.distances import LinkDistances
+from safe_robot.check import Check, CheckConfig, Inside, Situation, Violation
+from safe_robot.geometry.distances import LinkDistances, Pair
 from safe_robot.geometry.proximity import Proximity
 from safe_robot.limits import JointLimits
 from safe_robot.motion import Motion
@@ -49,12 +49,23 @@ class SelfCollision(Check):
         found = self.proximity.first(motion)
         if found is None:
             return None
-        subject, margin_m = "links '{}' and '{}'".format(*found.pair), self.config.margin_m
+        subject, margin_m = self._subject(found.pair), self.config.margin_m
         return Violation(self.name, subject, found.distance, margin_m, "m of distance", found.is_while_braking)
 
-    def bounds(self, end: np.ndarray, spread: np.ndarray) -> list[Bound]:
+    def bounds(self, end: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
         """See `Check`."""
-        return self.proximity.bounds(end, spread)
+        return self.proximity.bounds(end, spread, before)
+
+    def inside(self, q: np.ndarray) -> list[Inside]:
+        """See `Check`."""
+        inside, margin_m = list[Inside](), self.config.margin_m
+        for pair, contact in self.proximity.contacts(q, margin_m):
+            gradient = self.distances.gradient(pair, contact, q)
+            inside.append(Inside(self.name, pair, self._subject(pair), contact.distance, margin_m, gradient))
+        return inside
+
+    def _subject(self, pair: Pair) -> str:
+        return "links '{}' and '{}'".format(*pair)
 
     def _pairs(self) -> list[tuple[str, str]]:
         path = self.config.pairs_file

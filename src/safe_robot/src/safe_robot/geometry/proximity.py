@@ -134,7 +134,7 @@ class Proximity:
         self._distances.place(motion.position[row])
         return distance >= before - ROUNDING_M
 
-    def bounds(self, end: np.ndarray, spread: np.ndarray) -> list[Bound]:
+    def bounds(self, end: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
         """Returns what keeps pairs apart near a configuration, see `Check.bounds`."""
         if not len(self._pairs):
             return []
@@ -150,14 +150,21 @@ class Proximity:
         bounds = []
         for k in found:
             i = int(near[k])
-            contact = self._distances.contact(self._pairs[i], FAR_M)
+            pair = self._pairs[i]
+            contact = self._distances.contact(pair, FAR_M)
             if contact is None:
                 continue
             if not contact.distance < least[k] + LOOSE_M:
                 self._separation.learn(i, contact.directions, frames[0])
-            if contact.distance <= within_m[i]:
-                room = max(contact.distance - self._margin_m - KEPT_M, 0.0)
-                bounds.append(Bound(self._distances.gradient(self._pairs[i], contact, end), room))
+            if contact.distance > within_m[i]:
+                continue
+            gradient = self._distances.gradient(pair, contact, end)
+            room = contact.distance - self._margin_m - KEPT_M
+            if room < 0.0:
+                self._distances.place(before)
+                room = max(room, contact.distance - self._distances.distance(pair, FAR_M))
+                self._distances.place(end)
+            bounds.append(Bound(gradient, room))
         return bounds
 
     def contacts(self, q: np.ndarray, within_m: float) -> Iterator[tuple[Pair, Contact]]:

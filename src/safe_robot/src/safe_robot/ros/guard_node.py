@@ -49,6 +49,8 @@ class GuardNode:
         self._silence_s = config.silence_s
         self._around = None if config.base_frame is None else LiveObstacles(config.base_frame, config.left_out)
         self._warn = ThrottledWarning()
+        self._way_out_from: object = None
+        self._way_out_words = ""
         self._sent_s = NEVER_S
         self._last_stamp: tuple[rospy.Time, float] | None = None
         self._measured: tuple[Mapping[str, float], float] = {}, NEVER_S
@@ -182,7 +184,7 @@ class GuardNode:
         if violation is None:
             self._status.publish(Status(header=header, message="", is_safe=True))
             return
-        message = str(violation)
+        message = f"{violation}{self._way_out()}"
         self._status.publish(Status(header=header, message=message, is_safe=False))
         self._violation.publish(
             ViolationMessage(
@@ -197,6 +199,20 @@ class GuardNode:
         )
         then = "; halted until robot_safety/start_subscriber is called" if is_halted else ""
         self._warn(self._target_topic, f"{message}{then}")
+
+    def _way_out(self) -> str:
+        """Returns how the robot leaves the margins that it stands in, in words; it is looked for once at each place."""
+        if self._guard.is_moving:
+            return ""
+        place = self._guard.last_command, self._around and self._around.obstacles
+        if self._way_out_from != place:
+            self._way_out_from = place
+            try:
+                out = self._guard.way_out()
+                self._way_out_words = "" if out is None else f"; {out.words(self._guard.joint_names)}"
+            except Exception as error:
+                self._way_out_words = f"; it is not known how to leave the margins: {error!r}"
+        return self._way_out_words
 
     def _watch(self) -> None:
         with self._queue.lock:
