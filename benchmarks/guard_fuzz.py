@@ -19,11 +19,11 @@ import pybullet
 
 from rpbi.geometry import Pose
 from safe_robot.check import Situation
+from safe_robot.commands.way_out import SLIGHT, STEP
 from safe_robot.config import GuardConfig
 from safe_robot.geometry.obstacles import Obstacle
 from safe_robot.guard import Guard
 from safe_robot.robot import GuardedRobot
-from safe_robot.way_out import SLIGHT, STEP
 
 PERIOD_S = 0.01
 LIMITS = {"velocity": 1.0, "acceleration": 8.0, "jerk": 200.0}

@@ -9,9 +9,9 @@ from guarded_arm import HOME, KUKA, LIMITS, folding, slider
 from custom_ros_tools.errors import ConfigError
 from rpbi.geometry import Pose
 from rpbi.kinematics import Kinematics
-from safe_robot.braking import Brake
 from safe_robot.check import Situation
 from safe_robot.checks import CHECKS
+from safe_robot.commands.braking import Brake
 from safe_robot.conformance import CheckConformance
 from safe_robot.geometry.obstacles import Obstacle
 from safe_robot.limits import JointLimits, LimitsConfig

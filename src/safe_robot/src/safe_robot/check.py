@@ -10,10 +10,10 @@ from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, Switch
 
+from .commands.pursuit import Bound
 from .geometry.obstacles import Obstacle
 from .limits import JointLimits
 from .motion import Motion
-from .pursuit import Bound
 from .robot import GuardedRobot
 
 

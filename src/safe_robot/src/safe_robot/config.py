@@ -6,8 +6,8 @@ from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, ListOf, NonNegative, Seconds, Switch, Text, optional
 
+from .commands.shaping import ShapingConfig
 from .limits import LimitsConfig
-from .shaping import ShapingConfig
 
 
 class GuardConfig(ConfigModel):

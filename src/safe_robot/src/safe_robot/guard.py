@@ -7,16 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .braking import Braking
 from .check import Check, Inside, Situation, Violation
+from .commands.braking import Braking
+from .commands.pursuit import Bound, Detour, Stop, can_keep_bounds, pursue
+from .commands.shaping import Shaper
+from .commands.way_out import WayOut, find_way_out
 from .config import GuardConfig
 from .limits import JointLimits
 from .lookup import make_checks
 from .motion import Motion, State
-from .pursuit import Bound, Detour, Stop, can_keep_bounds, pursue
 from .robot import GuardedRobot
-from .shaping import Shaper
-from .way_out import WayOut, find_way_out
 
 log = logging.getLogger(__name__)
 

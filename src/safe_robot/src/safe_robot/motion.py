@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .braking import Brake
+from .commands.braking import Brake
 from .robot import GuardedRobot
 
 WAYPOINT_SPACING = 0.15

@@ -1,17 +1,14 @@
 """The robot that is guarded: its joints, and where its links are."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
-from custom_ros_tools.transforms import quat_of
-from rpbi.geometry import Vector
+from custom_ros_tools.transforms import matrix_of, quat_of
 from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.elements import UrdfJoint
-
-from .frames import LinkFrames
 
 
 class GuardedRobot:
@@ -57,7 +54,6 @@ class GuardedRobot:
         self.still = frozenset(name for name, joint in self._all.items() if joint.type == "fixed")
         self._above = {joint.child: joint for joint in self._all.values()}
         self._index = {name: i for i, name in enumerate(self.joint_names)}
-        self._turns = {joint.name: _Turn(joint) for joint in self._all.values()}
         self.frames = LinkFrames(self._all.values(), self.coupling)
 
     def check_link(self, name: str) -> str:
@@ -80,10 +76,9 @@ class GuardedRobot:
 
     def link_positions(self, q: np.ndarray, link: str) -> np.ndarray:
         """Returns where the origin of a link is in the root, k x 3 [m], in k configurations of n positions."""
-        position = np.zeros((1, 3))
-        for joint in reversed(self.chain(link)):
-            position = self._turns[joint.name].carry(self._positions(joint, q), position)
-        return np.broadcast_to(position, (len(q), 3))
+        frame, pose = self.frames.place(link)
+        positions: np.ndarray = self.frames.at(q)[:, frame, :3] @ pose[:, 3]
+        return positions
 
     def coupling(self, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
         """Returns how m joints follow from the n guarded ones: factors, m x n, and offsets, m [rad or m]."""
@@ -130,39 +125,68 @@ class GuardedRobot:
         return self._index.get(joint.mimic.joint if joint.mimic else joint.name)
 
 
-class _Turn:
-    """What a joint does to what hangs on it, after Rodrigues: R = R0 (1 + sin q K + (1 - cos q) K^2)."""
+class LinkFrames:
+    """Frames of what moves in one piece: frame 0 is the root, each other one that of a link below a joint that moves.
 
-    def __init__(self, joint: UrdfJoint) -> None:
-        self._fixed, self._shift = _matrix(joint.rpy), np.array(joint.xyz)
-        self._joint = joint
-        x, y, z = joint.axis
-        cross = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
-        sine, versine = self._fixed @ cross, self._fixed @ cross @ cross
-        self._way = self._fixed @ np.array(joint.axis)
-        self._carrying = np.concatenate((self._fixed + versine, sine, -versine)).T.copy()
+    Args:
+        joints: All joints of the robot.
+        coupling: Returns how some joints follow from the n guarded ones, see `GuardedRobot.coupling`.
+    """
 
-    def carry(self, position: np.ndarray, point: np.ndarray) -> np.ndarray:
-        """Returns where k points, or one, that hang on it are in what it hangs on, k x 3, at k positions."""
-        if not point.any():
-            turned = point
-        elif self._joint.is_moving and self._joint.is_revolute:
-            parts = point @ self._carrying
-            sine, cosine = np.sin(position)[:, None], np.cos(position)[:, None]
-            turned = parts[:, :3] + sine * parts[:, 3:6] + cosine * parts[:, 6:]
-        else:
-            turned = point @ self._fixed.T
-        if self._joint.is_moving and not self._joint.is_revolute:
-            turned = turned + position[:, None] * self._way
-        return turned + self._shift
+    def __init__(
+        self, joints: Iterable[UrdfJoint], coupling: Callable[[Sequence[str]], tuple[np.ndarray, np.ndarray]]
+    ) -> None:
+        self._above = {joint.child: joint for joint in joints}
+        moving = [joint for joint in self._above.values() if joint.is_moving]
+        moving.sort(key=lambda joint: self._depth(joint.child))
+        self._frame = {joint.child: i for i, joint in enumerate(moving, start=1)}
+        self._factors, self._offsets = coupling([joint.name for joint in moving])
+        parents = [self.place(joint.parent) for joint in moving]
+        self._parents = [frame for frame, _ in parents]
+        m = len(moving)
+        self._fixed, self._way, self._sine, self._versine = np.zeros((4, m, 4, 4))
+        for i, (joint, (_, parent)) in enumerate(zip(moving, parents)):
+            fixed = self._fixed[i] = parent @ _origin(joint)
+            if joint.is_revolute:  # after Rodrigues
+                x, y, z = joint.axis
+                cross = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+                self._sine[i, :3, :3] = fixed[:3, :3] @ cross
+                self._versine[i, :3, :3] = fixed[:3, :3] @ cross @ cross
+            else:
+                self._way[i, :3, 3] = fixed[:3, :3] @ joint.axis
+        self._last = b"", np.empty((0, m + 1, 4, 4))
+
+    def place(self, link: str) -> tuple[int, np.ndarray]:
+        """Returns the number of the frame that a link moves with, and the pose of the link in it, 4 x 4."""
+        pose = np.eye(4)
+        while link in self._above and link not in self._frame:
+            pose = _origin(self._above[link]) @ pose
+            link = self._above[link].parent
+        return self._frame.get(link, 0), pose
+
+    def at(self, q: np.ndarray) -> np.ndarray:
+        """Returns the m frames in the root in k configurations of n positions, k x m x 4 x 4; not to be changed."""
+        key = q.tobytes()
+        if key != self._last[0]:  # several checks ask for the same
+            self._last = key, self._computed(q)
+        return self._last[1]
+
+    def _computed(self, q: np.ndarray) -> np.ndarray:
+        angles = (q @ self._factors.T + self._offsets)[:, :, None, None]
+        local = self._fixed + np.sin(angles) * self._sine + (1.0 - np.cos(angles)) * self._versine
+        local += angles * self._way
+        frames = np.empty((len(q), len(self._parents) + 1, 4, 4))
+        frames[:, 0] = np.eye(4)
+        for i, parent in enumerate(self._parents):
+            np.matmul(frames[:, parent], local[:, i], out=frames[:, i + 1])
+        return frames
+
+    def _depth(self, link: str) -> int:
+        depth = 0
+        while link in self._above:
+            link, depth = self._above[link].parent, depth + 1
+        return depth
 
 
-def _matrix(rpy: Vector) -> np.ndarray:
-    x, y, z, w = quat_of(rpy)
-    return np.array(
-        (
-            (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
-            (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
-            (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
-        )
-    )
+def _origin(joint: UrdfJoint) -> np.ndarray:
+    return matrix_of(joint.xyz, quat_of(joint.rpy))

@@ -2,12 +2,11 @@
 
 import copy
 from collections.abc import Sequence
-from xml.etree.ElementTree import Element
 
 from rpbi.geometry import scaled
 
 from .document import UrdfDocument
-from .elements import UrdfJoint, end_of, inertial, joint_element, new_element, read_vector, text_of, words
+from .elements import Element, UrdfJoint, end_of, inertial, joint_element, new_element, read_vector, text_of, words
 from .files import beside_or_above
 
 

@@ -4,7 +4,7 @@ import math
 import re
 from typing import NamedTuple
 from xml.etree import ElementTree
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element as Element  # other modules have it from here
 from xml.parsers import expat
 
 from rpbi.geometry import Vector

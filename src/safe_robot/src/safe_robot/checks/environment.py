@@ -8,12 +8,12 @@ from pydantic import Field
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import NonNegativeMetres, Text
 from safe_robot.check import Check, CheckConfig, Inside, Situation, Violation
+from safe_robot.commands.pursuit import Bound
 from safe_robot.geometry.distances import LinkDistances, Pair
 from safe_robot.geometry.obstacles import Obstacle, obstacles_of_world
 from safe_robot.geometry.proximity import Proximity
 from safe_robot.limits import JointLimits
 from safe_robot.motion import Motion
-from safe_robot.pursuit import Bound
 from safe_robot.robot import GuardedRobot
 
 

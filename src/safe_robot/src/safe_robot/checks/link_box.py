@@ -9,9 +9,9 @@ from pydantic import Field, model_validator
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.schema import ConfigModel, KeyedError
 from safe_robot.check import Check, CheckConfig, Situation, Violation
+from safe_robot.commands.pursuit import Bound
 from safe_robot.limits import JointLimits
 from safe_robot.motion import Motion
-from safe_robot.pursuit import Bound
 from safe_robot.robot import GuardedRobot
 
 STEP = 1e-6

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from safe_robot.commands.pursuit import Bound
 from safe_robot.motion import Motion
-from safe_robot.pursuit import Bound
 
 from .distances import Contact, LinkDistances, Pair
 from .separation import Separation

@@ -6,10 +6,10 @@ import numpy as np
 from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, Positive, Seconds, Unit
+from safe_robot.limits import JointLimits
+from safe_robot.motion import State
 
 from .braking import Braking
-from .limits import JointLimits
-from .motion import State
 from .pursuit import pursue
 
 CAUGHT_UP = 0.05

@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from safe_robot.limits import JointLimits
+from safe_robot.motion import State
+
 from .braking import INSIDE, Braking
-from .limits import JointLimits
-from .motion import State
 
 STEPS = 10
 """Between braking hard and going on as fast as possible so many commands are tried, and as many between two of them."""

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linprog
 
-from .check import Inside
-from .geometry.distances import Pair
-from .limits import JointLimits
+from safe_robot.check import Inside
+from safe_robot.geometry.distances import Pair
+from safe_robot.limits import JointLimits
 
 STEP = 1e-3
 """A motion counts if things are further apart when the joint that moves most has moved so much [rad or m]."""
