@@ -281,20 +281,17 @@ def test_a_publisher_that_hangs_is_named_and_the_others_are_recorded(
 
 
 @pytest.fixture
-def stopped(ros: Any) -> Iterator[Callable[[str], str]]:
+def stopped(ros: Any) -> Callable[[str], str]:
     """Starts a publisher, stops it with SIGSTOP and returns the name of its node."""
-    talkers = []
 
     def stop(topic: str) -> str:
-        talkers.append(ros.start([sys.executable, "-c", TALKER, topic]))
+        talker = ros.start([sys.executable, "-c", TALKER, topic])
 
         def publishers() -> list[str]:
             return dict(rosgraph.Master("/tests").getSystemState()[0]).get(topic, [])
 
         (node,) = wait_until(publishers, f"{topic} is published")
-        talkers[-1].send_signal(signal.SIGSTOP)
+        talker.send_signal(signal.SIGSTOP)
         return node
 
-    yield stop
-    for talker in talkers:
-        talker.send_signal(signal.SIGCONT)
+    return stop

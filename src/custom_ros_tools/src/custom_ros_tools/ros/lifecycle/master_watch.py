@@ -25,13 +25,17 @@ class Registrations:
     That one waits for a master that has gone, with all topics locked, and registers nothing again. Here what is opened
     or closed while there is no master is told to the next one.
 
+    Args:
+        registry: What there is.
+        uri: The node's master.
+
     Attributes:
         are_complete: Whether the master knows them all, as far as is known.
     """
 
-    def __init__(self, registry: Registry) -> None:
+    def __init__(self, registry: Registry, uri: str) -> None:
         self.are_complete = True
-        self._registry = registry
+        self._registry, self._uri = registry, uri
         self._name, self._node_uri = rospy.get_name(), rospy.get_node_uri()
         self._withdrawn: list[tuple[str, tuple[str, str, str]]] = []
         """Calls that a master who comes back, and has not forgotten anything, has to hear."""
@@ -42,7 +46,7 @@ class Registrations:
         if not self.are_complete:
             return
         try:
-            with timed_master() as master:
+            with timed_master(self._uri) as master:
                 call = getattr(master, f"register{_METHODS[kind]}")
                 answer = call(self._name, name, type_or_uri, self._node_uri)
         except MASTER_FAILURES:
@@ -56,7 +60,7 @@ class Registrations:
         method, arguments = f"unregister{_METHODS[kind]}", (self._name, name, uri)
         try:
             if self.are_complete:
-                with timed_master() as master:
+                with timed_master(self._uri) as master:
                     getattr(master, method)(*arguments)
                 return
         except MASTER_FAILURES:
@@ -102,11 +106,11 @@ class MasterWatch:
     def __init__(self) -> None:
         self._name, self._uri = rospy.get_name(), rosgraph.get_master_uri()
         found = registry()
-        self._registrations = None if found is None else Registrations(found)
+        self._registrations = None if found is None else Registrations(found, self._uri)
         self._process: int | None = None
         self._is_gone = self._is_over = False
         self._registering = threading.Lock()
-        with contextlib.suppress(*MASTER_FAILURES), timed_master() as master:
+        with contextlib.suppress(*MASTER_FAILURES), timed_master(self._uri) as master:
             self._process = master.getPid(self._name)[2]
             kept_parameters.keep("/use_sim_time")
             kept_parameters.keep(self._name)
@@ -117,7 +121,7 @@ class MasterWatch:
 
     def _look(self) -> None:
         try:
-            with timed_master() as master:
+            with timed_master(self._uri) as master:
                 self._compare(master)
         except MASTER_FAILURES as error:
             if not self._is_gone and not rospy.core.is_shutdown_requested():

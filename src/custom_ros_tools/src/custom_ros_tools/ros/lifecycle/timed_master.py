@@ -27,9 +27,9 @@ class TimedTransport(Transport):
         return connection
 
 
-def timed_master() -> Any:
-    """Returns the master's XML-RPC interface, a context whose end closes the connection.
+def timed_master(uri: str | None = None) -> Any:
+    """Returns the XML-RPC interface of a master, by default of the environment's, a context that closes the connection.
 
     Its calls return (code, message, value) and raise one of MASTER_FAILURES if the master does not answer.
     """
-    return ServerProxy(rosgraph.get_master_uri(), TimedTransport(TIMEOUT_S))
+    return ServerProxy(uri or rosgraph.get_master_uri(), TimedTransport(TIMEOUT_S))
