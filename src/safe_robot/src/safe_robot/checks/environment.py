@@ -77,11 +77,7 @@ class Environment(Check):
 
     def inside(self, q: np.ndarray) -> list[Inside]:
         """See `Check`."""
-        inside, margin_m = list[Inside](), self.config.margin_m
-        for pair, contact in self.proximity.contacts(q, margin_m):
-            gradient = self.distances.gradient(pair, contact, q)
-            inside.append(Inside(self.name, pair, self._subject(pair), contact.distance, margin_m, gradient))
-        return inside
+        return self.proximity.inside(q, self.name, self._subject)
 
     def _subject(self, pair: Pair) -> str:
         return f"link '{pair[0]}' and '{self._obstacles[int(pair[1])].name}'"

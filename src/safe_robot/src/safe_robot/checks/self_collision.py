@@ -58,11 +58,7 @@ class SelfCollision(Check):
 
     def inside(self, q: np.ndarray) -> list[Inside]:
         """See `Check`."""
-        inside, margin_m = list[Inside](), self.config.margin_m
-        for pair, contact in self.proximity.contacts(q, margin_m):
-            gradient = self.distances.gradient(pair, contact, q)
-            inside.append(Inside(self.name, pair, self._subject(pair), contact.distance, margin_m, gradient))
-        return inside
+        return self.proximity.inside(q, self.name, self._subject)
 
     def _subject(self, pair: Pair) -> str:
         return "links '{}' and '{}'".format(*pair)

@@ -1,10 +1,11 @@
 """Which things come too near to each other while a robot moves."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from safe_robot.check import Inside
 from safe_robot.commands.pursuit import Bound
 from safe_robot.motion import Motion
 
@@ -166,6 +167,26 @@ class Proximity:
                 self._distances.place(end)
             bounds.append(Bound(gradient, room))
         return bounds
+
+    def inside(self, q: np.ndarray, check: str, subject: Callable[[Pair], str]) -> list[Inside]:
+        """Returns the pairs that are nearer than the margin in a configuration, see `Check.inside`.
+
+        Args:
+            q: n positions [rad or m].
+            check: Name of the check.
+            subject: What a pair is called in messages.
+        """
+        return [
+            Inside(
+                check,
+                pair,
+                subject(pair),
+                contact.distance,
+                self._margin_m,
+                self._distances.gradient(pair, contact, q),
+            )
+            for pair, contact in self.contacts(q, self._margin_m)
+        ]
 
     def contacts(self, q: np.ndarray, within_m: float) -> Iterator[tuple[Pair, Contact]]:
         """Yields the pairs that are nearer than a distance in a configuration of n positions, and where they are."""
