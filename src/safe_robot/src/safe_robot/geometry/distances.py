@@ -16,7 +16,7 @@ from rpbi.urdf.joints import Joint
 from rpbi.urdf.loading import load_urdf
 from safe_robot.robot import GuardedRobot
 
-from .hulls import Solid, solids_of
+from .hulls import Solid, missing_m, solids_of
 from .obstacles import Obstacle
 
 Pair = tuple[str, str | int]
@@ -81,6 +81,9 @@ class LinkDistances:
         self.place(np.zeros(len(robot.joint_names)))
         self.radius_m = {link: self._radius(link) for link in self.links}
         self._solids: dict[str | int, list[Solid]] = {link: self._solids_of(link) for link in self.links}
+        self._missing_m: dict[str | int, float] = {
+            link: missing_m(self._pb, self._body, self._index[link]) for link in self.links
+        }
 
     def place(self, q: np.ndarray) -> None:
         """Puts the robot into a configuration of n positions [rad or m]."""
@@ -103,6 +106,7 @@ class LinkDistances:
                     self._pb.removeBody(body)
                 body = obstacle.add_to(self._pb)
                 self._solids[i] = solids_of(self._pb, body, -1)
+                self._missing_m[i] = missing_m(self._pb, body, -1)
                 changed.append(i)
             elif old.pose != obstacle.pose:
                 self._pb.resetBasePositionAndOrientation(body, *obstacle.pose)
@@ -126,15 +130,17 @@ class LinkDistances:
 
     def distance(self, pair: Pair, most_m: float) -> float:
         """Returns how far two things are apart where they were put [m]; inf if that is more than some distance."""
-        return min([point[8] for point in self._closest(pair, most_m)], default=math.inf)
+        missing_m = self._missing_m[pair[0]] + self._missing_m[pair[1]]
+        return min([point[8] for point in self._closest(pair, most_m + missing_m)], default=math.inf) - missing_m
 
     def contact(self, pair: Pair, most_m: float) -> Contact | None:
         """Returns where two things are nearest where they were put; None if they are further apart than a distance."""
-        points = self._closest(pair, most_m)
+        missing_m = self._missing_m[pair[0]] + self._missing_m[pair[1]]
+        points = self._closest(pair, most_m + missing_m)
         if not points:
             return None
         point = min(points, key=lambda each: each[8])
-        return Contact(point[8], point[7], point[5], point[6], tuple(each[7] for each in points))
+        return Contact(point[8] - missing_m, point[7], point[5], point[6], tuple(each[7] for each in points))
 
     def gradient(self, pair: Pair, contact: Contact, q: np.ndarray) -> np.ndarray:
         """Returns how fast two things go apart as each of n joints moves, by where `contact` found them [m/rad or 1].

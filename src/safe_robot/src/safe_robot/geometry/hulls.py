@@ -16,6 +16,10 @@ from .obstacles import NO_FILE
 
 MESH_MARGIN_M = 1e-3
 """By so much PyBullet makes convex meshes thicker [m]."""
+EDGE_M = (math.sqrt(3.0) - 1.0) * 1e-3
+"""So far corners of boxes are, at most, from those that PyBullet rounds, with a radius of 1 mm [m]."""
+EDGED = (pybullet.GEOM_BOX, pybullet.GEOM_CYLINDER)
+"""Shapes whose edges and corners it rounds."""
 COARSE_M = 2e-3
 """So far corners of a mesh may be outside the hull of those that are kept; the balls are that much larger [m]."""
 MOST = 48
@@ -82,7 +86,7 @@ def solids_of(pb: Client, body: int, link: int) -> list[Solid]:
         least, most = _box(*Solid(0, np.concatenate([box.balls for box in boxes])).extent).moved(0, pose).extent
         if (least - AABB_MARGIN_M <= lower).all() and (most + AABB_MARGIN_M >= upper).all():
             return solids
-    return [_box(np.array(lower), np.array(upper)).moved(0, np.linalg.inv(pose))]
+    return [_box(np.array(lower) - EDGE_M, np.array(upper) + EDGE_M).moved(0, np.linalg.inv(pose))]
 
 
 def _box(lower: np.ndarray, upper: np.ndarray) -> Solid:
@@ -92,11 +96,19 @@ def _box(lower: np.ndarray, upper: np.ndarray) -> Solid:
     return Solid(0, np.column_stack((corners, np.zeros(8))))
 
 
+def missing_m(pb: Client, body: int, link: int) -> float:
+    """Returns how much nearer a link may be than PyBullet measures, since it rounds edges [m]."""
+    return EDGE_M * any(shape[2] in EDGED for shape in pb.getCollisionShapeData(body, link))
+
+
 def _balls(kind: int, size: tuple[float, ...]) -> np.ndarray:
-    """Returns balls of a shape that is no mesh, v x 4; none of an unknown one."""
+    """Returns balls of a shape that is no mesh, v x 4; none of an unknown one.
+
+    They are larger than shapes with edges by what `missing_m` says, so that they hold what is measured.
+    """
     if kind == pybullet.GEOM_BOX:
         half = np.array(size) / 2.0
-        return _box(-half, half).balls
+        return _box(-half, half).balls + (0.0, 0.0, 0.0, EDGE_M)
     if kind == pybullet.GEOM_SPHERE:
         return np.array(((0.0, 0.0, 0.0, size[0]),))
     if kind == pybullet.GEOM_CAPSULE:
@@ -104,7 +116,7 @@ def _balls(kind: int, size: tuple[float, ...]) -> np.ndarray:
     if kind == pybullet.GEOM_CYLINDER:
         angles = 2.0 * math.pi / SIDES * np.arange(SIDES)
         x, y = size[1] / math.cos(math.pi / SIDES) * np.array((np.cos(angles), np.sin(angles)))
-        ends = [np.column_stack((x, y, np.full(SIDES, z), np.zeros(SIDES))) for z in (-size[0] / 2.0, size[0] / 2.0)]
+        ends = [np.column_stack((x, y, np.full(SIDES, z), np.full(SIDES, EDGE_M))) for z in (-size[0] / 2.0, size[0] / 2.0)]
         return np.concatenate(ends)
     return np.empty((0, 4))
 
