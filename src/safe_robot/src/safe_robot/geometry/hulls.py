@@ -57,9 +57,23 @@ class Solid(NamedTuple):
         balls = np.column_stack((self.balls[:, :3] @ turn.T + shift, self.balls[:, 3]))
         return Solid(frame, balls, None if self.normal is None else turn @ self.normal)
 
+    def grown(self, by_m: float) -> "Solid":
+        """Returns it with larger balls."""
+        return self._replace(balls=self.balls + (0.0, 0.0, 0.0, by_m))
+
 
 def solids_of(pb: Client, body: int, link: int) -> list[Solid]:
-    """Returns the collision shapes of a link, in the frame of its centre of mass.
+    """Returns the collision shapes of a link, in the frame of its centre of mass, larger by `missing_m`."""
+    return [solid.grown(missing_m(pb, body, link)) for solid in _solids_of(pb, body, link)]
+
+
+def missing_m(pb: Client, body: int, link: int) -> float:
+    """Returns how much nearer a link may be than PyBullet measures, since it rounds edges [m]."""
+    return EDGE_M * any(shape[2] in EDGED for shape in pb.getCollisionShapeData(body, link))
+
+
+def _solids_of(pb: Client, body: int, link: int) -> list[Solid]:
+    """Returns the shapes as they are.
 
     If PyBullet does not tell the corners of each, the link counts as the box around it, as it lies now. So it does if
     some shapes are meshes of files and others are not, or lie askew to each other.
@@ -86,7 +100,7 @@ def solids_of(pb: Client, body: int, link: int) -> list[Solid]:
         least, most = _box(*Solid(0, np.concatenate([box.balls for box in boxes])).extent).moved(0, pose).extent
         if (least - AABB_MARGIN_M <= lower).all() and (most + AABB_MARGIN_M >= upper).all():
             return solids
-    return [_box(np.array(lower) - EDGE_M, np.array(upper) + EDGE_M).moved(0, np.linalg.inv(pose))]
+    return [_box(np.array(lower), np.array(upper)).moved(0, np.linalg.inv(pose))]
 
 
 def _box(lower: np.ndarray, upper: np.ndarray) -> Solid:
@@ -96,19 +110,11 @@ def _box(lower: np.ndarray, upper: np.ndarray) -> Solid:
     return Solid(0, np.column_stack((corners, np.zeros(8))))
 
 
-def missing_m(pb: Client, body: int, link: int) -> float:
-    """Returns how much nearer a link may be than PyBullet measures, since it rounds edges [m]."""
-    return EDGE_M * any(shape[2] in EDGED for shape in pb.getCollisionShapeData(body, link))
-
-
 def _balls(kind: int, size: tuple[float, ...]) -> np.ndarray:
-    """Returns balls of a shape that is no mesh, v x 4; none of an unknown one.
-
-    They are larger than shapes with edges by what `missing_m` says, so that they hold what is measured.
-    """
+    """Returns balls of a shape that is no mesh, v x 4; none of an unknown one."""
     if kind == pybullet.GEOM_BOX:
         half = np.array(size) / 2.0
-        return _box(-half, half).balls + (0.0, 0.0, 0.0, EDGE_M)
+        return _box(-half, half).balls
     if kind == pybullet.GEOM_SPHERE:
         return np.array(((0.0, 0.0, 0.0, size[0]),))
     if kind == pybullet.GEOM_CAPSULE:
@@ -116,7 +122,7 @@ def _balls(kind: int, size: tuple[float, ...]) -> np.ndarray:
     if kind == pybullet.GEOM_CYLINDER:
         angles = 2.0 * math.pi / SIDES * np.arange(SIDES)
         x, y = size[1] / math.cos(math.pi / SIDES) * np.array((np.cos(angles), np.sin(angles)))
-        ends = [np.column_stack((x, y, np.full(SIDES, z), np.full(SIDES, EDGE_M))) for z in (-size[0] / 2.0, size[0] / 2.0)]
+        ends = [np.column_stack((x, y, np.full(SIDES, z), np.zeros(SIDES))) for z in (-size[0] / 2.0, size[0] / 2.0)]
         return np.concatenate(ends)
     return np.empty((0, 4))
 
