@@ -15,7 +15,7 @@ from .pursuit import pursue
 CAUGHT_UP = 0.05
 """A joint has caught up with its target when going there takes at most this share of its acceleration and jerk."""
 OVERSHOOT = 0.01
-"""A target that is outside limits by no more than this counts as one at the limit: motors go as much past it [rad or m]."""
+"""A target outside limits by no more than this counts as one at the limit: motors go as much past it [rad or m]."""
 
 
 class ShapingConfig(ConfigModel):
