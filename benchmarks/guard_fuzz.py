@@ -28,6 +28,7 @@ def main() -> int:
     parser.add_argument("--robot", choices=SCENES, default="two", help="by how many joints it has (two)")
     parser.add_argument("--policy", nargs="*", choices=("reject", "limit"), default=("reject", "limit"))
     parser.add_argument("--shape", action="store_true", help="targets are smoothed")
+    parser.add_argument("--geometry", choices=("hulls", "exact"), default="hulls", help="of the guard (hulls)")
     parser.add_argument("--targets", type=int, default=100_000, help="for each policy")
     parser.add_argument("--states", type=int, default=0, help="states inside the margin; only of two joints")
     parser.add_argument("--seed", type=int, default=0)
@@ -40,14 +41,14 @@ def main() -> int:
     of = f"robot={options.robot} seed={options.seed}"
     for policy in options.policy if options.targets else ():
         began_s = time.process_time()
-        guard = scene.guard(policy, shape=options.shape)
+        guard = scene.guard(policy, shape=options.shape, geometry=options.geometry)
         report = fuzz(scene, guard, Oracle(scene), options.targets, np.random.default_rng(options.seed))
         spent_s = time.process_time() - began_s
         shares = " ".join(f"{key}={share:.6f}" for key, share in report.worst.items())
         refused = " ".join(f"{check}={count}" for check, count in sorted(report.refused.items()))
         print(*report.faults[:SHOWN], sep="\n", end="\n" if report.faults else "")
         print(
-            f"{of} policy={policy} shape={int(options.shape)} {shares} nearest_mm={1e3 * report.nearest_m:.2f} "
+            f"{of} policy={policy} shape={int(options.shape)} geometry={options.geometry} {shares} nearest_mm={1e3 * report.nearest_m:.2f} "
             f"per_second={report.targets / spent_s:.0f} refused: {refused} sums: targets={report.targets} "
             f"commands={report.commands} not_safe={report.refused.total()} brakings={report.brakings} "
             f"seconds={spent_s:.0f} faults={len(report.faults)}",

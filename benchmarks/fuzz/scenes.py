@@ -41,16 +41,26 @@ class Scene(NamedTuple):
             obstacles=tuple(Obstacle(name, "box", size, Pose(place)) for name, (size, place) in self.boxes.items())
         )
 
-    def guard(self, policy: str, around: bool = True, shape: bool = False, **changes: Any) -> Guard:
+    def guard(
+        self,
+        policy: str,
+        around: bool = True,
+        shape: bool = False,
+        geometry: str = "hulls",
+        margin_m: float = MARGIN_M,
+        **changes: float,
+    ) -> Guard:
         """Returns a started guard, with all checks of joints and, unless `around` is off, of shapes.
 
         Args:
             policy: `reject` or `limit`.
             around: Whether shapes are checked.
             shape: Whether targets are smoothed.
-            changes: Limits other than `LIMITS`, which makes it a bad one, or `margin_m`.
+            geometry: `hulls` or `exact`.
+            margin_m: The margin [m].
+            changes: Limits other than `LIMITS`, which makes it a bad one.
         """
-        shapes = {"margin_m": changes.pop("margin_m", MARGIN_M), "active": around}
+        shapes = {"margin_m": margin_m, "active": around, "geometry": geometry}
         options: dict[str, Any] = {
             "policy": policy,
             "period_s": PERIOD_S,

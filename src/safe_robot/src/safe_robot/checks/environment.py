@@ -9,7 +9,7 @@ from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import NonNegativeMetres, Text
 from safe_robot.check import Check, CheckConfig, Inside, Situation, Violation
 from safe_robot.commands.pursuit import Bound
-from safe_robot.geometry.distances import LinkDistances, Pair
+from safe_robot.geometry.distances import GEOMETRY, Geometry, LinkDistances, Pair
 from safe_robot.geometry.obstacles import Obstacle, obstacles_of_world
 from safe_robot.geometry.proximity import Proximity
 from safe_robot.limits import JointLimits
@@ -21,6 +21,7 @@ class EnvironmentConfig(CheckConfig):
     """How near links may come to bodies of the environment."""
 
     margin_m: NonNegativeMetres = Field(0.02, description="Least distance between links and bodies [m].")
+    geometry: Geometry = Field("hulls", description=GEOMETRY)
     world: Text | None = Field(
         None, description="Main YAML file of a world: its bodies as they are at the start; without it, live ones."
     )
@@ -41,7 +42,7 @@ class Environment(Check):
 
     def __init__(self, config: Any, robot: GuardedRobot, limits: JointLimits, file: str) -> None:
         super().__init__(config, robot, limits, file)
-        self.distances = LinkDistances(robot)
+        self.distances = LinkDistances(robot, config.geometry)
         joints = {name for name, joint in robot.document.joints.items() if joint.is_moving}
         self._still = () if config.world is None else obstacles_of_world(config.world, joints, config.robot)
         self._links = [link for link in self.distances.links if self.distances.reach((link, 0)).any()]

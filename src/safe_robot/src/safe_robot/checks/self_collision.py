@@ -12,7 +12,7 @@ from custom_ros_tools.schema import NonNegativeMetres, Text
 from rpbi.urdf.document import disabled_collisions
 from safe_robot.check import Check, CheckConfig, Inside, Situation, Violation
 from safe_robot.commands.pursuit import Bound
-from safe_robot.geometry.distances import LinkDistances, Pair
+from safe_robot.geometry.distances import GEOMETRY, Geometry, LinkDistances, Pair
 from safe_robot.geometry.proximity import Proximity
 from safe_robot.limits import JointLimits
 from safe_robot.motion import Motion
@@ -23,6 +23,7 @@ class SelfCollisionConfig(CheckConfig):
     """How near the links of the robot may come to each other."""
 
     margin_m: NonNegativeMetres = Field(0.01, description="Least distance between links [m].")
+    geometry: Geometry = Field("hulls", description=GEOMETRY)
     srdf: Text | None = Field(None, description="A SRDF; pairs for which it disables collisions are left out.")
     pairs_file: Text | None = Field(
         None, description="YAML of the pairs; it is written if it is not there, and read if it is."
@@ -38,7 +39,7 @@ class SelfCollision(Check):
 
     def __init__(self, config: Any, robot: GuardedRobot, limits: JointLimits, file: str) -> None:
         super().__init__(config, robot, limits, file)
-        self.distances = LinkDistances(robot)
+        self.distances = LinkDistances(robot, config.geometry)
         self.pairs = self._pairs()
         self.proximity = Proximity(self.distances, self.pairs, config.margin_m)
 

@@ -4,14 +4,16 @@ import math
 import random
 import weakref
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from importlib import import_module
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pybullet
 
+from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.transforms import matrix_of
 from rpbi.engine.client import Client
-from rpbi.geometry import Vector, cross, dot, minus, rotated
+from rpbi.geometry import Vector, cross, dot, minus, rotated, scaled
 from rpbi.urdf.joints import Joint
 from rpbi.urdf.loading import load_urdf
 from safe_robot.robot import GuardedRobot
@@ -19,6 +21,12 @@ from safe_robot.robot import GuardedRobot
 from .hulls import Solid, missing_m, solids_of
 from .obstacles import Obstacle
 
+Geometry = Literal["hulls", "exact"]
+"""What shapes are taken for."""
+GEOMETRY = (
+    "What decides where convex hulls of meshes are too near: hulls, which is fast; or exact, the meshes themselves, which"
+    " needs `./rpbi setup ik`."
+)
 Pair = tuple[str, str | int]
 """Two links, or a link and the number of an obstacle."""
 SAMPLES = 200
@@ -41,6 +49,7 @@ class Contact(NamedTuple):
         first: Where one of them is nearest, in the root [m].
         second: The same for the other.
         directions: The same as `direction` for each two of their shapes.
+        is_exact: Whether exact shapes say so: then `direction` points from the second to the first.
     """
 
     distance: float
@@ -48,13 +57,18 @@ class Contact(NamedTuple):
     first: Vector
     second: Vector
     directions: tuple[Vector, ...]
+    is_exact: bool = False
 
 
 class LinkDistances:
-    """Distances between the collision shapes of links: convex hulls, where a shape is a mesh.
+    """Distances between the collision shapes of links.
+
+    They are those of convex hulls, where a shape is a mesh. With exact geometry the shapes themselves decide where hulls
+    are near.
 
     Args:
         robot: The robot; its meshes have to be there.
+        geometry: What shapes are taken for.
 
     Attributes:
         links: Links that have a collision shape.
@@ -62,10 +76,12 @@ class LinkDistances:
 
     Raises:
         ConfigError: If the robot cannot be loaded.
+        MissingDependency: If exact shapes need what is not installed.
     """
 
-    def __init__(self, robot: GuardedRobot) -> None:
+    def __init__(self, robot: GuardedRobot, geometry: Geometry = "hulls") -> None:
         self._robot = robot
+        self._exact = None if geometry == "hulls" else import_module("safe_robot.geometry.exact")
         self._pb = Client(pybullet.DIRECT)
         weakref.finalize(self, self._pb.disconnect)
         self._body = load_urdf(self._pb, robot.urdf_path, {"fileName": robot.urdf_path, "useFixedBase": True})
@@ -78,6 +94,7 @@ class LinkDistances:
         self._index = {name: i for i, name in names.items() if self._pb.getCollisionShapeData(self._body, i)}
         self._obstacles: tuple[tuple[Obstacle, int], ...] = ()
         self.links = tuple(self._index)
+        self._pieces: dict[str | int, list[Any]] = {}
         self.place(np.zeros(len(robot.joint_names)))
         self.radius_m = {link: self._radius(link) for link in self.links}
         self._solids: dict[str | int, list[Solid]] = {link: self._solids_of(link) for link in self.links}
@@ -87,6 +104,7 @@ class LinkDistances:
 
     def place(self, q: np.ndarray) -> None:
         """Puts the robot into a configuration of n positions [rad or m]."""
+        self._placed = q
         factors, offsets = self._all
         values = (factors @ q + offsets)[:, None].tolist()
         self._pb.resetJointStatesMultiDof(self._body, self._moving, values)
@@ -107,6 +125,8 @@ class LinkDistances:
                 body = obstacle.add_to(self._pb)
                 self._solids[i] = solids_of(self._pb, body, -1)
                 self._missing_m[i] = missing_m(self._pb, body, -1)
+                if self._exact is not None:
+                    self._pieces[i] = self._exact.pieces_of_obstacle(obstacle, self._solids[i])
                 changed.append(i)
             elif old.pose != obstacle.pose:
                 self._pb.resetBasePositionAndOrientation(body, *obstacle.pose)
@@ -121,26 +141,58 @@ class LinkDistances:
         """Returns the shapes of a link, or of an obstacle where it was put."""
         if isinstance(thing, str):
             return self._solids[thing]
-        pose = matrix_of(*self._obstacles[thing][0].pose)
-        return [solid.moved(0, pose) for solid in self._solids[thing]]
+        return [solid.moved(0, self._pose(thing)) for solid in self._solids[thing]]
+
+    def pieces(self, thing: str | int) -> list[Any]:
+        """Returns the exact shapes of a link, or of an obstacle where it was put; none if there are none."""
+        if isinstance(thing, str):
+            return self._pieces[thing]
+        return [piece.moved(0, self._pose(thing)) for piece in self._pieces[thing]]
+
+    def _pose(self, obstacle: int) -> np.ndarray:
+        return matrix_of(*self._obstacles[obstacle][0].pose)
 
     def frames(self, q: np.ndarray) -> np.ndarray:
         """Returns where links are, in k configurations of n positions, see `LinkFrames`."""
         return self._robot.frames.at(q)
 
-    def distance(self, pair: Pair, most_m: float) -> float:
-        """Returns how far two things are apart where they were put [m]; inf if that is more than some distance."""
-        missing_m = self._missing_m[pair[0]] + self._missing_m[pair[1]]
-        return min([point[8] for point in self._closest(pair, most_m + missing_m)], default=math.inf) - missing_m
+    def distance(self, pair: Pair, most_m: float, within_m: float = -math.inf) -> float:
+        """Returns how far two things are apart where they were put [m]; inf if it is more than `most_m`, see `contact`."""
+        contact = self.contact(pair, most_m, within_m)
+        return math.inf if contact is None else contact.distance
 
-    def contact(self, pair: Pair, most_m: float) -> Contact | None:
-        """Returns where two things are nearest where they were put; None if they are further apart than a distance."""
+    def contact(self, pair: Pair, most_m: float, within_m: float = -math.inf) -> Contact | None:
+        """Returns where two things are nearest where they were put; None if they are further apart than a distance.
+
+        Args:
+            pair: The two.
+            most_m: The distance [m].
+            within_m: How far apart they have to be [m]. If hulls are nearer, exact shapes are asked, where there are
+                any; if these are further apart, the distance is this.
+        """
         missing_m = self._missing_m[pair[0]] + self._missing_m[pair[1]]
         points = self._closest(pair, most_m + missing_m)
         if not points:
             return None
         point = min(points, key=lambda each: each[8])
-        return Contact(point[8] - missing_m, point[7], point[5], point[6], tuple(each[7] for each in points))
+        contact = Contact(point[8] - missing_m, point[7], point[5], point[6], tuple(each[7] for each in points))
+        if self._exact is None or contact.distance >= within_m:
+            return contact
+        return self._exactly(pair, contact, within_m)
+
+    def _exactly(self, pair: Pair, contact: Contact, within_m: float) -> Contact:
+        """Returns a contact of hulls as exact shapes have it; the same if they are in each other, or there are none."""
+        assert self._exact is not None
+        pieces = [self.pieces(thing) for thing in pair]
+        if not all(pieces):
+            return contact
+        found = self._exact.nearest(*pieces, self.frames(self._placed[None])[0], within_m)
+        if found is None:
+            return contact
+        if not found.distance < within_m:
+            return contact._replace(distance=within_m)
+        direction = scaled(1.0 / found.distance, minus(found.first, found.second))
+        return Contact(found.distance, direction, found.first, found.second, contact.directions, True)
 
     def gradient(self, pair: Pair, contact: Contact, q: np.ndarray) -> np.ndarray:
         """Returns how fast two things go apart as each of n joints moves, by where `contact` found them [m/rad or 1].
@@ -158,7 +210,7 @@ class LinkDistances:
                     along[i] += sign * dot(contact.direction, way)
         gradient = along @ self._all[0]
         steepest = float(np.abs(gradient).max())
-        if steepest < FLAT:
+        if steepest < FLAT or contact.is_exact:
             return gradient
         self.place(q + TRIED * gradient / steepest)
         is_further = self.distance(pair, math.inf) > contact.distance
@@ -197,7 +249,7 @@ class LinkDistances:
         for _ in range(SAMPLES):
             self.place(np.array([_anywhere(generator, joint.lower, joint.upper) for joint in self._robot.joints]))
             for pair in apart:
-                touching[pair] += self.distance(pair, margin_m) < margin_m
+                touching[pair] += self.distance(pair, margin_m, margin_m) < margin_m
         return [pair for pair in apart if touching[pair] < ALWAYS * SAMPLES]
 
     def _group(self, link: str) -> str:
@@ -216,7 +268,14 @@ class LinkDistances:
         frame, pose = self._robot.frames.place(link)
         index = self._index[link]
         mass = pose @ matrix_of(*self._pb.getDynamicsInfo(self._body, index)[3:5])
-        return [solid.moved(frame, mass) for solid in solids_of(self._pb, self._body, index)]
+        solids = solids_of(self._pb, self._body, index)
+        if self._exact is not None:
+            try:
+                pieces = self._exact.pieces_of_link(self._pb, self._body, index, solids)
+            except ValueError as error:
+                raise ConfigError([Problem(self._robot.urdf_path, f"link '{link}'", str(error))]) from None
+            self._pieces[link] = [piece.moved(frame, mass) for piece in pieces]
+        return [solid.moved(frame, mass) for solid in solids]
 
     def _radius(self, link: str) -> float:
         """Returns how far the shape of a link goes from the link's origin, at most [m]."""

@@ -67,6 +67,11 @@ def solids_of(pb: Client, body: int, link: int) -> list[Solid]:
     return [solid.grown(missing_m(pb, body, link)) for solid in _solids_of(pb, body, link)]
 
 
+def extent_of(solids: Sequence[Solid]) -> tuple[np.ndarray, np.ndarray]:
+    """Returns least and greatest x, y and z of some shapes in one frame [m]."""
+    return Solid(0, np.concatenate([solid.balls for solid in solids] or [np.empty((0, 4))])).extent
+
+
 def missing_m(pb: Client, body: int, link: int) -> float:
     """Returns how much nearer a link may be than PyBullet measures, since it rounds edges [m]."""
     return EDGE_M * any(shape[2] in EDGED for shape in pb.getCollisionShapeData(body, link))

@@ -105,7 +105,7 @@ class Proximity:
             if placed != row:
                 self._distances.place(motion.position[row])
                 placed = row
-            contact = self._distances.contact(self._pairs[i], FAR_M)
+            contact = self._distances.contact(self._pairs[i], FAR_M, self._margin_m + ROUNDING_M)
             if contact is None:
                 continue
             distance = contact.distance
@@ -131,7 +131,7 @@ class Proximity:
     def _is_further(self, motion: Motion, i: int, distance: float, row: int) -> bool:
         """Returns whether a pair that is too near was no further apart before the motion."""
         self._distances.place(motion.start.position)
-        before = self._distances.distance(self._pairs[i], FAR_M)
+        before = self._distances.distance(self._pairs[i], FAR_M, self._margin_m)
         self._distances.place(motion.position[row])
         return distance >= before - ROUNDING_M
 
@@ -152,18 +152,18 @@ class Proximity:
         for k in found:
             i = int(near[k])
             pair = self._pairs[i]
-            contact = self._distances.contact(pair, FAR_M)
+            contact = self._distances.contact(pair, FAR_M, float(within_m[i]))
             if contact is None:
                 continue
             if not contact.distance < least[k] + LOOSE_M:
                 self._separation.learn(i, contact.directions, frames[0])
-            if contact.distance > within_m[i]:
+            if contact.distance >= within_m[i]:
                 continue
             gradient = self._distances.gradient(pair, contact, end)
             room = contact.distance - self._margin_m - KEPT_M
             if room < 0.0:
                 self._distances.place(before)
-                room = max(room, contact.distance - self._distances.distance(pair, FAR_M))
+                room = max(room, contact.distance - self._distances.distance(pair, FAR_M, float(within_m[i])))
                 self._distances.place(end)
             bounds.append(Bound(gradient, room))
         return bounds
@@ -192,6 +192,6 @@ class Proximity:
         """Yields the pairs that are nearer than a distance in a configuration of n positions, and where they are."""
         self._distances.place(q)
         for pair in self._pairs:
-            contact = self._distances.contact(pair, within_m)
-            if contact is not None:
+            contact = self._distances.contact(pair, within_m, within_m)
+            if contact is not None and contact.distance < within_m:
                 yield pair, contact

@@ -1,0 +1,214 @@
+"""Exact shapes: meshes as their triangles, by hpp-fcl, in place of convex hulls."""
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from custom_ros_tools.errors import MissingDependency
+from custom_ros_tools.transforms import matrix_of
+from rpbi.engine.client import Client
+
+try:
+    import hppfcl
+except ImportError:
+    raise MissingDependency("hpp-fcl", "./rpbi setup ik") from None
+
+from .hulls import Solid, extent_of
+from .obstacles import NO_FILE, OF_PYBULLET, Kind, Obstacle
+
+TOUCHING_M = 1e-5
+"""What is nearer has no direction [m]: convex hulls decide."""
+OUT_OF_PLACE_M = 0.015
+"""Boxes around a link's exact shapes and around its hulls differ by less [m]."""
+SAME_M = 1e-7
+"""Corners that are nearer to each other are one [m]."""
+
+
+class Surface(NamedTuple):
+    """Triangles of a mesh.
+
+    Attributes:
+        triangles: t x 3 x 3 [m].
+        points: A corner of each part that is not tied to the others, p x 3 [m].
+        lower: Least x, y and z [m].
+        upper: Greatest x, y and z [m].
+    """
+
+    triangles: np.ndarray
+    points: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+
+    def holds(self, points: np.ndarray) -> bool:
+        """Returns whether one of k points, k x 3, is inside: whether the triangles, seen from there, are all around.
+
+        By the solid angles of the triangles, after Van Oosterom and Strackee (1983).
+        """
+        for point in points[((points >= self.lower) & (points <= self.upper)).all(axis=1)]:
+            a, b, c = (self.triangles - point).transpose(1, 0, 2)
+            u, v, w = (np.linalg.norm(each, axis=1) for each in (a, b, c))
+            volume = (a * np.cross(b, c)).sum(axis=1)
+            rest = u * v * w + (a * b).sum(axis=1) * w + (b * c).sum(axis=1) * u + (c * a).sum(axis=1) * v
+            if not abs(np.arctan2(volume, rest).sum()) < math.pi:  # half of all around
+                return True
+        return False
+
+
+class Piece(NamedTuple):
+    """An exact shape that moves with a frame.
+
+    Attributes:
+        frame: The frame that it moves with, see `LinkFrames`.
+        pose: Where it is in that frame, 4 x 4.
+        shape: What hpp-fcl has of it.
+        surface: Its triangles, None if it is no mesh.
+    """
+
+    frame: int
+    pose: np.ndarray
+    shape: Any
+    surface: Surface | None = None
+
+    def moved(self, frame: int, pose: np.ndarray) -> "Piece":
+        """Returns it in another frame, in which its own one has a pose, 4 x 4."""
+        return self._replace(frame=frame, pose=pose @ self.pose)
+
+
+class Nearest(NamedTuple):
+    """How far two things are apart [m], and where each of them is nearest, in the root [m]."""
+
+    distance: float
+    first: tuple[float, float, float]
+    second: tuple[float, float, float]
+
+
+def pieces_of_link(pb: Client, body: int, link: int, solids: Sequence[Solid]) -> list[Piece]:
+    """Returns the collision shapes of a link in the frame of its centre of mass; none if hulls have to do.
+
+    Args:
+        pb: The client.
+        body: The body.
+        link: The link.
+        solids: Its hulls, in the same frame.
+
+    Raises:
+        ValueError: If a mesh cannot be read, or is not where its hull is.
+    """
+    data = dict.fromkeys(pb.getCollisionShapeData(body, link))  # a file of several objects is told of several times
+    return _placed([_piece(OF_PYBULLET.get(each[2]), *each[3:5], matrix_of(*each[5:7])) for each in data], solids)
+
+
+def pieces_of_obstacle(obstacle: Obstacle, solids: Sequence[Solid]) -> list[Piece]:
+    """Returns an obstacle in its own frame, see `pieces_of_link`."""
+    x, y, z = size = obstacle.size
+    sizes = {"sphere": (max(size) / 2.0,), "cylinder": (z, max(x, y) / 2.0), "capsule": (z, max(x, y) / 2.0)}
+    piece = _piece(obstacle.kind, sizes.get(obstacle.kind, size), obstacle.mesh_file.encode(), np.eye(4))
+    return _placed([piece], solids)
+
+
+def _piece(kind: Kind | None, size: tuple[float, ...], file: bytes, pose: np.ndarray) -> Piece | None:
+    """Returns a shape with sizes as PyBullet tells them; None of one that hulls are exact for, or nothing is known of."""
+    if kind == "mesh" and file.decode() not in NO_FILE:
+        return Piece(0, pose, *_mesh(file.decode(), size))
+    if kind == "box":
+        return Piece(0, pose, hppfcl.Box(*size))
+    if kind == "sphere":
+        return Piece(0, pose, hppfcl.Sphere(size[0]))
+    if kind in ("cylinder", "capsule"):
+        made = hppfcl.Cylinder if kind == "cylinder" else hppfcl.Capsule
+        return Piece(0, pose, made(size[1], size[0]))
+    return None
+
+
+def _placed(found: Sequence[Piece | None], solids: Sequence[Solid]) -> list[Piece]:
+    pieces = [piece for piece in found if piece is not None]
+    if len(pieces) < len(found):
+        return []
+    extent, expected = (np.array(extent_of(each)) for each in ([_corners(piece) for piece in pieces], solids))
+    if pieces and not (np.abs(extent - expected) < OUT_OF_PLACE_M).all():
+        raise ValueError(f"expected exact shapes where hulls are, {expected.tolist()} m, got {extent.tolist()} m")
+    return pieces
+
+
+def nearest(firsts: Sequence[Piece], seconds: Sequence[Piece], frames: np.ndarray, within_m: float) -> Nearest | None:
+    """Returns how far two things are apart, inf if that is more than a distance; None if they are in each other.
+
+    Args:
+        firsts: The shapes of one.
+        seconds: The shapes of the other.
+        frames: m frames, m x 4 x 4.
+        within_m: The distance [m].
+    """
+    found = Nearest(math.inf, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    request = hppfcl.CollisionRequest()
+    request.security_margin = within_m
+    for first in firsts:
+        place = frames[first.frame] @ first.pose
+        for second in seconds:
+            other = frames[second.frame] @ second.pose
+            shapes = first.shape, _transform(place), second.shape, _transform(other)
+            if hppfcl.collide(*shapes, request, hppfcl.CollisionResult()):
+                result = hppfcl.DistanceResult()
+                distance = hppfcl.distance(*shapes, hppfcl.DistanceRequest(True), result)
+                if not distance > TOUCHING_M:
+                    return None
+                if distance < found.distance:
+                    found = Nearest(distance, tuple(result.getNearestPoint1()), tuple(result.getNearestPoint2()))
+            elif _is_inside(first, second, np.linalg.solve(other, place)):
+                return None
+            elif _is_inside(second, first, np.linalg.solve(place, other)):
+                return None
+    return found
+
+
+def _is_inside(piece: Piece, other: Piece, pose: np.ndarray) -> bool:
+    """Returns whether a part of a piece, which has a pose in another one, is all inside of a mesh, and touches nothing."""
+    if other.surface is None:  # such shapes are solid
+        return False
+    points = np.zeros((1, 3)) if piece.surface is None else piece.surface.points
+    return other.surface.holds(points @ pose[:3, :3].T + pose[:3, 3])
+
+
+def _transform(pose: np.ndarray) -> Any:
+    return hppfcl.Transform3f(pose[:3, :3], pose[:3, 3])
+
+
+@lru_cache(maxsize=64)
+def _mesh(file: str, scale: tuple[float, ...]) -> tuple[Any, Surface]:
+    """Returns a mesh, and its triangles.
+
+    Raises:
+        ValueError: If it cannot be read.
+    """
+    try:
+        mesh = hppfcl.MeshLoader(hppfcl.NODE_TYPE.BV_OBBRSS).load(file, np.array(scale))
+        corners = np.array(mesh.vertices())
+        rows = np.array([[mesh.tri_indices(i)[k] for k in range(3)] for i in range(mesh.num_tris)])
+        triangles = corners[rows]
+    except (RuntimeError, ValueError, IndexError) as error:
+        raise ValueError(f"mesh {file}: {error}") from None
+    if not np.isfinite(triangles).all():
+        raise ValueError(f"mesh {file}: expected finite corners")
+    _, first, same = np.unique((corners / SAME_M).round(), axis=0, return_index=True, return_inverse=True)
+    ends = same.reshape(-1)[rows]
+    edges = np.concatenate((ends[:, :2], ends[:, 1:]))
+    count, part = connected_components(coo_matrix((np.ones(len(edges)), edges.T), (len(first),) * 2), directed=False)
+    used = np.isin(np.arange(len(first)), ends)
+    points = [corners[first[np.flatnonzero((part == i) & used)[:1]]] for i in range(count)]
+    return mesh, Surface(triangles, np.concatenate(points), triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1)))
+
+
+def _corners(piece: Piece) -> Solid:
+    """Returns the box around a shape that is no mesh, or the corners of a mesh."""
+    if piece.surface is None:
+        piece.shape.computeLocalAABB()
+        low, high = piece.shape.aabb_local.min_, piece.shape.aabb_local.max_
+        points = np.stack(np.meshgrid(*np.stack((low, high), axis=1)), axis=-1).reshape(-1, 3)
+    else:
+        points = piece.surface.triangles.reshape(-1, 3)
+    return Solid(0, np.column_stack((points, np.zeros(len(points))))).moved(0, piece.pose)
