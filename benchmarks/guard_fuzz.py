@@ -48,8 +48,8 @@ def main() -> int:
         refused = " ".join(f"{check}={count}" for check, count in sorted(report.refused.items()))
         print(*report.faults[:SHOWN], sep="\n", end="\n" if report.faults else "")
         print(
-            f"{of} policy={policy} shape={int(options.shape)} geometry={options.geometry} {shares} nearest_mm={1e3 * report.nearest_m:.2f} "
-            f"per_second={report.targets / spent_s:.0f} refused: {refused} sums: targets={report.targets} "
+            f"{of} policy={policy} shape={int(options.shape)} geometry={options.geometry} "
+            f"{shares} nearest_mm={1e3 * report.nearest_m:.2f} per_second={report.targets / spent_s:.0f} refused: {refused} sums: targets={report.targets} "
             f"commands={report.commands} not_safe={report.refused.total()} brakings={report.brakings} "
             f"seconds={spent_s:.0f} faults={len(report.faults)}",
             flush=True,

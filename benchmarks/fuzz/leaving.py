@@ -75,8 +75,9 @@ def leave_margin(scene: Scene, oracle: Oracle, count: int, generator: np.random.
             commands = driver.follow(q)
             kind = _gets_out(driver, oracle, commands)
         else:
-            commands, speed = (each.drive(q, q + way) for each in (driver, free))
-            slowest = min(slowest, float(np.abs(np.diff(commands, axis=0)).max() / np.abs(np.diff(speed, axis=0)).max()))
+            commands, freely = (each.drive(q, q + way) for each in (driver, free))
+            fastest, usual = (float(np.abs(np.diff(each, axis=0)).max()) for each in (commands, freely))
+            slowest = min(slowest, fastest / usual)
             kind = "straight" if _is_outside(oracle, commands[-1]) else None
         fault = fault_of(oracle, commands)
         nearer_m = max(nearer_m, _nearer_m(oracle, commands))
@@ -106,7 +107,7 @@ class Driver:
         self._around = scene.around
 
     def drive(self, start: np.ndarray, target: np.ndarray) -> np.ndarray:
-        """Returns what is commanded when a robot that stands is sent to a target, from the start to the last command."""
+        """Returns what is commanded when a robot that stands is sent to a target, from the start on."""
         self.guard.halt()
         self.guard.start()
         measured = dict(zip(self.guard.joint_names, start.tolist()))
@@ -137,9 +138,7 @@ class Driver:
         return np.array(commands)
 
 
-def leave_with_smaller_margin(
-    scene: Scene, oracle: Oracle, grid: Grid, start: np.ndarray, out: WayOut
-) -> str | None:
+def leave_with_smaller_margin(scene: Scene, oracle: Oracle, grid: Grid, start: np.ndarray, out: WayOut) -> str | None:
     """Drives a locked robot out, as docs/safety.md advises; returns what went wrong, None if it got out.
 
     The guard has a margin below all distances that the message told of. The way is the shortest one on a grid over

@@ -24,8 +24,8 @@ from .obstacles import Obstacle
 Geometry = Literal["hulls", "exact"]
 """What shapes are taken for."""
 GEOMETRY = (
-    "What decides where convex hulls of meshes are too near: hulls, which is fast; or exact, the meshes themselves, which"
-    " needs `./rpbi setup ik`."
+    "What decides where convex hulls of meshes are too near: hulls, which is fast; or exact, the meshes themselves,"
+    " which needs `./rpbi setup ik`."
 )
 Pair = tuple[str, str | int]
 """Two links, or a link and the number of an obstacle."""
@@ -63,8 +63,8 @@ class Contact(NamedTuple):
 class LinkDistances:
     """Distances between the collision shapes of links.
 
-    They are those of convex hulls, where a shape is a mesh. With exact geometry the shapes themselves decide where hulls
-    are near.
+    They are those of convex hulls, where a shape is a mesh. With exact geometry the shapes themselves decide where
+    hulls are near.
 
     Args:
         robot: The robot; its meshes have to be there.
@@ -157,7 +157,7 @@ class LinkDistances:
         return self._robot.frames.at(q)
 
     def distance(self, pair: Pair, most_m: float, within_m: float = -math.inf) -> float:
-        """Returns how far two things are apart where they were put [m]; inf if it is more than `most_m`, see `contact`."""
+        """Returns how far two things are apart where they were put [m]; inf beyond `most_m`, see `contact`."""
         contact = self.contact(pair, most_m, within_m)
         return math.inf if contact is None else contact.distance
 

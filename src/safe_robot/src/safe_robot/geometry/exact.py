@@ -100,7 +100,7 @@ def pieces_of_link(pb: Client, body: int, link: int, solids: Sequence[Solid]) ->
         ValueError: If a mesh cannot be read, or is not where its hull is.
     """
     data = dict.fromkeys(pb.getCollisionShapeData(body, link))  # a file of several objects is told of several times
-    return _placed([_piece(OF_PYBULLET.get(each[2]), *each[3:5], matrix_of(*each[5:7])) for each in data], solids)
+    return _placed([_piece(OF_PYBULLET.get(each[2]), each[3], each[4], matrix_of(*each[5:7])) for each in data], solids)
 
 
 def pieces_of_obstacle(obstacle: Obstacle, solids: Sequence[Solid]) -> list[Piece]:
@@ -112,7 +112,7 @@ def pieces_of_obstacle(obstacle: Obstacle, solids: Sequence[Solid]) -> list[Piec
 
 
 def _piece(kind: Kind | None, size: tuple[float, ...], file: bytes, pose: np.ndarray) -> Piece | None:
-    """Returns a shape with sizes as PyBullet tells them; None of one that hulls are exact for, or nothing is known of."""
+    """Returns a shape with sizes as PyBullet tells them; None of one of which there is no more than its hull."""
     if kind == "mesh" and file.decode() not in NO_FILE:
         return Piece(0, pose, *_mesh(file.decode(), size))
     if kind == "box":
@@ -167,7 +167,7 @@ def nearest(firsts: Sequence[Piece], seconds: Sequence[Piece], frames: np.ndarra
 
 
 def _is_inside(piece: Piece, other: Piece, pose: np.ndarray) -> bool:
-    """Returns whether a part of a piece, which has a pose in another one, is all inside of a mesh, and touches nothing."""
+    """Returns whether a part of a piece, which has a pose in another one and does not touch it, is inside of it."""
     if other.surface is None:  # such shapes are solid
         return False
     points = np.zeros((1, 3)) if piece.surface is None else piece.surface.points
