@@ -49,8 +49,8 @@ def main() -> int:
         print(*report.faults[:SHOWN], sep="\n", end="\n" if report.faults else "")
         print(
             f"{of} policy={policy} shape={int(options.shape)} geometry={options.geometry} "
-            f"{shares} nearest_mm={1e3 * report.nearest_m:.2f} per_second={report.targets / spent_s:.0f} refused: {refused} sums: targets={report.targets} "
-            f"commands={report.commands} not_safe={report.refused.total()} brakings={report.brakings} "
+            f"{shares} nearest_mm={1e3 * report.nearest_m:.2f} per_second={report.targets / spent_s:.0f} "
+            f"refused: {refused} sums: targets={report.targets} commands={report.commands} not_safe={report.refused.total()} brakings={report.brakings} "
             f"seconds={spent_s:.0f} faults={len(report.faults)}",
             flush=True,
         )

@@ -97,8 +97,13 @@ def test_what_is_in_a_closed_mesh_and_far_from_its_surface_is_in_collision(peg, 
     case, trough = mesh_of(tmp_path / "case.obj", CASE), mesh_of(tmp_path / "trough.obj", TROUGH)
     assert distance(peg, case, "exact", (0.0, 0.0)) < 0.0
     assert distance(peg, trough, "exact", (0.0, 0.0)) == MARGIN_M
-    nested = mesh_of(tmp_path / "nested.obj", (*CASE, ((0.6, 0.6, -0.005), (0.61, 0.61, 0.005))))
-    assert distance(peg, nested, "exact", (0.605, 0.605)) < 0.0, "the small part is inside the peg"
+    parts = mesh_of(tmp_path / "parts.obj", [((x, -0.02, -0.02), (x + 0.04, 0.02, 0.02)) for x in (-0.52, -0.02)])
+    (tmp_path / "parts.urdf").write_text(
+        PEG.replace('<box size="0.04 0.04 0.04"/>', f'<mesh filename="{parts.mesh_file}"/>')
+    )
+    dumb_bell = GuardedRobot(str(tmp_path / "parts.urdf"))
+    assert distance(dumb_bell, case, "exact", (0.0, 0.0)) < 0.0, "its second part is inside"
+    assert distance(dumb_bell, case, "exact", (0.25, 0.0)) == MARGIN_M, "the case is between its parts"
 
 
 @pytest.mark.parametrize("geometry", ["hulls", "exact"])
