@@ -176,10 +176,13 @@ class Guard:
     def _decide(self, target: tuple[float, ...], situation: Situation) -> Decision:
         if violation := self._input_problem(target):
             return self._refused(violation)
-        if self._is_first and (violation := self._take_start(target, situation)):
+        is_first = self._is_first
+        if is_first and (violation := self._take_start(target, situation)):
             return Decision(None, violation, violation.subject != MEASURED)
         assert self._state is not None
-        wanted = target if self._shaper is None else self._shaper.shaped(target, self._state)
+        wanted = target
+        if self._shaper is not None:  # controllers take the first command as rest, so it is where the robot stands
+            wanted = tuple(self._state.position.tolist()) if is_first else self._shaper.shaped(target, self._state)
         found = self._judged(wanted, situation)
         if isinstance(found, Violation) and wanted != target and found.check in MENDED:
             wanted = tuple(self._next_stop.tolist())
