@@ -47,8 +47,8 @@ class GuardNode:
         self._as_joint_state = config.publish_as_joint_state
         self._targets_are_states = config.targets_are_states
         self._silence_s = config.silence_s
-        looks_around = config.base_frame is not None and any(check.takes_obstacles for check in self._guard.checks)
-        self._around = LiveObstacles(config.base_frame, config.left_out) if looks_around else None
+        base_frame = config.base_frame if any(check.takes_obstacles for check in self._guard.checks) else None
+        self._around = None if base_frame is None else LiveObstacles(base_frame, config.left_out)
         self._warn = ThrottledWarning()
         self._way_out_from: object = None
         self._way_out_words = ""

@@ -180,7 +180,7 @@ def sample_topic(sensor: Sensor) -> Topic | None:
         return None
     if sensor.ros_topic:
         found = find_topic(sensor.ros_topic, sensor)
-        return found if sensor.topic_name is None else found._replace(name=sensor.topic_name)
+        return found if sensor.topic is None else found._replace(name=sensor.topic)
     if sensor.sample_type not in TOPICS:
         message = f"missing, expected 'module:NAME' of the Topic for its {sensor.sample_type.__qualname__}"
         raise ConfigError([Problem(full_name(sensor), "ros_topic", message)])

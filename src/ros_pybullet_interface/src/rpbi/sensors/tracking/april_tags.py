@@ -90,7 +90,7 @@ class AprilTagsSensor(BodySensor):
 
     def __init__(self, body: Any, config: AprilTagsConfig) -> None:
         super().__init__(body, config)
-        self.topic_name = config.topic
+        self.topic = config.topic
         self._missing: set[str] = set()
 
     def enter(self, world: SensedWorld) -> None:
