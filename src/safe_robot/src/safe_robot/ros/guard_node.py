@@ -198,8 +198,11 @@ class GuardNode:
                 message=message,
             )
         )
-        then = "; halted until robot_safety/start_subscriber is called" if is_halted else ""
-        self._warn(self._target_topic, f"{message}{then}")
+        if is_halted:  # in any case, whatever has been warned of a moment ago
+            what = f"{message}; halted until robot_safety/start_subscriber is called"
+            rospy.logwarn("%s: %s", self._target_topic, what)
+        else:
+            self._warn(self._target_topic, message)
 
     def _way_out(self) -> str:
         """Returns how the robot leaves the margins that it stands in, in words; it is looked for once at each place."""
