@@ -9,9 +9,11 @@ import json
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from safe_robot.ros.target_queue import TargetQueue
@@ -24,11 +26,11 @@ TRIES = 4
 
 
 def latest_s(faults: Sequence[str], *options: str) -> dict[str, list[float]]:
-    """Returns by fault how long after it the last motion was commanded [s]."""
+    """Returns by fault how long after it the last motion was commanded that is no braking [s]."""
     command = [sys.executable, str(PROGRAM), str(len(faults)), *options, "--faults", *faults]
     printed = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, timeout=300.0).stdout
     line = next(line for line in printed.splitlines() if line.startswith("result: "))
-    return json.loads(line.partition(": ")[2])
+    return {fault: [followed for followed, _ in each] for fault, each in json.loads(line.partition(": ")[2]).items()}
 
 
 def still(faults: Sequence[str], is_bad: Callable[[float], bool], *options: str) -> dict[str, float]:
@@ -45,9 +47,36 @@ def still(faults: Sequence[str], is_bad: Callable[[float], bool], *options: str)
 
 
 def test_nothing_moves_after_a_fault_and_without_a_guard_much_would(ros_master):
-    faults = ("NaN", "late input", "clock jumps ahead", "kill -9", "burst, SIGSTOP", "master killed")
-    assert not still(faults, lambda each: each > SOON_S)
+    assert not still(("NaN", "burst, SIGSTOP", "stamps jump ahead"), lambda each: each > SOON_S)
+    assert not still(("late input", "kill -9", "master killed"), lambda each: each > SOON_S, "--on-halt", "brake")
     assert not still(("NaN", "late input"), lambda each: each < SOON_S, "--unguarded")
+
+
+def test_what_runs_instead_of_targets_does_so_a_period_apart():
+    """However late it is: what is late is not caught up with, and what waited is dropped."""
+    period_s, taken = 0.02, []
+    times_s: list[float] = []
+    done = threading.Event()
+
+    def take(item: int) -> bool:
+        taken.append(item)
+        times_s.append(time.monotonic())
+        return True
+
+    def step() -> bool:
+        times_s.append(time.monotonic())
+        time.sleep(0.05 if len(times_s) == 3 else 0.0)
+        if len(times_s) == 8:
+            done.set()
+        return len(times_s) < 8
+
+    queue = TargetQueue(period_s, 60.0, 100, take, lambda age_s: None)
+    with queue.lock:
+        for item in range(4):
+            queue.put(item, 0.0)
+        queue.run_instead(step)
+    assert done.wait(60.0) and taken == [0]
+    assert np.diff(times_s).min() >= period_s - 1e-3, "but for what lies between the begin of a period and the take"
 
 
 @pytest.mark.parametrize("silence_s, is_dropped", [(0.12, True), (60.0, False)])
