@@ -24,7 +24,7 @@ MESSAGES = {
     "efforts": {"effort": (1.0, 1.0)},
 }
 """Faults of messages: fields that are wrong."""
-ELSEWHERE = ("joints swapped", "position jumps")
+OTHER_TARGETS = ("joints swapped", "position jumps")
 """Faults of all messages from one on, which are targets all the same."""
 STAMPS = {"stamps jump back": -1.0, "stamps jump ahead": 1.0, "late input": -0.15}
 """Faults of all stamps from one on: by how much they are wrong [s]."""
@@ -35,13 +35,12 @@ BURST = 10
 
 @dataclasses.dataclass(frozen=True)
 class Course:
-    """What a source does: it swings from where it begins, and has its fault after some targets.
+    """What a source does: it swings, and has its fault after some targets.
 
     What is none of its own faults it only reports.
     """
 
     fault: str
-    begin: tuple[float, float]
     hz: float
     count: int
     is_for_good: bool
@@ -51,7 +50,7 @@ class Course:
         """Returns target k."""
         t = k / HZ
         swing = (1.0 - math.exp(-t)) ** 3 * math.sin(2.0 * math.pi * self.hz * t)
-        return self.begin[0] + 0.08 * swing, self.begin[1] - 0.12 * swing
+        return 0.25 * swing, 0.5 - 0.35 * swing
 
 
 def stream(course: Course, report: Connection) -> None:

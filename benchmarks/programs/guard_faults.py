@@ -15,13 +15,13 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import rosgraph
 import roslib.packages
 import rospy
-from faulty_source import ELSEWHERE, ENDS, MESSAGES, STAMPS, TARGET, Course, stream
+from faulty_source import ENDS, MESSAGES, OTHER_TARGETS, STAMPS, TARGET, Course, stream
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
@@ -33,13 +33,18 @@ URDF = """<robot name="slider"><link name="base"/><link name="cart"/><link name=
   <joint name="turn" type="revolute"><parent link="cart"/><child link="hand"/><axis xyz="0 1 0"/>
     <limit lower="-2" upper="2" effort="1" velocity="3"/></joint>
 </robot>"""
-PARAMETERS = {"start_from": "target", "period_s": 0.009, "limits": {"acceleration": 20.0, "jerk": 2000.0}}
+PARAMETERS = {
+    "start_from": "target",
+    "start_tolerance": 1.0,
+    "period_s": 0.009,
+    "limits": {"acceleration": 10.0, "jerk": 1000.0},
+}
 MASTER = "master killed"
-FAULTS = (*MESSAGES, *ELSEWHERE, *STAMPS, *ENDS, MASTER)
-BEGIN = (0.0, 0.5)
+CLOCK_JUMPS = ("/clock jumps back", "/clock jumps ahead")
+FAULTS = (*MESSAGES, *OTHER_TARGETS, *STAMPS, *ENDS, MASTER)
 AFTER_S = 0.4
 """How long commands are looked at after a fault; much longer than the guard's watch-dogs take, and a braking."""
-LONGEST_BRAKING = 12
+LONGEST_BRAKING = 20
 """So many commands the braking from the fastest of these motions takes at most."""
 SLOWER = 5e-5
 """Each command of a braking moves joints at most by so much more than the one before [rad or m]: it may turn round."""
@@ -52,16 +57,20 @@ class Outcome(NamedTuple):
     moved_s: float
 
     @classmethod
-    def of(cls, commands: Sequence[tuple[float, tuple[float, ...]]], fault_s: float) -> Outcome:
-        """Judges commands: times of a clock [s], and positions."""
+    def of(cls, commands: Sequence[tuple[float, tuple[float, ...]]], fault_s: float, may_brake: bool) -> Outcome:
+        """Judges commands: times of a clock [s], and positions; a braking is what gets slower until it rests."""
+        times_s = [time_s - fault_s for time_s, _ in commands]
         steps = [[abs(x - y) for x, y in zip(b, a)] for (_, a), (_, b) in zip(commands, commands[1:])]
-        last = first = max((k for k, step in enumerate(steps) if any(step)), default=None)
-        if last is None or first is None:
+        moving = [k for k, step in enumerate(steps, start=1) if any(step)]
+        if not moving:
             return cls(-math.inf, -math.inf)  # a slow source may be halted before it moves anything
-        is_at_rest = time.monotonic() - commands[last + 1][0] > AFTER_S / 4.0
-        while is_at_rest and 0 < first > last - LONGEST_BRAKING and _is_slower(steps[first], steps[first - 1]):
+        last = first = moving[-1]
+        is_at_rest = time.monotonic() - commands[last][0] > AFTER_S / 4.0
+        while may_brake and is_at_rest and times_s[first] > 0.0 and first > max(1, last - LONGEST_BRAKING):
+            if not _is_slower(steps[first - 1], steps[first - 2]):
+                break
             first -= 1
-        return cls(commands[first + 1][0] - fault_s, commands[last + 1][0] - fault_s)
+        return cls(times_s[first], times_s[last])
 
 
 def _is_slower(step: Sequence[float], before: Sequence[float]) -> bool:
@@ -97,12 +106,14 @@ class SimulatedClock:
 
 
 CLOCK: dict[str, Callable[[SimulatedClock], None]] = {
-    "/clock jumps back": lambda clock: clock.jump(-1.0),
-    "/clock jumps ahead": lambda clock: clock.jump(1.0),
+    CLOCK_JUMPS[0]: lambda clock: clock.jump(-1.0),
+    CLOCK_JUMPS[1]: lambda clock: clock.jump(1.0),
     "/clock stands still": SimulatedClock.stand_still,
     "/clock begins anew": lambda clock: clock.stand_still(0.0),
 }
 """Faults of ROS time, where it is simulated."""
+FOLLOWED = {*OTHER_TARGETS, *CLOCK_JUMPS}
+"""What the policy `limit` follows: in the end these are targets, as good as others."""
 
 
 class Experiment:
@@ -113,8 +124,10 @@ class Experiment:
         is_simulated: Whether ROS time is that of `/clock`.
     """
 
-    def __init__(self, parameters: dict[str, object] | None, is_simulated: bool) -> None:
+    def __init__(self, parameters: Mapping[str, object] | None, is_simulated: bool) -> None:
         self._is_guarded = parameters is not None
+        options = parameters or {}
+        self._may_brake = options.get("policy") == "limit" or options.get("on_halt") == "brake"
         self._processes: list[subprocess.Popen[bytes]] = []
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
@@ -164,7 +177,7 @@ class Experiment:
                 fault_s = time.monotonic()
                 CLOCK[course.fault](self._clock)
             time.sleep(AFTER_S)
-            outcome = Outcome.of(list(self._commands), fault_s)
+            outcome = Outcome.of(list(self._commands), fault_s, self._may_brake)
         finally:
             source.kill()
             source.join()
@@ -176,11 +189,6 @@ class Experiment:
         if self._clock:
             self._clock.go_on()
         return outcome
-
-    @property
-    def position(self) -> tuple[float, float]:
-        """Where the robot was commanded to last."""
-        return tuple(self._commands[-1][1]) if self._commands else BEGIN
 
     def _take(self, message: JointState) -> None:
         self._commands.append((time.monotonic(), message.position))
@@ -230,16 +238,15 @@ def main() -> None:
     parser.add_argument("--simulated-time", action="store_true", help="ROS time is that of /clock, which fails")
     parser.add_argument("--unguarded", action="store_true", help="everything passes")
     arguments = parser.parse_args()
-    is_rejected = arguments.policy == "reject"  # what is a target all the same is followed by `limit`
-    faults = arguments.faults or (
-        [*CLOCK] if arguments.simulated_time else [each for each in FAULTS if is_rejected or each not in ELSEWHERE]
-    )
+    is_rejected = arguments.policy == "reject"
+    meant = CLOCK if arguments.simulated_time else FAULTS
+    faults = arguments.faults or [each for each in meant if is_rejected or each not in FOLLOWED]
     options = {"policy": arguments.policy, "on_halt": arguments.on_halt, "silence_s": arguments.silence}
     experiment = Experiment(None if arguments.unguarded else {**PARAMETERS, **options}, arguments.simulated_time)
     found: dict[str, list[Outcome]] = {}
     try:
         for fault, hz, count in courses(faults, arguments.count, arguments.seed):
-            course = Course(fault, experiment.position, hz, count, is_for_good=not is_rejected)
+            course = Course(fault, hz, count, is_for_good=not is_rejected)
             found.setdefault(fault, []).append(experiment.outcome(course))
     finally:
         experiment.close()
