@@ -94,7 +94,7 @@ def teleoperate(device: str, seed: int, seconds: float, guard: bool) -> tuple[di
     finally:
         screen.terminate()
         screen.wait()
-    why = found["reflex"] or (found["unsafe"][0] if found["unsafe"] else "")
+    why = "; ".join(reason for reason in (*found["unsafe"][:1], found["reflex"]) if reason)
     row = ROW.format(device, seed, "on" if guard else "off", f"{found['seconds']:.0f} s", found["targets"], why)
     print(row, file=sys.stderr, flush=True)
     return found, recorded
