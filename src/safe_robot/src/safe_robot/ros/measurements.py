@@ -22,6 +22,10 @@ NEVER_S = float("-inf")
 class Measurements:
     """Takes measured states and wrenches, and bodies of the environment; the last ones count.
 
+    A state without all guarded joints, or with values that are not finite, is refused with a warning: then the one
+    before counts, and gets older. Wrenches are taken as they come, in N and N m of their own frame. What has never
+    come is infinitely old.
+
     Args:
         joint_names: The n guarded joints.
         base_frame: TF frame of the robot's root; None: nobody tells of bodies.
