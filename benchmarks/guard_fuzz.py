@@ -50,7 +50,8 @@ def main() -> int:
         print(
             f"{of} policy={policy} shape={int(options.shape)} geometry={options.geometry} "
             f"{shares} nearest_mm={1e3 * report.nearest_m:.2f} per_second={report.targets / spent_s:.0f} "
-            f"refused: {refused} sums: targets={report.targets} commands={report.commands} not_safe={report.refused.total()} brakings={report.brakings} "
+            f"refused: {refused} sums: targets={report.targets} commands={report.commands} "
+            f"not_safe={report.refused.total()} brakings={report.brakings} "
             f"seconds={spent_s:.0f} faults={len(report.faults)}",
             flush=True,
         )

@@ -23,7 +23,7 @@ from safe_robot.robot import GuardedRobot
 
 LWR = Path(__file__).resolve().parent.parent / "src/rpbi_examples/robots/kuka_lwr.urdf"
 DEVICES = ("spacenav", "keyboard", "mouse")
-SEEDS, SECONDS = 10, 120.0
+SEEDS, SECONDS = 5, 240.0
 """An hour together."""
 QUICK_SEEDS, QUICK_SECONDS = 1, 20.0
 CONTROL_SECONDS = 60.0

@@ -151,6 +151,17 @@ def test_a_measured_force_that_is_not_a_number_is_too_large(bad):
     assert check.check(motion, Situation(wrench=(float(bad), 0.0, 0.0, 0.0, 0.0, 0.0), wrench_age_s=0.0)) is not None
 
 
+def test_a_robot_that_is_as_late_as_expected_follows_and_one_that_stands_does_not(tmp_path):
+    robot = slider(tmp_path)
+    check = check_of("tracking", robot, tolerance=0.05, lag_s=0.1)
+    start = State(np.array((0.5, 0.0)), np.array((0.8, 0.0)), np.zeros(2))
+    motion = Motion(robot, start, start.position + 0.01 * start.velocity, 0.01)
+    assert check.check(motion, Situation(measured={"slide": 0.42, "turn": 0.0})) is None
+    violation = check.check(motion, Situation(measured={"slide": 0.36, "turn": 0.0}))
+    assert violation == ("tracking", "joint 'slide'", pytest.approx(0.06), 0.05, "m of error", False)
+    assert check.check(motion, Situation(measured={"slide": 0.5, "turn": 0.0})) is not None
+
+
 @pytest.mark.parametrize("name", ["force", "tracking"])
 def test_without_a_measurement_nothing_is_safe(name):
     check = check_of(name, GuardedRobot(KUKA))
@@ -410,6 +421,11 @@ def test_pairs_can_be_read_changed_and_read_again(tmp_path):
     ]
     assert ("lwr_arm_0_link", "lwr_arm_7_link") in first.pairs
     assert ("lwr_arm_0_link", "lwr_arm_1_link") not in first.pairs
+    path.write_text("pairs:\n- [lwr_arm_0_link, lwr_arm_0_link]\n")
+    with pytest.raises(ConfigError, match=r"pairs.yaml: pairs: expected two links, got 'lwr_arm_0_link' twice"):
+        check_of("self_collision", GuardedRobot(KUKA), pairs_file=str(path))
+    with pytest.raises(ConfigError, match="checks.self_collision.pairs_file: expected a file that can be written"):
+        check_of("self_collision", GuardedRobot(KUKA), pairs_file=str(tmp_path / "nowhere" / "pairs.yaml"))
 
 
 def test_an_srdf_says_which_pairs_are_left_out_and_one_of_another_robot_is_refused(tmp_path):
@@ -419,6 +435,9 @@ def test_an_srdf_says_which_pairs_are_left_out_and_one_of_another_robot_is_refus
     assert ("lwr_arm_0_link", "lwr_arm_7_link") not in pairs and ("lwr_arm_0_link", "lwr_arm_6_link") in pairs
     path.write_text('<robot name="b"><disable_collisions link1="panda_link7" link2="panda_link0"/></robot>')
     with pytest.raises(ConfigError, match=r"arm.srdf: panda_link0: expected a link of .*kuka_lwr.urdf"):
+        check_of("self_collision", GuardedRobot(KUKA), srdf=str(path))
+    path.write_text('<robot name="b"><group name="arm"/></robot>')
+    with pytest.raises(ConfigError, match=r"arm.srdf: expected pairs of links .* as disable_collisions, got none"):
         check_of("self_collision", GuardedRobot(KUKA), srdf=str(path))
 
 

@@ -69,6 +69,7 @@ def test_a_motion_begins_at_the_last_command_or_where_the_robot_was_moved_to(tmp
     guard.start()
     target, there = (measured + 0.02, 0.0), {"slide": measured, "turn": 0.0}
     commands = [(begin, 0.0), *(decide(guard, target, measured=there).command for _ in range(100))]
+    assert commands[1] == (begin, 0.0), "controllers take the first command as rest"
     assert worst_shares(commands, LIMITS, PERIOD_S)["jerk"] <= 1.0 + 1e-6 and commands[-1] == target
 
 

@@ -18,6 +18,11 @@ class GuardConfig(ConfigModel):
         description="What happens to a target that is not safe: reject sends nothing and halts; limit sends what is"
         " safe instead, and goes on.",
     )
+    on_halt: Literal["nothing", "brake"] = Field(
+        "nothing",
+        description="What is sent after a halt in the middle of a motion: nothing; or, one each period_s, the braking"
+        " that was found safe with the last command.",
+    )
     period_s: Seconds = Field(
         0.009,
         description="Time between two commands: none follows another sooner, and each counts as so much time. A few"
@@ -53,7 +58,9 @@ class NodeConfig(ConfigModel):
         " source that died is followed no longer than this.",
     )
     base_frame: Text | None = Field(
-        None, description="TF frame of the robot's root; with it the bodies of rpbi/markers are around the robot."
+        None,
+        description="TF frame of the robot's root, which markers are shown in; with it the check `environment` takes"
+        " the bodies of rpbi/markers.",
     )
     left_out: ListOf[Text] = Field(
         (), description="Bodies of rpbi/markers that are no obstacles: first the robot itself."

@@ -30,8 +30,6 @@ SLOW_S = 1e6
 """How long the way from where the robot is to the first target is taken to last [s]: it is not judged by speed."""
 MENDED = ("joint_velocity", "joint_acceleration", "joint_jerk", "joint_position", "braking")
 """What braking for a period may mend where a smoothed command, whose steps are finite, just misses it."""
-MEASURED = "measured positions"
-"""What a start waits for."""
 
 
 class Decision(NamedTuple):
@@ -109,6 +107,11 @@ class Guard:
         return self._state is not None and not self._state.is_at_rest
 
     @property
+    def is_braking(self) -> bool:
+        """Whether it is halted, and `next_braking` has commands that bring the robot to rest."""
+        return self.is_halted and self.is_moving
+
+    @property
     def last_command(self) -> tuple[float, ...] | None:
         """The n positions that were commanded last [rad or m]; None before the first command."""
         return None if self._state is None or self._is_first else tuple(self._state.position.tolist())
@@ -125,15 +128,31 @@ class Guard:
         return find_way_out(self._state.position, self.limits, self._inside)
 
     def start(self) -> None:
-        """Lets targets pass again; the first one has to be near where the robot is."""
+        """Lets targets pass again; the first one has to be near where the robot is.
+
+        Raises:
+            RuntimeError: If the robot still brakes.
+        """
+        if self.is_braking:
+            raise RuntimeError("the robot still brakes: start when next_braking() returns None")
         self.is_halted, self._is_first = False, True
 
     def halt(self) -> None:
-        """Sends nothing any more; the robot is taken to stand where it was commanded to last."""
+        """Lets no target pass any more; with `on_halt: brake` the robot is to be braked by `next_braking`."""
+        self.is_halted = True
+        if self.config.on_halt == "nothing":
+            self.rest()
+
+    def rest(self) -> None:
+        """Halts without braking: the robot is taken to stand where it was commanded to last."""
         self.is_halted = True
         if self._state is not None:
             self._state = State.at_rest(self._state.position)
         self._stop = self._stop[:0]
+
+    def next_braking(self) -> tuple[float, ...] | None:
+        """Returns what to command next after a halt, a period after the last command; None if the robot rests."""
+        return self._brake_on() if self.is_braking else None
 
     def decide(self, target: Sequence[float], situation: Situation) -> Decision:
         """Returns what to command.
@@ -167,19 +186,26 @@ class Guard:
         if self.is_halted or self._is_first or self._state is None:
             return None
         motion = Motion(self.robot, self._state, self._state.position, self.config.period_s)
-        for check in self.checks:
-            if check.watches and (violation := check.check(motion, situation)):
-                self.halt()
-                return violation
-        return None
+        try:
+            found = (each.check(motion, situation) for each in self.checks if each.watches)
+            violation = next(filter(None, found), None)
+        except BaseException:
+            self.halt()
+            raise
+        if violation is not None:
+            self.halt()
+        return violation
 
     def _decide(self, target: tuple[float, ...], situation: Situation) -> Decision:
         if violation := self._input_problem(target):
             return self._refused(violation)
-        if self._is_first and (violation := self._take_start(target, situation)):
-            return Decision(None, violation, violation.subject != MEASURED)
+        is_first = self._is_first
+        if is_first and (violation := self._take_start(target, situation)):
+            return Decision(None, violation, math.isfinite(violation.value))  # for what is not known yet it waits
         assert self._state is not None
-        wanted = target if self._shaper is None else self._shaper.shaped(target, self._state)
+        wanted = target
+        if self._shaper is not None:  # controllers take the first command as rest, so it is where the robot stands
+            wanted = tuple(self._state.position.tolist()) if is_first else self._shaper.shaped(target, self._state)
         found = self._judged(wanted, situation)
         if isinstance(found, Violation) and wanted != target and found.check in MENDED:
             wanted = tuple(self._next_stop.tolist())
@@ -213,7 +239,7 @@ class Guard:
         position = np.array(target)
         there = self._whereabouts(position, situation)
         if there is None:
-            return Violation("start", MEASURED, math.inf, 0.0, "as age, since there are none of all joints")
+            return Violation("start", "measured positions", math.inf, 0.0, "as age, since there are none of all joints")
         distance = np.abs(position - there)
         if not (distance <= self.config.start_tolerance).all():
             i = int(np.argmin(distance <= self.config.start_tolerance))
