@@ -34,7 +34,8 @@ class Leaving(NamedTuple):
 
     Attributes:
         straight: States with a straight way on which no pair that is inside its margin comes nearer, and none comes in.
-        curved: States without, which the robot left by the ways that the guard told of, or along what is in the way.
+        curved: States without, or where it stood on such a way, which the robot left by the ways that the guard told
+            of, or along what is in the way.
         locked: States from where these ways led to where the guard says that there is none, and so does the oracle;
             with a smaller margin the robot left.
         narrow: The same, but the oracle sees a way.
@@ -78,11 +79,14 @@ def leave_margin(scene: Scene, oracle: Oracle, count: int, generator: np.random.
             commands, freely = (each.drive(q, q + way) for each in (driver, free))
             fastest, usual = (float(np.abs(np.diff(each, axis=0)).max()) for each in (commands, freely))
             slowest = min(slowest, fastest / usual)
-            kind = "straight" if _is_outside(oracle, commands[-1]) else None
+            kind = "straight"
+            if not _is_outside(oracle, commands[-1]):
+                commands = np.concatenate((commands, driver.follow(commands[-1])))
+                kind = _gets_out(driver, oracle, commands)
         fault = fault_of(oracle, commands)
         nearer_m = max(nearer_m, _nearer_m(oracle, commands))
         out = None if kind else driver.guard.way_out()
-        if way is None and out is not None and out.is_locked:
+        if out is not None and out.is_locked:
             kind = "locked" if is_locked(oracle, commands[-1]) else "narrow"
             fault = fault or leave_with_smaller_margin(scene, oracle, grid, commands[-1], out)
         if kind is None or fault is not None:
