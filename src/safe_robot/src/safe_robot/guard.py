@@ -90,6 +90,7 @@ class Guard:
         shape = (self.limits, self._braking, config.period_s)
         self._shaper = None if config.shape is None else Shaper(config.shape, *shape)
         self._watches = {check.name for check in self.checks if check.watches}
+        self._suspects = list(self.checks)  # the one that refused what was tried last comes first
         self._nearest = Nearest(self.limits, self._braking, self.checks, config.period_s)
         if config.policy == "limit" and not can_keep_bounds():
             log.warning("%s: policy limit comes less near to targets without DAQP: run `./rpbi setup ik`", file)
@@ -175,10 +176,10 @@ class Guard:
             return Decision(None, violation, violation.subject != MEASURED)
         assert self._state is not None
         wanted = target if self._shaper is None else self._shaper.shaped(target, self._state)
-        found = self._judged(wanted, situation)
+        found = self._judged(wanted, situation, self.checks)
         if isinstance(found, Violation) and wanted != target and found.check in MENDED:
             wanted = tuple(self._way_to_rest[0].tolist())
-            found = self._judged(wanted, situation)
+            found = self._judged(wanted, situation, self.checks)
         if isinstance(found, Violation):
             return self._instead(target, found, situation)
         return Decision(self._sent(found), is_shaped=wanted != target)
@@ -237,15 +238,17 @@ class Guard:
             return None
         return target if self._state is None else self._state.position
 
-    def _judged(self, command: Sequence[float], situation: Situation) -> _Safe | Violation:
-        """Returns the command if it is safe, else what is not."""
+    def _judged(
+        self, command: Sequence[float], situation: Situation, checks: Sequence[Check]
+    ) -> _Safe | Violation:
+        """Returns the command if it is safe, else what the first of some checks says that is not."""
         assert self._state is not None
         period_s = self.config.period_s
         position = np.array(command)
         state = self._state.then(position, period_s)
         brake = self._braking.plan(state.velocity, state.acceleration)
         motion = Motion(self.robot, self._state, position, period_s, brake)
-        for check in self.checks:
+        for check in checks:
             if violation := check.check(motion, situation):
                 return violation
         if brake is None:
@@ -268,9 +271,10 @@ class Guard:
         if self.config.policy == "reject" or violation.check in self._watches:  # no other command mends these
             return self._refused(violation)
         for wanted in self._nearest.commands(np.array(target), self._state, self._way_to_rest):
-            found = self._judged(tuple(wanted.tolist()), situation)
+            found = self._judged(tuple(wanted.tolist()), situation, self._suspects)
             if not isinstance(found, Violation):
                 return Decision(self._sent(found), violation)
+            self._suspects.sort(key=lambda check: check.name != found.check)
         return Decision(self._brake_on(), violation)
 
     def _inside(self, q: np.ndarray) -> list[Inside]:

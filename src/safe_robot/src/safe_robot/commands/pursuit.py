@@ -13,8 +13,6 @@ from .braking import INSIDE, Braking
 
 STEPS = 10
 """Between braking hard and going on as fast as possible so many commands are tried, and as many between two of them."""
-MOMENTS = 5
-"""Of the way to rest so many moments are looked at where something is near."""
 ROUNDING = 1e-12
 """Positions that differ by less are equal [rad or m]."""
 

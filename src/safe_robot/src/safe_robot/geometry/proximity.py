@@ -97,9 +97,9 @@ class Proximity:
         bounds = self._separation.lower_bounds(frames, suspects)
         travelled = motion.travelled[rows] @ self._reach[suspects].T
         free_to = np.full(len(suspects), -np.inf)  # how far a pair can go without being too near
-        placed = -1
-        for at, k in np.argwhere(~(bounds > self._margin_m + ROUNDING_M)).tolist():
-            if travelled[at, k] < free_to[k]:
+        placed, least_m = -1, self._margin_m + ROUNDING_M
+        for at, k in np.argwhere(~(bounds > least_m)).tolist():
+            if travelled[at, k] < free_to[k] or bounds[at, k] > least_m:
                 continue
             i, row = int(suspects[k]), int(rows[at])
             if placed != row:
@@ -111,9 +111,10 @@ class Proximity:
             distance = contact.distance
             if not distance >= self._margin_m and not self._is_further(motion, i, distance, row):
                 return TooNear(self._pairs[i], distance, row > 0)
-            if not (distance < bounds[at, k] + LOOSE_M or free_to[k] > -np.inf):
+            if not distance < bounds[at, k] + LOOSE_M:
                 self._separation.learn(i, contact.directions, frames[at])
-            free_to[k] = travelled[at, k] + distance - self._margin_m - ROUNDING_M
+                bounds[at:, k] = self._separation.lower_bounds(frames[at:], suspects[k : k + 1])[:, 0]
+            free_to[k] = travelled[at, k] + distance - least_m
         return None
 
     def _known_near(self, q: np.ndarray) -> np.ndarray:
