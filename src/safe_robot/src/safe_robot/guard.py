@@ -85,12 +85,12 @@ class Guard:
         self.config, self.robot = config, robot
         self.joint_names = robot.joint_names
         self.limits = JointLimits.of(robot, config.limits, file)
-        self.checks: Sequence[Check] = make_checks(config.checks, robot, self.limits, file)
+        self.checks = make_checks(config.checks, robot, self.limits, file)
         self._braking = Braking(self.limits.velocity, self.limits.acceleration, self.limits.jerk, config.period_s)
         shape = (self.limits, self._braking, config.period_s)
         self._shaper = None if config.shape is None else Shaper(config.shape, *shape)
         self._watches = {check.name for check in self.checks if check.watches}
-        self._suspects = list(self.checks)  # the one that refused what was tried last comes first
+        self._suspect = ""  # the check that refused what was tried last in place of a target
         self._nearest = Nearest(self.limits, self._braking, self.checks, config.period_s)
         if config.policy == "limit" and not can_keep_bounds():
             log.warning("%s: policy limit comes less near to targets without DAQP: run `./rpbi setup ik`", file)
@@ -238,9 +238,7 @@ class Guard:
             return None
         return target if self._state is None else self._state.position
 
-    def _judged(
-        self, command: Sequence[float], situation: Situation, checks: Sequence[Check]
-    ) -> _Safe | Violation:
+    def _judged(self, command: Sequence[float], situation: Situation, checks: Sequence[Check]) -> _Safe | Violation:
         """Returns the command if it is safe, else what the first of some checks says that is not."""
         assert self._state is not None
         period_s = self.config.period_s
@@ -271,10 +269,11 @@ class Guard:
         if self.config.policy == "reject" or violation.check in self._watches:  # no other command mends these
             return self._refused(violation)
         for wanted in self._nearest.commands(np.array(target), self._state, self._way_to_rest):
-            found = self._judged(tuple(wanted.tolist()), situation, self._suspects)
+            suspects = sorted(self.checks, key=lambda check: check.name != self._suspect)  # it likely does so again
+            found = self._judged(tuple(wanted.tolist()), situation, suspects)
             if not isinstance(found, Violation):
                 return Decision(self._sent(found), violation)
-            self._suspects.sort(key=lambda check: check.name != found.check)
+            self._suspect = found.check
         return Decision(self._brake_on(), violation)
 
     def _inside(self, q: np.ndarray) -> list[Inside]:

@@ -49,9 +49,7 @@ class Nearest:
         for share in SHARES:
             yield stop[0] + share * (best - stop[0])
 
-    def _detours(
-        self, wanted: np.ndarray, slowest: np.ndarray, state: State, stop: np.ndarray
-    ) -> Iterator[np.ndarray]:
+    def _detours(self, wanted: np.ndarray, slowest: np.ndarray, state: State, stop: np.ndarray) -> Iterator[np.ndarray]:
         """Yields the command nearest to one that is wanted with which bounds are kept, and each time a better one."""
         there, after = stop[-1:], Stop(wanted, state, self._braking, self._period_s)
         spread = np.abs(after.of(wanted)[-1] - there[0])

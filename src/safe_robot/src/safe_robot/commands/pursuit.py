@@ -1,7 +1,5 @@
 """How joints come near a target as fast as their limits allow, stop there, and keep out of what is in the way."""
 
-from collections.abc import Sequence
-from importlib.util import find_spec
 from typing import NamedTuple
 
 import numpy as np
