@@ -23,7 +23,7 @@ from safe_robot.robot import GuardedRobot
 
 LWR = Path(__file__).resolve().parent.parent / "src/rpbi_examples/robots/kuka_lwr.urdf"
 DEVICES = ("spacenav", "keyboard", "mouse")
-SEEDS, SECONDS = 10, 120.0
+SEEDS, SECONDS = 5, 240.0
 """An hour together."""
 QUICK_SEEDS, QUICK_SECONDS = 1, 20.0
 CONTROL_SECONDS = 60.0
@@ -94,7 +94,7 @@ def teleoperate(device: str, seed: int, seconds: float, guard: bool) -> tuple[di
     finally:
         screen.terminate()
         screen.wait()
-    why = found["reflex"] or (found["unsafe"][0] if found["unsafe"] else "")
+    why = "; ".join(reason for reason in (*found["unsafe"][:1], found["reflex"]) if reason)
     row = ROW.format(device, seed, "on" if guard else "off", f"{found['seconds']:.0f} s", found["targets"], why)
     print(row, file=sys.stderr, flush=True)
     return found, recorded

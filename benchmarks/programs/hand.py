@@ -9,6 +9,7 @@ import subprocess
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 import rospy
@@ -25,6 +26,10 @@ RESTS, TURNS = 0.2, 0.3
 RISES_S, HOLDS_S = (0.02, 0.1, 0.3, 0.6), (0.1, 1.5)
 """How long it takes to push, and how long it then pushes."""
 QUEUE_SIZE = 1000
+GUARDS = {
+    "/robot_safety/status": "the guard before the simulated arm",
+    "/real_robot/robot_safety/status": "the guard before the driver",
+}
 
 
 class Device(ABC):
@@ -108,8 +113,8 @@ class Witness:
         self.unsafe: list[str] = []
         self.driver = DriverState()
         self._subscribe(targets, JointState, lambda message: self.targets.append(message.position))
-        for guard in ("/robot_safety/status", "/real_robot/robot_safety/status"):
-            self._subscribe(guard, Status, self._take_status)
+        for topic, guard in GUARDS.items():
+            self._subscribe(topic, Status, partial(self._take_status, guard))
         self._subscribe("/stand_in/driver_state", DriverState, lambda message: setattr(self, "driver", message))
 
     @property
@@ -120,10 +125,10 @@ class Witness:
     def _subscribe(self, topic: str, kind: type, take: object) -> None:
         rospy.Subscriber(topic, kind, take, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
-    def _take_status(self, message: Status) -> None:
+    def _take_status(self, guard: str, message: Status) -> None:
         self.decisions += 1
         if not message.is_safe:
-            self.unsafe.append(message.message)
+            self.unsafe.append(f"{message.message} ({guard})")
 
 
 def main() -> None:

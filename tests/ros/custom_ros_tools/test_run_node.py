@@ -26,7 +26,9 @@ def test_the_master_knows_nothing_of_a_node_that_has_ended(ros):
     master = rosgraph.Master("/test")
     wait_until(lambda: "/leaver" in dict(master.getSystemState()[2]).get("/never_answers", ()), "the node is up")
     assert master.lookupNode("/leaver")
+    wait_until(lambda: "takes" in ros.output(node), "a callback is about to publish")
     os.killpg(node.pid, signal.SIGINT)
     assert node.wait(60.0) == 0, ros.output(node)
+    assert "bad callback" not in ros.output(node)
     with pytest.raises(rosgraph.MasterError, match="unknown node"):
         master.lookupNode("/leaver")

@@ -26,6 +26,7 @@ from ik_nodes import (
 from node_world import Rosout, publishing
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
 from ik_ros.msg import IKProblem, IKSolution, TracIKProblem
@@ -140,8 +141,8 @@ def test_poses_of_other_frames_are_turned_into_the_base(ros):
     assert not refused.success and "'nowhere'" in refused.message and "'foot'" in refused.message
 
 
-def test_continuity_holds_the_velocities_of_the_joints(ros):
-    start_solver(ros, continuity={"max_velocity": 0.5})
+def test_continuity_holds_the_velocities_of_the_joints_and_the_target_when_it_is_out_of_reach(ros):
+    start_solver(ros, continuity={"max_velocity": 0.5, "hold": True})
     targets = ros.listen("joint_states/target", JointState)
     solutions = ros.listen("ik/solution", IKSolution)
     far_away = np.add(HOME, 0.4)
@@ -152,6 +153,10 @@ def test_continuity_holds_the_velocities_of_the_joints(ros):
             asked.header.stamp = rospy.Time(100) + rospy.Duration.from_sec(0.01 * number)
             ik.publish(asked)
             targets.wait_for(number + 1)
+        ik.publish(IKProblem(header=Header(stamp=rospy.Time(200)), has_target=True, target=FAR))
+        held = targets.wait_for(121)[-1]
+    assert held.header.stamp == rospy.Time(200) and list(held.name) == JOINTS
+    assert held.position == targets.messages[-2].position
     positions = np.array([message.position for message in targets.messages])
     assert np.abs(np.diff(positions, axis=0)).max() <= 0.5 * 0.01 + 1e-9
     assert_there(positions[-1], forward(far_away))

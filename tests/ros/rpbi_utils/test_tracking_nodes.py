@@ -47,18 +47,22 @@ def start_tracking(ros: Any, objects: list[dict[str, Any]]) -> None:
 def test_what_drivers_send_becomes_frames_and_what_is_wrong_is_named(ros) -> None:
     """Millimetres, a frame with a leading slash, a tag in an optical frame, an offset; NaN, zeros and an outlier."""
     turn = {"orientation": [0.0, 0.0, 1.0, 0.0], "position": [0.1, 0.0, 0.0]}
-    objects = [{"name": "box", "vicon": "box/box", "unit": "mm", **turn}, {"name": "tag", "april_tag": [2, 1]}]
+    topics = [f"{side}/tag_detections" for side in ("left", "right")]
+    objects = [
+        {"name": "box", "vicon": "box/box", "unit": "mm", **turn},
+        {"name": "tag", "april_tag": [2, 1], "topics": topics},
+    ]
     start_tracking(ros, objects)
     tf, rosout = ros.listen("/tf", TFMessage), Rosout(ros)
     rosout.wait_to_hear("/tracked_object")
     camera = sent(0.0, CAMERA.position, "rpbi/world", x=1.0)
     camera.child_frame_id = "camera"
     bundle = AprilTagDetection(id=[1, 2], size=[0.1, 0.1])
-    bundle.pose.header.frame_id, bundle.pose.header.stamp = "camera", rospy.Time(5)
-    bundle.pose.pose.pose.position.z, bundle.pose.pose.pose.orientation.x = 0.9, 1.0
+    bundle.pose.header.frame_id, bundle.pose.pose.pose.orientation.x = "camera", 1.0
     with (
         publishing("vicon/box/box", TransformStamped) as vicon,
-        publishing("tag_detections", AprilTagDetectionArray) as tags,
+        publishing(topics[0], AprilTagDetectionArray) as left,
+        publishing(topics[1], AprilTagDetectionArray) as right,
         publishing("/tf_static", TFMessage) as static,
     ):
         vicon.publish(sent(1.0, (0.0, 0.0, 0.0), "/vicon/world"))
@@ -67,12 +71,15 @@ def test_what_drivers_send_becomes_frames_and_what_is_wrong_is_named(ros) -> Non
         vicon_world.child_frame_id = "vicon/world"
         static.publish(TFMessage([camera, vicon_world]))
 
-        def tag_comes() -> Any:
+        def tag_comes(tags: rospy.Publisher, stamp_s: int, z: float) -> Any:
+            bundle.pose.header.stamp, bundle.pose.pose.pose.position.z = rospy.Time(stamp_s), 1.0 - z
             tags.publish(AprilTagDetectionArray(detections=[AprilTagDetection(id=[1]), bundle]))
-            return newest(tf, "tag")
+            found = newest(tf, "tag")
+            return found if found and found[1].position[2] == pytest.approx(z) else None
 
-        parent, pose = wait_until(tag_comes, "the bundle comes")
-        assert parent == "rpbi/world" and pose.position == pytest.approx((0.0, 0.0, 0.1))
+        wait_until(lambda: tag_comes(left, 5, 0.1), "the bundle comes")
+        parent, pose = wait_until(lambda: tag_comes(right, 6, 0.12), "another camera sees it")
+        assert parent == "rpbi/world" and pose.position[:2] == pytest.approx((0.0, 0.0))
         assert math.hypot(*rotation_between(pose.quat_xyzw, (0.0, 0.0, 0.0, 1.0))) < 1e-6
 
         vicon.publish(sent(2.0, (1000.0, 500.0, 0.0), "/vicon/world"))

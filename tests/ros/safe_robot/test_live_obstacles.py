@@ -62,11 +62,9 @@ def test_bodies_are_where_tf_has_them_until_they_go(around):
 def test_an_arm_keeps_away_from_them_and_stands_while_nobody_knows_where_they_are(around, tmp_path):
     around, publish = around
     guard = guard_of(folding(tmp_path), policy="reject", checks={"environment": {"margin_m": 0.05}})
-    guard.decide((0.0, 0.0), Situation(obstacles=None))
-    assert guard.is_halted
+    assert guard.decide((0.0, 0.0), Situation(obstacles=None)).command is None
     publish([marker("box", 1.0, 0.9, 0.12)])  # above the lower arm, 0.04 m off
     wait_until(lambda: around.obstacles, "the body is known")
-    guard.start()
     guard.decide((0.1, 0.0), Situation(obstacles=around.obstacles))
     assert not guard.is_halted
     for k in range(1, 201):

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from worlds import FLOOR, ball, box, write_world
+from worlds import FLOOR, ball, box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError
 from rpbi.geometry import Pose, rotation_between
+from rpbi.ros.reference.interface_table import endpoints
 from rpbi.samples import AprilTagsSample, ViconSample
 from rpbi.world import World
 
@@ -86,6 +87,37 @@ def test_occlusion_hides_it_for_a_share_of_the_time_and_physics_does_not_notice(
     assert set(gaps[gaps > 1] % 20) == {1}, "it is hidden for whole parts"
     seen_by_nobody = build({**sliding(), "sensors": []})
     assert run(seen_by_nobody, 2000, ViconSample) == ([], poses)
+
+
+def test_each_segment_of_a_subject_is_a_link_of_the_body(build) -> None:
+    segments = [("foot", None), ("hand", "lbr_iiwa_link_7")]
+    sensors = [{"type": "vicon", "name": name, "hz": 100, "link": link} for name, link in segments]
+    world = build(robots=(iiwa("person", sensors=sensors),))
+    for _ in range(10):
+        found = {one.frame: one.pose for one in world.step() if isinstance(one, ViconSample)}
+    body = world.bodies["person"]
+    assert set(found) == {"vicon/person/foot", "vicon/person/hand"}
+    assert found["vicon/person/foot"].position == pytest.approx(body.base_pose().position)
+    assert found["vicon/person/hand"].position == pytest.approx(body.link_pose(6).position)
+    with pytest.raises(ConfigError, match="person.yaml: sensors.box.link: unknown link 'lid': known are"):
+        build(robots=(iiwa("person", sensors=[{"type": "vicon", "name": "box", "hz": 1, "link": "lid"}]),))
+
+
+def test_each_detector_has_a_topic_of_its_own(build) -> None:
+    """Two cameras look at the same tags."""
+    sensors = [
+        {"type": "april_tags", "name": f"tags_{i}", "hz": 100, "camera": "eye", "tags": [TAG], **more}
+        for i, more in enumerate(({}, {"topic": "left/tag_detections"}))
+    ]
+    world = build(box("box", sensors=sensors), rgbd_sensor=CAMERA)
+    assert [row.name for row in endpoints(world) if row.name.endswith("tag_detections")] == [
+        "tag_detections",
+        "left/tag_detections",
+    ]
+    with pytest.raises(ConfigError, match="the node publishes tag_detections twice as apriltag_ros/AprilTag"):
+        endpoints(
+            build(box("box", sensors=[{**one, "topic": "tag_detections"} for one in sensors]), rgbd_sensor=CAMERA)
+        )
 
 
 TAG = {"id": 7, "size": 0.1, "position": [0.0, 0.0, 0.1]}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from custom_ros_tools.errors import UnknownNameError
@@ -92,3 +93,23 @@ def test_continuity_refuses_to_begin_at_some_joints_and_makes_nothing_up(solver,
 
 def test_without_any_start_continuity_begins_at_the_first_solution(smooth):
     assert smooth.solve(at(0.5, -0.5), 1.0).positions == (0.5, -0.5)
+
+
+@pytest.mark.parametrize("hold", [True, False])
+def test_without_a_solution_targets_go_on_to_the_last_one_if_asked_to(solver, hold):
+    config = JointRateLimiterConfig(hold=hold)
+    stream = ProblemStream(solver, JointRateLimiter(config, JOINTS, solver.velocity_limits))
+    nowhere = IKProblem()
+    stream.solve(nowhere, 1.0)
+    assert stream.target is None  # nothing to go on to yet
+    stream.solve(at(0.0, 0.0), 1.0)
+    stream.solve(at(0.3, 0.0), 1.1)
+    targets = [stream.target]
+    for stamp_s in (1.12, 1.14, 1.16, 1.18):
+        assert not stream.solve(nowhere, stamp_s).success
+        targets.append(stream.target)
+    if hold:
+        assert np.allclose(targets, [(0.2, 0.0), (0.24, 0.0), (0.28, 0.0), (0.3, 0.0), (0.3, 0.0)])
+        assert solver.starts[-1] == dict(zip(JOINTS, targets[-2]))
+    else:
+        assert targets[1:] == [None] * 4

@@ -410,6 +410,11 @@ def test_pairs_can_be_read_changed_and_read_again(tmp_path):
     ]
     assert ("lwr_arm_0_link", "lwr_arm_7_link") in first.pairs
     assert ("lwr_arm_0_link", "lwr_arm_1_link") not in first.pairs
+    path.write_text("pairs:\n- [lwr_arm_0_link, lwr_arm_0_link]\n")
+    with pytest.raises(ConfigError, match=r"pairs.yaml: pairs: expected two links, got 'lwr_arm_0_link' twice"):
+        check_of("self_collision", GuardedRobot(KUKA), pairs_file=str(path))
+    with pytest.raises(ConfigError, match="checks.self_collision.pairs_file: expected a file that can be written"):
+        check_of("self_collision", GuardedRobot(KUKA), pairs_file=str(tmp_path / "nowhere" / "pairs.yaml"))
 
 
 def test_an_srdf_says_which_pairs_are_left_out_and_one_of_another_robot_is_refused(tmp_path):
@@ -419,6 +424,9 @@ def test_an_srdf_says_which_pairs_are_left_out_and_one_of_another_robot_is_refus
     assert ("lwr_arm_0_link", "lwr_arm_7_link") not in pairs and ("lwr_arm_0_link", "lwr_arm_6_link") in pairs
     path.write_text('<robot name="b"><disable_collisions link1="panda_link7" link2="panda_link0"/></robot>')
     with pytest.raises(ConfigError, match=r"arm.srdf: panda_link0: expected a link of .*kuka_lwr.urdf"):
+        check_of("self_collision", GuardedRobot(KUKA), srdf=str(path))
+    path.write_text('<robot name="b"><group name="arm"/></robot>')
+    with pytest.raises(ConfigError, match=r"arm.srdf: expected pairs of links .* as disable_collisions, got none"):
         check_of("self_collision", GuardedRobot(KUKA), srdf=str(path))
 
 

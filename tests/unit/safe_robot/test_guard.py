@@ -100,6 +100,13 @@ class TestStart:
         assert decision.command is None and not decision.is_halted and decision.violation.check == "start"
         assert decide(guard, (0.0, 0.0), measured={"slide": 0.01, "turn": 0.0}).command == (0.0, 0.0)
 
+    def test_until_it_is_told_what_is_around_it_waits(self, tmp_path):
+        guard = guard_of(slider(tmp_path), checks={"environment": {}})
+        decision = decide(guard, (0.0, 0.0))
+        assert decision.command is None and not decision.is_halted and decision.violation.check == "environment"
+        assert decide(guard, (0.0, 0.0), obstacles=()).command == (0.0, 0.0)
+        assert decide(guard, (0.0, 0.0)).is_halted
+
     def test_measured_positions_of_other_joints_are_none(self, tmp_path):
         guard = guard_of(slider(tmp_path), start_from="measured")
         assert decide(guard, (0.0, 0.0), measured={"slide": 0.0, "other": 0.0}).command is None

@@ -69,18 +69,29 @@ def test_a_motion_begins_at_the_last_command_or_where_the_robot_was_moved_to(tmp
     guard.start()
     target, there = (measured + 0.02, 0.0), {"slide": measured, "turn": 0.0}
     commands = [(begin, 0.0), *(decide(guard, target, measured=there).command for _ in range(100))]
+    assert commands[1] == (begin, 0.0), "controllers take the first command as rest"
     assert worst_shares(commands, LIMITS, PERIOD_S)["jerk"] <= 1.0 + 1e-6 and commands[-1] == target
 
 
 @pytest.mark.parametrize(
     ("target", "check"),
-    [((0.3, 1.9), "joint_velocity"), ((float("nan"), 1.9), "input"), ((0.0, 2.01), "joint_position")],
+    [((0.3, 1.9), "joint_velocity"), ((float("nan"), 1.9), "input"), ((0.0, 2.02), "joint_position")],
 )
 def test_a_jump_what_is_no_target_and_what_is_outside_limits_are_not_smoothed(tmp_path, target, check):
     guard = guard_of(slider(tmp_path), shape={}, limits={"velocity": 2.0})
     decide(guard, (0.0, 1.9))
     decision = decide(guard, target)
     assert decision.command is None and decision.is_halted and decision.violation.check == check
+
+
+def test_a_joint_that_goes_a_little_past_its_limit_is_kept_at_the_limit(tmp_path):
+    guard = guard_of(slider(tmp_path), shape={})
+    turns = 1.804 + 0.1 * (1.0 - np.cos(np.linspace(0.0, 2.0 * np.pi, 400)))
+    decisions = [decide(guard, (0.0, turn)) for turn in (*turns.tolist(), *[turns[-1]] * 50)]
+    assert not any(decision.violation for decision in decisions)
+    commands = np.array([decision.command for decision in decisions])
+    assert commands[:, 1].max() == 2.0 < turns.max()
+    assert decisions[-1].command == (0.0, turns[-1])
 
 
 def test_what_is_smoothed_is_judged(tmp_path):

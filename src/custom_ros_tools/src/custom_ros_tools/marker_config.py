@@ -8,7 +8,20 @@ from typing import Annotated
 from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 
 from .errors import hint
-from .schema import ConfigModel, Expects, FrameId, Hz, KeyedError, ListOf, NonNegative, Position, Rgba, Switch, Text
+from .schema import (
+    ConfigModel,
+    Expects,
+    FrameId,
+    Hz,
+    KeyedError,
+    ListOf,
+    NonNegative,
+    Position,
+    Rgba,
+    Switch,
+    Text,
+    TopicName,
+)
 from .transforms import quat_of
 
 MARKER_TYPES = (
@@ -42,9 +55,7 @@ def _one_of(names: Sequence[str], kind: str) -> AfterValidator:
 class MarkerNodeConfig(ConfigModel):
     """How the marker is published."""
 
-    topic_name: Annotated[str, Field(pattern=r"^[~/A-Za-z][A-Za-z0-9_/]*$"), Expects("the name of a topic")] = Field(
-        description="Topic of the visualization_msgs/Marker."
-    )
+    topic_name: TopicName = Field(description="Topic of the visualization_msgs/Marker.")
     hz: Hz = Field(50.0, description="How often it is sent, in wall time.")
     broadcast_offset: Switch = Field(False, description="Whether the marker's pose is on TF too.")
     child_frame_id: FrameId | None = Field(

@@ -24,6 +24,9 @@ class JointRateLimiterConfig(ConfigModel):
         description="Largest velocity of each joint, one for all or by joint [rad/s or m/s]; the URDF's if left out.",
     )
     velocity_scale: float = Field(1.0, gt=0.0, le=1.0, description="Share of these velocities that is used.")
+    hold: bool = Field(
+        False, description="Whether targets go on to the last solution, and stay there, while problems have none."
+    )
 
 
 class JointRateLimiter:
@@ -37,6 +40,9 @@ class JointRateLimiter:
         config: How.
         joint_names: The n joints.
         velocity_limits: Their velocities by the URDF [rad/s or m/s]; 0 and inf mean that it has none.
+
+    Attributes:
+        hold: Whether targets go on while problems have no solution.
 
     Raises:
         ValueError: If the configuration names a joint that is not there, or a joint has no limit at all.
@@ -56,6 +62,7 @@ class JointRateLimiter:
             limits = dict.fromkeys(limits, given)
         if unlimited := ", ".join(name for name, limit in limits.items() if not 0.0 < limit < np.inf):
             raise ValueError(f"continuity.max_velocity: the URDF has no velocity for {unlimited}; give it one here")
+        self.hold = config.hold
         self._limits = config.velocity_scale * np.array(list(limits.values()))
         self._last: np.ndarray | None = None
 
@@ -90,11 +97,16 @@ class ProblemStream:
     Args:
         solver: What solves them.
         continuity: Keeps the joints within their velocities; without it, targets are the solutions.
+
+    Attributes:
+        target: n positions to be commanded after the last problem [rad or m]; None if there are none.
     """
 
     def __init__(self, solver: Solver, continuity: JointRateLimiter | None = None) -> None:
         self._solver = solver
         self._continuity = continuity
+        self.target: tuple[float, ...] | None = None
+        self._goal: tuple[float, ...] | None = None
         self._last: JointPositions = {}
         self._last_s: float | None = None
 
@@ -113,24 +125,35 @@ class ProblemStream:
             UnknownNameError: If it names a joint that is not there.
             ValueError: If it makes no sense.
         """
-        is_first = not self._last
+        self.target, is_first = None, not self._last
         start: JointPositions = {**self._last, **problem.start}
         if self._continuity is not None:
             start = self._complete(problem.start) if is_first else self._last
         solution = self._solver.solve(dataclasses.replace(problem, start=start))
         if not solution.success:
+            if self._continuity is not None and self._continuity.hold and self._goal is not None:
+                self._advance(self._continuity, self._goal, stamp_s)
             return solution
-        if self._continuity is not None and solution.trajectory is None:
-            if is_first and start:
-                positions = [start[name] for name in self._solver.joint_names]
-                self._continuity.begin(np.clip(positions, self._solver.lower, self._solver.upper).tolist())
-            target, share = self._continuity.next(solution.positions, self._period_s(stamp_s))
-            message = solution.message
-            if share < 1.0:
-                message = f"{message}; the joints are {share:.0%} of the way there"
-            solution = dataclasses.replace(solution, positions=tuple(target.tolist()), message=message)
-        self._last = dict(zip(self._solver.joint_names, solution.positions))
-        return solution
+        if self._continuity is None or solution.trajectory is not None:
+            self._last = dict(zip(self._solver.joint_names, solution.positions))
+            self.target = solution.positions if solution.trajectory is None else None
+            return solution
+        if is_first and start:
+            positions = [start[name] for name in self._solver.joint_names]
+            self._continuity.begin(np.clip(positions, self._solver.lower, self._solver.upper).tolist())
+        self._goal = solution.positions
+        target, share = self._advance(self._continuity, solution.positions, stamp_s)
+        on_the_way = f"; the joints are {share:.0%} of the way there" if share < 1.0 else ""
+        return dataclasses.replace(solution, positions=target, message=f"{solution.message}{on_the_way}")
+
+    def _advance(
+        self, continuity: JointRateLimiter, goal: tuple[float, ...], stamp_s: float
+    ) -> tuple[tuple[float, ...], float]:
+        """Makes the next target on the way to a goal; returns it, and at which share of the way it is."""
+        positions, share = continuity.next(goal, self._period_s(stamp_s))
+        self.target = tuple(positions.tolist())
+        self._last = dict(zip(self._solver.joint_names, self.target))
+        return self.target, share
 
     def _complete(self, start: JointPositions) -> JointPositions:
         """Returns a start, which must have all joints or none: the robot would jump to what is made up for the rest."""

@@ -113,12 +113,14 @@ class Check(ABC):
         name: Its name in the table and in messages.
         is_default: Whether it is made without being named in the configuration.
         watches: Whether it is about the situation, not the command, so that it is made also while no target comes.
+        takes_obstacles: Whether it asks what is around the robot, `Situation.obstacles`.
     """
 
     Config: ClassVar[type[CheckConfig]] = CheckConfig
     name: ClassVar[str]
     is_default: ClassVar[bool] = False
     watches: ClassVar[bool] = False
+    takes_obstacles: ClassVar[bool] = False
 
     def __init__(self, config: Any, robot: GuardedRobot, limits: JointLimits, file: str) -> None:
         self.config, self.robot, self.limits, self.file = config, robot, limits, file

@@ -53,7 +53,9 @@ class NodeConfig(ConfigModel):
         " source that died is followed no longer than this.",
     )
     base_frame: Text | None = Field(
-        None, description="TF frame of the robot's root; with it the bodies of rpbi/markers are around the robot."
+        None,
+        description="TF frame of the robot's root, which markers are shown in; with it the check `environment` takes"
+        " the bodies of rpbi/markers.",
     )
     left_out: ListOf[Text] = Field(
         (), description="Bodies of rpbi/markers that are no obstacles: first the robot itself."

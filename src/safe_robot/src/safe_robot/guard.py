@@ -25,8 +25,6 @@ SLOW_S = 1e6
 """How long the way from where the robot is to the first target is taken to last [s]: it is not judged by speed."""
 MENDED = ("joint_velocity", "joint_acceleration", "joint_jerk", "joint_position", "braking")
 """What braking for a period may mend where a smoothed command, whose steps are finite, just misses it."""
-MEASURED = "measured positions"
-"""What a start waits for."""
 
 
 class Decision(NamedTuple):
@@ -172,10 +170,13 @@ class Guard:
     def _decide(self, target: tuple[float, ...], situation: Situation) -> Decision:
         if violation := self._input_problem(target):
             return self._refused(violation)
-        if self._is_first and (violation := self._take_start(target, situation)):
-            return Decision(None, violation, violation.subject != MEASURED)
+        is_first = self._is_first
+        if is_first and (violation := self._take_start(target, situation)):
+            return Decision(None, violation, math.isfinite(violation.value))  # for what is not known yet it waits
         assert self._state is not None
-        wanted = target if self._shaper is None else self._shaper.shaped(target, self._state)
+        wanted = target
+        if self._shaper is not None:  # controllers take the first command as rest, so it is where the robot stands
+            wanted = tuple(self._state.position.tolist()) if is_first else self._shaper.shaped(target, self._state)
         found = self._judged(wanted, situation, self.checks)
         if isinstance(found, Violation) and wanted != target and found.check in MENDED:
             wanted = tuple(self._way_to_rest[0].tolist())
@@ -209,7 +210,7 @@ class Guard:
         position = np.array(target)
         there = self._whereabouts(position, situation)
         if there is None:
-            return Violation("start", MEASURED, math.inf, 0.0, "as age, since there are none of all joints")
+            return Violation("start", "measured positions", math.inf, 0.0, "as age, since there are none of all joints")
         distance = np.abs(position - there)
         if not (distance <= self.config.start_tolerance).all():
             i = int(np.argmin(distance <= self.config.start_tolerance))

@@ -144,6 +144,7 @@ Name = Annotated[
     str, AfterValidator(_name), WithJsonSchema({"type": "string", "pattern": f"^{_NAME}$"}), Expects("a name")
 ]
 """Name of an object: letters, digits and '_'."""
+TopicName = Annotated[str, Field(pattern=r"^[~/A-Za-z][A-Za-z0-9_/]*$"), Expects("the name of a topic")]
 FrameId = Annotated[
     str,
     AfterValidator(_frame_id),

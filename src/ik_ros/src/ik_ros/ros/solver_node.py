@@ -1,7 +1,7 @@
 """`ik_solver_node.py SOLVER`: problems of inverse kinematics in, joint targets out."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import genpy
 import rospy
@@ -109,11 +109,12 @@ class SolverNode:
             return
         message_type, read = PROBLEMS[type_name]
         message = message_type().deserialize(raw._buff)
-        header = message.header
+        header, target = message.header, None
         try:
             with self._solving:
                 problem = self._base.with_poses_in_it(read(message), header.frame_id)
                 solution = stream.solve(problem, header.stamp.to_sec())
+                target = stream.target
         except (InterfaceError, ValueError) as error:
             self._warn(self._topic, f"problem refused: {error}")
             solution = IKSolution(False, str(error), self._solver.joint_names, ())
@@ -122,13 +123,13 @@ class SolverNode:
                 self._warn("ik/solution", solution.message)
         with self._publishing:
             if stream is self._stream:  # it may have been switched off meanwhile
-                self._publish(solution, header.stamp)
+                self._publish(solution, target, header.stamp)
 
-    def _publish(self, solution: IKSolution, stamp: rospy.Time) -> None:
+    def _publish(self, solution: IKSolution, target: Sequence[float] | None, stamp: rospy.Time) -> None:
         names, positions = solution.joint_names, solution.positions
-        if solution.success and solution.trajectory is None:
-            self._target.publish(JointState(header=Header(stamp=stamp), name=names, position=positions))
-        elif solution.success:
+        if target is not None:
+            self._target.publish(JointState(header=Header(stamp=stamp), name=self._solver.joint_names, position=target))
+        if solution.success and solution.trajectory is not None:
             self._trajectory.publish(trajectory_message(names, solution.trajectory))
         self._solution.publish(
             IKSolutionMessage(

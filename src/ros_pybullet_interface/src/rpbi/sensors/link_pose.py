@@ -10,6 +10,11 @@ from rpbi.samples import LinkPoseSample
 from .sensor import Sensor
 
 
+def index_of_link(body: Body, link: str | None) -> int | None:
+    """Returns PyBullet's index of a link by its name, -1 without one; None if there is no such link."""
+    return -1 if link is None else next((i for i in (-1, *body.link_indices) if body.link_name(i) == link), None)
+
+
 class LinkPoseSensor(Sensor):
     """Poses of the URDF frames of a body's links in the world.
 

@@ -49,6 +49,8 @@ class Sensor(ABC):
     """The type of its samples, by which their topic is found."""
     ros_topic: ClassVar[str] = ""
     """Where to find the topic of a sensor from another package, a Topic, as `module:NAME`."""
+    topic: str | None = None
+    """Name of its topic, where it is not the one that the Topic has."""
 
     def __init__(self, name: str, hz: float) -> None:
         self.name = name

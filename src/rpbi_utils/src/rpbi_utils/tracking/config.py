@@ -18,6 +18,7 @@ from custom_ros_tools.schema import (
     Seconds,
     Switch,
     Text,
+    TopicName,
     optional,
 )
 from rpbi.geometry import Pose
@@ -34,7 +35,10 @@ class TrackedObjectConfig(ConfigModel):
 
     name: FrameId = Field(description="TF frame of the object that is broadcast.")
     vicon: Text | None = optional("Subject and segment, as `SUBJECT/SEGMENT`; the topic is `vicon/SUBJECT/SEGMENT`.")
-    april_tag: Count | ListOf[Count] | None = optional("Id of a tag on `tag_detections`, or a list: those of a bundle.")
+    april_tag: Count | ListOf[Count] | None = optional("Id of a tag, or a list: those of a bundle.")
+    topics: ListOf[TopicName] = Field(
+        ("tag_detections",), description="Topics of the detectors that see its tags, one for each camera."
+    )
     frame_id: FrameId | None = optional("TF frame that its poses are in; without it, the one that messages name.")
     unit: Literal["m", "mm"] = Field("m", description="Unit of the positions that come.")
     position: Position = Field((0.0, 0.0, 0.0), description="The object's frame in what is tracked.")
@@ -46,6 +50,8 @@ class TrackedObjectConfig(ConfigModel):
             raise KeyedError("vicon", "an object is seen by either vicon or april_tag, one of them")
         if self.vicon is not None and len([part for part in self.vicon.split("/") if part]) != 2:
             raise KeyedError("vicon", f"expected SUBJECT/SEGMENT, got '{self.vicon}'")
+        if not self.topics or (self.vicon is not None and "topics" in self.model_fields_set):
+            raise KeyedError("topics", "expected at least one, with april_tag only")
         return self
 
     @property

@@ -38,6 +38,7 @@ class Environment(Check):
 
     Config = EnvironmentConfig
     name = "environment"
+    takes_obstacles = True
 
     def __init__(self, config: Any, robot: GuardedRobot, limits: JointLimits, file: str) -> None:
         super().__init__(config, robot, limits, file)

@@ -71,8 +71,15 @@ class SelfCollision(Check):
             self.distances.pairs(self.config.margin_m) if self.config.srdf is None else self._all_but(self._disabled())
         )
         if path is not None:
-            Path(path).write_text(yaml.safe_dump({"pairs": [list(pair) for pair in pairs]}, default_flow_style=None))
+            self._write(path, pairs)
         return pairs
+
+    def _write(self, path: str, pairs: list[tuple[str, str]]) -> None:
+        try:
+            Path(path).write_text(yaml.safe_dump({"pairs": [list(pair) for pair in pairs]}, default_flow_style=None))
+        except OSError as error:
+            message = f"expected a file that can be written, got {error}"
+            raise ConfigError([Problem(self.file, "checks.self_collision.pairs_file", message)]) from None
 
     def _read(self, path: str) -> list[tuple[str, str]]:
         try:
@@ -81,11 +88,16 @@ class SelfCollision(Check):
             message = f"expected 'pairs': a list of pairs of links, got {error}"
             raise ConfigError([Problem(path, "", message)]) from None
         self._check_links(path, {link for pair in pairs for link in pair}, self.distances.links)
+        if same := [first for first, second in pairs if first == second]:
+            raise ConfigError([Problem(path, "pairs", f"expected two links, got '{same[0]}' twice")])
         return pairs
 
     def _disabled(self) -> set[frozenset[str]]:
         path = str(self.config.srdf)
         disabled = disabled_collisions(path)
+        if not disabled:
+            message = f"expected pairs of links of {self.robot.urdf_path} as disable_collisions, got none"
+            raise ConfigError([Problem(path, "", message)])
         self._check_links(path, {link for pair in disabled for link in pair}, self.robot.links)
         return disabled
 

@@ -14,6 +14,8 @@ from .pursuit import pursue
 
 CAUGHT_UP = 0.05
 """A joint has caught up with its target when going there takes at most this share of its acceleration and jerk."""
+OVERSHOOT = 0.01
+"""A target outside limits by no more than this counts as one at the limit: motors go as much past it [rad or m]."""
 
 
 class ShapingConfig(ConfigModel):
@@ -47,16 +49,16 @@ class Shaper:
     def shaped(self, target: tuple[float, ...], state: State) -> tuple[float, ...]:
         """Returns what comes after a state on the way to n positions [rad or m].
 
-        Positions that can be commanded are returned themselves, and so are those that are a jump or outside limits.
+        Positions that can be commanded are returned themselves, and so are those that are a jump or outside limits by
+        more than `OVERSHOOT`.
         """
-        position = np.array(target)
-        limits = self._limits
-        is_near = np.abs(position - state.position) <= self._reach
-        if not (is_near & (position >= limits.lower) & (position <= limits.upper)).all():
+        asked = np.array(target)
+        position = asked.clip(self._limits.lower, self._limits.upper)
+        if not ((np.abs(asked - state.position) <= self._reach) & (np.abs(asked - position) <= OVERSHOOT)).all():
             return target
         if self._can_be(position, state):
             self._is_behind = False
-            return target
+            return tuple(position.tolist())
         self._is_behind = True
         acceleration = self._smooth(position, state)
         wanted = pursue(position, state, self._limits, self._braking, self._period_s, acceleration).wanted

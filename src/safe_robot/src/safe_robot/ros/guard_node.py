@@ -47,7 +47,8 @@ class GuardNode:
         self._as_joint_state = config.publish_as_joint_state
         self._targets_are_states = config.targets_are_states
         self._silence_s = config.silence_s
-        self._around = None if config.base_frame is None else LiveObstacles(config.base_frame, config.left_out)
+        base_frame = config.base_frame if any(check.takes_obstacles for check in self._guard.checks) else None
+        self._around = None if base_frame is None else LiveObstacles(base_frame, config.left_out)
         self._warn = ThrottledWarning()
         self._way_out_from: object = None
         self._way_out_words = ""
@@ -197,8 +198,11 @@ class GuardNode:
                 message=message,
             )
         )
-        then = "; halted until robot_safety/start_subscriber is called" if is_halted else ""
-        self._warn(self._target_topic, f"{message}{then}")
+        if is_halted:  # in any case, whatever has been warned of a moment ago
+            what = f"{message}; halted until robot_safety/start_subscriber is called"
+            rospy.logwarn("%s: %s", self._target_topic, what)
+        else:
+            self._warn(self._target_topic, message)
 
     def _way_out(self) -> str:
         """Returns how the robot leaves the margins that it stands in, in words; it is looked for once at each place."""

@@ -35,6 +35,7 @@ LONGEST_FAREWELL_S = 10.0
 """How long leaving the ROS master may take [s]; it may hang or be gone."""
 MASTER_PERIOD_S = 0.2
 ROSOUT = "/rosout"
+ROSPY_LOGGER = "rosout"
 LOG_PARAMETER = "/rosout_disable_topics_generation"
 LONGEST_WAIT_S = 10.0
 """How long to wait for those who listen to /rosout; a node that has just begun is not connected to them yet."""
@@ -207,6 +208,15 @@ def _attach_logging(modules: Iterable[str]) -> None:
         logger.setLevel(logging.INFO)
         logger.propagate = False
         logger.addHandler(handler)
+    logging.getLogger(ROSPY_LOGGER).addFilter(_is_news)
+
+
+def _is_news(record: logging.LogRecord) -> bool:
+    """Returns whether a message of rospy is worth a line: not that a callback met a topic that a shutdown has closed.
+
+    rospy closes topics first, and only then takes what callbacks raise for what it is.
+    """
+    return not (rospy.core.is_shutdown_requested() and record.getMessage().startswith("bad callback"))
 
 
 def _log_fatal_lines(lines: Iterable[str]) -> None:

@@ -179,7 +179,8 @@ def sample_topic(sensor: Sensor) -> Topic | None:
     if sensor.sample_type in _ELSEWHERE:
         return None
     if sensor.ros_topic:
-        return find_topic(sensor.ros_topic, sensor)
+        found = find_topic(sensor.ros_topic, sensor)
+        return found if sensor.topic is None else found._replace(name=sensor.topic)
     if sensor.sample_type not in TOPICS:
         message = f"missing, expected 'module:NAME' of the Topic for its {sensor.sample_type.__qualname__}"
         raise ConfigError([Problem(full_name(sensor), "ros_topic", message)])

@@ -42,7 +42,7 @@ VICON = Topic(
     "vicon/{name}",
     TransformStamped,
     _vicon_message,
-    "Pose of the root link in the world [m] as vicon_bridge reports it, on TF too; `hz` of a sensor `vicon`.",
+    "Pose of a link in the world [m] as vicon_bridge reports it, on TF too; `hz` of a sensor `vicon`.",
 )
 APRIL_TAGS = Topic(
     "tag_detections",

@@ -20,10 +20,12 @@ from custom_ros_tools.schema import (
     PositiveMetres,
     Quat,
     Text,
+    TopicName,
     optional,
 )
 from rpbi.geometry import Pose, Vector, dot, plus, rotated
 from rpbi.samples import AprilTagsSample, SeenTag
+from rpbi.sensors.link_pose import index_of_link
 from rpbi.sensors.rgbd import RgbdSensor
 from rpbi.sensors.sensor import BodySensor, SensedWorld
 
@@ -55,6 +57,7 @@ class AprilTagsConfig(TrackingConfig):
     """Which tags a detector knows, and what camera it looks through."""
 
     camera: Name = Field(description="RGB-D camera of the world; its images need not be drawn.")
+    topic: TopicName = Field("tag_detections", description="Topic of its detections; each detector has another one.")
     tags: ListOf[TagConfig] = Field(description="The tags that are reported.")
     max_angle_deg: Annotated[Degrees, Field(gt=0, lt=90)] = Field(
         75.0, description="A tag is seen up to this angle between its normal and the line of sight."
@@ -87,6 +90,7 @@ class AprilTagsSensor(BodySensor):
 
     def __init__(self, body: Any, config: AprilTagsConfig) -> None:
         super().__init__(body, config)
+        self.topic = config.topic
         self._missing: set[str] = set()
 
     def enter(self, world: SensedWorld) -> None:
@@ -129,8 +133,7 @@ class AprilTagsSensor(BodySensor):
         if body is None:
             self._warn_once(str(tag.body), f"no body '{tag.body}' for tag {tag.id}; it is not seen")
             return None
-        indices = (-1, *body.link_indices)
-        index = -1 if tag.link is None else next((i for i in indices if body.link_name(i) == tag.link), None)
+        index = index_of_link(body, tag.link)
         if index is None:
             self._warn_once(f"{body.name}/{tag.link}", f"no link '{tag.link}' in '{body.name}' for tag {tag.id}")
             return None

@@ -5,27 +5,43 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from custom_ros_tools.errors import PhysicsError
+from custom_ros_tools.errors import ConfigError, PhysicsError, Problem, UnknownNameError
+from custom_ros_tools.schema import Text, optional
 from rpbi.geometry import Pose
 from rpbi.samples import ViconSample
+from rpbi.sensors.link_pose import index_of_link
 from rpbi.sensors.sensor import BodySensor, SensedWorld
 
 from .imperfections import Delay, Occlusion, PoseNoise, TrackingConfig
 
 
+class ViconConfig(TrackingConfig):
+    """A segment of a subject, the body: a rigid part that carries markers."""
+
+    link: Text | None = optional("Link that is the segment; without it, the root link.")
+
+
 class ViconSensor(BodySensor):
-    """Pose of a body's root link in the world, as a motion capture system sees it; while it is hidden, nothing.
+    """Pose of a link of a body in the world, as a motion capture system sees it; while it is hidden, nothing.
 
     Attributes:
         frames: The TF frame that is reported.
+
+    Raises:
+        ConfigError: If the body has no such link.
     """
 
-    Config = TrackingConfig
+    Config = ViconConfig
     sample_type = ViconSample
     ros_topic = "rpbi.ros.publishers.tracking:VICON"
 
-    def __init__(self, body: Any, config: TrackingConfig) -> None:
+    def __init__(self, body: Any, config: ViconConfig) -> None:
         super().__init__(body, config)
+        self._index = index_of_link(body, config.link)
+        if self._index is None:
+            links = [body.link_name(index) for index in (-1, *body.link_indices)]
+            message = str(UnknownNameError("link", str(config.link), links))
+            raise ConfigError([Problem(body.name, f"sensors.{config.name}.link", message)])
         self.frames = (f"vicon/{self.name}",)
         self._noise = PoseNoise(config, config.seed_of(self.name))
 
@@ -46,7 +62,7 @@ class ViconSensor(BodySensor):
         return ViconSample(self.name, self.frames[0], pose, (tick - seen_at) * self._dt_ns)
 
     def _pose(self, tick: int) -> Pose:
-        pose: Pose = self.body.base_pose()
+        pose: Pose = self.body.base_pose() if self._index == -1 else self.body.link_pose(self._index)
         if not math.isfinite(sum(pose.position)):
             raise PhysicsError(f"{self.name}: pose is not finite any more at tick {tick}: {pose.position}")
         return pose

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 
 import rospy
 import tf2_ros
@@ -64,7 +65,10 @@ class TrackedObjectNode:
         config = private_config(TrackingNodeConfig)
         self._frame_id = config.frame_id
         self._objects = [TrackedObject(each, config) for each in config.objects]
-        self._by_tags = {each.config.tag_ids: each for each in self._objects if each.config.tag_ids}
+        by_tags: dict[str, dict[tuple[int, ...], TrackedObject]] = {}
+        for each in self._objects:
+            for topic in each.config.topics if each.config.tag_ids else ():
+                by_tags.setdefault(topic, {})[each.config.tag_ids] = each
         self._warn = ThrottledWarning()
         self._buffer = tf2_ros.Buffer()
         self._listener = TfListener(self._buffer)
@@ -73,8 +77,8 @@ class TrackedObjectNode:
             if each.config.vicon is not None:
                 topic = f"vicon/{each.config.vicon.strip('/')}"
                 self._subscribe(topic, TransformStamped, lambda message, each=each: self._take_vicon(each, message))
-        if self._by_tags:
-            self._subscribe("tag_detections", AprilTagDetectionArray, self._take_tags)
+        for topic, by_ids in by_tags.items():
+            self._subscribe(topic, AprilTagDetectionArray, partial(self._take_tags, by_ids))
         WallTimer(LOOKS_HZ, self._tell_what_is_lost)
 
     def _subscribe(self, topic: str, message_type: type, take: object) -> None:
@@ -87,9 +91,9 @@ class TrackedObjectNode:
     def _take_vicon(self, tracked: TrackedObject, message: TransformStamped) -> None:
         self._take(tracked, message.header, as_pose(message.transform))
 
-    def _take_tags(self, message: AprilTagDetectionArray) -> None:
+    def _take_tags(self, by_ids: Mapping[tuple[int, ...], TrackedObject], message: AprilTagDetectionArray) -> None:
         for detection in message.detections:
-            tracked = self._by_tags.get(_key(detection.id))
+            tracked = by_ids.get(_key(detection.id))
             if tracked is not None:
                 stamped = detection.pose
                 self._take(tracked, stamped.header if stamped.header.frame_id else message.header, stamped.pose.pose)
