@@ -1,10 +1,9 @@
-"""Lets sources of targets, their messages and the ROS master fail, and looks when the last motion was commanded."""
+"""Lets sources of targets, their messages, ROS time and the ROS master fail, and looks when commands moved last."""
 
 from __future__ import annotations
 
 import argparse
 import contextlib
-import dataclasses
 import json
 import math
 import multiprocessing
@@ -15,97 +14,77 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
-from multiprocessing.connection import Connection
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import rosgraph
 import roslib.packages
 import rospy
+from faulty_source import ENDS, MESSAGES, OTHER_TARGETS, STAMPS, TARGET, Course, stream
 from sensor_msgs.msg import JointState
+from simulated_clock import SimulatedClock
 from std_srvs.srv import Trigger
 
-from safe_robot.msg import Status
-
-HZ = 100
-TARGET, COMMAND = "/joint_states/target", "/joint_states/command"
-START, STATUS = "/robot_safety/start_subscriber", "/robot_safety/status"
-NAMES = ["slide", "turn"]
+COMMAND, SERVICE = "/joint_states/command", "/robot_safety/{}_subscriber"
 URDF = """<robot name="slider"><link name="base"/><link name="cart"/><link name="hand"/>
   <joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
     <limit lower="-1" upper="1" effort="1" velocity="2"/></joint>
   <joint name="turn" type="revolute"><parent link="cart"/><child link="hand"/><axis xyz="0 1 0"/>
     <limit lower="-2" upper="2" effort="1" velocity="3"/></joint>
 </robot>"""
-PARAMETERS = {"start_from": "target", "period_s": 0.009, "limits": {"acceleration": 20.0, "jerk": 2000.0}}
-MESSAGES = {
-    "NaN": {"position": (math.nan, 0.0)},
-    "infinite": {"position": (0.0, math.inf)},
-    "no positions": {"position": ()},
-    "missing joint": {"name": NAMES[:1], "position": (0.0,)},
-    "unknown joint": {"name": [NAMES[0], "trun"]},
-    "efforts": {"effort": (1.0, 1.0)},
+PARAMETERS = {
+    "start_from": "target",
+    "start_tolerance": 1.0,
+    "period_s": 0.009,
+    "limits": {"acceleration": 10.0, "jerk": 1000.0},
 }
-"""Faults of one message: fields that are wrong."""
-FROM_THEN_ON = ("joints swapped", "position jumps", "clock jumps back", "clock jumps ahead", "late input")
-"""Faults of all messages from one on."""
-ENDS = ("kill -9", "SIGSTOP", "burst, kill -9", "burst, SIGSTOP")
-"""Faults of the source's process; a burst is left behind by a source that has hung, and is ahead of its time."""
 MASTER = "master killed"
-FAULTS = (*MESSAGES, *FROM_THEN_ON, *ENDS, MASTER)
-BURST = 10
-BEGIN = (0.0, 0.5)
-AFTER_S = 0.2
-"""How long commands are looked at after a fault; much longer than the guard's watch-dogs take."""
+CLOCK_JUMPS = ("/clock jumps back", "/clock jumps ahead")
+FAULTS = (*MESSAGES, *OTHER_TARGETS, *STAMPS, *ENDS, MASTER)
+AFTER_S = 0.4
+"""How long commands are looked at after a fault; much longer than the guard's watch-dogs take, and a braking."""
+LONGEST_BRAKING = 20
+"""So many commands the braking from the fastest of these motions takes at most."""
+SLOWER = 5e-5
+"""Each command of a braking moves joints at most by so much more than the one before [rad or m]: it may turn round."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Course:
-    """What a source does: it swings from where it begins, and has its fault after some targets."""
+class Outcome(NamedTuple):
+    """What was commanded after a fault: when the last motion was that is no braking, and the last of all [s]."""
 
-    fault: str
-    begin: tuple[float, float]
-    hz: float
-    count: int
+    followed_s: float
+    moved_s: float
 
-    def position(self, k: int) -> tuple[float, float]:
-        """Returns target k."""
-        t = k / HZ
-        swing = (1.0 - math.exp(-t)) ** 3 * math.sin(2.0 * math.pi * self.hz * t)
-        return self.begin[0] + 0.08 * swing, self.begin[1] - 0.12 * swing
+    @classmethod
+    def of(cls, commands: Sequence[tuple[float, tuple[float, ...]]], fault_s: float, may_brake: bool) -> Outcome:
+        """Judges commands: times of a clock [s], and positions; a braking is what gets slower until it rests."""
+        times_s = [time_s - fault_s for time_s, _ in commands]
+        steps = [[abs(x - y) for x, y in zip(b, a)] for (_, a), (_, b) in zip(commands, commands[1:])]
+        moving = [k for k, step in enumerate(steps, start=1) if any(step)]
+        if not moving:
+            return cls(-math.inf, -math.inf)  # a slow source may be halted before it moves anything
+        last = first = moving[-1]
+        is_at_rest = time.monotonic() - commands[last][0] > AFTER_S / 4.0
+        while may_brake and is_at_rest and times_s[first] > 0.0 and first > max(1, last - LONGEST_BRAKING):
+            if not _is_slower(steps[first - 1], steps[first - 2]):
+                break
+            first -= 1
+        return cls(times_s[first], times_s[last])
 
 
-def stream(course: Course, report: Connection) -> None:
-    """Publishes targets, from a process of its own, and reports when the fault was [s]."""
-    rospy.init_node("source", anonymous=True, disable_signals=True, disable_rosout=True)
-    publisher = rospy.Publisher(TARGET, JointState, queue_size=100, tcp_nodelay=True)
-    while not publisher.get_num_connections():
-        time.sleep(0.01)
-    offset_s, begin_s, fault = 0.0, time.monotonic(), course.fault
+def _is_slower(step: Sequence[float], before: Sequence[float]) -> bool:
+    return all(b <= a + SLOWER for a, b in zip(before, step))
 
-    def publish(k: int, **fields: object) -> None:
-        message = JointState(**{"name": NAMES, "position": course.position(k), **fields})
-        message.header.stamp = rospy.Time.from_sec(time.time() + offset_s)
-        publisher.publish(message)
 
-    for k in range(100 * HZ):
-        time.sleep(max(0.0, begin_s + k / HZ - time.monotonic()))
-        fields = {}
-        if k == course.count and (fault in ENDS or fault == MASTER):
-            for ahead in range(BURST if "burst" in fault else 0):
-                publish(k + ahead)
-            time.sleep(0.002 if "burst" in fault else 0.0)  # rospy sends from a thread of its own
-            report.send(time.monotonic())
-            if fault != MASTER:
-                os.kill(os.getpid(), signal.SIGKILL if "kill" in fault else signal.SIGSTOP)
-        elif k == course.count:
-            fields = MESSAGES.get(fault, {})
-            offset_s = {"clock jumps back": -1.0, "clock jumps ahead": 1.0, "late input": -0.15}.get(fault, 0.0)
-            report.send(time.monotonic())
-        if k >= course.count and fault == "joints swapped":
-            fields = {"name": NAMES[::-1]}
-        if k >= course.count and fault == "position jumps":
-            fields = {"position": tuple(value + 0.2 for value in course.position(k))}
-        publish(k, **fields)
+CLOCK: dict[str, Callable[[SimulatedClock], None]] = {
+    CLOCK_JUMPS[0]: lambda clock: clock.jump(-1.0),
+    CLOCK_JUMPS[1]: lambda clock: clock.jump(1.0),
+    "/clock stands still": SimulatedClock.stand_still,
+    "/clock begins anew": lambda clock: clock.stand_still(0.0),
+}
+"""Faults of ROS time, where it is simulated."""
+FOLLOWED = {*OTHER_TARGETS, *CLOCK_JUMPS}
+"""What the policy `limit` follows: in the end these are targets, as good as others."""
 
 
 class Experiment:
@@ -113,10 +92,13 @@ class Experiment:
 
     Args:
         parameters: Of the guard; None puts a node in its place that lets everything pass.
+        is_simulated: Whether ROS time is that of `/clock`.
     """
 
-    def __init__(self, parameters: dict[str, object] | None) -> None:
+    def __init__(self, parameters: Mapping[str, object] | None, is_simulated: bool) -> None:
         self._is_guarded = parameters is not None
+        options = parameters or {}
+        self._may_brake = options.get("policy") == "limit" or options.get("on_halt") == "brake"
         self._processes: list[subprocess.Popen[bytes]] = []
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
@@ -125,11 +107,11 @@ class Experiment:
         self._fork = multiprocessing.get_context("forkserver")
         self._fork.set_forkserver_preload(["rospy", "sensor_msgs.msg", "std_srvs.srv", "safe_robot.msg"])
         self._master = self._start_master()
+        rospy.set_param("/use_sim_time", is_simulated)
         rospy.init_node("judge", disable_signals=True)
-        self._motions: list[tuple[float, tuple[float, ...]]] = []
-        self._statuses: list[Status] = []
+        self._clock = SimulatedClock() if is_simulated else None
+        self._commands: list[tuple[float, tuple[float, ...]]] = []
         rospy.Subscriber(COMMAND, JointState, self._take, tcp_nodelay=True)
-        rospy.Subscriber(STATUS, Status, self._statuses.append, tcp_nodelay=True)
         if parameters is None:
             commands = rospy.Publisher(COMMAND, JointState, queue_size=100, tcp_nodelay=True)
             rospy.Subscriber(TARGET, JointState, commands.publish, tcp_nodelay=True)
@@ -137,7 +119,7 @@ class Experiment:
             rospy.set_param("/robot_description", URDF)
             rospy.set_param("/robot_safety_node", parameters)
             self._start([roslib.packages.find_node("safe_robot", "safe_robot_node.py")[0], "__name:=robot_safety_node"])
-            rospy.wait_for_service(START, timeout=60.0)
+            rospy.wait_for_service(SERVICE.format("start"), timeout=60.0)
 
     def close(self) -> None:
         """Ends all that was started."""
@@ -147,10 +129,11 @@ class Experiment:
                 process.wait(20.0)
             process.kill()
 
-    def latest_motion_s(self, course: Course) -> float:
-        """Returns how long after a fault the last command came that moved the robot [s]; below 0: before it."""
-        self._until(self._has_started, "the guard takes targets")
-        self._motions.clear()
+    def outcome(self, course: Course) -> Outcome:
+        """Returns what is commanded after a fault."""
+        self._until(lambda: self._call("stop"), "the guard takes no targets")
+        self._until(lambda: self._call("start"), "the guard takes targets")
+        self._commands.clear()
         ours, theirs = self._fork.Pipe()
         source = self._fork.Process(target=stream, args=(course, theirs), daemon=True)
         source.start()
@@ -161,33 +144,30 @@ class Experiment:
             if course.fault == MASTER:
                 fault_s = time.monotonic()
                 self._master.kill()
+            elif self._clock and course.fault in CLOCK:
+                fault_s = time.monotonic()
+                CLOCK[course.fault](self._clock)
             time.sleep(AFTER_S)
-            motions = list(self._motions)
+            outcome = Outcome.of(list(self._commands), fault_s, self._may_brake)
         finally:
             source.kill()
             source.join()
-        moved = [b[0] for a, b in zip(motions, motions[1:]) if a[1] != b[1]]
         if course.fault == MASTER:
             self._master = self._start_master()
             if self._is_guarded:
-                self._until(lambda: rosgraph.Master("/judge").lookupService(START), "the guard is registered again")
-        return max(moved, default=-math.inf) - fault_s  # a slow source may be halted before it moves anything
-
-    @property
-    def position(self) -> tuple[float, float]:
-        """Where the robot was commanded to last."""
-        return tuple(self._motions[-1][1]) if self._motions else BEGIN
-
-    def _said(self) -> str:
-        return self._statuses[-1].message if self._statuses else "nothing"
+                lookup = rosgraph.Master("/judge").lookupService
+                self._until(lambda: lookup(SERVICE.format("start")), "the guard is registered again")
+        if self._clock:
+            self._clock.go_on()
+        return outcome
 
     def _take(self, message: JointState) -> None:
-        self._motions.append((time.monotonic(), message.position))
+        self._commands.append((time.monotonic(), message.position))
 
-    def _has_started(self) -> bool:
+    def _call(self, verb: str) -> bool:
         if not self._is_guarded:
             return True
-        answer = rospy.ServiceProxy(START, Trigger)()
+        answer = rospy.ServiceProxy(SERVICE.format(verb), Trigger)()
         return answer.success or "already" in answer.message
 
     def _start_master(self) -> subprocess.Popen[bytes]:
@@ -199,7 +179,7 @@ class Experiment:
         self._processes.append(subprocess.Popen(command, stdout=sys.stderr, start_new_session=True))
         return self._processes[-1]
 
-    def _until(self, condition: object, what: str) -> None:
+    def _until(self, condition: Callable[[], object], what: str) -> None:
         end_s = time.monotonic() + 60.0
         while time.monotonic() < end_s:
             with contextlib.suppress(OSError, rosgraph.MasterException, rospy.ROSException, rospy.ServiceException):
@@ -218,20 +198,27 @@ def courses(faults: Sequence[str], count: int, seed: int) -> Iterator[tuple[str,
 
 
 def main() -> None:
-    """Prints as JSON, by fault, how long after each the last motion was commanded [s]."""
+    """Prints as JSON, by fault, for each one the outcome."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", type=int)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--faults", nargs="+", default=FAULTS, choices=FAULTS)
+    parser.add_argument("--faults", nargs="+", choices=(*FAULTS, *CLOCK), help="by default all that are meant")
+    parser.add_argument("--policy", default="reject", help="the guard's")
+    parser.add_argument("--on-halt", default="nothing", help="the guard's on_halt")
     parser.add_argument("--silence", type=float, default=0.02, help="the guard's silence_s")
+    parser.add_argument("--simulated-time", action="store_true", help="ROS time is that of /clock, which fails")
     parser.add_argument("--unguarded", action="store_true", help="everything passes")
     arguments = parser.parse_args()
-    experiment = Experiment(None if arguments.unguarded else {**PARAMETERS, "silence_s": arguments.silence})
-    found: dict[str, list[float]] = {}
+    is_rejected = arguments.policy == "reject"
+    meant = CLOCK if arguments.simulated_time else FAULTS
+    faults = arguments.faults or [each for each in meant if is_rejected or each not in FOLLOWED]
+    options = {"policy": arguments.policy, "on_halt": arguments.on_halt, "silence_s": arguments.silence}
+    experiment = Experiment(None if arguments.unguarded else {**PARAMETERS, **options}, arguments.simulated_time)
+    found: dict[str, list[Outcome]] = {}
     try:
-        for fault, hz, count in courses(arguments.faults, arguments.count, arguments.seed):
-            course = Course(fault, experiment.position, hz, count)
-            found.setdefault(fault, []).append(experiment.latest_motion_s(course))
+        for fault, hz, count in courses(faults, arguments.count, arguments.seed):
+            course = Course(fault, hz, count, is_for_good=not is_rejected)
+            found.setdefault(fault, []).append(experiment.outcome(course))
     finally:
         experiment.close()
     print("result:", json.dumps(found))

@@ -60,6 +60,10 @@ class GuardStation:
         self._publisher.publish(message)
         return message
 
+    def send_unstamped(self, *position: float) -> None:
+        """Publishes a target that does not say of when it is."""
+        self._publisher.publish(JointState(name=NAMES, position=position))
+
     def call(self, verb: str) -> TriggerResponse:
         """Calls `start` or `stop`."""
         return self._ros.call(f"{self._namespace}/robot_safety/{verb}_subscriber", Trigger)

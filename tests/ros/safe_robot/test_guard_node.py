@@ -88,6 +88,15 @@ def test_what_cannot_be_answered_for_is_refused_and_named(left, fields, words):
     assert left.commands.messages == []
 
 
+def test_a_target_without_a_stamp_after_others_that_had_one_is_refused(left):
+    """ROS time that begins anew at 0 looks like that."""
+    left.send(0.0, 0.0)
+    left.commands.wait_for()
+    left.send_unstamped(0.001, 0.0)
+    assert "expected a stamp" in left.statuses.wait_for(2)[1].message
+    assert len(left.commands.messages) == 1
+
+
 def test_numbers_come_in_the_robots_order_a_period_apart_and_from_where_the_robot_was_measured(left, right):
     """Late targets that come together make the robot no faster; and what one guard is told another does not hear."""
     right.send(0.3, -0.2)

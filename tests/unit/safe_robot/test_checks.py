@@ -151,6 +151,17 @@ def test_a_measured_force_that_is_not_a_number_is_too_large(bad):
     assert check.check(motion, Situation(wrench=(float(bad), 0.0, 0.0, 0.0, 0.0, 0.0), wrench_age_s=0.0)) is not None
 
 
+def test_a_robot_that_is_as_late_as_expected_follows_and_one_that_stands_does_not(tmp_path):
+    robot = slider(tmp_path)
+    check = check_of("tracking", robot, tolerance=0.05, lag_s=0.1)
+    start = State(np.array((0.5, 0.0)), np.array((0.8, 0.0)), np.zeros(2))
+    motion = Motion(robot, start, start.position + 0.01 * start.velocity, 0.01)
+    assert check.check(motion, Situation(measured={"slide": 0.42, "turn": 0.0})) is None
+    violation = check.check(motion, Situation(measured={"slide": 0.36, "turn": 0.0}))
+    assert violation == ("tracking", "joint 'slide'", pytest.approx(0.06), 0.05, "m of error", False)
+    assert check.check(motion, Situation(measured={"slide": 0.5, "turn": 0.0})) is not None
+
+
 @pytest.mark.parametrize("name", ["force", "tracking"])
 def test_without_a_measurement_nothing_is_safe(name):
     check = check_of(name, GuardedRobot(KUKA))

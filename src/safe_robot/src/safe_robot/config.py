@@ -18,6 +18,11 @@ class GuardConfig(ConfigModel):
         description="What happens to a target that is not safe: reject sends nothing and halts; limit sends what is"
         " safe instead, and goes on.",
     )
+    on_halt: Literal["nothing", "brake"] = Field(
+        "nothing",
+        description="What is sent after a halt in the middle of a motion: nothing; or, one each period_s, the braking"
+        " that was found safe with the last command.",
+    )
     period_s: Seconds = Field(
         0.009,
         description="Time between two commands: none follows another sooner, and each counts as so much time. A few"

@@ -103,6 +103,11 @@ class Guard:
         return self._state is not None and not self._state.is_at_rest
 
     @property
+    def is_braking(self) -> bool:
+        """Whether it is halted, and `next_braking` has commands that bring the robot to rest."""
+        return self.is_halted and self.is_moving
+
+    @property
     def last_command(self) -> tuple[float, ...] | None:
         """The n positions that were commanded last [rad or m]; None before the first command."""
         return None if self._state is None or self._is_first else tuple(self._state.position.tolist())
@@ -119,15 +124,31 @@ class Guard:
         return find_way_out(self._state.position, self.limits, self._inside)
 
     def start(self) -> None:
-        """Lets targets pass again; the first one has to be near where the robot is."""
+        """Lets targets pass again; the first one has to be near where the robot is.
+
+        Raises:
+            RuntimeError: If the robot still brakes.
+        """
+        if self.is_braking:
+            raise RuntimeError("the robot still brakes: start when next_braking() returns None")
         self.is_halted, self._is_first = False, True
 
     def halt(self) -> None:
-        """Sends nothing any more; the robot is taken to stand where it was commanded to last."""
+        """Lets no target pass any more; with `on_halt: brake` the robot is to be braked by `next_braking`."""
+        self.is_halted = True
+        if self.config.on_halt == "nothing":
+            self.rest()
+
+    def rest(self) -> None:
+        """Halts without braking: the robot is taken to stand where it was commanded to last."""
         self.is_halted = True
         if self._state is not None:
             self._state = State.at_rest(self._state.position)
         self._stop = self._stop[:0]
+
+    def next_braking(self) -> tuple[float, ...] | None:
+        """Returns what to command next after a halt, a period after the last command; None if the robot rests."""
+        return self._brake_on() if self.is_braking else None
 
     def decide(self, target: Sequence[float], situation: Situation) -> Decision:
         """Returns what to command.
@@ -161,11 +182,15 @@ class Guard:
         if self.is_halted or self._is_first or self._state is None:
             return None
         motion = Motion(self.robot, self._state, self._state.position, self.config.period_s)
-        for check in self.checks:
-            if check.watches and (violation := check.check(motion, situation)):
-                self.halt()
-                return violation
-        return None
+        try:
+            found = (each.check(motion, situation) for each in self.checks if each.watches)
+            violation = next(filter(None, found), None)
+        except BaseException:
+            self.halt()
+            raise
+        if violation is not None:
+            self.halt()
+        return violation
 
     def _decide(self, target: tuple[float, ...], situation: Situation) -> Decision:
         if violation := self._input_problem(target):

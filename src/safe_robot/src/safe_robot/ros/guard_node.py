@@ -1,10 +1,8 @@
 """`safe_robot_node.py`: targets of a robot in, safe commands out."""
 
 import time
-from collections.abc import Mapping
 
 import rospy
-from geometry_msgs.msg import WrenchStamped
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, Header
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
@@ -13,15 +11,14 @@ from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.joint_values import JointValues
 from custom_ros_tools.ros.joint_states import values_in
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
-from safe_robot.check import Situation, Violation
+from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
+from safe_robot.check import Violation
 from safe_robot.guard import Decision
-from safe_robot.msg import Status
-from safe_robot.msg import Violation as ViolationMessage
 
 from .guard_markers import GuardMarkers
-from .live_obstacles import LiveObstacles
+from .guard_status import GuardStatus, violation_of
 from .master_connection import MasterConnection
+from .measurements import Measurements
 from .parameters import guard_of_parameters
 from .target_queue import TargetQueue
 
@@ -47,15 +44,8 @@ class GuardNode:
         self._as_joint_state = config.publish_as_joint_state
         self._targets_are_states = config.targets_are_states
         self._silence_s = config.silence_s
-        base_frame = config.base_frame if any(check.takes_obstacles for check in self._guard.checks) else None
-        self._around = None if base_frame is None else LiveObstacles(base_frame, config.left_out)
-        self._warn = ThrottledWarning()
-        self._way_out_from: object = None
-        self._way_out_words = ""
         self._sent_s = NEVER_S
         self._last_stamp: tuple[rospy.Time, float] | None = None
-        self._measured: tuple[Mapping[str, float], float] = {}, NEVER_S
-        self._wrench: tuple[tuple[float, ...], float] = (0.0,) * 6, NEVER_S
         self._target_topic = rospy.resolve_name("joint_states/target")
         self._command = rospy.Publisher(
             "joint_states/command",
@@ -63,8 +53,9 @@ class GuardNode:
             queue_size=QUEUE_SIZE,  # a command that is left out would make the next one a jump
             tcp_nodelay=True,
         )
-        self._status = rospy.Publisher("robot_safety/status", Status, queue_size=QUEUE_SIZE, latch=True)
-        self._violation = rospy.Publisher("robot_safety/violation", ViolationMessage, queue_size=QUEUE_SIZE, latch=True)
+        self._status = GuardStatus(self._guard, self._target_topic)
+        base_frame = config.base_frame if any(check.takes_obstacles for check in self._guard.checks) else None
+        self._measurements = Measurements(self._guard.joint_names, base_frame, config.left_out)
         self._guard.start()
         # what limits or shapes can skip late targets; a skipped one makes the next a jump, at which `reject` halts
         can_skip = self._guard.config.policy == "limit" or self._guard.config.shape
@@ -74,10 +65,9 @@ class GuardNode:
         self._master = MasterConnection(self._lose_master)
         rospy.Service("robot_safety/start_subscriber", Trigger, self._start)
         rospy.Service("robot_safety/stop_subscriber", Trigger, self._stop)
-        options = {"queue_size": QUEUE_SIZE, "tcp_nodelay": True}
-        rospy.Subscriber("joint_states/measured", JointState, self._take_measured, **options)
-        rospy.Subscriber("robot_safety/wrench", WrenchStamped, self._take_wrench, **options)
-        self._targets = rospy.Subscriber(self._target_topic, JointState, self._receive, **options)
+        self._targets = rospy.Subscriber(
+            self._target_topic, JointState, self._receive, queue_size=QUEUE_SIZE, tcp_nodelay=True
+        )
         WallTimer(WATCH_HZ, self._watch)
 
     def _receive(self, message: JointState) -> None:
@@ -90,33 +80,48 @@ class GuardNode:
     def _take(self, message: JointState) -> bool:
         """Decides on a target; returns whether a command has gone out."""
         if self._guard.is_halted:
-            self._warn(self._target_topic, "halted; call robot_safety/start_subscriber to go on")
+            self._status.warn_of_halt()
             return False
         try:
             decision = self._decide(message)
             if decision.command is not None:
                 self._send(message, decision)
         except Exception as error:
-            self._guard.halt()
-            decision = Decision(None, Violation("input", f"it cannot be judged: {error!r}", *NO_NUMBERS), True)
-        self._tell(message.header, decision.violation, decision.is_halted)
+            decision = Decision(None, violation_of("input", f"it cannot be judged: {error!r}"), True)
+        if decision.is_halted:
+            self._halt(decision.violation, message.header)
+        else:
+            self._status.publish(message.header, decision.violation, self._measurements.obstacles)
         return decision.command is not None
 
     def _end_wait(self, age_s: float) -> None:
-        self._halt(Violation("staleness", "the newest target", age_s, self._silence_s, "s of age"))
+        if not self._guard.is_halted:
+            self._halt(Violation("staleness", "the newest target", age_s, self._silence_s, "s of age"))
 
     def _lose_master(self) -> None:
         reason = f"the ROS master at {self._master.uri} has gone, and nobody could find stop_subscriber"
         with self._queue.lock:
-            self._halt(Violation("master", reason, *NO_NUMBERS))
+            if not self._guard.is_halted:
+                self._halt(violation_of("master", reason))
 
-    def _halt(self, violation: Violation) -> None:
-        """Halts for a reason that no target is to blame for; the queue's lock is held."""
-        if self._guard.is_halted:
-            return
+    def _halt(self, violation: Violation | None, header: Header | None = None) -> None:
+        """Halts, brakes if the guard is to, and says why; the queue's lock is held."""
         self._guard.halt()
-        self._queue.clear()
-        self._tell(Header(stamp=_now()), violation, True)
+        self._queue.run_instead(self._brake)
+        if violation is not None:
+            self._status.publish(header or Header(stamp=_now()), violation, self._measurements.obstacles)
+
+    def _brake(self) -> bool:
+        """Sends the next command of the braking; returns whether there was one."""
+        command = self._guard.next_braking()
+        if command is None:
+            return False
+        try:
+            self._publish(self._message(Header(stamp=_now()), command))
+        except Exception as error:
+            rospy.logerr("the braking ends: %r", error)
+            return False
+        return True
 
     def _decide(self, message: JointState) -> Decision:
         try:
@@ -125,6 +130,8 @@ class GuardNode:
             return self._guard.refuse(str(error))
         stamp = message.header.stamp
         age_s, step_s = 0.0, None
+        if self._last_stamp is not None and not stamp:
+            return self._guard.refuse("expected a stamp, as the targets before had")
         if stamp:
             age_s, now_s = (_now() - stamp).to_sec(), time.monotonic()
             if self._last_stamp is not None:
@@ -134,7 +141,7 @@ class GuardNode:
             self._last_stamp = stamp, now_s
             if self._guard.last_command is None and age_s > self._silence_s:  # it waited for a connection
                 return Decision(None, Violation("staleness", "the first target", age_s, self._silence_s, "s of age"))
-        return self._guard.decide(values.position, self._situation(age_s, step_s))
+        return self._guard.decide(values.position, self._measurements.situation(self._sent_s, age_s, step_s))
 
     def _checked(self, message: JointState) -> JointValues:
         """Returns the positions of the guarded joints, in order.
@@ -156,67 +163,23 @@ class GuardNode:
                 raise ValueError(f"joint '{name}': expected a velocity within {most:g}, got {speed:g}")
         return ordered
 
-    def _situation(self, age_s: float = 0.0, stamp_step_s: float | None = None) -> Situation:
-        now_s = time.monotonic()
-        (measured, measured_s), (wrench, wrench_s) = self._measured, self._wrench
-        return Situation(
-            now_s=now_s,
-            age_s=age_s,
-            stamp_step_s=stamp_step_s,
-            since_command_s=now_s - self._sent_s,
-            measured=measured,
-            measured_age_s=now_s - measured_s,
-            wrench=wrench,
-            wrench_age_s=now_s - wrench_s,
-            obstacles=None if self._around is None else self._around.obstacles,
-        )
-
     def _send(self, message: JointState, decision: Decision) -> None:
         self._sent_s = time.monotonic()
-        if not self._as_joint_state:
-            self._command.publish(Float64MultiArray(data=decision.command))
-        elif decision.violation is None and not decision.is_shaped:
-            self._command.publish(message)  # to the last bit as it came
-        else:
-            names = self._guard.joint_names
-            self._command.publish(JointState(header=message.header, name=names, position=decision.command))
+        assert decision.command is not None
+        is_same = self._as_joint_state and decision.violation is None and not decision.is_shaped
+        self._publish(message if is_same else self._message(message.header, decision.command))
 
-    def _tell(self, header: Header, violation: Violation | None, is_halted: bool) -> None:
-        if violation is None:
-            self._status.publish(Status(header=header, message="", is_safe=True))
-            return
-        message = f"{violation}{self._way_out()}"
-        self._status.publish(Status(header=header, message=message, is_safe=False))
-        self._violation.publish(
-            ViolationMessage(
-                header=header,
-                check=violation.check,
-                subject=violation.subject,
-                value=violation.value,
-                limit=violation.limit,
-                is_while_braking=violation.is_while_braking,
-                message=message,
-            )
-        )
-        if is_halted:  # in any case, whatever has been warned of a moment ago
-            what = f"{message}; halted until robot_safety/start_subscriber is called"
-            rospy.logwarn("%s: %s", self._target_topic, what)
-        else:
-            self._warn(self._target_topic, message)
+    def _message(self, header: Header, command: tuple[float, ...]) -> JointState | Float64MultiArray:
+        if self._as_joint_state:
+            return JointState(header=header, name=self._guard.joint_names, position=command)
+        return Float64MultiArray(data=command)
 
-    def _way_out(self) -> str:
-        """Returns how the robot leaves the margins that it stands in, in words; it is looked for once at each place."""
-        if self._guard.is_moving:
-            return ""
-        place = self._guard.last_command, self._around and self._around.obstacles
-        if self._way_out_from != place:
-            self._way_out_from = place
-            try:
-                out = self._guard.way_out()
-                self._way_out_words = "" if out is None else f"; {out.words(self._guard.joint_names)}"
-            except Exception as error:
-                self._way_out_words = f"; it is not known how to leave the margins: {error!r}"
-        return self._way_out_words
+    def _publish(self, message: JointState | Float64MultiArray) -> None:
+        try:
+            self._command.publish(message)
+        except BaseException:
+            self._guard.rest()  # nothing can be braked from a command that has not gone out
+            raise
 
     def _watch(self) -> None:
         with self._queue.lock:
@@ -224,29 +187,21 @@ class GuardNode:
                 return
             if self._guard.is_moving and not self._targets.get_num_connections():
                 reason = f"nobody sends {self._target_topic} any more, while the robot moves"
-                self._halt(Violation("source", reason, *NO_NUMBERS))
-            elif violation := self._guard.late(self._situation()):
-                self._queue.clear()
-                self._tell(Header(stamp=_now()), violation, True)
-
-    def _take_measured(self, message: JointState) -> None:
-        try:
-            values = values_in(message)
-            values.in_order(self._guard.joint_names)
-        except (InterfaceError, ValueError) as error:
-            self._warn("joint_states/measured", f"message refused: {error}")
-            return
-        self._measured = dict(zip(values.names, values.position)), time.monotonic()
-
-    def _take_wrench(self, message: WrenchStamped) -> None:
-        force, torque = message.wrench.force, message.wrench.torque
-        wrench = (force.x, force.y, force.z, torque.x, torque.y, torque.z)
-        self._wrench = wrench, time.monotonic()
+                self._halt(violation_of("source", reason))
+                return
+            try:
+                violation = self._guard.late(self._measurements.situation(self._sent_s))
+            except Exception as error:
+                violation = violation_of("input", f"the situation cannot be judged: {error!r}")
+            if violation is not None:
+                self._halt(violation)
 
     def _start(self, _: TriggerRequest) -> TriggerResponse:
         with self._queue.lock:
             if not self._guard.is_halted:
                 return TriggerResponse(False, "targets are taken already")
+            if self._guard.is_braking:
+                return TriggerResponse(False, "the robot still brakes; call again when it rests")
             if not self._master.is_there:
                 return TriggerResponse(False, f"the ROS master at {self._master.uri} has gone")
             self._last_stamp = None
@@ -258,11 +213,8 @@ class GuardNode:
         with self._queue.lock:
             if self._guard.is_halted:
                 return TriggerResponse(False, "no targets are taken already")
-            self._guard.halt()
+            self._halt(None)
         return TriggerResponse(True, "no targets are taken")
-
-
-NO_NUMBERS = (float("nan"), float("nan"), "")
 
 
 def _now() -> rospy.Time:

@@ -42,6 +42,7 @@ class TargetQueue(Generic[Item]):
         self._take, self._give_up = take, give_up
         self.lock = threading.Condition()
         self._waiting: deque[tuple[Item, float]] = deque(maxlen=size)
+        self._step: Callable[[], bool] | None = None
         self._due_s = self._alive_s = float("-inf")
         threading.Thread(target=self._run, name="target queue", daemon=True).start()
 
@@ -65,6 +66,18 @@ class TargetQueue(Generic[Item]):
         """Drops all that waits; `lock` is held."""
         self._waiting.clear()
 
+    def run_instead(self, step: Callable[[], bool]) -> None:
+        """Drops all that waits, and calls a step a period after what was handed on last, and so on; `lock` is held.
+
+        What is late is not caught up with: no call follows another one sooner than a period.
+
+        Args:
+            step: Is called, `lock` held, until it returns False.
+        """
+        self._waiting.clear()
+        self._step = step
+        self.lock.notify()
+
     def _left_s(self, now_s: float) -> float:
         return self._due_s - now_s
 
@@ -84,10 +97,16 @@ class TargetQueue(Generic[Item]):
 
     def _rest_s(self) -> float | None:
         """Hands on what is due; returns how long there is nothing to do then [s], None: until a target comes."""
-        while self._waiting:
+        while self._step or self._waiting:
             now_s = time.monotonic()
             if (left_s := self._left_s(now_s)) > 0.0:
                 return left_s
+            if self._step:
+                if self._step():
+                    self._due_s = time.monotonic() + self._period_s
+                else:
+                    self._step = None
+                continue
             if self._is_alive(now_s):
                 self._hand_on()
                 continue

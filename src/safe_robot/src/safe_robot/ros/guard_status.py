@@ -1,0 +1,87 @@
+"""What the guard's node says of its decisions."""
+
+import math
+
+import rospy
+from std_msgs.msg import Header
+
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
+from safe_robot.check import Violation
+from safe_robot.geometry.obstacles import Obstacle
+from safe_robot.guard import Guard
+from safe_robot.msg import Status
+from safe_robot.msg import Violation as ViolationMessage
+
+QUEUE_SIZE = 100
+
+
+def violation_of(check: str, reason: str) -> Violation:
+    """Returns a violation that is not about a number."""
+    return Violation(check, reason, math.nan, math.nan, "")
+
+
+class GuardStatus:
+    """Publishes a status for each decision, and warns of what is not safe.
+
+    Args:
+        guard: The guard.
+        subject: What warnings are about: the topic of targets.
+    """
+
+    def __init__(self, guard: Guard, subject: str) -> None:
+        self._guard, self._subject = guard, subject
+        self._status = rospy.Publisher("robot_safety/status", Status, queue_size=QUEUE_SIZE, latch=True)
+        self._violation = rospy.Publisher("robot_safety/violation", ViolationMessage, queue_size=QUEUE_SIZE, latch=True)
+        self._warn = ThrottledWarning()
+        self._way_out_from: object = None
+        self._way_out_words = ""
+
+    def publish(
+        self, header: Header, violation: Violation | None, obstacles: tuple[Obstacle, ...] | None = None
+    ) -> None:
+        """Says what was decided.
+
+        Args:
+            header: The target's.
+            violation: Why it is not safe; None if it is.
+            obstacles: Bodies of the environment; equal ones are the same tuple.
+        """
+        if violation is None:
+            self._status.publish(Status(header=header, message="", is_safe=True))
+            return
+        message = f"{violation}{self._way_out(obstacles)}"
+        self._status.publish(Status(header=header, message=message, is_safe=False))
+        self._violation.publish(
+            ViolationMessage(
+                header=header,
+                check=violation.check,
+                subject=violation.subject,
+                value=violation.value,
+                limit=violation.limit,
+                is_while_braking=violation.is_while_braking,
+                message=message,
+            )
+        )
+        if self._guard.is_halted:  # in any case, whatever has been warned of a moment ago
+            then = "braking to rest, and halted" if self._guard.is_braking else "halted"
+            rospy.logwarn("%s: %s; %s until robot_safety/start_subscriber is called", self._subject, message, then)
+        else:
+            self._warn(self._subject, message)
+
+    def warn_of_halt(self) -> None:
+        """Says that a target has come in vain."""
+        self._warn(self._subject, "halted; call robot_safety/start_subscriber to go on")
+
+    def _way_out(self, obstacles: tuple[Obstacle, ...] | None) -> str:
+        """Returns how the robot leaves the margins that it stands in, in words; it is looked for once at each place."""
+        if self._guard.is_moving:
+            return ""
+        place = self._guard.last_command, obstacles
+        if self._way_out_from != place:
+            self._way_out_from = place
+            try:
+                out = self._guard.way_out()
+                self._way_out_words = "" if out is None else f"; {out.words(self._guard.joint_names)}"
+            except Exception as error:
+                self._way_out_words = f"; it is not known how to leave the margins: {error!r}"
+        return self._way_out_words
