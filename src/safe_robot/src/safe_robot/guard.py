@@ -88,7 +88,6 @@ class Guard:
         shape = (self.limits, self._braking, config.period_s)
         self._shaper = None if config.shape is None else Shaper(config.shape, *shape)
         self._watches = {check.name for check in self.checks if check.watches}
-        self._suspect = ""  # the check that refused what was tried last in place of a target
         self._nearest = Nearest(self.limits, self._braking, self.checks, config.period_s)
         if config.policy == "limit" and not can_keep_bounds():
             log.warning("%s: policy limit comes less near to targets without DAQP: run `./rpbi setup ik`", file)
@@ -294,13 +293,13 @@ class Guard:
         assert self._state is not None
         if self.config.policy == "reject" or violation.check in self._watches:  # no other command mends these
             return self._refused(violation)
-        for wanted in self._nearest.commands(np.array(target), self._state, self._way_to_rest):
-            suspects = sorted(self.checks, key=lambda check: check.name != self._suspect)  # it likely does so again
-            found = self._judged(tuple(wanted.tolist()), situation, suspects)
-            if not isinstance(found, Violation):
-                return Decision(self._sent(found), violation)
-            self._suspect = found.check
-        return Decision(self._brake_on(), violation)
+        safe = self._nearest.find(
+            np.array(target),
+            self._state,
+            self._way_to_rest,
+            lambda wanted, checks: self._judged(tuple(wanted.tolist()), situation, checks),
+        )
+        return Decision(self._brake_on() if safe is None else self._sent(safe), violation)
 
     def _inside(self, q: np.ndarray) -> list[Inside]:
         return [each for check in self.checks for each in check.inside(q)]

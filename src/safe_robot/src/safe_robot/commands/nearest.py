@@ -1,16 +1,19 @@
-"""The search for a safe command near to a target that is not safe: what is worth judging, the best first."""
+"""The search for a safe command near to a target that is not safe."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from typing import TypeVar
 
 import numpy as np
 
-from safe_robot.check import Check
+from safe_robot.check import Check, Violation
 from safe_robot.limits import JointLimits
 from safe_robot.motion import State
 
 from .braking import Braking
 from .detour import Bound, Detour, Stop, can_keep_bounds
 from .pursuit import pursue
+
+Safe = TypeVar("Safe")
 
 SHARES = (0.5, 0.2)
 """How much of the way from braking to what is wanted is tried."""
@@ -21,27 +24,46 @@ OVER, OVER_M = 0.5, 1e-8
 
 
 class Nearest:
-    """Finds commands to n joints that come near a target; whether they are safe is for the checks to say.
+    """Finds safe commands to n joints that come near a target.
 
     Args:
         limits: Limits of the joints.
         braking: How they come to rest.
-        checks: Those that tell what is in the way.
+        checks: Those by which commands are judged, and which tell what is in the way.
         period_s: Time between two commands [s].
     """
 
     def __init__(self, limits: JointLimits, braking: Braking, checks: Sequence[Check], period_s: float) -> None:
         self._limits, self._braking, self._checks, self._period_s = limits, braking, checks, period_s
         self._keeps_bounds = can_keep_bounds()
+        self._suspect = ""
 
-    def commands(self, target: np.ndarray, state: State, stop: np.ndarray) -> Iterator[np.ndarray]:
-        """Yields n positions near to what the joints alone can do, the best ones first; each time if the last was bad.
+    def find(
+        self,
+        target: np.ndarray,
+        state: State,
+        stop: np.ndarray,
+        judged: Callable[[np.ndarray, Sequence[Check]], Safe | Violation],
+    ) -> Safe | None:
+        """Returns the first command that is safe of those near to what the joints alone can do; None if none is.
+
+        The check that refused what was tried last is asked first, since it likely refuses again.
 
         Args:
             target: n positions.
             state: Where the robot is.
             stop: The commands that bring it to rest from there, as they were found safe, k x n; one at least.
+            judged: Judges n positions by checks in an order.
         """
+        for command in self._commands(target, state, stop):
+            found = judged(command, sorted(self._checks, key=lambda check: check.name != self._suspect))
+            if not isinstance(found, Violation):
+                return found
+            self._suspect = found.check
+        return None
+
+    def _commands(self, target: np.ndarray, state: State, stop: np.ndarray) -> Iterator[np.ndarray]:
+        """Yields what is worth judging, the best first; each one because the last was not safe."""
         best, slowest = pursue(target, state, self._limits, self._braking, self._period_s)
         for wanted in self._detours(best, slowest, state, stop) if self._keeps_bounds else [best]:
             best = wanted
