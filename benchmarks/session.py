@@ -94,8 +94,16 @@ class Session:
     def simulator(self, world: dict[str, Any]) -> subprocess.Popen[bytes]:
         """Starts the simulator with a main configuration and waits until it is up."""
         self._master.setParam("/ros_pybullet_interface/config", world)
-        process = self.start(["rosrun", "ros_pybullet_interface", "ros_pybullet_interface_node.py"])
-        self._until(lambda: self._master.lookupService("/rpbi/list_objects"), "the simulator is up", process)
+        return self.node(["rosrun", "ros_pybullet_interface", "ros_pybullet_interface_node.py"], "/rpbi/list_objects")
+
+    def node(self, command: list[str], service: str) -> subprocess.Popen[bytes]:
+        """Starts a node and waits until it offers a service.
+
+        Raises:
+            RuntimeError: If it does not; with what it has printed.
+        """
+        process = self.start(command)
+        self._until(lambda: self._master.lookupService(service), f"there is {service}", process)
         return process
 
     def place_camera(self) -> None:

@@ -70,7 +70,7 @@ def main() -> None:
         arrivals_ns[message.header.stamp.to_nsec() - to_wall_ns] = time.monotonic_ns()
 
     message_type = JointState if arguments.joint_states else IKProblem
-    publisher = rospy.Publisher(arguments.topic, message_type, queue_size=10, tcp_nodelay=True)
+    publisher = rospy.Publisher(arguments.topic, message_type, queue_size=1000, tcp_nodelay=True)  # none is lost
     subscriber = rospy.Subscriber(arguments.target, JointState, take, tcp_nodelay=True)
     while not (publisher.get_num_connections() and subscriber.get_num_connections()):
         time.sleep(0.05)

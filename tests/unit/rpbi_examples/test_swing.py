@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rpbi_examples.motions import SWING_PERIOD_S, TO_ZERO_S, Swing
+from rpbi_examples.motions import SWING_PERIOD_S, TO_MIDDLE_S, Swing
 
 START = (0.3, -1.2, 0.0)
 LOWER = (-2.0, -0.5, -math.inf)
@@ -19,29 +19,36 @@ def swing():
 
 def test_it_starts_where_the_robot_is_and_comes_to_zero(swing):
     assert swing.at(0.0) == START
-    assert swing.at(TO_ZERO_S) == (0.0, 0.0, 0.0)
+    assert swing.at(TO_MIDDLE_S) == (0.0, 0.0, 0.0)
 
 
 def test_one_joint_moves_at_a_time_forth_and_back(swing):
     moved = []
     for turn in range(8):
-        positions = swing.at(TO_ZERO_S + (turn + 0.25) * SWING_PERIOD_S)
+        positions = swing.at(TO_MIDDLE_S + (turn + 0.25) * SWING_PERIOD_S)
         moved += [joint for joint, position in enumerate(positions) if position]
     assert moved == [0, 1, 2, 1, 0, 1, 2, 1]
 
 
 def test_no_joint_ever_leaves_its_limits(swing):
-    for time_s in np.arange(TO_ZERO_S, TO_ZERO_S + 8 * SWING_PERIOD_S, 0.05):
+    for time_s in np.arange(TO_MIDDLE_S, TO_MIDDLE_S + 8 * SWING_PERIOD_S, 0.05):
         assert all(low <= position <= high for low, position, high in zip(LOWER, swing.at(time_s), UPPER))
 
 
 def test_each_swing_begins_and_ends_at_rest_and_is_no_faster_than_its_joint(swing):
     dt_s = 1e-3
-    times = np.arange(TO_ZERO_S - 0.5, TO_ZERO_S + 4 * SWING_PERIOD_S, dt_s)
+    times = np.arange(TO_MIDDLE_S - 0.5, TO_MIDDLE_S + 4 * SWING_PERIOD_S, dt_s)
     velocities = np.diff([swing.at(time_s) for time_s in times], axis=0) / dt_s
     assert np.abs(velocities).max() < 1.9  # the slowest joint of the KUKA LWR: 1.92 rad/s
     assert np.abs(np.diff(velocities, axis=0)).max() / dt_s < 6.0
 
 
 def test_a_joint_whose_limits_leave_out_zero_goes_to_the_nearest_it_may():
-    assert Swing((1.0,), (0.5,), (2.0,)).at(TO_ZERO_S) == (0.5,)
+    assert Swing((1.0,), (0.5,), (2.0,)).at(TO_MIDDLE_S) == (0.5,)
+
+
+def test_joints_may_swing_about_another_place_than_zero():
+    swing = Swing(START, LOWER, UPPER, (0.3, 1.9, 1.0))
+    assert swing.at(TO_MIDDLE_S) == (0.3, 1.9, 1.0)
+    second = [swing.at(TO_MIDDLE_S + turn * SWING_PERIOD_S)[1] for turn in np.linspace(1.0, 2.0, 50)]
+    assert 1.97 < max(second) < 2.0 and 1.8 < min(second) < 1.85

@@ -61,7 +61,7 @@ def run(robot: RobotController, path: Array, start_s: float = 0.0) -> tuple[int 
         robot.command(start_s + i * DT_S, position)
         if at is None and robot.mode is Mode.REFLEX:
             at = i
-        points.append(robot.cycle(start_s + i * DT_S, robot.set_point, NO_EFFORT))
+        points += [point.position for point in robot.cycle(start_s + i * DT_S, robot.set_point, NO_EFFORT)]
     return at, points
 
 
@@ -106,7 +106,7 @@ def test_what_it_follows_reaches_the_motors_as_it_is_and_peaks_are_told() -> Non
     robot = controller(command_delay_s=0.0195)
     at, points = run(robot, path)
     assert at is None and robot.mode is Mode.MOVE
-    assert points[:20] == [None] * 20 and np.array_equal(np.array(points[20:]), path[:-20])
+    assert np.array_equal(np.array(points), path[:-20])
     peaks = [np.abs(np.diff(path, n, axis=0)) / DT_S**n for n in (1, 2)]
     told = robot.counters.peaks
     assert told["velocity"] == pytest.approx((peaks[0] / VELOCITY).max())
@@ -123,7 +123,7 @@ def test_a_reflex_brakes_as_hard_as_it_may_and_needs_to_be_recovered() -> None:
     assert robot.recover(robot.set_point) == "the robot has not come to rest yet"
     speed = (path[699] - path[698]) / DT_S
     while robot.is_braking:
-        points.append(robot.cycle((len(points)) * DT_S, robot.set_point, NO_EFFORT))
+        points += [point.position for point in robot.cycle(len(points) * DT_S, robot.set_point, NO_EFFORT)]
     brake = np.array(points[698:])  # from the last two commands on
     assert np.abs(np.diff(brake, 2, axis=0)).max(axis=0) / DT_S**2 == pytest.approx(ACCELERATION, rel=1e-6)
     way = np.sign(speed) * speed**2 / (2.0 * ACCELERATION)
@@ -153,8 +153,27 @@ def test_commands_on_their_way_are_lost_in_a_reflex() -> None:
     robot = controller(command_delay_s=0.01)
     robot.command(0.0, HOME + 0.01)
     robot.refuse_command("a joint is missing")
-    assert robot.cycle(0.001, HOME, NO_EFFORT) is None and robot.recover(HOME) is None
-    assert robot.cycle(1.0, HOME, NO_EFFORT) is None and robot.set_point == tuple(HOME)
+    assert not robot.cycle(0.001, HOME, NO_EFFORT) and robot.recover(HOME) is None
+    assert not robot.cycle(1.0, HOME, NO_EFFORT) and robot.set_point == tuple(HOME)
+
+
+def test_commands_that_come_at_uneven_times_are_a_cycle_apart_for_the_motors() -> None:
+    robot = controller(command_delay_s=0.01, timeout_s=1.0, rate_tolerance=0.9)
+    arrivals_s = 5.0 + np.arange(2000) * DT_S + np.random.default_rng(0).uniform(0.0, DT_S, 2000)
+    arrivals_s[1000:] += 0.5  # a pause
+    arrivals_s[1500:1520] = arrivals_s[1520]  # a burst
+    points = []
+    for now_s in arrivals_s:
+        robot.command(now_s, HOME)
+        points += robot.cycle(now_s, HOME, NO_EFFORT)
+    points += robot.cycle(arrivals_s[-1] + 0.01, HOME, NO_EFFORT)
+    assert robot.mode is Mode.MOVE and len(points) == 2000
+    times_s = np.array([point.time_s for point in points])
+    steps = np.delete(np.diff(times_s), 999) / DT_S
+    assert np.delete(np.abs(steps - 1.0), slice(1490, 1700)).max() < 0.1
+    assert steps.min() >= 0.5
+    assert times_s[[0, 1000]] == pytest.approx(arrivals_s[[0, 1000]] + 0.01)
+    assert np.abs(times_s - arrivals_s - 0.01)[[900, 1400, 1999]].max() < 2.0 * DT_S
 
 
 def test_motors_at_their_torque_and_joints_left_behind_are_reflexes() -> None:

@@ -38,8 +38,8 @@ REACHED_M = 0.03
 """A waypoint counts as reached within this distance [m]..."""
 REACHED_RAD = 0.03
 """... and this angle [rad]."""
-TO_ZERO_S = 3.0
-"""Time that all joints take together to reach zero [s]."""
+TO_MIDDLE_S = 3.0
+"""Time that all joints take together to reach the middle of their swings [s]."""
 SWING_PERIOD_S = 4.0
 """Time that one joint swings [s]."""
 SWING_RAMP_S = 0.6
@@ -182,25 +182,33 @@ class Swing:
         start: Where the n joints are at time 0 [rad or m].
         lower: Their lower limits; -inf where there is none.
         upper: Their upper limits.
+        middle: What they swing about; 0 if left out, as near as limits allow.
     """
 
-    def __init__(self, start: Sequence[float], lower: Sequence[float], upper: Sequence[float]) -> None:
-        self._zero = tuple(min(max(0.0, low), high) for low, high in zip(lower, upper, strict=True))
-        self._to_zero = minimum_jerk(start, self._zero, 0.0, TO_ZERO_S)
+    def __init__(
+        self,
+        start: Sequence[float],
+        lower: Sequence[float],
+        upper: Sequence[float],
+        middle: Sequence[float] | None = None,
+    ) -> None:
+        wanted = (0.0,) * len(start) if middle is None else middle
+        self._middle = tuple(min(max(at, low), high) for at, low, high in zip(wanted, lower, upper, strict=True))
+        self._to_middle = minimum_jerk(start, self._middle, 0.0, TO_MIDDLE_S)
         self._amplitude = tuple(
-            max(0.0, min(SWING_AMPLITUDE, SWING_MARGIN * (high - zero), SWING_MARGIN * (zero - low)))
-            for zero, low, high in zip(self._zero, lower, upper, strict=True)
+            max(0.0, min(SWING_AMPLITUDE, SWING_MARGIN * (high - at), SWING_MARGIN * (at - low)))
+            for at, low, high in zip(self._middle, lower, upper, strict=True)
         )
         forth = list(range(len(start)))
         self._order = forth + forth[-2:0:-1]
 
     def at(self, time_s: float) -> tuple[float, ...]:
         """Returns the positions of the n joints at a time since the start [s]."""
-        if time_s < TO_ZERO_S:
-            return self._to_zero.sample(time_s).position
-        turn, phase_s = divmod(time_s - TO_ZERO_S, SWING_PERIOD_S)
+        if time_s < TO_MIDDLE_S:
+            return self._to_middle.sample(time_s).position
+        turn, phase_s = divmod(time_s - TO_MIDDLE_S, SWING_PERIOD_S)
         joint = self._order[int(turn) % len(self._order)]
-        positions = list(self._zero)
+        positions = list(self._middle)
         positions[joint] += self._amplitude[joint] * math.sin(_swing_angle(phase_s))
         return tuple(positions)
 

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, Switch
 
-from .commands.pursuit import Bound
+from .commands.detour import Bound
 from .geometry.obstacles import Obstacle
 from .limits import JointLimits
 from .motion import Motion
@@ -132,14 +132,14 @@ class Check(ABC):
         What is not a number is never safe. A robot that is outside a limit of where it may be, may go further in.
         """
 
-    def bounds(self, end: np.ndarray, spread: np.ndarray, before: np.ndarray) -> Sequence[Bound]:
-        """Returns what keeps the robot safe near where it would come to rest; only for the policy `limit`.
+    def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> Sequence[Bound]:
+        """Returns what keeps the robot safe near some configurations on its way to rest; only for the policy `limit`.
 
         It helps to find a command that `check` will let pass, and judges nothing. It is called after `check`.
 
         Args:
-            end: n positions where the robot would come to rest [rad or m].
-            spread: How far from there joints may come to rest instead; what is out of their reach may be left out.
+            rows: The configurations, k x n positions [rad or m].
+            spread: How far from there n joints may come instead; what is out of their reach may be left out.
             before: n positions where it is: what is not safe there may not become worse.
         """
         return ()

@@ -2,14 +2,15 @@
 
 import logging
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from .check import Check, Inside, Situation, Violation
 from .commands.braking import Braking
-from .commands.pursuit import Bound, Detour, Stop, can_keep_bounds, pursue
+from .commands.detour import can_keep_bounds
+from .commands.nearest import Nearest
 from .commands.shaping import Shaper
 from .commands.way_out import WayOut, find_way_out
 from .config import GuardConfig
@@ -20,12 +21,6 @@ from .robot import GuardedRobot
 
 log = logging.getLogger(__name__)
 
-SHARES = (0.5, 0.2)
-"""How much of the way from braking to what is wanted is tried."""
-DETOURS = 3
-"""So often bounds that a command does not keep are added, and another one is tried."""
-OVER, OVER_M = 0.5, 1e-8
-"""Where a bound was not kept, it is asked for more: by this share of what is missing, and by so much."""
 SLOW_S = 1e6
 """How long the way from where the robot is to the first target is taken to last [s]: it is not judged by speed."""
 MENDED = ("joint_velocity", "joint_acceleration", "joint_jerk", "joint_position", "braking")
@@ -88,13 +83,13 @@ class Guard:
         self.config, self.robot = config, robot
         self.joint_names = robot.joint_names
         self.limits = JointLimits.of(robot, config.limits, file)
-        self.checks: Sequence[Check] = make_checks(config.checks, robot, self.limits, file)
+        self.checks = make_checks(config.checks, robot, self.limits, file)
         self._braking = Braking(self.limits.velocity, self.limits.acceleration, self.limits.jerk, config.period_s)
         shape = (self.limits, self._braking, config.period_s)
         self._shaper = None if config.shape is None else Shaper(config.shape, *shape)
         self._watches = {check.name for check in self.checks if check.watches}
-        self._keeps_bounds = config.policy == "limit" and can_keep_bounds()
-        if config.policy == "limit" and not self._keeps_bounds:
+        self._nearest = Nearest(self.limits, self._braking, self.checks, config.period_s)
+        if config.policy == "limit" and not can_keep_bounds():
             log.warning("%s: policy limit comes less near to targets without DAQP: run `./rpbi setup ik`", file)
         self.is_halted = True
         self._state: State | None = None
@@ -206,19 +201,19 @@ class Guard:
         wanted = target
         if self._shaper is not None:  # controllers take the first command as rest, so it is where the robot stands
             wanted = tuple(self._state.position.tolist()) if is_first else self._shaper.shaped(target, self._state)
-        found = self._judged(wanted, situation)
+        found = self._judged(wanted, situation, self.checks)
         if isinstance(found, Violation) and wanted != target and found.check in MENDED:
-            wanted = tuple(self._next_stop.tolist())
-            found = self._judged(wanted, situation)
+            wanted = tuple(self._way_to_rest[0].tolist())
+            found = self._judged(wanted, situation, self.checks)
         if isinstance(found, Violation):
             return self._instead(target, found, situation)
         return Decision(self._sent(found), is_shaped=wanted != target)
 
     @property
-    def _next_stop(self) -> np.ndarray:
-        """The next command of the braking that is known to be safe."""
+    def _way_to_rest(self) -> np.ndarray:
+        """The commands of the braking that is known to be safe, k x n; one at least."""
         assert self._state is not None
-        return self._stop[0] if len(self._stop) else self._state.position
+        return self._stop if len(self._stop) else self._state.position[None]
 
     def _refused(self, violation: Violation) -> Decision:
         if self.config.policy == "reject" or self._is_first:
@@ -268,15 +263,15 @@ class Guard:
             return None
         return target if self._state is None else self._state.position
 
-    def _judged(self, command: Sequence[float], situation: Situation) -> _Safe | Violation:
-        """Returns the command if it is safe, else what is not."""
+    def _judged(self, command: Sequence[float], situation: Situation, checks: Sequence[Check]) -> _Safe | Violation:
+        """Returns the command if it is safe, else what the first of some checks says that is not."""
         assert self._state is not None
         period_s = self.config.period_s
         position = np.array(command)
         state = self._state.then(position, period_s)
         brake = self._braking.plan(state.velocity, state.acceleration)
         motion = Motion(self.robot, self._state, position, period_s, brake)
-        for check in self.checks:
+        for check in checks:
             if violation := check.check(motion, situation):
                 return violation
         if brake is None:
@@ -298,62 +293,16 @@ class Guard:
         assert self._state is not None
         if self.config.policy == "reject" or violation.check in self._watches:  # no other command mends these
             return self._refused(violation)
-        for wanted in self._nearest(target):
-            found = self._judged(tuple(wanted.tolist()), situation)
-            if not isinstance(found, Violation):
-                return Decision(self._sent(found), violation)
-        return Decision(self._brake_on(), violation)
-
-    def _nearest(self, target: tuple[float, ...]) -> Iterator[np.ndarray]:
-        """Yields commands near to what the joints alone can do, and which checks may let pass, the best ones first."""
-        assert self._state is not None
-        state, period_s = self._state, self.config.period_s
-        next_stop = self._next_stop
-        best, slowest = pursue(np.array(target), state, self.limits, self._braking, period_s)
-        for wanted in self._detours(best, slowest, next_stop) if self._keeps_bounds else [best]:
-            best = wanted
-            yield best
-        for share in SHARES:
-            yield next_stop + share * (best - next_stop)
-
-    def _detours(self, wanted: np.ndarray, slowest: np.ndarray, next_stop: np.ndarray) -> Iterator[np.ndarray]:
-        """Yields the command nearest to one that is wanted with which bounds are kept, and each time a better one."""
-        assert self._state is not None
-        state, period_s = self._state, self.config.period_s
-        there = self._stop[-1] if len(self._stop) else state.position
-        stop = Stop(wanted, state, self._braking, period_s)
-        spread = np.abs(stop.of(wanted)[-1] - there)
-        detour = Detour(wanted, np.where(self._may_rest(stop.of(slowest)[-1]), slowest, next_stop))
-        detour.add(self._bounds(there, spread), there, stop, -1)
-        found = detour.command()
-        yield wanted if found is None else found
-        for _ in range(DETOURS):
-            if found is None or not self._add_missed(detour, found):
-                return
-            found = detour.command()
-            if found is not None:
-                yield found
-
-    def _add_missed(self, detour: Detour, command: np.ndarray) -> bool:
-        """Adds the bounds that are not kept on the way to rest after a command; returns whether there are any."""
-        assert self._state is not None
-        stop, is_missed = Stop(command, self._state, self._braking, self.config.period_s), False
-        for moment, at in enumerate(stop.of(command)):
-            missed = [bound for bound in self._bounds(at, np.zeros_like(at)) if bound.room < 0.0]
-            more = [Bound(gradient, (1.0 + OVER) * room - OVER_M) for gradient, room in missed]
-            detour.add(more, at, stop, moment)
-            is_missed |= bool(missed)
-        return is_missed
+        safe = self._nearest.find(
+            np.array(target),
+            self._state,
+            self._way_to_rest,
+            lambda wanted, checks: self._judged(tuple(wanted.tolist()), situation, checks),
+        )
+        return Decision(self._brake_on() if safe is None else self._sent(safe), violation)
 
     def _inside(self, q: np.ndarray) -> list[Inside]:
         return [each for check in self.checks for each in check.inside(q)]
-
-    def _bounds(self, end: np.ndarray, spread: np.ndarray) -> list[Bound]:
-        assert self._state is not None
-        return [bound for check in self.checks for bound in check.bounds(end, spread, self._state.position)]
-
-    def _may_rest(self, end: np.ndarray) -> np.ndarray:
-        return (end >= self.limits.lower) & (end <= self.limits.upper)
 
     def _brake_on(self) -> tuple[float, ...]:
         assert self._state is not None

@@ -26,7 +26,10 @@ APPROACH_S = 3.0
 
 
 def basic_robot_example() -> None:
-    """Moves the joints of the robot that `~robot_name` or the first argument names, one after the other."""
+    """Moves the joints of the robot that `~robot_name` or the first argument names, one after the other.
+
+    They swing about 0, or with `~about_start` about where they are at first.
+    """
     run_node("basic_robot_example", _swing)
 
 
@@ -60,7 +63,8 @@ def _robot_name() -> str:
 
 def _swing() -> None:
     robot = JointTargets(_robot_name())
-    swing = Swing(robot.positions, *zip(*robot.limits))
+    lower, upper = zip(*robot.limits)
+    swing = Swing(robot.positions, lower, upper, robot.positions if rospy.get_param("~about_start", False) else None)
     time_s = 0.0
     while True:
         robot.send(swing.at(time_s))

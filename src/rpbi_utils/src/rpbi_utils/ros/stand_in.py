@@ -93,10 +93,10 @@ class StandIn:
             now_s, self._position = time.monotonic(), values.position
             if self._controller is None:
                 self._controller = RobotController(self._config, self._limits, values.position)
-            target = self._controller.cycle(now_s, values.position, values.effort)
-            if target is not None:
-                header = Header(stamp=rospy.Time.now())
-                self._target.publish(joint_state(JointValues(tuple(self._limits), target), header))
+            now = rospy.Time.now()
+            for time_s, position in self._controller.cycle(now_s, values.position, values.effort):
+                header = Header(stamp=now + rospy.Duration.from_sec(time_s - now_s))
+                self._target.publish(joint_state(JointValues(tuple(self._limits), position), header))
             measured = self._measurement.take(now_s, values)
             if measured is not None:
                 self._states.publish(joint_state(measured.converted(self._to_driver), message.header))

@@ -19,6 +19,12 @@ EFFORT_SHARE = 0.999
 """Motors do not give more than their limit, so this share of it is the limit, but for rounding."""
 LONGEST_CYCLE_S = 0.05
 """A reflex stop goes on by so much at most from cycle to cycle, however late the machine is [s]."""
+EVENING_OUT = 0.05
+"""Commands count for the motors a cycle apart; this share of how late or early one comes is taken into account."""
+LONGEST_GAP_S = 0.2
+"""After a longer pause they count from when they come [s]."""
+SHORTEST = 0.5
+"""However early they come, they are this share of a cycle apart at least."""
 
 Vector = tuple[float, ...]
 
@@ -72,6 +78,18 @@ class _Motion(NamedTuple):
     acceleration: Vector
 
 
+class SetPoint(NamedTuple):
+    """Where the motors are to be at a time.
+
+    Attributes:
+        time_s: By the clock of the commands [s]. Commands that come at uneven times are a cycle apart, nearly.
+        position: [rad or m].
+    """
+
+    time_s: float
+    position: Vector
+
+
 class RobotController:
     """Judges commands one by one, hands them on as they are, and stops the robot on the first that breaks a limit.
 
@@ -92,7 +110,8 @@ class RobotController:
         self.counters = Counters()
         self._motion = self._at_rest(position)
         self._sent = self._motion
-        self._waiting: deque[tuple[float, _Motion]] = deque()
+        self._waiting: deque[tuple[float, float, _Motion]] = deque()
+        self._planned_s = -math.inf
         self._arrivals_s: deque[float] = deque()
         self._last_cycle_s: float | None = None
         self._saturated_s: dict[str, float] = {}
@@ -125,7 +144,9 @@ class RobotController:
             return
         self.mode, self._motion = Mode.MOVE, motion
         self.counters.commands += 1
-        self._waiting.append((now_s + self._config.command_delay_s, motion))
+        self._planned_s = self._planned(now_s)
+        delay_s = self._config.command_delay_s
+        self._waiting.append((now_s + delay_s, self._planned_s + delay_s, motion))
 
     def refuse_command(self, what: str) -> None:
         """Takes a command that is none, for instance since it lacks a joint; `what` says what is wrong."""
@@ -134,7 +155,7 @@ class RobotController:
         else:
             self._stop(Reflex("command_invalid", "", 0.0, 0.0, what))
 
-    def cycle(self, now_s: float, position: Sequence[float], effort: Sequence[float]) -> Vector | None:
+    def cycle(self, now_s: float, position: Sequence[float], effort: Sequence[float]) -> list[SetPoint]:
         """Goes through a cycle of the motors.
 
         Args:
@@ -143,7 +164,7 @@ class RobotController:
             effort: What their motors give [N m or N].
 
         Returns:
-            A new set point [rad or m]; None if it stays as it is.
+            New set points, in order.
         """
         last_s, self._last_cycle_s = self._last_cycle_s, now_s
         if self.mode is not Mode.REFLEX:
@@ -151,14 +172,12 @@ class RobotController:
             if wrong is not None:
                 self._stop(wrong)
         if self.mode is Mode.REFLEX:
-            return self._brake(min(now_s - (now_s if last_s is None else last_s), LONGEST_CYCLE_S))
-        due = None
+            return self._brake(now_s, min(now_s - (now_s if last_s is None else last_s), LONGEST_CYCLE_S))
+        points = []
         while self._waiting and self._waiting[0][0] <= now_s:
-            _, due = self._waiting.popleft()
-        if due is None:
-            return None
-        self._sent = due
-        return due.position
+            _, time_s, self._sent = self._waiting.popleft()
+            points.append(SetPoint(time_s, self._sent.position))
+        return points
 
     def recover(self, position: Sequence[float]) -> str | None:
         """Ends a reflex; returns why it cannot, None if it could.
@@ -290,10 +309,17 @@ class RobotController:
         self.counters.reflexes += 1
         self._waiting.clear()
 
-    def _brake(self, cycle_s: float) -> Vector | None:
-        """Slows every joint down by its acceleration; returns the new set point, None at rest."""
+    def _planned(self, now_s: float) -> float:
+        """Returns when a command that comes now counts for the motors [s]: a cycle after the one before, nearly."""
+        planned_s = self._planned_s + self._cycle_s
+        if not abs(now_s - planned_s) <= LONGEST_GAP_S:
+            return now_s
+        return max(planned_s + EVENING_OUT * (now_s - planned_s), self._planned_s + SHORTEST * self._cycle_s)
+
+    def _brake(self, now_s: float, cycle_s: float) -> list[SetPoint]:
+        """Slows every joint down by its acceleration; returns the new set point, none at rest."""
         if not self.is_braking:
-            return None
+            return []
         position, velocity = [], []
         for q, v, limits in zip(self._sent.position, self._sent.velocity, self._limits):
             slower = math.copysign(max(abs(v) - limits.acceleration * cycle_s, 0.0), v) if v else 0.0
@@ -301,4 +327,4 @@ class RobotController:
             position.append(q + 0.5 * (v + slower) * time_s + slower * (cycle_s - time_s))
             velocity.append(slower or 0.0)
         self._sent = _Motion(tuple(position), tuple(velocity), (0.0,) * len(position))
-        return self._sent.position
+        return [SetPoint(now_s, self._sent.position)]

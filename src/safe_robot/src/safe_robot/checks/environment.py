@@ -8,7 +8,7 @@ from pydantic import Field
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import NonNegativeMetres, Text
 from safe_robot.check import Check, CheckConfig, Inside, Situation, Violation
-from safe_robot.commands.pursuit import Bound
+from safe_robot.commands.detour import Bound
 from safe_robot.geometry.distances import GEOMETRY, Geometry, LinkDistances, Pair
 from safe_robot.geometry.obstacles import Obstacle, obstacles_of_world
 from safe_robot.geometry.proximity import Proximity
@@ -73,9 +73,9 @@ class Environment(Check):
             return None
         return Violation(self.name, self._subject(found.pair), found.distance, margin_m, unit, found.is_while_braking)
 
-    def bounds(self, end: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
+    def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
         """See `Check`."""
-        return self.proximity.bounds(end, spread, before)
+        return self.proximity.bounds(rows, spread, before)
 
     def inside(self, q: np.ndarray) -> list[Inside]:
         """See `Check`."""

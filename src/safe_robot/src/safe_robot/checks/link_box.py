@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.schema import ConfigModel, KeyedError
 from safe_robot.check import Check, CheckConfig, Situation, Violation
-from safe_robot.commands.pursuit import Bound
+from safe_robot.commands.detour import Bound
 from safe_robot.limits import JointLimits
 from safe_robot.motion import Motion
 from safe_robot.robot import GuardedRobot
@@ -73,15 +73,17 @@ class LinkBox(Check):
                 return Violation(self.name, f"{'xyz'[axis]} of link '{link}'", value, limit, "m", row > 1)
         return None
 
-    def bounds(self, end: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
+    def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
         """See `Check`."""
         bounds = []
-        rows = np.concatenate((end[None], before[None], end + STEP * np.eye(len(end))))
+        k, n = rows.shape
+        tried = np.concatenate((before[None], rows, (rows[:, None] + STEP * np.eye(n)).reshape(-1, n)))
         for link, (low, high) in self._boxes.items():
-            position = self.robot.link_positions(rows, link)
-            slopes = (position[2:] - position[0]).T / STEP  # 3 x n
-            low, high = np.minimum(low + KEPT_M, position[1]), np.maximum(high - KEPT_M, position[1])
-            for slope, room in ((slopes, position[0] - low), (-slopes, high - position[0])):
-                near = np.flatnonzero(np.abs(slope) @ spread > room)
-                bounds += [Bound(slope[axis], float(room[axis])) for axis in near.tolist()]
+            position = self.robot.link_positions(tried, link)
+            at = position[1 : k + 1]
+            slopes = (position[k + 1 :].reshape(k, n, 3) - at[:, None]).transpose(0, 2, 1) / STEP  # k x 3 x n
+            low, high = np.minimum(low + KEPT_M, position[0]), np.maximum(high - KEPT_M, position[0])
+            for slope, room in ((slopes, at - low), (-slopes, high - at)):
+                near = np.argwhere(np.abs(slope) @ spread > room)
+                bounds += [Bound(row, slope[row, axis], float(room[row, axis])) for row, axis in near.tolist()]
         return bounds

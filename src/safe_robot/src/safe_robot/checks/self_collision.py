@@ -11,7 +11,7 @@ from custom_ros_tools.errors import ConfigError, Problem, hint
 from custom_ros_tools.schema import NonNegativeMetres, Text
 from rpbi.urdf.document import disabled_collisions
 from safe_robot.check import Check, CheckConfig, Inside, Situation, Violation
-from safe_robot.commands.pursuit import Bound
+from safe_robot.commands.detour import Bound
 from safe_robot.geometry.distances import GEOMETRY, Geometry, LinkDistances, Pair
 from safe_robot.geometry.proximity import Proximity
 from safe_robot.limits import JointLimits
@@ -53,9 +53,9 @@ class SelfCollision(Check):
         subject, margin_m = self._subject(found.pair), self.config.margin_m
         return Violation(self.name, subject, found.distance, margin_m, "m of distance", found.is_while_braking)
 
-    def bounds(self, end: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
+    def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
         """See `Check`."""
-        return self.proximity.bounds(end, spread, before)
+        return self.proximity.bounds(rows, spread, before)
 
     def inside(self, q: np.ndarray) -> list[Inside]:
         """See `Check`."""

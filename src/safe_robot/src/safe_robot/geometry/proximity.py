@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from safe_robot.check import Inside
-from safe_robot.commands.pursuit import Bound
+from safe_robot.commands.detour import Bound
 from safe_robot.motion import Motion
 
 from .distances import Contact, LinkDistances, Pair
@@ -73,7 +73,7 @@ class Proximity:
         if not len(self._pairs):
             return None
         least_m, reach = self._margin_m + ROUNDING_M, self._reach
-        known = self._known_near(motion.position[[0, -1]])
+        known = self._known_near(motion.position[[0, -1], None])
         near = np.flatnonzero(~(known[0] + known[1] - reach @ motion.path > 2.0 * least_m))
         if not len(near):
             return None
@@ -97,9 +97,9 @@ class Proximity:
         bounds = self._separation.lower_bounds(frames, suspects)
         travelled = motion.travelled[rows] @ self._reach[suspects].T
         free_to = np.full(len(suspects), -np.inf)  # how far a pair can go without being too near
-        placed = -1
-        for at, k in np.argwhere(~(bounds > self._margin_m + ROUNDING_M)).tolist():
-            if travelled[at, k] < free_to[k]:
+        placed, least_m = -1, self._margin_m + ROUNDING_M
+        for at, k in np.argwhere(~(bounds > least_m)).tolist():
+            if travelled[at, k] < free_to[k] or bounds[at, k] > least_m:
                 continue
             i, row = int(suspects[k]), int(rows[at])
             if placed != row:
@@ -111,15 +111,19 @@ class Proximity:
             distance = contact.distance
             if not distance >= self._margin_m and not self._is_further(motion, i, distance, row):
                 return TooNear(self._pairs[i], distance, row > 0)
-            if not (distance < bounds[at, k] + LOOSE_M or free_to[k] > -np.inf):
+            if not distance < bounds[at, k] + LOOSE_M:
                 self._separation.learn(i, contact.directions, frames[at])
-            free_to[k] = travelled[at, k] + distance - self._margin_m - ROUNDING_M
+                bounds[at:, k] = self._separation.lower_bounds(frames[at:], suspects[k : k + 1])[:, 0]
+            free_to[k] = travelled[at, k] + distance - least_m
         return None
 
     def _known_near(self, q: np.ndarray) -> np.ndarray:
-        """Returns lower bounds of the distances in two configurations, or twice in one: 2 x pairs [m]."""
-        moved = np.abs(q.reshape(-1, 1, q.shape[-1]) - self._known_at)
-        known: np.ndarray = self._known_m - np.einsum("epn,pn->ep", moved, self._reach)
+        """Returns lower bounds of the distances [m] by what is known at both ends of a motion, ... x 2 x pairs.
+
+        Args:
+            q: Positions of the n joints, ... x 2 x 1 x n; or ... x 1 x 1 x n for both.
+        """
+        known: np.ndarray = self._known_m - np.einsum("...n,...n->...", np.abs(q - self._known_at), self._reach)
         return known
 
     def _sparse(self, travelled: np.ndarray, spacing_m: float) -> np.ndarray:
@@ -135,37 +139,37 @@ class Proximity:
         self._distances.place(motion.position[row])
         return distance >= before - ROUNDING_M
 
-    def bounds(self, end: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
-        """Returns what keeps pairs apart near a configuration, see `Check.bounds`."""
+    def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
+        """Returns what keeps pairs apart near some configurations, see `Check.bounds`."""
         if not len(self._pairs):
             return []
         within_m = self._margin_m + KEPT_M + self._reach @ spread
-        near = np.flatnonzero(~(self._known_near(end).max(axis=0) > within_m))
+        near = np.flatnonzero(~(self._known_near(rows[:, None, None]).max(axis=1) > within_m).all(axis=0))
         if not len(near):
             return []
-        frames = self._distances.frames(end[None])
-        least = self._separation.lower_bounds(frames, near)[0]
-        found = np.flatnonzero(~(least > within_m[near])).tolist()
-        if found:
-            self._distances.place(end)
-        bounds = []
-        for k in found:
+        frames = self._distances.frames(rows)
+        least = self._separation.lower_bounds(frames, near)
+        bounds, placed = [], -1
+        for row, k in np.argwhere(~(least > within_m[near])).tolist():
             i = int(near[k])
             pair = self._pairs[i]
+            if placed != row:
+                self._distances.place(rows[row])
+                placed = row
             contact = self._distances.contact(pair, FAR_M, float(within_m[i]))
             if contact is None:
                 continue
-            if not contact.distance < least[k] + LOOSE_M:
-                self._separation.learn(i, contact.directions, frames[0])
+            if not contact.distance < least[row, k] + LOOSE_M:
+                self._separation.learn(i, contact.directions, frames[row])
             if contact.distance >= within_m[i]:
                 continue
-            gradient = self._distances.gradient(pair, contact, end)
+            gradient = self._distances.gradient(pair, contact, rows[row])
             room = contact.distance - self._margin_m - KEPT_M
             if room < 0.0:
                 self._distances.place(before)
                 room = max(room, contact.distance - self._distances.distance(pair, FAR_M, float(within_m[i])))
-                self._distances.place(end)
-            bounds.append(Bound(gradient, room))
+                placed = -1
+            bounds.append(Bound(row, gradient, room))
         return bounds
 
     def inside(self, q: np.ndarray, check: str, subject: Callable[[Pair], str]) -> list[Inside]:

@@ -1,0 +1,98 @@
+"""The command nearest to one that is wanted that keeps out of what is in the way: a quadratic program, by DAQP."""
+
+from collections.abc import Sequence
+from importlib.util import find_spec
+from typing import NamedTuple
+
+import numpy as np
+
+from safe_robot.motion import State
+
+from .braking import Braking
+
+MOMENTS = 5
+"""Of the way to rest so many moments are looked at where something is near."""
+
+
+class Bound(NamedTuple):
+    """What a robot has to keep near one of k configurations: `gradient @ (q - configuration) >= -room`.
+
+    Attributes:
+        row: Number of the configuration.
+        gradient: n values, how something safe grows as joints move.
+        room: How much of it is left; negative where it is missing.
+    """
+
+    row: int
+    gradient: np.ndarray
+    room: float
+
+
+def can_keep_bounds() -> bool:
+    """Returns whether the solver of quadratic programs is installed: DAQP, of the extra `ik`."""
+    return find_spec("daqp") is not None
+
+
+class Stop:
+    """How n joints come to rest after a command: where they are at some moments, near the command linear in it.
+
+    Args:
+        command: n positions [rad or m].
+        state: The state before it.
+        period_s: The period [s].
+
+    Attributes:
+        slope: How each moment moves with the command, MOMENTS x n; the first is that of the command, the last the end.
+    """
+
+    def __init__(self, command: np.ndarray, state: State, braking: Braking, period_s: float) -> None:
+        after = state.then(command, period_s)
+        by_velocity, by_acceleration = braking.factors(after.velocity, after.acceleration, MOMENTS)
+        still = state.then(state.position, period_s)
+        self.slope = 1.0 + by_velocity / period_s + by_acceleration / period_s**2
+        self._offset = state.position + by_velocity * still.velocity + by_acceleration * still.acceleration
+        self._start = state.position
+
+    def of(self, command: np.ndarray) -> np.ndarray:
+        """Returns where they are after a command, MOMENTS x n."""
+        return self._offset + self.slope * (command - self._start)
+
+
+class Detour:
+    """The command nearest to one that is wanted, between two others, with which bounds are kept until the robot rests.
+
+    Bounds are linear, while what they stand for seldom is. So where a command turns out to be bad, more are added that
+    are true there, and the next one is better.
+
+    Args:
+        wanted: n positions [rad or m].
+        other: n positions, at the other end of what is possible.
+    """
+
+    def __init__(self, wanted: np.ndarray, other: np.ndarray) -> None:
+        self._wanted = wanted
+        self._least, self._most = np.minimum(wanted, other), np.maximum(wanted, other)
+        self._rows: list[np.ndarray] = []
+        self._rooms: list[float] = []
+
+    def add(self, bounds: Sequence[Bound], at: np.ndarray, stop: Stop) -> None:
+        """Adds bounds that are true near k x n positions, at the last k moments of the way to rest."""
+        slope, way = stop.slope[-len(at) :], stop.of(self._wanted)[-len(at) :] - at
+        for row, gradient, room in bounds:
+            self._rows.append(gradient * slope[row])
+            self._rooms.append(room + float(gradient @ way[row]))
+
+    def command(self) -> np.ndarray | None:
+        """Returns the command, n positions; None if there is none."""
+        import daqp  # of the extra `ik`
+
+        wanted, n = self._wanted, len(self._wanted)
+        if not self._rows:
+            return wanted
+        scale = np.maximum(self._most - self._least, 1e-9)  # of joints, so that the program has ordinary numbers
+        matrix = np.ascontiguousarray(np.array(self._rows) * scale)
+        upper = np.concatenate(((self._most - wanted) / scale, np.full(len(matrix), 1e30)))
+        lower = np.concatenate(((self._least - wanted) / scale, -np.array(self._rooms)))
+        scaled, _, flag, _ = daqp.solve(np.diag(scale * scale) / scale.max() ** 2, np.zeros(n), matrix, upper, lower)
+        found = wanted + scale * scaled
+        return np.clip(found, self._least, self._most) if flag > 0 and np.isfinite(found).all() else None
