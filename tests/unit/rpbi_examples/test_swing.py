@@ -48,7 +48,9 @@ def test_a_joint_whose_limits_leave_out_zero_goes_to_the_nearest_it_may():
 
 
 def test_joints_may_swing_about_another_place_than_zero():
-    swing = Swing(START, LOWER, UPPER, (0.3, 1.9, 1.0))
+    swing = Swing(START, LOWER, UPPER, (0.3, 1.9, 1.0), 0.2)
     assert swing.at(TO_MIDDLE_S) == (0.3, 1.9, 1.0)
     second = [swing.at(TO_MIDDLE_S + turn * SWING_PERIOD_S)[1] for turn in np.linspace(1.0, 2.0, 50)]
     assert 1.97 < max(second) < 2.0 and 1.8 < min(second) < 1.85
+    third = [swing.at(TO_MIDDLE_S + turn * SWING_PERIOD_S)[2] for turn in np.linspace(2.0, 3.0, 51)]
+    assert max(third) == pytest.approx(1.2, abs=0.01) and min(third) == pytest.approx(0.8, abs=0.01)

@@ -183,6 +183,7 @@ class Swing:
         lower: Their lower limits; -inf where there is none.
         upper: Their upper limits.
         middle: What they swing about; 0 if left out, as near as limits allow.
+        amplitude: How far to either side [rad or m]; less where limits ask for it.
     """
 
     def __init__(
@@ -191,12 +192,13 @@ class Swing:
         lower: Sequence[float],
         upper: Sequence[float],
         middle: Sequence[float] | None = None,
+        amplitude: float = SWING_AMPLITUDE,
     ) -> None:
         wanted = (0.0,) * len(start) if middle is None else middle
         self._middle = tuple(min(max(at, low), high) for at, low, high in zip(wanted, lower, upper, strict=True))
         self._to_middle = minimum_jerk(start, self._middle, 0.0, TO_MIDDLE_S)
         self._amplitude = tuple(
-            max(0.0, min(SWING_AMPLITUDE, SWING_MARGIN * (high - at), SWING_MARGIN * (at - low)))
+            max(0.0, min(amplitude, SWING_MARGIN * (high - at), SWING_MARGIN * (at - low)))
             for at, low, high in zip(self._middle, lower, upper, strict=True)
         )
         forth = list(range(len(start)))

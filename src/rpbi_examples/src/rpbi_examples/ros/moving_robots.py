@@ -14,7 +14,7 @@ from custom_ros_tools.ros.services import call_service
 from custom_ros_tools.tf import TfInterface
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem, Contacts
 from ros_pybullet_interface.srv import ResetEffState
-from rpbi_examples.motions import POINTING_DOWN, PlanarPose, Route, Swing, hand_position, wiped
+from rpbi_examples.motions import POINTING_DOWN, SWING_AMPLITUDE, PlanarPose, Route, Swing, hand_position, wiped
 
 from .joint_targets import HZ, JointTargets
 
@@ -28,7 +28,7 @@ APPROACH_S = 3.0
 def basic_robot_example() -> None:
     """Moves the joints of the robot that `~robot_name` or the first argument names, one after the other.
 
-    They swing about 0, or with `~about_start` about where they are at first.
+    They swing by `~amplitude` (1 rad or m) about 0, or with `~about_start` about where they are at first.
     """
     run_node("basic_robot_example", _swing)
 
@@ -64,7 +64,8 @@ def _robot_name() -> str:
 def _swing() -> None:
     robot = JointTargets(_robot_name())
     lower, upper = zip(*robot.limits)
-    swing = Swing(robot.positions, lower, upper, robot.positions if rospy.get_param("~about_start", False) else None)
+    middle = robot.positions if rospy.get_param("~about_start", False) else None
+    swing = Swing(robot.positions, lower, upper, middle, float(rospy.get_param("~amplitude", SWING_AMPLITUDE)))
     time_s = 0.0
     while True:
         robot.send(swing.at(time_s))
