@@ -12,7 +12,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from safe_robot.ros.guard_markers import TOO_NEAR, GuardMarkers
 
 
-def test_lines_are_as_long_as_they_say_and_red_where_it_is_narrow(ros, tmp_path):
+def test_lines_are_about_as_long_as_they_say_and_red_where_it_is_narrow(ros, tmp_path):
     checks = {"self_collision": {"margin_m": 0.02}, "link_box": {"boxes": {"lower": {"x": [-0.5, 0.5]}}}}
     guard = guard_of(folding(tmp_path), checks=checks)
     decide(guard, (0.0, 2.6))  # the elbow is folded: the lower arm is beside the base
@@ -26,8 +26,9 @@ def test_lines_are_as_long_as_they_say_and_red_where_it_is_narrow(ros, tmp_path)
     for line, text in zip(lines, texts):
         first, second = line.points
         length_mm = 1e3 * sum((getattr(first, axis) - getattr(second, axis)) ** 2 for axis in "xyz") ** 0.5
-        assert length_mm == pytest.approx(float(text.split()[0]), abs=0.6)
-        assert (line.color == TOO_NEAR) == (length_mm <= 40.0)
+        said_mm = float(text.split()[0])
+        assert said_mm - 0.6 < length_mm < said_mm + 2.1, "what PyBullet may have measured too much is taken off"
+        assert (line.color == TOO_NEAR) == (said_mm <= 40.0)
     (box,) = [each for each in message.markers if each.ns == "link_box"]
     assert box.scale.x == pytest.approx(1.0) and box.pose.position.x == pytest.approx(0.0)
     assert {each.header.frame_id for each in message.markers} == {"base"}

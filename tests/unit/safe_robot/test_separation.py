@@ -12,6 +12,7 @@ from guarded_arm import KUKA
 from rpbi.geometry import Pose, normalized
 from safe_robot.geometry.distances import LinkDistances
 from safe_robot.geometry.obstacles import Obstacle
+from safe_robot.geometry.pairs import pairs_that_may_meet
 from safe_robot.geometry.separation import Separation
 from safe_robot.robot import GuardedRobot
 
@@ -41,7 +42,8 @@ def distances():
 @pytest.fixture(scope="module")
 def pairs(distances):
     moving = [link for link in distances.links if distances.reach((link, 0)).any()]
-    return [*distances.pairs(0.01), *((link, i) for i in range(len(OBSTACLES)) for link in moving)]
+    own = pairs_that_may_meet(GuardedRobot(KUKA), distances, 0.01)
+    return [*own, *((link, i) for i in range(len(OBSTACLES)) for link in moving)]
 
 
 def bounds_and_distances(distances, pairs, separation, q, learn=False):

@@ -13,6 +13,7 @@ from rpbi.urdf.document import disabled_collisions
 from safe_robot.check import Check, CheckConfig, Inside, Situation, Violation
 from safe_robot.commands.detour import Bound
 from safe_robot.geometry.distances import GEOMETRY, Geometry, LinkDistances, Pair
+from safe_robot.geometry.pairs import pairs_that_may_meet
 from safe_robot.geometry.proximity import Proximity
 from safe_robot.limits import JointLimits
 from safe_robot.motion import Motion
@@ -68,9 +69,10 @@ class SelfCollision(Check):
         path = self.config.pairs_file
         if path is not None and Path(path).exists():
             return self._read(path)
-        pairs = (
-            self.distances.pairs(self.config.margin_m) if self.config.srdf is None else self._all_but(self._disabled())
-        )
+        if self.config.srdf is None:
+            pairs = pairs_that_may_meet(self.robot, self.distances, self.config.margin_m)
+        else:
+            pairs = self._all_but(self._disabled())
         if path is not None:
             self._write(path, pairs)
         return pairs

@@ -1,7 +1,6 @@
 """Distances between the links of a robot and obstacles, in a PyBullet client of its own."""
 
 import math
-import random
 import weakref
 from collections.abc import Sequence
 from importlib import import_module
@@ -29,11 +28,6 @@ GEOMETRY = (
 )
 Pair = tuple[str, str | int]
 """Two links, or a link and the number of an obstacle."""
-SAMPLES = 200
-"""Random configurations in which pairs are tried that may always be near."""
-ALWAYS = 0.95
-"""Pairs that are too near in this share of them are left out: they are built so."""
-
 TRIED = 1e-4
 """By so much joints are moved to see which way is apart [rad or m]."""
 FLAT = 1e-6
@@ -230,40 +224,6 @@ class LinkDistances:
             return self._robot.reach(a, self.radius_m[a])
         return self._robot.reach(a, self.radius_m[a], b) + self._robot.reach(b, self.radius_m[b], a)
 
-    def pairs(self, margin_m: float) -> list[tuple[str, str]]:
-        """Returns the pairs of links that may come too near.
-
-        Those that a joint ties, or several fixed ones, are left out, and those that nearly always are nearer than the
-        margin [m], as in a compact wrist. It goes by random configurations, the same every time.
-        """
-        groups = {link: self._group(link) for link in self.links}
-        parents = {child: self._group(parent) for child, parent in self._parents().items()}
-        apart = [
-            (a, b)
-            for i, a in enumerate(self.links)
-            for b in self.links[i + 1 :]
-            if groups[a] != groups[b] and parents.get(groups[a]) != groups[b] and parents.get(groups[b]) != groups[a]
-        ]
-        touching = dict.fromkeys(apart, 0)
-        generator = random.Random(0)
-        for _ in range(SAMPLES):
-            self.place(np.array([_anywhere(generator, joint.lower, joint.upper) for joint in self._robot.joints]))
-            for pair in apart:
-                touching[pair] += self.distance(pair, margin_m, margin_m) < margin_m
-        return [pair for pair in apart if touching[pair] < ALWAYS * SAMPLES]
-
-    def _group(self, link: str) -> str:
-        """Returns the first of the links that fixed joints tie to a link."""
-        for joint in reversed(self._robot.chain(link)):
-            if joint.is_moving:
-                return joint.child
-            link = joint.parent
-        return link
-
-    def _parents(self) -> dict[str, str]:
-        """Returns the link above each that a joint moves."""
-        return {joint.child: joint.parent for joint in self._robot.document.joints.values() if joint.is_moving}
-
     def _solids_of(self, link: str) -> list[Solid]:
         frame, pose = self._robot.frames.place(link)
         index = self._index[link]
@@ -282,7 +242,3 @@ class LinkDistances:
         lower, upper = self._pb.getAABB(self._body, self._index[link])
         origin = self._robot.link_positions(np.zeros((1, len(self._robot.joint_names))), link)[0]
         return math.hypot(*np.maximum(np.subtract(upper, origin), np.subtract(origin, lower)))
-
-
-def _anywhere(generator: random.Random, lower: float, upper: float) -> float:
-    return generator.uniform(max(lower, -math.pi), min(upper, math.pi))
