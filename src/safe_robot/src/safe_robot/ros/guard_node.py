@@ -1,5 +1,7 @@
 """`safe_robot_node.py`: targets of a robot in, safe commands out."""
 
+import gc
+import sys
 import time
 
 import rospy
@@ -9,9 +11,11 @@ from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.joint_values import JointValues
+from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
 from custom_ros_tools.ros.joint_states import values_in
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
+from custom_ros_tools.ros.rospy_internals import DirectSending
 from safe_robot.check import Violation
 from safe_robot.guard import Decision
 
@@ -30,6 +34,8 @@ WATCH_HZ = 100.0
 JUMP_S = 0.5
 """How much further than the time that has gone by a stamp may be from the one before [s]."""
 NEVER_S = float("-inf")
+SWITCH_S = 0.0005
+"""After so long Python gives way to another thread that waits, such as one that a target has just reached [s]."""
 
 
 class GuardNode:
@@ -53,6 +59,7 @@ class GuardNode:
             queue_size=QUEUE_SIZE,  # a command that is left out would make the next one a jump
             tcp_nodelay=True,
         )
+        self._sending = DirectSending.of(self._command, QUEUE_SIZE)
         self._status = GuardStatus(self._guard, self._target_topic)
         base_frame = config.base_frame if any(check.takes_obstacles for check in self._guard.checks) else None
         self._measurements = Measurements(self._guard.joint_names, base_frame, config.left_out)
@@ -68,6 +75,8 @@ class GuardNode:
         self._targets = rospy.Subscriber(
             self._target_topic, JointState, self._receive, queue_size=QUEUE_SIZE, tcp_nodelay=True
         )
+        gc.collect()
+        gc.freeze()  # what is there stays, so that collecting the rest takes next to no time
         WallTimer(WATCH_HZ, self._watch)
 
     def _receive(self, message: JointState) -> None:
@@ -176,12 +185,16 @@ class GuardNode:
 
     def _publish(self, message: JointState | Float64MultiArray) -> None:
         try:
+            if self._sending is not None:
+                self._sending.wrap_connections()
             self._command.publish(message)
+            flush_buffered_sockets()
         except BaseException:
             self._guard.rest()  # nothing can be braked from a command that has not gone out
             raise
 
     def _watch(self) -> None:
+        flush_buffered_sockets()
         with self._queue.lock:
             if self._guard.is_halted:
                 return
@@ -224,4 +237,5 @@ def _now() -> rospy.Time:
 
 def main() -> None:
     """Runs the node."""
+    sys.setswitchinterval(SWITCH_S)
     run_node(NODE, GuardNode, loggers=["rpbi"])

@@ -11,6 +11,10 @@ PATIENCE_S = 0.1
 """How long targets wait for a sign of life of their source [s]."""
 
 
+WAKE_UP_S = 0.0002
+"""So long before a target is due the queue's thread is woken up, since that takes time [s]."""
+
+
 class TargetQueue(Generic[Item]):
     """Hands targets on, a period apart, as long as the newest one is fresh.
 
@@ -99,8 +103,10 @@ class TargetQueue(Generic[Item]):
         """Hands on what is due; returns how long there is nothing to do then [s], None: until a target comes."""
         while self._step or self._waiting:
             now_s = time.monotonic()
-            if (left_s := self._left_s(now_s)) > 0.0:
-                return left_s
+            if (left_s := self._left_s(now_s)) > WAKE_UP_S:
+                return left_s - WAKE_UP_S
+            if left_s > 0.0:
+                continue
             if self._step:
                 if self._step():
                     self._due_s = time.monotonic() + self._period_s
