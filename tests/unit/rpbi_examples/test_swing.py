@@ -1,11 +1,23 @@
 """The motion of the example robots."""
 
 import math
+from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
+import pybullet_data
 import pytest
+import yaml
 
 from rpbi_examples.motions import SWING_PERIOD_S, TO_MIDDLE_S, Swing
+from safe_robot.geometry.distances import LinkDistances
+from safe_robot.geometry.pairs import pairs_that_may_meet
+from safe_robot.robot import GuardedRobot
+
+EXAMPLES = Path(__file__).parents[3] / "src/rpbi_examples"
+ARM = [f"panda_joint{i}" for i in range(1, 8)]
+MARGIN_M = 0.01
+"""That of the guard, by default."""
 
 START = (0.3, -1.2, 0.0)
 LOWER = (-2.0, -0.5, -math.inf)
@@ -54,3 +66,23 @@ def test_joints_may_swing_about_another_place_than_zero():
     assert 1.97 < max(second) < 2.0 and 1.8 < min(second) < 1.85
     third = [swing.at(TO_MIDDLE_S + turn * SWING_PERIOD_S)[2] for turn in np.linspace(2.0, 3.0, 51)]
     assert max(third) == pytest.approx(1.2, abs=0.01) and min(third) == pytest.approx(0.8, abs=0.01)
+
+
+def test_the_panda_stays_out_of_its_own_way():
+    """Its guard would stop it, and did."""
+    config = yaml.safe_load((EXAMPLES / "configs/basic_example_panda/panda.yaml").read_text())
+    launch = ElementTree.parse(EXAMPLES / "launch/basic_example_panda.launch")
+    node = next(each for each in launch.iter("node") if each.get("name") == "basic_robot_example")
+    parameters = {each.get("name"): each.get("value") for each in node.iter("param")}
+    robot = GuardedRobot(f"{pybullet_data.getDataPath()}/{config['loadURDF']['fileName']}", ARM)
+    home = np.radians([config["initial_joint_position"].get(name, 0.0) for name in ARM])
+    lower, upper = ([getattr(joint, side) for joint in robot.joints] for side in ("lower", "upper"))
+    middle = home if parameters["about_start"] == "true" else None
+    swing = Swing(home, lower, upper, middle, float(parameters["amplitude"]))
+    distances = LinkDistances(robot)
+    pairs = pairs_that_may_meet(robot, distances, MARGIN_M)
+    assert len(pairs) > 20
+    for time_s in np.arange(0.0, TO_MIDDLE_S + len(ARM) * SWING_PERIOD_S, 0.2):
+        distances.place(np.array(swing.at(time_s)))
+        near = [pair for pair in pairs if distances.distance(pair, 1.0) < MARGIN_M]
+        assert not near, f"{near} after {time_s:.1f} s"
