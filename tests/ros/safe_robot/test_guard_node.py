@@ -9,7 +9,7 @@ import pytest
 import rospy
 from guard_nodes import NAMES, GuardStation
 from guarded_arm import FOLDING, SLIDER
-from node_world import publishing
+from node_world import Rosout, publishing
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
 
@@ -95,6 +95,18 @@ def test_a_target_without_a_stamp_after_others_that_had_one_is_refused(left):
     left.send_unstamped(0.001, 0.0)
     assert "expected a stamp" in left.statuses.wait_for(2)[1].message
     assert len(left.commands.messages) == 1
+
+
+def test_measured_states_of_other_joints_are_refused_with_their_names(module_ros, right):
+    heard = Rosout(module_ros)
+    other = JointState(name=["shoulder", "wrist"], position=[0.3, -0.2])
+    refused = (
+        "/right/joint_states/measured: message refused: no values for joints 'slide', 'turn': it has shoulder, wrist"
+    )
+    with publishing("/right/joint_states/measured", JointState) as measured:
+        wait_until(lambda: measured.publish(other) or heard.logs(refused), "it is told", every_s=0.25)
+    right.send(0.3, -0.2)
+    assert "start: measured positions" in right.statuses.wait_for()[0].message
 
 
 def test_numbers_come_in_the_robots_order_a_period_apart_and_from_where_the_robot_was_measured(left, right):

@@ -74,7 +74,7 @@ class Measurements:
             values = values_in(message)
             values.in_order(self._joint_names)
         except (InterfaceError, ValueError) as error:
-            self._warn("joint_states/measured", f"message refused: {error}")
+            self._warn(rospy.resolve_name("joint_states/measured"), f"message refused: {error}")
             return
         self._measured = dict(zip(values.names, values.position)), time.monotonic()
 
