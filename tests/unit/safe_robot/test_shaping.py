@@ -101,6 +101,8 @@ def test_what_is_smoothed_is_judged(tmp_path):
     assert decisions[1].is_shaped and decisions[1].violation is None
     (refused,) = [decision for decision in decisions if decision.violation]
     assert refused.violation.check == "self_collision" and refused.command is None
+    steps = np.diff([decision.command[1] for decision in decisions if decision.command])
+    assert steps[-1] > 0.99 * steps[-20], "it halts at once, and does not brake before"
 
 
 def test_who_is_too_fast_is_followed_at_the_limit_of_speed(tmp_path):
