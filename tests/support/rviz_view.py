@@ -13,7 +13,7 @@ import yaml
 from ros_system import RosSystem, stop_group, wait_until
 from screen import Screen, Window
 
-SLOW_S = 300.0
+SLOW_S, OPEN_S = 300.0, 150.0
 ATTEMPTS = 3
 CRASH = re.compile(r"\[rviz-\d+\] process has died \[pid \d+, exit code -(6|11),")
 """What roslaunch says of it: it was aborted, or accessed memory that is not there."""
@@ -71,21 +71,26 @@ def start_with_rviz(system: RosSystem, screen: Screen, *command: str) -> subproc
     """Starts RViz, or what starts it, and waits until it is open.
 
     Debian's RViz sometimes, once in some fifty times on a busy machine, crashes while it starts (`free(): invalid next
-    size`, exit code -6). Then it is started again; nothing else is tried twice.
+    size`, exit code -6), or, seen once, never opens. Then it is started again; nothing else is tried twice.
     """
+    failures = []
     for _ in range(ATTEMPTS):
         process = system.start(list(command), **screen.environment)
-        said = wait_until(
-            lambda process=process: (
-                CRASH.search(system.output(process))
-                or (find_view(screen) and "open")
-                or (process.poll() is not None and ("over" if process.poll() not in CRASH_CODES else process))
-            ),
-            "RViz is open",
-            SLOW_S,
-            every_s=0.5,
-        )
+        try:
+            said = wait_until(
+                lambda process=process: (
+                    CRASH.search(system.output(process))
+                    or (find_view(screen) and "open")
+                    or (process.poll() is not None and ("over" if process.poll() not in CRASH_CODES else process))
+                ),
+                "RViz is open",
+                OPEN_S,
+                every_s=0.5,
+            )
+        except TimeoutError as error:
+            said = error
         if isinstance(said, str):
             return process
+        failures.append(f"{said}, windows {screen.windows()}:\n{system.output(process)}")
         stop_group(process)
-    raise AssertionError(f"RViz crashed {ATTEMPTS} times while it started")
+    raise AssertionError(f"RViz did not start in {ATTEMPTS} attempts:\n" + "\n".join(failures))

@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 from rpbi_examples.motions import SWING_PERIOD_S, TO_MIDDLE_S, Swing
+from safe_robot.checks.self_collision import pairs_that_may_meet
 from safe_robot.geometry.distances import LinkDistances
-from safe_robot.geometry.pairs import pairs_that_may_meet
 from safe_robot.robot import GuardedRobot
 
 EXAMPLES = Path(__file__).parents[3] / "src/rpbi_examples"

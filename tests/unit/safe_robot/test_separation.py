@@ -10,9 +10,9 @@ import pytest
 from guarded_arm import KUKA
 
 from rpbi.geometry import Pose, normalized
+from safe_robot.checks.self_collision import pairs_that_may_meet
 from safe_robot.geometry.distances import LinkDistances
 from safe_robot.geometry.obstacles import Obstacle
-from safe_robot.geometry.pairs import pairs_that_may_meet
 from safe_robot.geometry.separation import Separation
 from safe_robot.robot import GuardedRobot
 

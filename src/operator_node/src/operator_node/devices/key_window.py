@@ -139,10 +139,15 @@ class KeyWindow:
         now_s = time.monotonic()
         due_s = self._rising.due_s if self._rising else math.inf
         self._window.wait(max(0.0, min(timeout_s, due_s - now_s)))
-        if self._rising and time.monotonic() >= self._rising.due_s:
-            self._let_rise()
+        if self._is_due():
+            self._window.wait(0.0)  # on a busy machine it may be late, and what it waits for there already
+            if self._is_due():
+                self._let_rise()
         if self._drawn != (tuple(self._keys.codes), self._has_focus):
             self._draw()
+
+    def _is_due(self) -> bool:
+        return self._rising is not None and time.monotonic() >= self._rising.due_s
 
     def close(self) -> None:
         """Closes the window."""
