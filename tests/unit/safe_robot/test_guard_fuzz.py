@@ -25,7 +25,8 @@ TWO, SEVEN = SCENES["two"], SCENES["seven"]
 def test_no_adversary_gets_the_robot_out_of_limits_or_into_anything(scene, count, policy):
     report = fuzz(scene, scene.guard(policy), Oracle(scene), count, np.random.default_rng(1))
     assert not report.faults, report.faults[:5]
-    assert report.refused and report.commands > 0.4 * count and report.brakings > 0.02 * count
+    refused, commands, brakings = (10, 500, 30) if scene is TWO else (1, 120, 6)
+    assert report.refused.total() >= refused and report.commands > commands and report.brakings > brakings
     assert min(report.worst.values()) > 0.5, "the adversary was not near the limits"
     assert policy == "reject" or scene is SEVEN or report.nearest_m < MARGIN_M + 0.002
 

@@ -145,6 +145,7 @@ Name = Annotated[
 ]
 """Name of an object: letters, digits and '_'."""
 TopicName = Annotated[str, Field(pattern=r"^[~/A-Za-z][A-Za-z0-9_/]*$"), Expects("the name of a topic")]
+"""Name of a topic, relative, private or absolute."""
 FrameId = Annotated[
     str,
     AfterValidator(_frame_id),

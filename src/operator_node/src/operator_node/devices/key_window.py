@@ -146,12 +146,13 @@ class KeyWindow:
         if self._drawn != (tuple(self._keys.codes), self._has_focus):
             self._draw()
 
-    def _is_due(self) -> bool:
-        return self._rising is not None and time.monotonic() >= self._rising.due_s
-
     def close(self) -> None:
         """Closes the window."""
         self._window.close()
+
+    def _is_due(self) -> bool:
+        """Returns whether a key that X said goes up has gone up."""
+        return self._rising is not None and time.monotonic() >= self._rising.due_s
 
     def _press(self, event: "Event[Misc]") -> None:
         if self._rising and (event.keycode, event.time) == self._rising[:2]:

@@ -1,4 +1,4 @@
-"""How joints come near a target as fast as their limits allow, stop there, and keep out of what is in the way."""
+"""How joints come near a target as fast as their limits allow, and stop there."""
 
 from typing import NamedTuple
 

@@ -9,8 +9,6 @@ from typing import Generic, TypeVar
 Item = TypeVar("Item")
 PATIENCE_S = 0.1
 """How long targets wait for a sign of life of their source [s]."""
-
-
 WAKE_UP_S = 0.0002
 """So long before a target is due the queue's thread is woken up, since that takes time [s]."""
 
