@@ -200,6 +200,24 @@ def test_the_speed_of_a_link_is_that_of_its_origin(tmp_path):
     assert violation.value == pytest.approx(0.251) and violation.limit == 0.25
 
 
+@pytest.mark.parametrize("name", ["link_box", "link_velocity"])
+def test_what_joints_could_not_bring_about_at_all_is_not_computed_and_the_answers_are_the_same(name):
+    robot, link, generator, safe = GuardedRobot(KUKA), "lwr_arm_7_link", np.random.default_rng(5), 0
+    low, high, most = np.array((-0.66, -0.04, 0.52)), np.array((-0.59, 0.04, 0.58)), 0.3
+    boxes = {link: dict(zip("xyz", np.stack((low, high), axis=1).tolist()))}
+    check = check_of(name, robot, **({"boxes": boxes} if name == "link_box" else {"links": {link: most}}))
+    q = np.array(HOME)
+    for _ in range(400):
+        command = HOME + 0.9 * (q - HOME) + generator.uniform(-1.0, 1.0, 7) * generator.choice((0.002, 0.05))
+        before, place = robot.link_positions(np.stack((q, command)), link)
+        is_inside = bool(((place >= np.minimum(low, before)) & (place <= np.maximum(high, before))).all())
+        is_safe = is_inside if name == "link_box" else bool(np.linalg.norm(place - before) <= most * 0.05)
+        motion = Motion(robot, State.at_rest(q), command, 0.05)
+        assert (check.check(motion, Situation()) is None) == is_safe
+        safe, q = safe + is_safe, command
+    assert 100 < safe < 300
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_link_outside_its_box_may_only_move_inwards(tmp_path, side):
     robot = slider(tmp_path)

@@ -1,7 +1,7 @@
 """Boxes that links stay in."""
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -42,6 +42,20 @@ class LinkBoxConfig(CheckConfig):
     boxes: dict[str, BoxConfig] = Field({}, description="A box for each link whose origin is to stay in one.")
 
 
+class Box(NamedTuple):
+    """Where a link stays.
+
+    Attributes:
+        low: Least x, y and z in the robot's root [m].
+        high: Greatest x, y and z [m].
+        reach: How far, at most, each of n joints moves the link, for 1 rad or m each.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    reach: np.ndarray
+
+
 class LinkBox(Check):
     """The origins of links stay in boxes."""
 
@@ -50,7 +64,8 @@ class LinkBox(Check):
 
     def __init__(self, config: Any, robot: GuardedRobot, limits: JointLimits, file: str) -> None:
         super().__init__(config, robot, limits, file)
-        self._boxes: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        self._boxes: dict[str, Box] = {}
+        self._room: dict[str, tuple[np.ndarray, float]] = {}  # in some configuration a link had so much of it
         for link, box in config.boxes.items():
             try:
                 robot.check_link(link)
@@ -58,12 +73,17 @@ class LinkBox(Check):
                 raise ConfigError([Problem(file, f"checks.link_box.boxes.{link}", str(error))]) from None
             low = [-math.inf if axis[0] is None else axis[0] for axis in (box.x, box.y, box.z)]
             high = [math.inf if axis[1] is None else axis[1] for axis in (box.x, box.y, box.z)]
-            self._boxes[link] = np.array(low), np.array(high)
+            self._boxes[link] = Box(np.array(low), np.array(high), robot.reach(link, 0.0))
 
     def check(self, motion: Motion, situation: Situation) -> Violation | None:
         """See `Check`."""
-        for link, (low, high) in self._boxes.items():
+        for link, (low, high, reach) in self._boxes.items():
+            if link in self._room:
+                place, room = self._room[link]
+                if (np.abs(motion.with_start - place) @ reach).max() < room:  # it cannot get out
+                    continue
             position = motion.link_positions(link)
+            self._room[link] = motion.start.position, float(np.minimum(position[0] - low, high - position[0]).min())
             before = position[0]
             is_inside = (position >= np.minimum(low, before)) & (position <= np.maximum(high, before))
             if not is_inside.all():
@@ -78,7 +98,7 @@ class LinkBox(Check):
         bounds = []
         k, n = rows.shape
         tried = np.concatenate((before[None], rows, (rows[:, None] + STEP * np.eye(n)).reshape(-1, n)))
-        for link, (low, high) in self._boxes.items():
+        for link, (low, high, _) in self._boxes.items():
             position = self.robot.link_positions(tried, link)
             at = position[1 : k + 1]
             slopes = (position[k + 1 :].reshape(k, n, 3) - at[:, None]).transpose(0, 2, 1) / STEP  # k x 3 x n

@@ -27,15 +27,19 @@ class LinkVelocity(Check):
 
     def __init__(self, config: Any, robot: GuardedRobot, limits: JointLimits, file: str) -> None:
         super().__init__(config, robot, limits, file)
+        self._reach: dict[str, np.ndarray] = {}  # how far, at most, each joint moves a link, for 1 rad or m each
         for link in config.links:
             try:
                 robot.check_link(link)
             except UnknownNameError as error:
                 raise ConfigError([Problem(file, f"checks.link_velocity.links.{link}", str(error))]) from None
+            self._reach[link] = robot.reach(link, 0.0)
 
     def check(self, motion: Motion, situation: Situation) -> Violation | None:
         """See `Check`."""
         for link, limit in self.config.links.items():
+            if (np.abs(motion.velocity) @ self._reach[link]).max() <= limit:  # no joints could make it faster
+                continue
             position = motion.link_positions(link)
             step = position[1:] - position[:-1]
             speed = np.sqrt((step * step).sum(axis=1)) / motion.period_s

@@ -12,6 +12,8 @@ from .braking import Braking
 
 MOMENTS = 5
 """Of the way to rest so many moments are looked at where something is near."""
+TINY = 1e-12
+"""A bound that changes by less within what is possible [m] does not hinder the solver."""
 
 
 class Bound(NamedTuple):
@@ -90,9 +92,11 @@ class Detour:
         if not self._rows:
             return wanted
         scale = np.maximum(self._most - self._least, 1e-9)  # of joints, so that the program has ordinary numbers
-        matrix = np.ascontiguousarray(np.array(self._rows) * scale)
+        rows = np.array(self._rows) * scale
+        sizes = np.maximum(np.linalg.norm(rows, axis=1), TINY)  # of bounds, since the solver's tolerance is absolute
+        matrix = np.ascontiguousarray(rows / sizes[:, None])
         upper = np.concatenate(((self._most - wanted) / scale, np.full(len(matrix), 1e30)))
-        lower = np.concatenate(((self._least - wanted) / scale, -np.array(self._rooms)))
+        lower = np.concatenate(((self._least - wanted) / scale, -np.array(self._rooms) / sizes))
         scaled, _, flag, _ = daqp.solve(np.diag(scale * scale) / scale.max() ** 2, np.zeros(n), matrix, upper, lower)
         found = wanted + scale * scaled
         return np.clip(found, self._least, self._most) if flag > 0 and np.isfinite(found).all() else None
