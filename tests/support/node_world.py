@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -55,12 +56,14 @@ _published: set[str] = set()
 
 @contextmanager
 def publishing(topic: str, message_type: type) -> Iterator[rospy.Publisher]:
-    """Publishes a topic that somebody listens to."""
+    """Publishes a topic that somebody listens to; none of the messages is lost when it ends."""
     name = rospy.resolve_name(topic)
     if name in _published:
         wait_until(lambda: not _is_taken_for_connected(name), f"who listened to {name} has noticed that it ended")
     _published.add(name)
-    publisher = rospy.Publisher(topic, message_type, queue_size=100)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # without a queue, a message has gone when `publish` returns
+        publisher = rospy.Publisher(topic, message_type, queue_size=None)
     wait_until(publisher.get_num_connections, f"somebody listens to {topic}")
     try:
         yield publisher
