@@ -18,11 +18,10 @@ from .limits import JointLimits
 from .lookup import make_checks
 from .motion import Motion, State
 from .robot import GuardedRobot
+from .start import Start
 
 log = logging.getLogger(__name__)
 
-SLOW_S = 1e6
-"""How long the way from where the robot is to the first target is taken to last [s]: it is not judged by speed."""
 MENDED = ("joint_velocity", "joint_acceleration", "joint_jerk", "joint_position", "braking")
 """What braking for a period may mend where a smoothed command, whose steps are finite, just misses it."""
 
@@ -87,6 +86,7 @@ class Guard:
         self._braking = Braking(self.limits.velocity, self.limits.acceleration, self.limits.jerk, config.period_s)
         shape = (self.limits, self._braking, config.period_s)
         self._shaper = None if config.shape is None else Shaper(config.shape, *shape)
+        self._start = Start(config, robot, self.checks, file)
         self._watches = {check.name for check in self.checks if check.watches}
         self._nearest = Nearest(self.limits, self._braking, self.checks, config.period_s)
         if config.policy == "limit" and not can_keep_bounds():
@@ -230,38 +230,13 @@ class Guard:
         return None
 
     def _take_start(self, target: tuple[float, ...], situation: Situation) -> Violation | None:
-        """Puts the guard where the robot is, if the first target is near; the robot stands."""
-        position = np.array(target)
-        there = self._whereabouts(position, situation)
-        if there is None:
-            return Violation("start", "measured positions", math.inf, 0.0, "as age, since there are none of all joints")
-        distance = np.abs(position - there)
-        if not (distance <= self.config.start_tolerance).all():
-            i = int(np.argmin(distance <= self.config.start_tolerance))
-            subject = f"joint '{self.joint_names[i]}'"
-            unit = "of distance to where the robot is"
-            return Violation("start", subject, float(distance[i]), self.config.start_tolerance, unit)
-        slow = Motion(self.robot, State.at_rest(there), position, SLOW_S)
-        for check in self.checks:
-            if violation := check.check(slow, situation):
-                return violation
-        self._state = State.at_rest(position if self._shaper is None else self._begin(there))
-        self._stop = self._state.position[None]
-        self._is_first = False
+        """Puts the guard where the robot starts, if the first target allows it."""
+        last = None if self._state is None else self._state.position
+        found = self._start.at(np.array(target), last, situation)
+        if isinstance(found, Violation):
+            return found
+        self._state, self._stop, self._is_first = found, found.position[None], False
         return None
-
-    def _begin(self, there: np.ndarray) -> np.ndarray:
-        """Returns from where a smoothed motion begins: the last command, unless the robot has been moved away."""
-        if self._state is None or (np.abs(self._state.position - there) > self.config.start_tolerance).any():
-            return there
-        return self._state.position
-
-    def _whereabouts(self, target: np.ndarray, situation: Situation) -> np.ndarray | None:
-        if all(name in situation.measured for name in self.joint_names):
-            return np.array([situation.measured[name] for name in self.joint_names])
-        if self.config.start_from == "measured":
-            return None
-        return target if self._state is None else self._state.position
 
     def _judged(self, command: Sequence[float], situation: Situation, checks: Sequence[Check]) -> _Safe | Violation:
         """Returns the command if it is safe, else what the first of some checks says that is not."""

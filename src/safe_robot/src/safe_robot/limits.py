@@ -68,7 +68,8 @@ class JointLimits(NamedTuple):
         if problems:
             raise ConfigError(problems)
         low, high = np.array(lower), np.array(upper)
-        cut = np.where(np.isfinite(high - low), (1.0 - config.position_factor) / 2.0 * (high - low), 0.0)
+        span = np.where(np.isfinite(high - low), high - low, 0.0)
+        cut = (1.0 - config.position_factor) / 2.0 * span
         return cls(
             low + cut, high - cut, config.velocity_factor * np.array(velocity), *map(np.array, (acceleration, jerk))
         )

@@ -10,6 +10,9 @@ from custom_ros_tools.transforms import matrix_of, quat_of
 from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.elements import UrdfJoint
 
+OUTSIDE = 0.1
+"""A lever starts at most so far outside its limits [rad or m]."""
+
 
 class GuardedRobot:
     """The joints of a robot that commands move, in the order in which they are checked, and its kinematics.
@@ -26,6 +29,7 @@ class GuardedRobot:
         joint_names: The n joints.
         joints: What the description says of them.
         links: Names of all links.
+        levers: Names of the guarded joints by which something slides in what others turn: the further out, the faster.
         still: Names of the joints that do not move, which joint states may have too.
         frames: Where its links are.
 
@@ -54,6 +58,7 @@ class GuardedRobot:
         self.still = frozenset(name for name, joint in self._all.items() if joint.type == "fixed")
         self._above = {joint.child: joint for joint in self._all.values()}
         self._index = {name: i for i, name in enumerate(self.joint_names)}
+        self.levers = tuple(dict.fromkeys(name for link in self.links for name in self._levers_of(link)))
         self.frames = LinkFrames(self._all.values(), self.coupling)
 
     def check_link(self, name: str) -> str:
@@ -105,6 +110,9 @@ class GuardedRobot:
             link: The link.
             radius_m: How far its shape goes from its origin [m].
             other: The other link, by default the root; what both hang on does not move one in the other.
+
+        Raises:
+            ConfigError: If there is no limit to it.
         """
         still = {joint.name for joint in self.chain(self._root if other is None else other)}
         reach, beyond = np.zeros(len(self.joint_names)), radius_m
@@ -115,9 +123,33 @@ class GuardedRobot:
             if i is not None:
                 factor = abs(joint.mimic.multiplier) if joint.mimic else 1.0
                 reach[i] += factor * (beyond if joint.is_revolute else 1.0)
-            travel = 0.0 if joint.is_revolute or not joint.is_moving else max(abs(joint.lower), abs(joint.upper))
-            beyond += math.hypot(*joint.xyz) + travel
+            beyond += math.hypot(*joint.xyz)
+            if joint.is_moving and not joint.is_revolute:
+                beyond += self._travel(joint)
+        if not np.isfinite(reach).all():
+            name = self.joint_names[int(np.argmin(np.isfinite(reach)))]
+            message = f"expected limits for what slides between joint '{name}', which turns it, and link '{link}'"
+            raise ConfigError([Problem(self.urdf_path, "", message)])
         return reach
+
+    def _travel(self, joint: UrdfJoint) -> float:
+        """Returns how far from 0 a joint may be [rad or m]."""
+        if joint.mimic is not None:
+            leader = self._all[joint.mimic.joint]
+            return abs(joint.mimic.multiplier) * self._travel(leader) + abs(joint.mimic.offset)
+        if joint.name in self._index:
+            return max(abs(joint.lower), abs(joint.upper)) + OUTSIDE
+        return abs(float(self._positions(joint, np.zeros((1, 0)))[0]))
+
+    def _levers_of(self, link: str) -> list[str]:
+        turned, levers = False, []
+        for joint in self.chain(link):
+            i = self._driver(joint)
+            if i is not None and joint.is_revolute:
+                turned = True
+            elif i is not None and turned:
+                levers.append(self.joint_names[i])
+        return levers
 
     def _driver(self, joint: UrdfJoint) -> int | None:
         if not joint.is_moving:
