@@ -6,7 +6,6 @@ import contextlib
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -18,6 +17,8 @@ from typing import Any
 
 import arrivals
 import rosgraph
+
+from custom_ros_tools.ros.lifecycle.timed_master import unused_port
 
 PROGRAMS = Path(__file__).parent / "programs"
 JOINT_STATES = "/rpbi/kuka_lwr/joint_states"
@@ -43,9 +44,7 @@ class Session:
         self._processes: list[subprocess.Popen[bytes]] = []
         self._folder = tempfile.TemporaryDirectory(prefix="rpbi-bench-")
         self.folder = Path(self._folder.name)
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
+        port = unused_port()
         uri = f"http://127.0.0.1:{port}"
         self._environment = {
             **{key: value for key, value in os.environ.items() if key not in ("ROS_HOSTNAME", "ROS_NAMESPACE")},

@@ -10,7 +10,6 @@ import multiprocessing
 import os
 import random
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -24,6 +23,8 @@ from faulty_source import ENDS, MESSAGES, OTHER_TARGETS, STAMPS, TARGET, Course,
 from sensor_msgs.msg import JointState
 from simulated_clock import SimulatedClock
 from std_srvs.srv import Trigger
+
+from custom_ros_tools.ros.lifecycle.timed_master import unused_port
 
 COMMAND, SERVICE = "/joint_states/command", "/robot_safety/{}_subscriber"
 URDF = """<robot name="slider"><link name="base"/><link name="cart"/><link name="hand"/>
@@ -100,9 +101,7 @@ class Experiment:
         options = parameters or {}
         self._may_brake = options.get("policy") == "limit" or options.get("on_halt") == "brake"
         self._processes: list[subprocess.Popen[bytes]] = []
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self._port = probe.getsockname()[1]
+        self._port = unused_port()
         os.environ.update(ROS_MASTER_URI=f"http://127.0.0.1:{self._port}", ROS_IP="127.0.0.1")
         self._fork = multiprocessing.get_context("forkserver")
         self._fork.set_forkserver_preload(["rospy", "sensor_msgs.msg", "std_srvs.srv", "safe_robot.msg"])

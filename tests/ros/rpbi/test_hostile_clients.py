@@ -7,10 +7,13 @@ import math
 import os
 import random
 import resource
+import socket
 import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from urllib.parse import urlsplit
 
 import pytest
 import rosgraph
@@ -21,6 +24,7 @@ import yaml
 from geometry_msgs.msg import TransformStamped
 from node_world import add, main_config, objects, publishing, remove
 from ros_system import SUPPORT, support_on_path, wait_until
+from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from worlds import FLOOR, ball, iiwa
@@ -207,6 +211,18 @@ def _add(ros, config, verdict, problems):
         assert remove(ros, "it").success
     else:
         assert answer.message.replace("config: ", "") == "\n".join(problems).replace("it.yaml: ", "")
+
+
+def test_who_connects_and_says_nothing_or_something_else_holds_up_nobody(ros, node):
+    address = urlsplit(rosgraph.Master("/tests").lookupService("/rpbi/list_objects"))
+    with ThreadPoolExecutor(1) as callers, ExitStack() as stack:
+        for said in (b"", b"\x10", b"POST /RPC2 HTTP/1.1\r\n\r\n"):
+            connection = stack.enter_context(socket.create_connection((address.hostname, address.port)))
+            connection.sendall(said)
+            assert "iiwa" in callers.submit(objects, ros).result(LONGEST_ANSWER_S)
+        states = ros.listen("/rpbi/iiwa/joint_states", JointState)
+        wait_until(lambda: states.is_connected, "the node sends to who subscribes")
+    _is_well(ros, node)
 
 
 def test_a_node_that_was_out_of_file_handles_hears_again(ros, node):

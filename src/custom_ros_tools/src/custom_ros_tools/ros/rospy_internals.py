@@ -7,9 +7,7 @@ expected, what is there and what is lost by that, and the node goes on without i
 
 from __future__ import annotations
 
-import errno
 import socket
-import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from functools import partial
@@ -20,11 +18,9 @@ from weakref import WeakMethod
 import rospy
 
 from .buffered_socket import BufferedSocket, flush_buffered_sockets
+from .server_socket import ServerSocket
 
 T = TypeVar("T")
-
-OUT_OF_HANDLES_S = 0.5
-"""How long a node that is out of file handles waits before it looks again [s]."""
 
 
 def _expecting(expected: str, loss: str, use: Callable[[], T]) -> T | None:
@@ -179,37 +175,17 @@ def _call(method: WeakMethod, *arguments: Any) -> Any:
     return bound(*arguments)
 
 
-class _LastingServerSocket:
-    """A listening socket that waits when the process is out of file handles; rospy would never accept anybody again."""
-
-    def __init__(self, server: socket.socket) -> None:
-        self._server = server
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._server, name)
-
-    def accept(self) -> tuple[socket.socket, Any]:
-        try:
-            return self._server.accept()
-        except OSError as error:
-            if error.errno not in (errno.EMFILE, errno.ENFILE):
-                raise
-            time.sleep(OUT_OF_HANDLES_S)
-            raise TimeoutError from None  # after which rospy asks again
-
-
 def keep_accepting() -> None:
-    """Has this node accept subscribers and callers again once it was out of file handles."""
+    """Has this process, before it is a node, accept whoever connects to it, whatever others do; see `ServerSocket`."""
 
     def wrap() -> None:
-        tcpros = import_module("rospy.impl.tcpros_base")
-        tcpros.start_tcpros_server()
-        server = tcpros._tcpros_server.tcp_ros_server
-        server.server_sock = _LastingServerSocket(server.server_sock)
+        server = import_module("rospy.impl.tcpros_base").TCPServer
+        listening = server._create_server_sock
+        server._create_server_sock = lambda self: ServerSocket(listening(self))
 
     _expecting(
         "rospy.impl.tcpros_base to have a server",
-        "a node that was out of file handles once has to be started again",
+        "a node to which somebody connects and says nothing is out of reach for others",
         wrap,
     )
 

@@ -7,7 +7,6 @@ import json
 import logging
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -24,6 +23,7 @@ from sensor_msgs.msg import Image
 from tf2_msgs.msg import TFMessage
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.lifecycle.timed_master import unused_port
 from custom_ros_tools.ros.transform_messages import position_in, quat_in
 from rpbi.config.loading import load_world
 from rpbi.geometry import Pose
@@ -112,9 +112,7 @@ def _demo(arguments: argparse.Namespace) -> int:
 @contextmanager
 def _example(headless: bool, log: Path) -> Iterator[None]:
     """Launches the example on a ROS master of its own, so that it meets nobody else's nodes, and ends it."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = unused_port()
     os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
     os.environ["ROS_IP"] = "127.0.0.1"
     os.environ.pop("ROS_HOSTNAME", None)

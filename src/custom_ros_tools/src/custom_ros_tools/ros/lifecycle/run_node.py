@@ -48,11 +48,11 @@ MOST_FILES = 8192
 
 def init_node(name: str, loggers: Iterable[str] = (), anonymous: bool = False, ros_time: bool = True) -> None:
     """Makes this process a node that a ROS master finds again when it comes back; for the arguments see `run_node`."""
+    keep_accepting()
     rospy.init_node(name, anonymous=anonymous, disable_rostime=not ros_time, disable_signals=True)
     rospy.on_shutdown(_leave_parameters)
     _attach_logging({"custom_ros_tools", *loggers})
     _allow_many_files()
-    keep_accepting()
     MasterWatch()
 
 
