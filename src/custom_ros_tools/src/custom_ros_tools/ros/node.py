@@ -17,7 +17,7 @@ def run(main: str) -> None:
     imported; so the function is imported here.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    _mind_memory_limit()
+    _set_limits()
     pkgutil.resolve_name(main)()
 
 
@@ -32,7 +32,7 @@ def run_command(main: str) -> None:
     if heeds:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-    _mind_memory_limit()
+    _set_limits()
     function = pkgutil.resolve_name(main)
     try:
         if heeds:
@@ -45,13 +45,15 @@ def run_command(main: str) -> None:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def _mind_memory_limit() -> None:
-    """Ends the program with 1 if a limit of memory leaves it too little, and else has it hang on none."""
+def _set_limits() -> None:
+    """Has matrices computed in one thread, unless the environment says otherwise; before NumPy is imported.
+
+    Ours are small, so further threads would do little but wait for each other, which costs more the busier the machine
+    is, and under a limit of memory for ever. Where memory is limited to too little, the program ends with 1.
+    """
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if limit == resource.RLIM_INFINITY:
-        return
-    if limit < LEAST_MEMORY:
+    if limit != resource.RLIM_INFINITY and limit < LEAST_MEMORY:
         sys.exit(
             f"memory is limited to {limit / 1e6:.0f} MB (ulimit -v); expected at least {LEAST_MEMORY / 1e6:.0f} MB"
         )
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # its threads wait for ever for 128 MB each
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
