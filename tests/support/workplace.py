@@ -62,7 +62,6 @@ class Workplace:
         run.mkdir(mode=0o700)
         for name in FOREIGN_SETTINGS:
             os.environ.pop(name, None)
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as our nodes have it; before NumPy is imported
         os.environ.update(
             ROS_MASTER_URI=self.port.uri,
             ROS_IP="127.0.0.1",

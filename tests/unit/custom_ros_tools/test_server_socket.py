@@ -14,7 +14,7 @@ from rospy.impl.tcpros_base import TCPROSServer, TCPServer
 
 from custom_ros_tools.ros import server_socket
 from custom_ros_tools.ros.rospy_internals import keep_accepting
-from custom_ros_tools.ros.server_socket import ENOUGH, ServerSocket
+from custom_ros_tools.ros.server_socket import PEEKED, ServerSocket
 
 SOON_S = 60.0
 
@@ -34,7 +34,7 @@ class Node:
         while True:
             connection, _ = self._server.accept()
             with connection, self._news:
-                self._headers.append(connection.recv(ENOUGH, socket.MSG_DONTWAIT))
+                self._headers.append(connection.recv(PEEKED, socket.MSG_DONTWAIT))
                 self._news.notify_all()
 
     def heard(self, count: int) -> list[bytes]:
@@ -84,8 +84,8 @@ def test_those_who_say_what_they_want_are_served_beside_those_who_do_not(node, c
 
 
 def test_a_header_that_is_larger_than_what_the_kernel_keeps_comes_through(node, connect):
-    connect(header(4 * ENOUGH))
-    assert node.heard(1)[0] == header(4 * ENOUGH)[:ENOUGH]
+    connect(header(4 * PEEKED))
+    assert node.heard(1)[0] == header(4 * PEEKED)[:PEEKED]
 
 
 @pytest.mark.parametrize("said", [b"GET / HTTP/1.1\r\n\r\n", b"\0\0\0\0", b"\xff" * 4])
@@ -99,11 +99,11 @@ def test_another_protocol_is_sent_away_at_once(node, connect, caplog, said):
 
 
 def test_who_says_nothing_for_long_is_sent_away(monkeypatch, caplog):
-    monkeypatch.setattr(server_socket, "PATIENCE_S", 0.1)
+    monkeypatch.setattr(server_socket, "HEADER_TIMEOUT_S", 0.1)
     node = Node()
     with socket.create_connection(node.address, SOON_S) as silent:
         assert is_closed(silent)
-    assert "closed: it has said nothing for 0.1 s" in caplog.text
+    assert "closed: no header came within 0.1 s" in caplog.text
 
 
 def test_who_goes_without_a_word_is_forgotten(node, connect):

@@ -14,11 +14,11 @@ from .commands.nearest import Nearest
 from .commands.shaping import Shaper
 from .commands.way_out import WayOut, find_way_out
 from .config import GuardConfig
+from .first_target import FirstTarget
 from .limits import JointLimits
 from .lookup import make_checks
 from .motion import Motion, State
 from .robot import GuardedRobot
-from .start import Start
 
 log = logging.getLogger(__name__)
 
@@ -86,7 +86,7 @@ class Guard:
         self._braking = Braking(self.limits.velocity, self.limits.acceleration, self.limits.jerk, config.period_s)
         shape = (self.limits, self._braking, config.period_s)
         self._shaper = None if config.shape is None else Shaper(config.shape, *shape)
-        self._start = Start(config, robot, self.checks, file)
+        self._first_target = FirstTarget(config, robot, self.checks, file)
         self._watches = {check.name for check in self.checks if check.watches}
         self._nearest = Nearest(self.limits, self._braking, self.checks, config.period_s)
         if config.policy == "limit" and not can_keep_bounds():
@@ -232,7 +232,7 @@ class Guard:
     def _take_start(self, target: tuple[float, ...], situation: Situation) -> Violation | None:
         """Puts the guard where the robot starts, if the first target allows it."""
         last = None if self._state is None else self._state.position
-        found = self._start.at(np.array(target), last, situation)
+        found = self._first_target.judged(np.array(target), last, situation)
         if isinstance(found, Violation):
             return found
         self._state, self._stop, self._is_first = found, found.position[None], False

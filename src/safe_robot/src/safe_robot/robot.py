@@ -10,8 +10,8 @@ from custom_ros_tools.transforms import matrix_of, quat_of
 from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.elements import UrdfJoint
 
-OUTSIDE = 0.1
-"""A lever starts at most so far outside its limits [rad or m]."""
+MOST_OUTSIDE = 0.1
+"""A telescopic joint starts at most so far outside its limits [rad or m]."""
 
 
 class GuardedRobot:
@@ -29,7 +29,7 @@ class GuardedRobot:
         joint_names: The n joints.
         joints: What the description says of them.
         links: Names of all links.
-        levers: Names of the guarded joints by which something slides in what others turn: the further out, the faster.
+        telescopic: Names of the guarded joints by which something slides in what others turn.
         still: Names of the joints that do not move, which joint states may have too.
         frames: Where its links are.
 
@@ -58,7 +58,7 @@ class GuardedRobot:
         self.still = frozenset(name for name, joint in self._all.items() if joint.type == "fixed")
         self._above = {joint.child: joint for joint in self._all.values()}
         self._index = {name: i for i, name in enumerate(self.joint_names)}
-        self.levers = tuple(dict.fromkeys(name for link in self.links for name in self._levers_of(link)))
+        self.telescopic = tuple(dict.fromkeys(name for link in self.links for name in self._telescopic_to(link)))
         self.frames = LinkFrames(self._all.values(), self.coupling)
 
     def check_link(self, name: str) -> str:
@@ -138,18 +138,19 @@ class GuardedRobot:
             leader = self._all[joint.mimic.joint]
             return abs(joint.mimic.multiplier) * self._travel(leader) + abs(joint.mimic.offset)
         if joint.name in self._index:
-            return max(abs(joint.lower), abs(joint.upper)) + OUTSIDE
+            return max(abs(joint.lower), abs(joint.upper)) + MOST_OUTSIDE
         return abs(float(self._positions(joint, np.zeros((1, 0)))[0]))
 
-    def _levers_of(self, link: str) -> list[str]:
-        turned, levers = False, []
+    def _telescopic_to(self, link: str) -> list[str]:
+        """Returns the names of the guarded joints on the way to a link by which it slides in what others turn."""
+        turned, telescopic = False, []
         for joint in self.chain(link):
             i = self._driver(joint)
             if i is not None and joint.is_revolute:
                 turned = True
             elif i is not None and turned:
-                levers.append(self.joint_names[i])
-        return levers
+                telescopic.append(self.joint_names[i])
+        return telescopic
 
     def _driver(self, joint: UrdfJoint) -> int | None:
         if not joint.is_moving:

@@ -17,7 +17,7 @@ def run(main: str) -> None:
     imported; so the function is imported here.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    _set_limits()
+    _prepare_for_numpy()
     pkgutil.resolve_name(main)()
 
 
@@ -32,7 +32,7 @@ def run_command(main: str) -> None:
     if heeds:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-    _set_limits()
+    _prepare_for_numpy()
     function = pkgutil.resolve_name(main)
     try:
         if heeds:
@@ -45,7 +45,7 @@ def run_command(main: str) -> None:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def _set_limits() -> None:
+def _prepare_for_numpy() -> None:
     """Has matrices computed in one thread, unless the environment says otherwise; before NumPy is imported.
 
     Ours are small, so further threads would do little but wait for each other, which costs more the busier the machine

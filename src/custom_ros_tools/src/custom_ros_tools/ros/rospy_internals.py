@@ -176,7 +176,7 @@ def _call(method: WeakMethod, *arguments: Any) -> Any:
 
 
 def keep_accepting() -> None:
-    """Has this process, before it is a node, accept whoever connects to it, whatever others do; see `ServerSocket`."""
+    """Has this process, before it is a node, go on accepting connections whatever others do; see `ServerSocket`."""
 
     def wrap() -> None:
         server = import_module("rospy.impl.tcpros_base").TCPServer
@@ -184,8 +184,8 @@ def keep_accepting() -> None:
         server._create_server_sock = lambda self: ServerSocket(listening(self))
 
     _expecting(
-        "rospy.impl.tcpros_base to have a server",
-        "a node to which somebody connects and says nothing is out of reach for others",
+        "rospy.impl.tcpros_base.TCPServer to make its socket",
+        "who connects and sends no header, or a lack of file handles, keeps others from this node",
         wrap,
     )
 

@@ -10,13 +10,13 @@ from custom_ros_tools.errors import ConfigError, Problem
 from .check import Check, Situation, Violation
 from .config import GuardConfig
 from .motion import Motion, State
-from .robot import OUTSIDE, GuardedRobot
+from .robot import MOST_OUTSIDE, GuardedRobot
 
 SLOW_S = 1e6
 """How long the way from where the robot is to the first target is taken to last [s]: it is not judged by speed."""
 
 
-class Start:
+class FirstTarget:
     """Judges the first target after a start.
 
     Args:
@@ -30,12 +30,12 @@ class Start:
     """
 
     def __init__(self, config: GuardConfig, robot: GuardedRobot, checks: Sequence[Check], file: str) -> None:
-        if robot.levers and not any(check.name == "joint_position" for check in checks):
-            message = f"expected true, since joint '{robot.levers[0]}' slides in what others turn, got false"
+        if robot.telescopic and not any(check.name == "joint_position" for check in checks):
+            message = f"expected true, since joint '{robot.telescopic[0]}' slides in what others turn, got false"
             raise ConfigError([Problem(file, "checks.joint_position.active", message)])
         self._config, self._robot, self._checks = config, robot, checks
 
-    def at(self, target: np.ndarray, last: np.ndarray | None, situation: Situation) -> State | Violation:
+    def judged(self, target: np.ndarray, last: np.ndarray | None, situation: Situation) -> State | Violation:
         """Returns the state in which the robot starts, at rest; else why it cannot.
 
         Args:
@@ -78,10 +78,10 @@ class Start:
 
     def _far_outside(self, there: np.ndarray) -> Violation | None:
         """Returns which joint is so far outside its limits that it is not known how far links reach."""
-        for name in self._robot.levers:
+        for name in self._robot.telescopic:
             i = self._robot.joint_names.index(name)
             joint, position = self._robot.joints[i], float(there[i])
             outside = max(joint.lower - position, position - joint.upper)
-            if not outside <= OUTSIDE:
-                return Violation("start", f"joint '{name}'", outside, OUTSIDE, "outside of its limits")
+            if not outside <= MOST_OUTSIDE:
+                return Violation("start", f"joint '{name}'", outside, MOST_OUTSIDE, "outside of its limits")
         return None

@@ -10,7 +10,7 @@ from guarded_arm import decide, guard_of
 
 from custom_ros_tools.errors import ConfigError
 from safe_robot.guard import Guard
-from safe_robot.robot import OUTSIDE, GuardedRobot
+from safe_robot.robot import MOST_OUTSIDE, GuardedRobot
 
 CRANE = """<robot name="crane"><link name="base"/><link name="boom"/><link name="trolley"/><link name="hook"/>
   <joint name="turn" type="revolute"><parent link="base"/><child link="boom"/><axis xyz="0 0 1"/>
@@ -36,29 +36,29 @@ def started(robot: GuardedRobot, out: float, **config: object) -> Guard:
 
 
 @pytest.mark.parametrize("link", ["trolley", "hook"])
-def test_no_link_goes_further_than_by_its_reach_from_wherever_a_lever_may_start(tmp_path, link):
+def test_no_link_goes_further_than_by_its_reach_from_wherever_a_joint_may_start(tmp_path, link):
     robot = crane(tmp_path)
-    assert robot.levers == ("reach",)
+    assert robot.telescopic == ("reach",)
     reach, chance = robot.reach(link, 0.0), np.random.default_rng(4)
-    low, high = np.array((-3.0, -OUTSIDE)), np.array((3.0, 1.0 + OUTSIDE))
+    low, high = np.array((-3.0, -MOST_OUTSIDE)), np.array((3.0, 1.0 + MOST_OUTSIDE))
     q = chance.uniform(low, high, (2000, 2))
-    q[::2, 1] = high[1]  # where the lever is longest
+    q[::2, 1] = high[1]  # where the boom is longest
     after = np.clip(q + chance.uniform(-0.1, 0.1, q.shape), low, high)
     way = np.linalg.norm(robot.link_positions(after, link) - robot.link_positions(q, link), axis=1)
     shares = way / (np.abs(after - q) @ reach)
     assert 0.5 < shares.max() <= 1.0
 
 
-def test_a_lever_that_is_further_outside_may_not_start(tmp_path):
+def test_a_joint_that_is_further_outside_may_not_start(tmp_path):
     robot = crane(tmp_path)
-    started(robot, 1.0 + 0.99 * OUTSIDE)
-    violation = decide(guard_of(robot), (0.0, 1.0 + 1.5 * OUTSIDE)).violation
-    assert violation == ("start", "joint 'reach'", pytest.approx(0.15), OUTSIDE, "outside of its limits", False)
-    violation = decide(guard_of(robot), (0.0, -1.5 * OUTSIDE)).violation
+    started(robot, 1.0 + 0.99 * MOST_OUTSIDE)
+    violation = decide(guard_of(robot), (0.0, 1.0 + 1.5 * MOST_OUTSIDE)).violation
+    assert violation == ("start", "joint 'reach'", pytest.approx(0.15), MOST_OUTSIDE, "outside of its limits", False)
+    violation = decide(guard_of(robot), (0.0, -1.5 * MOST_OUTSIDE)).violation
     assert violation[:2] == ("start", "joint 'reach'")
 
 
-def test_a_link_is_no_faster_where_the_lever_is_longest(tmp_path):
+def test_a_link_is_no_faster_where_the_boom_is_longest(tmp_path):
     """The turn may be as fast as 1 rad/s; the trolley is 1.05 m out, and may be as fast as 0.3 m/s."""
     guard = started(crane(tmp_path), 1.05, checks={"link_velocity": {"links": {"trolley": 0.3}}})
     angle, speed, fastest = 0.0, 0.0, 0.0
