@@ -1,8 +1,8 @@
 """What is probably not meant in a world, although it can be built."""
 
-from collections.abc import Iterator
-from itertools import combinations
+from collections.abc import Iterator, Sequence
 
+import numpy as np
 import pybullet
 
 from custom_ros_tools.errors import Problem, closest, hint
@@ -62,8 +62,7 @@ def _topics(world: World) -> Iterator[Problem]:
 
 def _overlaps(world: World) -> Iterator[Problem]:
     """Yields a warning for each pair of bodies that are in each other, unless nothing can push them apart."""
-    solid = [body for body in world.bodies.values() if _has_place(world, body)]
-    for one, other in combinations(solid, 2):
+    for one, other in _neighbours([body for body in world.bodies.values() if _has_place(world, body)]):
         found = world.pb.getClosestPoints(one.body_id, other.body_id, 0.0)
         depths = {(point[3], point[4]): -point[8] for point in sorted(found, key=lambda point: -point[8])}
         depths = {links: depth for links, depth in depths.items() if not _are_still(one, other, *links)}
@@ -71,6 +70,16 @@ def _overlaps(world: World) -> Iterator[Problem]:
             (link, other_link), depth = deepest
             parts = f"{_named(one, link)} and {_named(other, other_link)} are in each other by {depth:.2g} m"
             yield Problem(_file_of(world, one.name), "", f"at the start, {parts}, and will be pushed apart")
+
+
+def _neighbours(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
+    """Yields the pairs of bodies whose bounding boxes meet."""
+    links = [[body.pb.getAABB(body.body_id, index) for index in (-1, *body.joint_indices)] for body in bodies]
+    lower = np.array([np.min([box[0] for box in boxes], axis=0) for boxes in links]).reshape(-1, 3)
+    upper = np.array([np.max([box[1] for box in boxes], axis=0) for boxes in links]).reshape(-1, 3)
+    meet = np.all(lower[:, None] <= upper[None], axis=2)
+    for one, other in np.argwhere(np.triu(meet & meet.T, 1)):
+        yield bodies[one], bodies[other]
 
 
 def _has_place(world: World, body: Body) -> bool:
