@@ -74,13 +74,13 @@ def test_world_goes_at_another_pace_and_tells_it_and_once_why_it_cannot(ros, sim
     assert not states.messages[-1].commands, "pace is no matter of the world"
 
     def said():
-        return re.findall(
-            r"too slow: real-time factor [\d.]+ instead of 10000: .* \(docs/slow.md\)", ros.output(simulator)
-        )
+        return re.findall(r"too slow: real-time factor .* instead of .*: .* \(docs/slow.md\)", ros.output(simulator))
 
-    assert not said()
     ros.call("/rpbi/set_real_time_factor", SetRealTimeFactor, 1e4)
     wait_until(said, "why it is slower than asked for")
+    diagnostics.messages.clear()
+    diagnostics.wait_for(1)
+    assert len(said()) == 1
 
 
 def test_gravity_is_a_command_and_a_reset_brings_it_back(ros, simulator):

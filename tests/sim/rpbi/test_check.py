@@ -58,6 +58,23 @@ def test_warnings_are_told_apart_from_errors_and_only_errors_fail(tmp_path):
     ]
 
 
+def test_meshes_that_are_missing_are_told_together_with_all_else(tmp_path):
+    mesh = "<visual><geometry><mesh filename='none.stl'/></geometry></visual>"
+    (tmp_path / "cup.urdf").write_text(f"<robot name='cup'><link name='cup'>{mesh}</link></robot>")
+    cup = {"loadURDF": {"fileName": "cup.urdf"}}
+    write_world(tmp_path, dynamic=(box(baseMas=1.0),), urdfs=({**cup, "name": "a"}, {**cup, "name": "b", "hz": 1}))
+    code, lines, told = check("world.yaml", tmp_path)
+    assert (code, lines) == (1, [])
+    missing = f"loadURDF.fileName: {tmp_path}/cup.urdf: no such mesh: none.stl"
+    assert [line.split(" (looked")[0].split("; ")[0] for line in told] == [
+        "error: box.yaml: baseMas: unknown key 'baseMas'",
+        "error: b.yaml: hz: unknown key 'hz'",
+        f"error: a.yaml: {missing}",
+        f"error: b.yaml: {missing}",
+        "world.yaml: 4 errors",
+    ]
+
+
 def test_the_world_of_the_docs_is_fine(tmp_path):
     blocks = re.findall(r"```yaml\n# (\w+\.yaml)\n(.*?)```", (ROOT / "docs" / "worlds.md").read_text(), re.DOTALL)
     for name, text in blocks:

@@ -30,7 +30,7 @@ class _Printed:
     """The lines that PyBullet prints while a call lasts, on their way to the log.
 
     It prints by C's `printf` and `fprintf`, to the streams that C's variables `stdout` and `stderr` name. These are
-    changed, not the file descriptors 1 and 2: Python's own output, that of other threads too, goes where it always goes.
+    changed, not the file descriptors 1 and 2, so that Python's own output stays where it is, that of other threads too.
     """
 
     def __init__(self) -> None:

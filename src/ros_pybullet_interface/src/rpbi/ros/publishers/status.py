@@ -44,7 +44,7 @@ FREE_RUNNING_CLOCK_HZ = 250.0
 FALLING_BEHIND = 0.98
 """Share of the asked real-time factor below which the diagnostics warn."""
 SLOW_PERIODS = 3
-"""Messages of the diagnostics in a row after which a warning says why a world is slow; the start alone takes a while."""
+"""Messages of the diagnostics in a row after which a warning says why a world is slow; at its start it may be."""
 SLOW_CALL_S = 0.0005
 """From so long a call of PyBullet on, its window is what slows a world down [s]; without one it takes 10 µs."""
 
