@@ -12,16 +12,27 @@ from rpbi.bodies.robots.robot_config import RobotConfig
 from rpbi.config.world import WORLD_FRAME
 from rpbi.engine.inputs import PoseInput
 from rpbi.sensors.link_pose import LinkPoseSensor
+from rpbi.urdf.copies import weighed_by_pybullet
+from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.joints import Joint
 from rpbi.world import World
 
+MAX_NAMES = 5
+"""Links that a warning names; of more, it says that there are."""
 TOUCHING_M = 1e-3
 """Bodies that are in each other by less only touch: PyBullet has margins around meshes."""
 
 
 def world_warnings(world: World) -> list[Problem]:
     """Returns what looks wrong at the start of a world that has made no step yet, by the files that say it."""
-    return [*_Frames(world).warnings(), *_gravity(world), *_limits(world), *_topics(world), *_overlaps(world)]
+    return [
+        *_Frames(world).warnings(),
+        *_gravity(world),
+        *_masses(world),
+        *_limits(world),
+        *_topics(world),
+        *_overlaps(world),
+    ]
 
 
 def _file_of(world: World, name: str) -> str:
@@ -37,6 +48,18 @@ def _gravity(world: World) -> Iterator[Problem]:
     if free:
         message = f"missing, so there is no gravity, and {', '.join(free)} will not fall; write {{gravZ: -9.81}}, or 0"
         yield Problem(world.loaded.file, "setGravity", message)
+
+
+def _masses(world: World) -> Iterator[Problem]:
+    for item in world.loaded.objects:
+        load, body = getattr(item.config, "loadURDF", None), world.bodies[item.config.name]
+        if load is None or body.is_soft or not body.has_physics:
+            continue
+        is_fixed = bool(load.useFixedBase) or getattr(item.config, "planar_base", None) is not None
+        if links := weighed_by_pybullet(UrdfDocument(load.fileName), is_fixed):
+            shown = ", ".join(links[:MAX_NAMES]) + (", ..." if len(links) > MAX_NAMES else "")
+            message = f"without <inertial>, PyBullet gives 1 kg to each of these links: {shown}"
+            yield Problem(item.file, "loadURDF.fileName", message)
 
 
 def _limits(world: World) -> Iterator[Problem]:

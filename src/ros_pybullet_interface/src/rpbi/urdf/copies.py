@@ -9,6 +9,11 @@ from .document import UrdfDocument
 from .elements import Element, UrdfJoint, end_of, inertial, joint_element, new_element, read_vector, text_of, words
 from .files import beside_or_above
 
+WORLD_LINK = "world"
+"""The link that PyBullet takes for the world: without inertia it weighs nothing, and as a root it is fixed."""
+LEAST_KG = "1e-06"
+"""Mass of a floating root that is a mere frame [kg]: PyBullet would fix one without mass to the world."""
+
 
 def without_shapes(document: UrdfDocument, links: Sequence[str] | None = None) -> str:
     """Returns a URDF without shapes, of all or some links and the joints between them.
@@ -63,6 +68,73 @@ def mounted_on(document: UrdfDocument, joints: Sequence[UrdfJoint]) -> str:
     robot[:0] = [*links, root]  # in order, in case of URDF_MAINTAIN_LINK_ORDER
     robot.extend(map(joint_element, joints))
     return text_of(robot)
+
+
+def frame_masses(document: UrdfDocument, is_fixed: bool) -> dict[str, str]:
+    """Returns the masses [kg] of links that are mere frames, which PyBullet would give 1 kg each.
+
+    A frame is a link without inertia and shape. It weighs nothing, but PyBullet needs some mass where something moves
+    freely: a root that is not fixed weighs `LEAST_KG`, if mass is fixed to it. Left out are frames on a moving joint
+    that moves no mass, and a root that is neither fixed nor has mass fixed to it.
+
+    Args:
+        is_fixed: Whether the base is fixed to the world.
+    """
+    frames = document.frames - {WORLD_LINK}
+    if not frames:
+        return {}
+    above = {edge.child: edge for edge in document.edges}
+    # Mass that moves with a link, and that is fixed to it
+    carries, holds = (set(document.links) - document.frames - document.massless for _ in range(2))
+    for link in reversed(_from_the_root(document)):
+        edge = above.get(link)
+        if edge is not None and link in carries:
+            carries.add(edge.parent)
+        if edge is not None and link in holds and document.joint_types[edge.joint] == "fixed":
+            holds.add(edge.parent)
+    masses = {}
+    for link in frames:
+        if (edge := above.get(link)) is None:
+            masses |= {link: LEAST_KG} if link in holds and not is_fixed else {}
+        elif link in carries or document.joint_types[edge.joint] == "fixed":
+            masses[link] = "0"
+    return masses
+
+
+def _from_the_root(document: UrdfDocument) -> list[str]:
+    """Returns all links, each one after that on which it hangs."""
+    below: dict[str, list[str]] = {}
+    for edge in document.edges:
+        below.setdefault(edge.parent, []).append(edge.child)
+    ordered = [document.root_link()]
+    for link in ordered:
+        ordered += below.get(link, [])
+    return ordered
+
+
+def with_massless_frames(document: UrdfDocument, is_fixed: bool) -> str | None:
+    """Returns a URDF in which links that are mere frames weigh what `frame_masses` says; None if there are none."""
+    masses = frame_masses(document, is_fixed)
+    if not masses:
+        return None
+    robot = _absolute(document)
+    for link in robot.findall("link"):
+        if (mass := masses.get(link.get("name", ""))) is not None:
+            link.append(inertial(mass))
+    return text_of(robot)
+
+
+def weighed_by_pybullet(document: UrdfDocument, is_fixed: bool) -> list[str]:
+    """Returns the links that can move and weigh 1 kg because the URDF says nothing of their mass."""
+    above = {edge.child: edge for edge in document.edges}
+    moving: set[str] = set()
+    for link in _from_the_root(document):
+        edge = above.get(link)
+        is_free = not (is_fixed or link == WORLD_LINK) if edge is None else edge.parent in moving
+        if is_free or (edge is not None and document.joint_types[edge.joint] != "fixed"):
+            moving.add(link)
+    missing = document.links_without_inertial - frame_masses(document, is_fixed).keys()
+    return [link for link in document.links if link in missing & moving]
 
 
 def for_window(document: UrdfDocument) -> str | None:
@@ -124,5 +196,5 @@ def _absolute(document: UrdfDocument) -> Element:
     robot = copy.deepcopy(document.root)
     for element in robot.iterfind(".//*[@filename]"):
         name = element.get("filename", "")
-        element.set("filename", str(beside_or_above(name, document.source) or name))
+        element.set("filename", str(beside_or_above(name.removeprefix("model://"), document.source) or name))
     return robot

@@ -15,7 +15,7 @@ from rpbi.engine.client import Client
 from rpbi.meshes.checks import mesh_file_problem
 from rpbi.meshes.trial import Mesh, Use, faults_in
 
-from .copies import for_window
+from .copies import for_window, with_massless_frames
 from .document import UrdfDocument
 from .files import PACKAGE, beside_or_above, mesh_file, resolve_meshes, write_description
 from .structure import structure_problems, texts_for_numbers
@@ -119,6 +119,9 @@ def load_urdf(
         document = UrdfDocument(prepared)
         if texts := texts_for_numbers(document):
             log.warning("%s: expected numbers, PyBullet takes these for 0: %s", name, ", ".join(texts[:3]))
+        if (text := with_massless_frames(document, bool(arguments.get("useFixedBase")))) is not None:
+            prepared = write_description(text)
+            document = UrdfDocument(prepared)
         if pb.has_window and (text := for_window(document)) is not None:
             prepared = write_description(text)
         flags = arguments.get("flags") or 0
