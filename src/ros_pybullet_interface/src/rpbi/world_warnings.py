@@ -1,5 +1,6 @@
 """What is probably not meant in a world, although it can be built."""
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -11,12 +12,15 @@ from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.bodies.robots.robot_config import RobotConfig
 from rpbi.config.world import WORLD_FRAME
 from rpbi.engine.inputs import PoseInput
+from rpbi.meshes.triangles import volumes
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.urdf.copies import weighed_by_pybullet
 from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.joints import Joint
 from rpbi.world import World
 
+CONCAVE_SHARE = 0.05
+"""Share of a mesh's volume that its convex hull may add without a warning."""
 MAX_NAMES = 5
 """Links that a warning names; of more, it says that there are."""
 TOUCHING_M = 1e-3
@@ -29,6 +33,7 @@ def world_warnings(world: World) -> list[Problem]:
         *_Frames(world).warnings(),
         *_gravity(world),
         *_masses(world),
+        *_hulls(world),
         *_limits(world),
         *_topics(world),
         *_overlaps(world),
@@ -60,6 +65,21 @@ def _masses(world: World) -> Iterator[Problem]:
             shown = ", ".join(links[:MAX_NAMES]) + (", ..." if len(links) > MAX_NAMES else "")
             message = f"without <inertial>, PyBullet gives 1 kg to each of these links: {shown}"
             yield Problem(item.file, "loadURDF.fileName", message)
+
+
+def _hulls(world: World) -> Iterator[Problem]:
+    for item in world.loaded.objects:
+        shape = getattr(item.config, "createCollisionShape", None)
+        if shape is None or shape.shapeType != pybullet.GEOM_MESH or shape.fileName is None:
+            continue
+        is_exact = bool((shape.flags or 0) & pybullet.GEOM_FORCE_CONCAVE_TRIMESH)
+        if is_exact or getattr(item.config, "convexDecomposition", None) or not (found := volumes(shape.fileName)):
+            continue
+        mesh_m3, hull_m3 = (abs(math.prod(shape.meshScale or (1.0,))) * volume for volume in found)
+        if hull_m3 - mesh_m3 > CONCAVE_SHARE * mesh_m3:
+            added = f"which adds {hull_m3 - mesh_m3:.2g} m^3 to its {mesh_m3:.2g} m^3"
+            message = f"the concave mesh collides as its convex hull, {added}; see convexDecomposition"
+            yield Problem(item.file, "createCollisionShape.fileName", message)
 
 
 def _limits(world: World) -> Iterator[Problem]:

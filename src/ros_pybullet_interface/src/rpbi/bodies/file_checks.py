@@ -15,10 +15,12 @@ from rpbi.config.pybullet_models import (
     PybulletModel,
 )
 from rpbi.meshes.checks import mesh_problems, soft_mesh_problems
+from rpbi.meshes.decomposition import convex_parts
 from rpbi.meshes.trial import Mesh, Use, faults_in
 from rpbi.urdf.loading import urdf_problems
 
 from .body_config import BodyConfig
+from .shape_object import ConvexDecomposition
 
 _PARTS: dict[str, type[PybulletModel]] = {
     "createVisualShape": CreateVisualShape,
@@ -75,8 +77,26 @@ def file_problems(parts: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
                     problems = soft_mesh_problems(file)
                     yield from ((f"{key}.{inner}", message) for message in problems)
                     meshes |= {} if problems else {Mesh(Use.SOFT, file): f"{key}.{inner}"}
-    for mesh, fault in faults_in(meshes).items():
+    faults = faults_in(meshes)
+    for mesh, fault in faults.items():
         yield meshes[mesh], f"{fault}: {mesh.file}"
+    shape, decomposition = parts.get("createCollisionShape"), parts.get("convexDecomposition")
+    if not faults and isinstance(shape, CreateCollisionShape) and isinstance(decomposition, ConvexDecomposition):
+        if problem := _decomposition_problem(shape, decomposition):
+            yield "convexDecomposition", problem
+
+
+def _decomposition_problem(shape: CreateCollisionShape, decomposition: ConvexDecomposition) -> str:
+    """Returns why a shape cannot be divided into convex parts, empty if it can, and then is."""
+    if shape.shapeType != pybullet.GEOM_MESH or shape.fileName is None:
+        return "expected a createCollisionShape of GEOM_MESH with a fileName"
+    if (shape.flags or 0) & pybullet.GEOM_FORCE_CONCAVE_TRIMESH:
+        return "with the flag GEOM_FORCE_CONCAVE_TRIMESH a mesh collides as it is; remove one of the two"
+    try:
+        convex_parts(shape.fileName, decomposition.model_dump())
+    except ValueError as error:
+        return str(error)
+    return ""
 
 
 def _use_of(shape: CreateVisualShape | CreateCollisionShape) -> Use | None:

@@ -105,7 +105,8 @@ class Load(NamedTuple):
 
     def since(self, before: Load) -> Load:
         """Returns what was spent since an earlier time."""
-        return Load(*(now - then for now, then in zip(self, before)))
+        wall_s, loop_s, process_s, physics_s = (now - then for now, then in zip(self[:4], before[:4]))
+        return Load(wall_s, loop_s, process_s, physics_s, self.ticks - before.ticks)
 
     def reason(self, dt_s: float) -> str:
         """Returns why a world that spent this is slower than it should be, and what to do about it.

@@ -7,7 +7,6 @@ may well crash, which is what it is for.
 import ctypes
 import math
 import os
-import resource
 import struct
 import sys
 import tempfile
@@ -18,7 +17,7 @@ import pybullet
 
 from custom_ros_tools.config import read_file
 
-from .trial import MOST_BYTES, MOST_CPU_S, Use
+from .trial import MOST_CPU_S, Use, limit_resources
 
 GETS_NOTHING = b"cannot extract anything useful"
 """What PyBullet says of a mesh that it leaves out; nothing else tells it of a visual one."""
@@ -26,10 +25,7 @@ GETS_NOTHING = b"cannot extract anything useful"
 
 def main() -> None:
     """Tries all meshes that the arguments name."""
-    for limit, most in ((resource.RLIMIT_AS, MOST_BYTES), (resource.RLIMIT_CPU, MOST_CPU_S), (resource.RLIMIT_CORE, 0)):
-        already = resource.getrlimit(limit)[0]
-        most = most if already == resource.RLIM_INFINITY else min(already, most)
-        resource.setrlimit(limit, (most, most))
+    limit_resources(MOST_CPU_S)
     report, *meshes = sys.argv[1:]
     said = tempfile.TemporaryFile()
     os.dup2(said.fileno(), 1)

@@ -7,6 +7,7 @@ well is remembered by its content, in the user's cache folder, so that every mes
 import enum
 import logging
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -51,6 +52,14 @@ class Mesh(NamedTuple):
 
 _tried: set[tuple[Mesh, int, int]] = set()
 """Meshes that went well, by size and time of the last change [ns]: files that are the same need not be read again."""
+
+
+def limit_resources(cpu_s: int) -> None:
+    """Limits what this process may take: memory, time of the processor [s], and no core dump."""
+    for limit, most in ((resource.RLIMIT_AS, MOST_BYTES), (resource.RLIMIT_CPU, cpu_s), (resource.RLIMIT_CORE, 0)):
+        already = resource.getrlimit(limit)[0]
+        most = most if already == resource.RLIM_INFINITY else min(already, most)
+        resource.setrlimit(limit, (most, most))
 
 
 def faults_in(meshes: Iterable[Mesh]) -> dict[Mesh, str]:

@@ -92,7 +92,7 @@ def frame_masses(document: UrdfDocument, is_fixed: bool) -> dict[str, str]:
             carries.add(edge.parent)
         if edge is not None and link in holds and document.joint_types[edge.joint] == "fixed":
             holds.add(edge.parent)
-    masses = {}
+    masses: dict[str, str] = {}
     for link in frames:
         if (edge := above.get(link)) is None:
             masses |= {link: LEAST_KG} if link in holds and not is_fixed else {}
