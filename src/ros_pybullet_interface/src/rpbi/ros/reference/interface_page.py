@@ -15,8 +15,8 @@ from .reference_world import CONTROLLERS, JOINT
 INTRODUCTION = """\
 What the node `ros_pybullet_interface_node.py` has in ROS. `./rpbi check WORLD.yaml` tells the same of your own world.
 
-- `NAME` stands for the name of an object, `JOINT` for that of a joint, `LINK` for that of a link, `CONTROLLER` for that of a
-  [controller](controllers.md) in a robot's YAML.
+- `NAME` stands for the name of an object, `JOINT` for that of a joint, `LINK` for that of a link, `CONTROLLER` for
+  that of a [controller](controllers.md) in a robot's YAML.
 - Names without `/` in front are relative: a namespace moves them.
 - All that is of one tick has that tick's stamp. Rates are in the world's time unless they are said to be in wall time.
 - Keys such as `broadcast_hz` set the rate or open the topic; they stand in [config_reference.md](config_reference.md).
