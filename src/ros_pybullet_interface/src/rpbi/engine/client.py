@@ -14,6 +14,8 @@ from rpbi.geometry import Vector
 
 WINDOWS = frozenset((pybullet.GUI, pybullet.GUI_SERVER, pybullet.GUI_MAIN_THREAD))
 """Modes in which PyBullet opens a window of its own; in others it is the server's, if there is one."""
+MAXIMAL_COORDINATES = 1
+"""PyBullet's type of bodies that the solver of rigid bodies moves, in `getDynamicsInfo`."""
 
 
 class Client:
