@@ -7,6 +7,7 @@ from pathlib import Path
 
 from custom_ros_tools.config import read_file, replace_package
 from custom_ros_tools.errors import ConfigError, Problem
+from rpbi.meshes.copies import with_textures_that_exist
 from rpbi.temporary import temporary_folder
 
 _FILENAME = re.compile(
@@ -77,7 +78,8 @@ def description_for_ros(path: str) -> str:
     """Returns a URDF file as ROS wants it, which does not know where the file is.
 
     Returns:
-        Its text, with relative mesh paths as `file://` addresses; paths of ROS packages stay.
+        Its text, with relative mesh paths as `file://` addresses; paths of ROS packages stay. Meshes whose textures
+        are missing are copies without them.
 
     Raises:
         ConfigError: If a mesh belongs to an unknown package.
@@ -92,7 +94,7 @@ def description_for_ros(path: str) -> str:
             file = mesh_file(mesh, source)
         else:
             file = None if _is_in_its_package(mesh) else _near(mesh, source)
-        said = mesh if file is None else f"file://{file.resolve()}"
+        said = mesh if file is None else f"file://{with_textures_that_exist(file.resolve())}"
         return f"{match['before']}{match['quote']}{said}{match['quote']}"
 
     return _FILENAME.sub(address, _read(source))
