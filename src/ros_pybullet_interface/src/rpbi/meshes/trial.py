@@ -5,10 +5,11 @@ well is remembered by its content, in the user's cache folder, so that every mes
 """
 
 import enum
+import errno
 import hashlib
+import io
 import logging
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -18,7 +19,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
+from custom_ros_tools.child_process import start_child
 from custom_ros_tools.config import read_file
+from custom_ros_tools.errors import shortened
 
 TRIAL = 2
 """Number of the present kind of trial; meshes that went well in another are tried again."""
@@ -30,8 +33,10 @@ LONGEST_TRIAL_S = 60.0
 """Time that a trial may take [s] of wall time."""
 MOST_TOGETHER = 100
 """Meshes that one process tries, as long as it lives."""
-_NAMED = re.compile(rb"^\s*(?:mtllib|map_\w+)\s+(.*?)\s*$", re.MULTILINE)
-"""Files that an OBJ file and its materials name."""
+MOST_FILE_BYTES = 1_000_000_000
+"""Length of a file."""
+MOST_FILES = 100
+"""Files that a mesh consists of, with its materials and textures."""
 
 log = logging.getLogger(__name__)
 
@@ -101,9 +106,9 @@ def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
     command = [sys.executable, "-P", "-m", __name__.rpartition(".")[0], str(writing)]
     with open(reading, "rb") as report:
         try:
-            process = subprocess.Popen(
+            process = start_child(
                 [*command, *(part for mesh in meshes for part in (mesh.use.value, mesh.file))],
-                stdin=subprocess.DEVNULL,
+                signal.SIGKILL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 pass_fds=[writing],
@@ -118,6 +123,8 @@ def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
         finally:
             process.kill()
             process.wait()
+            assert process.stdin is not None
+            process.stdin.close()
         lines = report.read().decode(errors="replace").splitlines()
     return [f"PyBullet cannot load it: {line}" if line else "" for line in lines], end or "it could not be tried"
 
@@ -132,7 +139,11 @@ def _words(returncode: int) -> str:
 
 
 def _hash_of(file: str) -> str:
-    """Returns the hash of all that PyBullet reads of a mesh."""
+    """Returns the hash of all that PyBullet reads of a mesh.
+
+    Raises:
+        OSError: If one of its files is there, but is no ordinary file, or if it names too many.
+    """
     digest = hashlib.blake2b(f"{TRIAL} {version('pybullet')}".encode(), digest_size=16)
     waiting, seen = [Path(file)], set()
     while waiting:
@@ -140,12 +151,26 @@ def _hash_of(file: str) -> str:
         if path in seen:
             continue
         seen.add(path)
-        with suppress(OSError):  # it may name what is not there
-            data = read_file(path)
-            digest.update(f"{path.suffix.lower()} {len(data)} ".encode() + data)
-            if path.suffix.lower() in (".obj", ".mtl"):
-                waiting += [path.parent / os.fsdecode(name) for name in _NAMED.findall(data) if b"\0" not in name]
+        if len(seen) > MOST_FILES:
+            raise OSError(errno.EMFILE, f"names more than {MOST_FILES} files")
+        try:
+            data = read_file(path, MOST_FILE_BYTES)
+        except OSError as error:
+            if len(seen) > 1 and os.path.exists(path):  # it may name what is not there
+                raise OSError(error.errno, f"names '{shortened(path.name)}', which {error.strerror}") from None
+            continue
+        digest.update(f"{path.suffix.lower()} {len(data)} ".encode() + data)
+        if path.suffix.lower() in (".obj", ".mtl"):
+            waiting += [path.parent / os.fsdecode(name) for name in _named_in(data)]
     return digest.hexdigest()
+
+
+def _named_in(data: bytes) -> Iterator[bytes]:
+    """Yields the files that an OBJ file or its materials name."""
+    for line in io.BytesIO(data):
+        words = line.split(None, 1)
+        if len(words) == 2 and (words[0] == b"mtllib" or words[0].startswith(b"map_")) and b"\0" not in line:
+            yield words[1].rstrip()
 
 
 def _folder() -> Path:
