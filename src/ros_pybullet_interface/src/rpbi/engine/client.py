@@ -31,9 +31,9 @@ log = logging.getLogger("pybullet")
 class _Printed:
     """The lines that PyBullet prints while a call lasts, on their way to the log.
 
-    It prints by C's `printf` and `fprintf`, to the streams that C's variables `stdout` and `stderr` name. These variables
-    are changed, not the file descriptors 1 and 2: Python's own output, that of other threads too, goes where it always
-    goes.
+    It prints by C's `printf` and `fprintf`, to the streams that C's variables `stdout` and `stderr` name. These
+    variables are changed, not the file descriptors 1 and 2: Python's own output, that of other threads too, goes where
+    it always goes.
     """
 
     def __init__(self) -> None:

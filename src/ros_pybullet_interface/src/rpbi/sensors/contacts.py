@@ -14,7 +14,6 @@ from rpbi.samples import ContactPoint, ContactsSample
 
 from .sensor import SensedWorld, Sensor
 
-
 Touch = tuple[Any, ...]
 """A contact point as PyBullet's `getContactPoints` returns it."""
 
@@ -57,6 +56,7 @@ class ContactReader:
         self._are_finite = _finite(all_touches)
         by_body: dict[int, list[list[Touch]]] = {}
         links: tuple[int, ...] = ()
+        together: list[Touch] = []
         for touch in all_touches:
             if touch[8] > 0.0 and touch[9] == 0.0:
                 continue  # near, but not touching
@@ -70,9 +70,7 @@ class ContactReader:
 
 def _finite(touches: Iterable[Touch]) -> bool:
     """Tells whether all numbers of contact points are finite: `dist` is, if those of both its vectors are."""
-    sizes = [
-        dist(t[5], t[6]) + dist(t[7], t[11]) + dist(t[7], t[13]) + t[8] + t[9] + t[10] + t[12] for t in touches
-    ]
+    sizes = [dist(t[5], t[6]) + dist(t[7], t[11]) + dist(t[7], t[13]) + t[8] + t[9] + t[10] + t[12] for t in touches]
     return isfinite(sum(sizes))
 
 
