@@ -8,7 +8,7 @@ import pybullet
 import pytest
 from worlds import FLOOR, ball, box, iiwa, write_world
 
-from custom_ros_tools.errors import ConfigError
+from custom_ros_tools.errors import ConfigError, PhysicsError
 from rpbi.config.loading import load_object
 from rpbi.geometry import Pose
 from rpbi.samples import ContactArrowsSample, ContactsSample
@@ -150,6 +150,28 @@ def test_pybullet_is_asked_once_a_tick_for_all(build, monkeypatch):
     monkeypatch.setattr(world.pb, "getContactPoints", lambda *given: asked.append(given) or original(*given))
     run(world, 10)
     assert asked == [()] * 10
+
+
+@pytest.mark.parametrize("field", range(5, 14))
+def test_what_is_not_finite_is_refused_by_name_and_tick_and_only_where_it_is(build, monkeypatch, field):
+    world = build(resting_box("a"), resting_box("b", 0.3), floor={**FLOOR, "contacts": TOLD})
+    run(world, 10)
+    original = world.pb.getContactPoints
+
+    def spoilt() -> list[tuple]:
+        value = math.nan if field in (8, 9, 10, 12) else (0.0, math.inf, 0.0)
+        ends = {world.bodies["floor"].body_id, world.bodies["a"].body_id}
+        return [
+            touch[:field] + (value,) + touch[field + 1 :] if set(touch[1:3]) == ends else touch for touch in original()
+        ]
+
+    monkeypatch.setattr(world.pb, "getContactPoints", spoilt)
+    world.set_sensor_rate("floor", 0, 0.0)
+    world.set_sensor_rate("a", 0, 0.0)
+    run(world, 1)  # those on the other box are sound
+    world.set_sensor_rate("a", 0, 1000.0)
+    with pytest.raises(PhysicsError, match="a: contacts are not finite any more at tick 12"):
+        world.step()
 
 
 def test_arrows_are_the_forces_to_scale(build):

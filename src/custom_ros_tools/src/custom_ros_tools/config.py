@@ -20,6 +20,9 @@ MOST_BYTES = 16_000_000
 """A YAML file or text may be so long."""
 MOST_VALUES = 1_000_000
 """And have so many values, with those that aliases (`*NAME`) repeat counted each time."""
+LONGEST_NUMBER = 1000
+"""Characters of a number."""
+_INT, _FLOAT = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
 _PACKAGE = re.compile(r"package://(?P<uri>[^/{}]+)|\{(?P<braces>[^{}]*)\}")
 
 
@@ -103,14 +106,14 @@ def load_config(path: str, most_bytes: int = MOST_BYTES) -> dict[str, Any]:
     return load_configs(text, path)
 
 
-def load_configs(s: str, file: str = "text") -> dict[str, Any]:
+def load_configs(s: str, file: str = "text", most_characters: int = MOST_BYTES) -> dict[str, Any]:
     """Returns the mapping in the YAML text `s`, which messages call `file`; an empty text is an empty mapping.
 
     Raises:
         ConfigError: If it is not a YAML mapping, names a key twice, asks for Python objects, or is too large.
     """
-    if len(s) > MOST_BYTES:
-        raise ConfigError([Problem(file, "", f"has {len(s)} characters, expected at most {MOST_BYTES}")])
+    if len(s) > most_characters:
+        raise ConfigError([Problem(file, "", f"has {len(s)} characters, expected at most {most_characters}")])
     try:
         data = yaml.load(s, Loader=_StrictLoader)
     except yaml.MarkedYAMLError as error:
@@ -142,6 +145,19 @@ class _StrictLoader(yaml.SafeLoader):
         if _size(node, {}) > MOST_VALUES:
             raise yaml.YAMLError(f"its aliases repeat more than {MOST_VALUES} values")
         return self.construct_document(node)
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        is_number = isinstance(node, yaml.ScalarNode) and node.tag in (_INT, _FLOAT)
+        try:
+            if is_number and len(node.value) > LONGEST_NUMBER:  # it would be worked out digit by digit
+                raise ValueError("too long")
+            return super().construct_object(node, deep)
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
+            wanted = node.tag.removeprefix("tag:yaml.org,2002:")
+            got = shortened(node.value) if isinstance(node, yaml.ScalarNode) else f"a {node.id}"
+            raise yaml.constructor.ConstructorError(
+                None, None, f"expected a value of the type {shortened(wanted)}, got '{got}'", node.start_mark
+            ) from None
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         seen: dict[Any, yaml.Node] = {}

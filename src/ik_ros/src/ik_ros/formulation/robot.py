@@ -13,6 +13,7 @@ from rpbi.kinematics.limits import Limits
 from rpbi.urdf.copies import with_limited_joints
 from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.elements import MOVING
+from rpbi.urdf.structure import check_structure
 
 from .clearance import RobotShape
 
@@ -66,6 +67,7 @@ class Robot:
         self, urdf_path: str, floating: bool = False, joints: Sequence[str] = (), base: str | None = None
     ) -> None:
         document = UrdfDocument(urdf_path)
+        check_structure(document)
         types = document.joint_types
         if base is not None:
             _known("link", base, document.links)

@@ -23,7 +23,7 @@ class ContactArrowsSensor(Sensor):
         """Reads the contacts and scales their forces; where there is none there is no arrow."""
         arrows = (
             (point.position, plus(point.position, scaled(self._metres_per_newton, point.force)))
-            for point in self._contacts.points(tick)
+            for point in self._contacts.read(tick).points
         )
         return ContactArrowsSample(self.name, tuple((start, end) for start, end in arrows if start != end))
 
