@@ -164,7 +164,9 @@ def test_a_session_with_an_arm_is_the_same_after_a_reset(build):
             if tick % 100 == 0:
                 world.put("iiwa/target", JointTarget(["lbr_iiwa_joint_1"], [0.6 * (-1.0) ** (tick // 100)]))
             world.step()
-            hashes.append((world.state_hash(), bool(world.contacts.sample(world.bodies["iiwa"], world.clock.tick).points)))
+            hashes.append(
+                (world.state_hash(), bool(world.contacts.sample(world.bodies["iiwa"], world.clock.tick).points))
+            )
         return hashes
 
     first = session()

@@ -11,9 +11,7 @@ from rpbi.bodies.body import Body
 from rpbi.engine.client import Client
 from rpbi.geometry import scaled
 from rpbi.samples import ContactPoint, ContactsSample
-
-from .sensor import SensedWorld, Sensor
-
+from rpbi.sensors.sensor import SensedWorld, Sensor
 
 Touch = tuple[Any, ...]
 """A contact point as PyBullet's `getContactPoints` returns it."""
@@ -61,7 +59,8 @@ class ContactReader:
             if touch[8] > 0.0 and touch[9] == 0.0:
                 continue  # near, but not touching
             if touch[1:5] != links:
-                links, together = touch[1:5], []
+                links = touch[1:5]
+                together: list[Touch] = []
                 for body_id in {touch[1], touch[2]}:
                     by_body.setdefault(body_id, []).append(together)
             together.append(touch)
@@ -70,9 +69,7 @@ class ContactReader:
 
 def _finite(touches: Iterable[Touch]) -> bool:
     """Tells whether all numbers of contact points are finite: `dist` is, if those of both its vectors are."""
-    sizes = [
-        dist(t[5], t[6]) + dist(t[7], t[11]) + dist(t[7], t[13]) + t[8] + t[9] + t[10] + t[12] for t in touches
-    ]
+    sizes = [dist(t[5], t[6]) + dist(t[7], t[11]) + dist(t[7], t[13]) + t[8] + t[9] + t[10] + t[12] for t in touches]
     return isfinite(sum(sizes))
 
 
