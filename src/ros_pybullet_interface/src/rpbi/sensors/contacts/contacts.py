@@ -11,8 +11,7 @@ from rpbi.bodies.body import Body
 from rpbi.engine.client import Client
 from rpbi.geometry import scaled
 from rpbi.samples import ContactPoint, ContactsSample
-
-from .sensor import SensedWorld, Sensor
+from rpbi.sensors.sensor import SensedWorld, Sensor
 
 Touch = tuple[Any, ...]
 """A contact point as PyBullet's `getContactPoints` returns it."""
@@ -61,7 +60,8 @@ class ContactReader:
             if touch[8] > 0.0 and touch[9] == 0.0:
                 continue  # near, but not touching
             if touch[1:5] != links:
-                links, together = touch[1:5], []
+                links = touch[1:5]
+                together: list[Touch] = []
                 for body_id in {touch[1], touch[2]}:
                     by_body.setdefault(body_id, []).append(together)
             together.append(touch)
