@@ -9,7 +9,7 @@ from worlds import iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError
 from rpbi.samples import JointStateSample, LinkPoseSample, WrenchSample
-from rpbi.urdf.copies import with_massless_frames
+from rpbi.urdf.copies import frame_masses
 from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
@@ -207,7 +207,7 @@ def test_links_whose_mass_nobody_says_are_told_if_they_can_move(build, tmp_path)
 def test_a_urdf_without_frames_is_loaded_as_it_is():
     for file in ("kuka_iiwa/model.urdf", "franka_panda/panda.urdf", "r2d2.urdf", "humanoid/humanoid.urdf"):
         document = UrdfDocument(f"{pybullet_data.getDataPath()}/{file}")
-        assert with_massless_frames(document, is_fixed=True) is None
+        assert frame_masses(document, is_fixed=True) == {}
 
 
 def test_a_root_that_is_called_world_stays_fixed(build):

@@ -12,7 +12,7 @@ import pybullet_data
 import pytest
 
 from rpbi.meshes.copies import cache_folder, kept
-from rpbi.urdf.files import description_for_ros
+from rpbi.urdf.copies import description_for_ros
 
 PANDA = f"{pybullet_data.getDataPath()}/franka_panda/panda.urdf"
 """In the materials of one of its meshes stand paths of a computer that ran Windows."""

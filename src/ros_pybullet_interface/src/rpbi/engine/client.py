@@ -16,6 +16,8 @@ from rpbi.geometry import Vector
 
 WINDOWS = frozenset((pybullet.GUI, pybullet.GUI_SERVER, pybullet.GUI_MAIN_THREAD))
 """Modes in which PyBullet opens a window of its own; in others it is the server's, if there is one."""
+MAXIMAL_COORDINATES = 1
+"""PyBullet's type of bodies that the solver of rigid bodies moves, in `getDynamicsInfo`."""
 
 
 PRINTING = frozenset(
@@ -29,8 +31,9 @@ log = logging.getLogger("pybullet")
 class _Printed:
     """The lines that PyBullet prints while a call lasts, on their way to the log.
 
-    It prints by C's `printf` and `fprintf`, to the streams that C's variables `stdout` and `stderr` name. These are
-    changed, not the file descriptors 1 and 2, so that Python's own output stays where it is, that of other threads too.
+    It prints by C's `printf` and `fprintf`, to the streams that C's variables `stdout` and `stderr` name. These
+    variables are changed, not the file descriptors 1 and 2: Python's own output, that of other threads too, goes where
+    it always goes.
     """
 
     def __init__(self) -> None:

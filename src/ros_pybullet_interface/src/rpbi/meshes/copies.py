@@ -1,19 +1,22 @@
 """Files made from meshes, kept in the user's cache folder by what they were made from."""
 
+import errno
 import hashlib
+import io
 import os
-import re
 import shutil
 import tempfile
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from pathlib import Path
 
 from custom_ros_tools.config import read_file
+from custom_ros_tools.errors import shortened
 
-_NAMED = re.compile(rb"^\s*(mtllib|map_\w+)\s+(.*?)\s*$", re.MULTILINE)
-"""Files that an OBJ file and its materials name."""
+MOST_FILE_BYTES = 1_000_000_000
+"""Length of a file."""
+MOST_FILES = 100
+"""Files that a mesh consists of, with its materials and textures."""
 
 
 def cache_folder() -> Path:
@@ -22,7 +25,11 @@ def cache_folder() -> Path:
 
 
 def content_hash(file: str, *parameters: object) -> str:
-    """Returns a hash of all that PyBullet reads of a mesh, of its version, and of what else matters."""
+    """Returns a hash of all that PyBullet reads of a mesh, of its version, and of what else matters.
+
+    Raises:
+        OSError: If one of its files is there, but is no ordinary file, or if it names too many.
+    """
     digest = hashlib.blake2b(f"{parameters} {version('pybullet')}".encode(), digest_size=16)
     waiting, seen = [Path(file)], set()
     while waiting:
@@ -30,17 +37,26 @@ def content_hash(file: str, *parameters: object) -> str:
         if path in seen:
             continue
         seen.add(path)
-        with suppress(OSError):  # it may name what is not there
-            data = read_file(path)
-            digest.update(f"{path.suffix.lower()} {len(data)} ".encode() + data)
-            if path.suffix.lower() in (".obj", ".mtl"):
-                waiting += [path.parent / name for _, name in _named(data)]
+        if len(seen) > MOST_FILES:
+            raise OSError(errno.EMFILE, f"names more than {MOST_FILES} files")
+        try:
+            data = read_file(path, MOST_FILE_BYTES)
+        except OSError as error:
+            if len(seen) > 1 and os.path.exists(path):  # it may name what is not there
+                raise OSError(error.errno, f"names '{shortened(path.name)}', which {error.strerror}") from None
+            continue
+        digest.update(f"{path.suffix.lower()} {len(data)} ".encode() + data)
+        if path.suffix.lower() in (".obj", ".mtl"):
+            waiting += [path.parent / name for _, name in _named(data)]
     return digest.hexdigest()
 
 
-def _named(text: bytes) -> list[tuple[bytes, str]]:
-    """Returns the lines of an OBJ file, or of its materials, that name files, and what they name."""
-    return [(match[0], os.fsdecode(match[2])) for match in _NAMED.finditer(text) if b"\0" not in match[2]]
+def _named(data: bytes) -> Iterator[tuple[bytes, str]]:
+    """Yields the lines of an OBJ file, or of its materials, that name files, and the names."""
+    for line in io.BytesIO(data):
+        words = line.split(None, 1)
+        if len(words) == 2 and (words[0] == b"mtllib" or words[0].startswith(b"map_")) and b"\0" not in line:
+            yield line, os.fsdecode(words[1].rstrip())
 
 
 def kept(name: str, make: Callable[[Path], None]) -> Path:
@@ -83,7 +99,7 @@ def with_textures_that_exist(mesh: Path) -> Path:
         if not missing:
             return mesh
         for name, line in missing:
-            materials[name] = materials[name].replace(line, b"")
+            materials[name] = materials[name].replace(line, b"\n")
 
         def make(folder: Path) -> None:
             for name, text in {mesh.name: data, **materials}.items():

@@ -16,6 +16,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
+from custom_ros_tools.child_process import start_child
+
 from .copies import cache_folder, content_hash
 
 TRIAL = 2
@@ -105,9 +107,9 @@ def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
     command = [sys.executable, "-P", "-m", __name__.rpartition(".")[0], str(writing)]
     with open(reading, "rb") as report:
         try:
-            process = subprocess.Popen(
+            process = start_child(
                 [*command, *(part for mesh in meshes for part in (mesh.use.value, mesh.file))],
-                stdin=subprocess.DEVNULL,
+                signal.SIGKILL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 pass_fds=[writing],
@@ -122,6 +124,8 @@ def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
         finally:
             process.kill()
             process.wait()
+            assert process.stdin is not None
+            process.stdin.close()
         lines = report.read().decode(errors="replace").splitlines()
     return [f"PyBullet cannot load it: {line}" if line else "" for line in lines], end or "it could not be tried"
 

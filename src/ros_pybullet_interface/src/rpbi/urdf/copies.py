@@ -1,13 +1,76 @@
-"""Changed copies of a URDF, as text."""
+"""Changed copies of a URDF."""
 
 import copy
-from collections.abc import Sequence
+import logging
+from collections.abc import Mapping, Sequence
 
+from custom_ros_tools.errors import ConfigError, Problem, shortened
 from rpbi.geometry import scaled
 
 from .document import UrdfDocument
-from .elements import Element, UrdfJoint, end_of, inertial, joint_element, new_element, read_vector, text_of, words
-from .files import beside_or_above
+from .elements import (
+    Element,
+    UrdfJoint,
+    as_read,
+    end_of,
+    inertial,
+    joint_element,
+    new_element,
+    read_vector,
+    text_of,
+    words,
+)
+from .files import address_for_ros, beside_or_above, found_mesh
+
+log = logging.getLogger(__name__)
+
+
+def for_pybullet(document: UrdfDocument) -> Element:
+    """Returns what PyBullet reads of a URDF, with absolute names of files.
+
+    PyBullet knows nothing of ROS packages. Textures that are no ordinary files, or are not there, are left out.
+
+    Raises:
+        ConfigError: If a mesh belongs to an unknown package or does not exist.
+    """
+    robot = as_read(document.root)
+    problems: list[Problem] = []
+    for parent in list(robot.iter()):
+        for element in parent.findall("*[@filename]"):
+            name = element.get("filename", "")
+            try:
+                if element.tag != "texture":
+                    element.set("filename", str(found_mesh(name, document.source)))
+                elif (file := beside_or_above(name, document.source)) is not None:
+                    element.set("filename", str(file))
+                else:
+                    log.info("%s: no such texture: %s", document.path, shortened(name))
+                    parent.remove(element)
+            except ConfigError as error:
+                problems += error.problems
+            except OSError as error:
+                problems.append(Problem(document.path, "", str(error)))
+    if problems:
+        raise ConfigError(problems)
+    return robot
+
+
+def description_for_ros(path: str) -> str:
+    """Returns a URDF file as ROS wants it, which does not know where the file is.
+
+    Returns:
+        Its text, with relative mesh paths as `file://` addresses; paths of ROS packages stay.
+
+    Raises:
+        ConfigError: If it is no URDF, or a mesh belongs to an unknown package.
+    """
+    document = UrdfDocument(path)
+    robot = copy.deepcopy(document.root)
+    for tag in ("mesh", "texture"):
+        for element in robot.iterfind(f".//{tag}[@filename]"):
+            element.set("filename", address_for_ros(element.get("filename", ""), document.source))
+    return text_of(robot)
+
 
 WORLD_LINK = "world"
 """The link that PyBullet takes for the world: without inertia it weighs nothing, and as a root it is fixed."""
@@ -24,7 +87,8 @@ def without_shapes(document: UrdfDocument, links: Sequence[str] | None = None) -
     kept = [name for name in document.links if links is None or name in links]
     ends = {*kept}
     every = document.joint_elements
-    joints = [one for one in every if links is None or {end_of(one, "parent"), end_of(one, "child")} <= ends]
+    tied = (one for one in every if links is None or {end_of(one, "parent"), end_of(one, "child")} <= ends)
+    joints = map(as_read, tied)
     bare = [new_element("link", inertial("1"), name=name) for name in kept]
     return text_of(new_element("robot", *bare, *joints, **document.root.attrib))
 
@@ -53,21 +117,21 @@ def with_limited_joints(document: UrdfDocument, base: str | None = None) -> str:
     return text_of(root)
 
 
-def mounted_on(document: UrdfDocument, joints: Sequence[UrdfJoint]) -> str:
-    """Returns a URDF with a chain of massless links above the root, and with absolute names of meshes.
+def mounted_on(robot: Element, root_link: str, joints: Sequence[UrdfJoint]) -> None:
+    """Puts a chain of massless links above the root of a robot.
 
     Args:
+        robot: The robot, which is changed.
+        root_link: The name of its root.
         joints: The joints of the chain, from its fixed end to the root.
     """
-    robot = _absolute(document)
-    root = next(link for link in robot.findall("link") if link.get("name") == joints[-1].child)
+    root = next(link for link in robot.findall("link") if link.get("name") == root_link)
     if root.find("inertial") is None:
         root.append(inertial("0"))  # PyBullet gives 1 kg to any link without, unless it is the fixed one
     robot.remove(root)
     links = [new_element("link", inertial("0"), name=joint.parent) for joint in joints]
     robot[:0] = [*links, root]  # in order, in case of URDF_MAINTAIN_LINK_ORDER
     robot.extend(map(joint_element, joints))
-    return text_of(robot)
 
 
 def frame_masses(document: UrdfDocument, is_fixed: bool) -> dict[str, str]:
@@ -112,16 +176,11 @@ def _from_the_root(document: UrdfDocument) -> list[str]:
     return ordered
 
 
-def with_massless_frames(document: UrdfDocument, is_fixed: bool) -> str | None:
-    """Returns a URDF in which links that are mere frames weigh what `frame_masses` says; None if there are none."""
-    masses = frame_masses(document, is_fixed)
-    if not masses:
-        return None
-    robot = _absolute(document)
+def weigh_frames(robot: Element, masses: Mapping[str, str]) -> None:
+    """Gives links of a robot, by name, masses [kg] such as `frame_masses` returns."""
     for link in robot.findall("link"):
         if (mass := masses.get(link.get("name", ""))) is not None:
             link.append(inertial(mass))
-    return text_of(robot)
 
 
 def weighed_by_pybullet(document: UrdfDocument, is_fixed: bool) -> list[str]:
@@ -133,26 +192,21 @@ def weighed_by_pybullet(document: UrdfDocument, is_fixed: bool) -> list[str]:
         is_free = not (is_fixed or link == WORLD_LINK) if edge is None else edge.parent in moving
         if is_free or (edge is not None and document.joint_types[edge.joint] != "fixed"):
             moving.add(link)
-    missing = document.links_without_inertial - frame_masses(document, is_fixed).keys()
-    return [link for link in document.links if link in missing & moving]
+    silent = {link.get("name", "") for link in document.root.findall("link") if link.find("inertial") is None}
+    missing = moving & silent - frame_masses(document, is_fixed).keys()
+    return [link for link in document.links if link in missing]
 
 
-def for_window(document: UrdfDocument) -> str | None:
-    """Returns a URDF with the first visual of each link at its end, with absolute names of meshes.
+def put_first_visuals_last(robot: Element) -> None:
+    """Puts the first visual of each link of a robot at its end.
 
     PyBullet's window draws a whole link in the colour of its last visual; the first one is the link's main one, as
     a rule.
-
-    Returns:
-        Nothing if no link has several.
     """
-    robot = _absolute(document)
-    several = [link for link in robot.findall("link") if len(link.findall("visual")) > 1]
-    for link in several:
-        first = link.findall("visual")[0]
-        link.remove(first)
-        link.append(first)
-    return text_of(robot) if several else None
+    for link in robot.findall("link"):
+        if len(visuals := link.findall("visual")) > 1:
+            link.remove(visuals[0])
+            link.append(visuals[0])
 
 
 def chain_urdf(joints: Sequence[UrdfJoint]) -> str:
@@ -189,12 +243,3 @@ def _hang_on(robot: Element, base: str) -> None:
             robot.append(new_element("link", name=start))
             robot.append(new_element("joint", *between, origin, name=f"{start}/fixed", type="fixed"))
         link = parent
-
-
-def _absolute(document: UrdfDocument) -> Element:
-    """Returns a copy that may stand in another folder, since names of meshes and textures are absolute."""
-    robot = copy.deepcopy(document.root)
-    for element in robot.iterfind(".//*[@filename]"):
-        name = element.get("filename", "")
-        element.set("filename", str(beside_or_above(name.removeprefix("model://"), document.source) or name))
-    return robot
