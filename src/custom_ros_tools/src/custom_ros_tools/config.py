@@ -1,10 +1,12 @@
 """Configuration files: paths with ROS packages in them, and YAML that is safe to load."""
 
 import errno
+import gc
 import os
 import re
 import stat
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, cast
@@ -115,7 +117,8 @@ def load_configs(s: str, file: str = "text", most_characters: int = MOST_BYTES) 
     if len(s) > most_characters:
         raise ConfigError([Problem(file, "", f"has {len(s)} characters, expected at most {most_characters}")])
     try:
-        data = yaml.load(s, Loader=_StrictLoader)
+        with _without_collections():
+            data = yaml.load(s, Loader=_StrictLoader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
@@ -135,6 +138,29 @@ def config_to_str(config: Mapping[str, Any]) -> str:
     return str(yaml.safe_dump(dict(config), sort_keys=False))
 
 
+@contextmanager
+def _without_collections() -> Iterator[None]:
+    """Keeps the garbage collector from going through what is just being parsed, which would stop all threads."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+def _dismantle(root: yaml.Node) -> None:
+    """Frees nodes one by one; freed all at once, they would stop all threads."""
+    waiting = [root]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, yaml.CollectionNode):
+            for child in node.value:
+                waiting += child if isinstance(child, tuple) else [child]
+            node.value = []
+
+
 class _StrictLoader(yaml.SafeLoader):
     """The safe loader, which moreover refuses a key that stands twice in one mapping, and texts that unfold too far."""
 
@@ -144,7 +170,10 @@ class _StrictLoader(yaml.SafeLoader):
             return None
         if _size(node, {}) > MOST_VALUES:
             raise yaml.YAMLError(f"its aliases repeat more than {MOST_VALUES} values")
-        return self.construct_document(node)
+        try:
+            return self.construct_document(node)
+        finally:
+            _dismantle(node)
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
         is_number = isinstance(node, yaml.ScalarNode) and node.tag in (_INT, _FLOAT)

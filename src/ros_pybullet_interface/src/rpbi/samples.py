@@ -108,7 +108,7 @@ class WrenchSample(NamedTuple):
 class ContactPoint(NamedTuple):
     """A point where a body touches another, or one of its links another one.
 
-    Forces are those on the body, as mean over the last tick.
+    Forces are those on the body, as mean over the last tick, or with `average` over all ticks since the last sample.
 
     Attributes:
         link: The body's link.

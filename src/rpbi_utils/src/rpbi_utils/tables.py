@@ -169,11 +169,18 @@ class TableBuilder:
             same = np.ones(len(indices), bool)
             for start, stop in plan.fixed:
                 same &= (matrix[:, start:stop] == matrix[0, start:stop]).all(axis=1)
+                if np.count_nonzero(same) == 1:
+                    break
+            alike = int(np.count_nonzero(same))
             for note in plan.notes:
-                self._notes[note] += int(same.sum())
-            if same.all():
+                self._notes[note] += alike
+            if alike == len(indices):
                 yield _Block(plan.rows, matrix, indices)
                 return
+            if alike == 1:  # a view, which copies nothing
+                yield _Block(plan.rows, matrix[:1], indices[:1])
+                matrix, indices = matrix[1:], indices[1:]
+                continue
             yield _Block(plan.rows, matrix[same], indices[same])
             matrix, indices = matrix[~same], indices[~same]
 

@@ -93,7 +93,8 @@ class Robot:
         self.free = np.array([*range(FREE if floating else 0), *in_v], dtype=int)
         self._all_free = self.free.tolist() == list(range(self.model.nv))
         lower, upper = self.model.lowerPositionLimit[self._in_q], self.model.upperPositionLimit[self._in_q]
-        limited = (lower < upper) & [types[name] != "continuous" for name in self.joint_names]  # as in PyBullet
+        is_bounded = np.array([types[name] != "continuous" for name in self.joint_names], dtype=bool)
+        limited = (lower < upper) & is_bounded  # as in PyBullet
         self.lower, self.upper = np.where(limited, lower, -np.inf), np.where(limited, upper, np.inf)
         self.is_revolute = [types[name] != "prismatic" for name in self.joint_names]
         self.limits = Limits(self.lower.tolist(), self.upper.tolist(), self.is_revolute)

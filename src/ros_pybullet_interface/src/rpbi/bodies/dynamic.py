@@ -14,7 +14,7 @@ from rpbi.config.pybullet_models import (
 from rpbi.config.sensors import ContactsConfig
 from rpbi.engine.client import Client
 from rpbi.sensors.base_state import BaseStateSensor
-from rpbi.sensors.contact_arrows import contact_sensors
+from rpbi.sensors.contacts.arrows import contact_sensors
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
 

@@ -19,6 +19,8 @@ READ = frozenset(
     "num_modes stiffness_scale damping_coefficient cache_barycenter".split()
 )
 """Elements that PyBullet reads, and gets."""
+MOST_TAGS = 50_000
+"""Tags in a file."""
 MOST_NESTED = 100
 """Largest depth of elements; more are taken for no XML."""
 _NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -84,9 +86,11 @@ def parse(text: str) -> Element:
 
     Raises:
         ExpatError: If it is not well-formed.
-        RecursionError: If it is nested too deeply.
+        RecursionError: If it is nested too deeply, or has too many elements.
     """
     text = _without_comments(text)
+    if (tags := text.count("<")) > MOST_TAGS:
+        raise RecursionError(f"expected at most {MOST_TAGS} tags, got {tags}")
     start, end = _ROBOT.search(text), _end_of_robot(text)
     if start and start.start() < end:
         text = _blank(text[: start.start()]) + text[start.start() : end]

@@ -19,6 +19,8 @@ LONGEST_TEXT = 1000
 """Bytes of any other text; for names of files, the same holds."""
 MOST_LINKS = 2000
 """Links of a robot, those on fixed joints too."""
+MOST_SHAPES = 2000
+"""Shapes of all links, to see or to touch."""
 MOST_ATTRIBUTES = 100_000
 """Texts in a file."""
 MOST_PROBLEMS = 20
@@ -70,8 +72,11 @@ def _problems(document: UrdfDocument) -> Iterator[str]:
         counts = f"{len(document.links)} links and {len(document.edges)} joints"
         yield f"expected at most {MOST_LINKS} links and as many joints, got {counts}"
         return
+    if (shapes := sum(1 for _ in document.root.iter("geometry"))) > MOST_SHAPES:
+        yield f"expected at most {MOST_SHAPES} shapes, got {shapes}"
     yield from _name_problems(document)
     yield from _tree_problems(document)
+    yield from _mimic_problems(document)
     yield from _text_problems(document)
 
 
@@ -108,6 +113,21 @@ def _tree_problems(document: UrdfDocument) -> Iterator[str]:
         if link in way:
             yield f"link '{shortened(link)}' hangs on itself in the end"
         reaching.update(way)
+
+
+def _mimic_problems(document: UrdfDocument) -> Iterator[str]:
+    leaders = {
+        joint.get("name", ""): mimic.get("joint", "")
+        for joint in document.joint_elements
+        if (mimic := joint.find("mimic")) is not None
+    }
+    for joint in leaders:
+        line, leader = {joint}, leaders[joint]
+        while leader in leaders and leader not in line:
+            line.add(leader)
+            leader = leaders[leader]
+        if leader == joint:
+            yield f"joint '{shortened(joint)}' mimics itself in the end"
 
 
 def _text_problems(document: UrdfDocument) -> Iterator[str]:

@@ -11,8 +11,7 @@ from rpbi.bodies.body import Body
 from rpbi.engine.client import Client
 from rpbi.geometry import scaled
 from rpbi.samples import ContactPoint, ContactsSample
-
-from .sensor import SensedWorld, Sensor
+from rpbi.sensors.sensor import SensedWorld, Sensor
 
 Touch = tuple[Any, ...]
 """A contact point as PyBullet's `getContactPoints` returns it."""
