@@ -44,7 +44,7 @@ class Climber:
     """Changes courses so that the robot comes nearer and nearer to things.
 
     Every command counts, and so does every braking that the guard holds ready after one, since a target that is no
-    target would have it sent. Pairs that are within `FAR_M` of each other at the home of the scene are left out.
+    target would have it sent. Only distances to boxes count.
 
     Args:
         scene: The robot and the boxes around it.

@@ -41,8 +41,8 @@ def test_reject_sends_nothing_from_the_first_unsafe_target_on_until_it_is_starte
     assert decide(guard, (0.0, 0.0)).command == (0.0, 0.0)
     decision = decide(guard, (0.1, 0.0))
     assert decision.command is None and decision.is_halted
-    assert decision.violation == Violation("joint_velocity", "joint 'slide'", pytest.approx(10.0), 0.95, "m/s")
-    assert str(decision.violation) == "joint_velocity: joint 'slide' would have 10 m/s; the limit is 0.95"
+    assert decision.violation == Violation("joint_velocity", "joint 'slide'", pytest.approx(10.0), 0.95, "m/s", False, "velocity")
+    assert str(decision.violation) == "joint_velocity: joint 'slide': velocity is 10 m/s, limit 0.95 m/s"
     assert decide(guard, (0.0, 0.0)) == Decision(None, is_halted=True)
     guard.start()
     assert decide(guard, (0.0, 0.0)).command == (0.0, 0.0)

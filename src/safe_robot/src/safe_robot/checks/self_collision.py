@@ -53,12 +53,12 @@ class SelfCollision(Check):
     def check(self, motion: Motion, situation: Situation) -> Violation | None:
         """See `Check`."""
         if not np.isfinite(motion.position).all():  # PyBullet would find nothing near it
-            return Violation(self.name, "the robot", float("nan"), self.config.margin_m, "m of distance")
+            return Violation(self.name, "the robot", math.nan, self.config.margin_m, "m", quantity="distance")
         found = self.proximity.first(motion)
         if found is None:
             return None
         subject, margin_m = self._subject(found.pair), self.config.margin_m
-        return Violation(self.name, subject, found.distance, margin_m, "m of distance", found.is_while_braking)
+        return Violation(self.name, subject, found.distance, margin_m, "m", found.is_while_braking, "distance")
 
     def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
         """See `Check`."""
