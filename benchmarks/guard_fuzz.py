@@ -74,7 +74,8 @@ def main() -> int:
     if options.climbs:
         guard = scene.guard("limit", geometry=options.geometry)
         for seed in range(options.seed, options.seed + options.climbs):
-            found_m, course = Climber(scene, guard, np.random.default_rng(seed)).climb(options.steps)
+            climber = Climber(scene, guard, np.random.default_rng(seed), options.geometry)
+            found_m, course = climber.climb(options.steps)
             print(f"climb robot={options.robot} seed={seed} geometry={options.geometry} nearest_mm={1e3 * found_m:.5f}")
             if found_m < MARGIN_M - TOLERANCE_M:
                 print(f"inside the margin: {course}", flush=True)

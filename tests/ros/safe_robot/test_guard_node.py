@@ -12,9 +12,11 @@ from guarded_arm import FOLDING, SLIDER
 from node_world import Rosout, publishing
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 
 from custom_ros_tools.errors import ConfigError
 from safe_robot.check import Situation
+from safe_robot.ros.guard_status import GuardStatus
 from safe_robot.ros.parameters import guard_of_parameters
 
 
@@ -198,3 +200,41 @@ def test_a_parameter_that_is_wrong_is_named(parameters, values, words):
     parameters(**values)
     with pytest.raises(ConfigError, match=words):
         guard_of_parameters()
+
+
+def test_launch_files_of_the_release_are_answered_with_what_they_lack(ros):
+    """They have the robot's description from EXOTica, and no measured positions."""
+    heard = Rosout(ros, own=True)
+    heard.wait_to_hear(rospy.get_name())
+    rospy.set_param("~exotica_xml_filename", "any.xml")
+    with pytest.raises(ConfigError, match="'robot_description', got nothing; 'exotica_xml_filename', which names it"):
+        guard_of_parameters()
+    rospy.set_param("~robot_description", SLIDER)
+    guard, _ = guard_of_parameters()
+    guard.start()
+    assert "set start_from to target" in str(guard.decide((0.0, 0.0), Situation()).violation)
+    assert not heard.logs("start_from is 'target'")
+    rospy.set_param("~start_from", "target")
+    guard, _ = guard_of_parameters()
+    guard.start()
+    assert guard.decide((0.0, 0.0), Situation()).command
+    heard.wait_for(["the robot is assumed to stand at the first target"])
+
+
+def test_targets_with_one_stamp_are_warned_of_in_one_line_a_minute(parameters, ros):
+    """In the policy `limit` the guard goes on, and a busy computer may send hundreds of them."""
+    parameters(policy="limit", start_from="target")
+    guard, _ = guard_of_parameters()
+    guard.start()
+    guard.decide((0.0, 0.0), Situation())
+    heard = Rosout(ros, own=True)
+    heard.wait_to_hear(rospy.get_name())
+    status = GuardStatus(guard, "/joint_states/target")
+    for _ in range(20):
+        status.publish(Header(), guard.decide((0.0, 0.0), Situation(stamp_step_s=0.0)).violation)
+    rospy.logwarn("all have been published")
+    heard.wait_for(["all have been published"])
+    assert [log.msg for log in heard.logs("stamp")] == [
+        "/joint_states/target: staleness: two targets have the same stamp; give each target a later stamp, or none, and"
+        " let one source publish"
+    ]
