@@ -80,7 +80,10 @@ def test_targets_pass_unchanged_until_one_is_unsafe_and_again_after_a_start(left
         ({"effort": (1.0, 1.0)}, "expected no efforts"),
         ({"velocity": (9.0, 0.0)}, "joint 'slide': expected a velocity within 0.95, got 9"),
         ({"age_s": 100.0}, "staleness: the "),
-        ({"age_s": -100.0}, "staleness: the stamp of the target is 100 s in the future, limit 60 s; synchronise the clocks"),
+        (
+            {"age_s": -100.0},
+            "staleness: the stamp of the target is 100 s in the future, limit 60 s; synchronise the clocks",
+        ),
     ],
 )
 def test_what_cannot_be_answered_for_is_refused_and_named(left, fields, words):

@@ -76,9 +76,7 @@ def test_bodies_that_follow_a_frame_are_looked_at_where_the_main_file_puts_it(wa
     thing = box("thing", basePosition=[3.0, 0.0, 0.15])
     poses = [{"tf_id": "rpbi/table", "position": [3.0, 0.0, 0.0]}]
     told = warnings_of(collision=(table,), dynamic=(thing,), poses=poses)
-    assert told == [
-        "table.yaml: at the start, 'table' and 'thing' overlap by 0.05 m, and will be pushed apart"
-    ]
+    assert told == ["table.yaml: at the start, 'table' and 'thing' overlap by 0.05 m, and will be pushed apart"]
     at_origin = box("thing", basePosition=[0.0, 0.0, 0.15])
     assert warnings_of(collision=(table,), dynamic=(at_origin,), poses=poses) == []
 

@@ -41,7 +41,9 @@ def test_reject_sends_nothing_from_the_first_unsafe_target_on_until_it_is_starte
     assert decide(guard, (0.0, 0.0)).command == (0.0, 0.0)
     decision = decide(guard, (0.1, 0.0))
     assert decision.command is None and decision.is_halted
-    assert decision.violation == Violation("joint_velocity", "joint 'slide'", pytest.approx(10.0), 0.95, "m/s", False, "velocity")
+    assert decision.violation == Violation(
+        "joint_velocity", "joint 'slide'", pytest.approx(10.0), 0.95, "m/s", quantity="velocity"
+    )
     assert str(decision.violation) == "joint_velocity: joint 'slide': velocity is 10 m/s, limit 0.95 m/s"
     assert decide(guard, (0.0, 0.0)) == Decision(None, is_halted=True)
     guard.start()
@@ -259,9 +261,9 @@ class TestBadConfiguration:
             ({"checks": {"joint_velocty": {}}}, "guard.yaml: checks.joint_velocty: unknown check.*'joint_velocity'"),
             ({"policy": "stop"}, "guard.yaml: policy"),
             ({"period_s": 1e-300}, "guard.yaml: period_s: must be >= 1e-05"),
-            ({"limits": {"acceleration": 1e-6}}, "guard.yaml: limits: expected limits with which braking takes at most"),
+            ({"limits": {"acceleration": 1e-6}}, "guard.yaml: limits: expected limits with which braking takes"),
             ({"joint_names": []}, r"guard.yaml: joint_names: expected a joint, got \[\]"),
-            ({"joint_names": ["turn", "turn"]}, "guard.yaml: joint_names: expected each joint once, got text 'turn' twice"),
+            ({"joint_names": ["turn"] * 2}, "guard.yaml: joint_names: expected each joint once, got text 'turn' twice"),
         ],
     )  # fmt: skip
     def test_it_is_named(self, tmp_path, config, message):

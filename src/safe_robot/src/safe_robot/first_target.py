@@ -79,7 +79,9 @@ class FirstTarget:
             return None
         i = int(np.argmin(is_near))
         subject = f"joint '{self._robot.joint_names[i]}'"
-        return Violation("start", subject, float(distance[i]), tolerance, self._unit(i), quantity="distance of the target")
+        return Violation(
+            "start", subject, float(distance[i]), tolerance, self._unit(i), quantity="distance of the target"
+        )
 
     def _unit(self, i: int) -> str:
         return "rad" if self._robot.joints[i].is_revolute else "m"
@@ -91,5 +93,12 @@ class FirstTarget:
             joint, position = self._robot.joints[i], float(there[i])
             outside = max(joint.lower - position, position - joint.upper)
             if not outside <= MOST_OUTSIDE:
-                return Violation("start", f"joint '{name}'", outside, MOST_OUTSIDE, self._unit(i), quantity="distance beyond its limits")
+                return Violation(
+                    "start",
+                    f"joint '{name}'",
+                    outside,
+                    MOST_OUTSIDE,
+                    self._unit(i),
+                    quantity="distance beyond its limits",
+                )
         return None

@@ -207,14 +207,19 @@ class Guard:
         assert self._state is not None
         wanted = target
         if self._shaper is not None:  # controllers take the first command as rest, so it is where the robot stands
-            wanted = tuple(self._state.position.tolist()) if is_first else self._shaper.shaped(target, self._state, self._way_to_rest)
+            wanted = (
+                tuple(self._state.position.tolist())
+                if is_first
+                else self._shaper.shaped(target, self._state, self._way_to_rest)
+            )
         found = self._judged(wanted, situation, self.checks)
         if isinstance(found, Violation) and wanted != target and found.check in MENDED:
             wanted = tuple(self._way_to_rest[0].tolist())
             found = self._judged(wanted, situation, self.checks)
         before, self._target = self._target, target
-        violation = found if isinstance(found, Violation) else self._passes(target, before, found)
-        if violation is not None:
+        if isinstance(found, Violation):
+            return self._instead(target, found, situation)
+        if violation := self._passes(target, before, found):
             return self._instead(target, violation, situation)
         return Decision(self._sent(found), is_shaped=wanted != target)
 
@@ -245,7 +250,14 @@ class Guard:
     def _input_problem(self, target: tuple[float, ...]) -> Violation | None:
         n = len(self.joint_names)
         if len(target) != n:
-            return Violation("input", "the number of joints", len(target), n, "joints", words=f"expected {n} positions, got {len(target)}")
+            return Violation(
+                "input",
+                "the number of joints",
+                len(target),
+                n,
+                "joints",
+                words=f"expected {n} positions, got {len(target)}",
+            )
         for name, position in zip(self.joint_names, target):
             if not math.isfinite(position):
                 return Violation("input", f"joint '{name}'", position, math.inf, "rad or m", quantity="position")

@@ -28,11 +28,13 @@ class Staleness(Check):
             return too_old(situation.age_s, timeout_s, "checks.staleness.timeout_s")
         step_s = situation.stamp_step_s
         if step_s is not None and not step_s > 0.0:
-            return Violation(self.name, "the stamp, after that of the target before,", step_s, 0.0, "s", words=_order(step_s))
+            return Violation(
+                self.name, "the stamp, after that of the target before,", step_s, 0.0, "s", words=_order(step_s)
+            )
         if not motion.start.is_at_rest and not situation.since_command_s <= timeout_s:
             since_s = situation.since_command_s
             words = (
-                f"no target for {since_s:.3g} s while the robot moves, limit {timeout_s:.6g} s; publish targets until it"
+                f"no target for {since_s:.3g} s while the robot moves, limit {timeout_s:.6g} s; publish until it"
                 " rests, or raise checks.staleness.timeout_s"
             )
             return Violation(self.name, "the time without a target", since_s, timeout_s, "s", words=words)
@@ -42,7 +44,9 @@ class Staleness(Check):
 def too_old(age_s: float, limit_s: float, key: str) -> Violation:
     """Returns the violation of a target of an age [s] beyond a limit [s], which a parameter sets."""
     if age_s < 0.0:
-        words = f"the stamp of the target is {-age_s:.3g} s in the future, limit {limit_s:.6g} s; synchronise the clocks"
+        words = (
+            f"the stamp of the target is {-age_s:.3g} s in the future, limit {limit_s:.6g} s; synchronise the clocks"
+        )
     else:
         words = (
             f"the target is {age_s:.3g} s old, limit {limit_s:.6g} s; synchronise the clocks, publish targets sooner,"

@@ -5,7 +5,7 @@ command a period: v_k = (q_k - q_{k-1}) / T, a_k = (v_k - v_{k-1}) / T, j_k = (a
 """
 
 import math
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,8 +40,8 @@ class Brake(NamedTuple):
         rows = max(len(self.velocity), len(other.velocity))
         return Brake(
             *(
-                np.where(joints, _padded(theirs, rows, mode), _padded(own, rows, mode))
-                for own, theirs, mode in zip(self, other, ("edge", "constant", "constant", "constant"))
+                np.where(joints, _padded(theirs, rows, i == 0), _padded(own, rows, i == 0))
+                for i, (own, theirs) in enumerate(zip(self, other))
             )
         )
 
@@ -187,9 +187,9 @@ class Braking:
         return is_within
 
 
-def _padded(values: np.ndarray, rows: int, mode: Literal["edge", "constant"]) -> np.ndarray:
-    """Returns k x n values with rows after them, which repeat the last one or are 0; 0 where there is no row."""
-    return np.pad(values, ((0, rows - len(values)), (0, 0)), mode if len(values) else "constant")
+def _padded(values: np.ndarray, rows: int, repeats: bool) -> np.ndarray:
+    """Returns k x n values with rows after them, which repeat the last one, if there is one, or are 0."""
+    return np.pad(values, ((0, rows - len(values)), (0, 0)), "edge" if repeats and len(values) else "constant")
 
 
 def _jerk_line(length: int) -> np.ndarray:
