@@ -84,7 +84,7 @@ def test_the_real_robot_follows_the_simulated_one_and_a_jump_stops_it_until_it_i
     status = ros.listen("/real_robot/robot_safety/status", Status)
     put(-0.6)
     wait_until(lambda: not status.messages[-1].is_safe, "the guard refuses a jump")
-    assert status.messages[-1].message.startswith(f"joint_velocity: joint '{JOINT}' would have ")
+    assert status.messages[-1].message.startswith(f"joint_velocity: joint '{JOINT}': velocity is ")
     put(0.15)
 
     def restarted() -> bool:

@@ -45,7 +45,7 @@ def test_warnings_are_told_apart_from_errors_and_only_errors_fail(tmp_path):
     code, lines, told = check("world.yaml", tmp_path)
     assert (code, told) == (
         0,
-        ["warning: floor.yaml: at the start, 'floor' and 'box' are in each other by 0.05 m, and will be pushed apart"],
+        ["warning: floor.yaml: at the start, 'floor' and 'box' overlap by 0.05 m, and will be pushed apart"],
     )
     assert lines[0] == "world.yaml: fine; 1000 ticks a second, 1 warning"
     write_world(tmp_path, collision=(BOX_FLOOR,), dynamic=(ball(radius=1.0), {**sunk, "mass": 1.0}))

@@ -25,7 +25,7 @@ from rpbi.world import World
 CONCAVE_SHARE = 0.05
 """Share of a mesh's volume that its convex hull may add without a warning."""
 TOUCHING_M = 1e-3
-"""Bodies that are in each other by less only touch: PyBullet has margins around meshes."""
+"""Bodies that overlap by less only touch: PyBullet has margins around meshes."""
 
 MAX_FALL_M = 100.0
 """Height above a plane from which a body is expected to fall onto it."""
@@ -121,7 +121,7 @@ def _overlaps(world: World) -> Iterator[Problem]:
         depths = {links: depth for links, depth in depths.items() if not _are_still(one, other, *links)}
         if depths and (deepest := max(depths.items(), key=lambda item: item[1]))[1] > TOUCHING_M:
             (link, other_link), depth = deepest
-            parts = f"{_named(one, link)} and {_named(other, other_link)} are in each other by {depth:.2g} m"
+            parts = f"{_named(one, link)} and {_named(other, other_link)} overlap by {depth:.2g} m"
             yield Problem(_file_of(world, one.name), "", f"at the start, {parts}, and will be pushed apart")
 
 
