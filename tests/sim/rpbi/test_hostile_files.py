@@ -90,7 +90,10 @@ FAULTS = {
         _urdf(_links("a")).replace('"r"', f'"{"r" * 1100}"'),
         "robot.name: expected at most 250 bytes, got 1100",
     ),
-    "a long text": (_urdf(_links("a"), f'<material name="{"m" * 2000}"/>'), "material.name: expected at most 250 bytes"),
+    "a long text": (
+        _urdf(_links("a"), f'<material name="{"m" * 2000}"/>'),
+        "material.name: expected at most 250 bytes",
+    ),
     "a format": (_urdf(_links("%p %p")), "link.name: expected a text without % and control characters, got '%p %p'"),
     "a format as a type": (
         _urdf(_links("a", "b"), JOINT.format("j", "%n", "a", "b")),

@@ -29,6 +29,8 @@ def from_base(q: np.ndarray) -> Pose:
     return Pose((x, y, z), (qx, qy, qz, qw))
 
 
+MOST_JOINTS = 500
+"""Joints that move; the memory that Pinocchio takes grows with their square."""
 FREE = 6
 """Ways in which a floating base moves."""
 
@@ -68,6 +70,10 @@ class Robot:
     ) -> None:
         document = UrdfDocument(urdf_path)
         check_structure(document)
+        moving = sum(kind != "fixed" for kind in document.joint_types.values())
+        if moving > MOST_JOINTS:
+            message = f"expected at most {MOST_JOINTS} joints that are not fixed, got {moving}"
+            raise ConfigError([Problem(urdf_path, "", message)])
         types = document.joint_types
         if base is not None:
             _known("link", base, document.links)

@@ -5,7 +5,6 @@ import logging
 from collections.abc import Sequence
 
 from custom_ros_tools.errors import ConfigError, Problem, shortened
-
 from rpbi.geometry import scaled
 
 from .document import UrdfDocument
@@ -34,7 +33,7 @@ def for_pybullet(document: UrdfDocument) -> Element:
     Raises:
         ConfigError: If a mesh belongs to an unknown package or does not exist.
     """
-    robot, problems = as_read(document.root), []
+    robot, problems = as_read(document.root), list[Problem]()
     for parent in list(robot.iter()):
         for element in parent.findall("*[@filename]"):
             name = element.get("filename", "")
@@ -78,7 +77,8 @@ def without_shapes(document: UrdfDocument, links: Sequence[str] | None = None) -
     It loads in half a millisecond where meshes take up to some hundred. Every link has unit mass at its own frame, so
     that PyBullet's frames of mass centres are the links' frames.
     """
-    kept = [name for name in document.links if links is None or name in links]
+    root = document.root_link()
+    kept = sorted((name for name in document.links if links is None or name in links), key=lambda name: name != root)
     ends = {*kept}
     every = document.joint_elements
     tied = (one for one in every if links is None or {end_of(one, "parent"), end_of(one, "child")} <= ends)
@@ -128,6 +128,14 @@ def mounted_on(robot: Element, root_link: str, joints: Sequence[UrdfJoint]) -> N
     robot.extend(map(joint_element, joints))
 
 
+def put_root_first(robot: Element) -> None:
+    """Puts the root link of a robot before all others: with URDF_MAINTAIN_LINK_ORDER, PyBullet dies of another order."""
+    children = {end_of(joint, "child") for joint in robot.findall("joint")}
+    for root in [link for link in robot.findall("link") if link.get("name") not in children]:
+        robot.remove(root)
+        robot.insert(0, root)
+
+
 def put_first_visuals_last(robot: Element) -> None:
     """Puts the first visual of each link of a robot at its end.
 
@@ -174,4 +182,3 @@ def _hang_on(robot: Element, base: str) -> None:
             robot.append(new_element("link", name=start))
             robot.append(new_element("joint", *between, origin, name=f"{start}/fixed", type="fixed"))
         link = parent
-

@@ -118,4 +118,3 @@ def _is_of_unknown_package(mesh: str) -> bool:
     except ConfigError:
         return mesh.startswith(PACKAGE)
     return False
-
