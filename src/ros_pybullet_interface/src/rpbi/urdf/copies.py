@@ -129,7 +129,7 @@ def mounted_on(robot: Element, root_link: str, joints: Sequence[UrdfJoint]) -> N
 
 
 def put_root_first(robot: Element) -> None:
-    """Puts the root link of a robot before all others: with URDF_MAINTAIN_LINK_ORDER, PyBullet dies of another order."""
+    """Puts the root link of a robot before all others: PyBullet dies of others with URDF_MAINTAIN_LINK_ORDER."""
     children = {end_of(joint, "child") for joint in robot.findall("joint")}
     for root in [link for link in robot.findall("link") if link.get("name") not in children]:
         robot.remove(root)

@@ -19,7 +19,7 @@ LONGEST_TEXT = 1000
 """Bytes of any other text; for names of files, the same holds."""
 MOST_LINKS = 2000
 """Links of a robot, those on fixed joints too."""
-MOST_SHAPES = 2000
+MOST_SHAPES = 1000
 """Shapes of all links, to see or to touch."""
 MOST_ATTRIBUTES = 100_000
 """Texts in a file."""
