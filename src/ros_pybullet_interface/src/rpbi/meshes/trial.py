@@ -23,7 +23,7 @@ from custom_ros_tools.config import read_file
 from custom_ros_tools.errors import shortened
 from custom_ros_tools.processes.child import start_child
 
-TRIAL = 2
+TRIAL = 3
 """Number of the present kind of trial; meshes that went well in another are tried again."""
 MOST_BYTES = 2 * 2**30
 """Memory that a trial may take."""
