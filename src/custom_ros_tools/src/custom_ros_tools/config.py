@@ -108,17 +108,17 @@ def load_config(path: str, most_bytes: int = MOST_BYTES) -> dict[str, Any]:
     return load_configs(text, path)
 
 
-def load_configs(text: str, file: str = "text", most_characters: int = MOST_BYTES) -> dict[str, Any]:
-    """Returns the mapping in a YAML text, which messages call `file`; an empty text is an empty mapping.
+def load_configs(s: str, file: str = "text", most_characters: int = MOST_BYTES) -> dict[str, Any]:
+    """Returns the mapping in the YAML text `s`, which messages call `file`; an empty text is an empty mapping.
 
     Raises:
         ConfigError: If it is not a YAML mapping, names a key twice, asks for Python objects, or is too large.
     """
-    if len(text) > most_characters:
-        raise ConfigError([Problem(file, "", f"has {len(text)} characters, expected at most {most_characters}")])
+    if len(s) > most_characters:
+        raise ConfigError([Problem(file, "", f"has {len(s)} characters, expected at most {most_characters}")])
     try:
         with _without_collections():
-            data = yaml.load(text, Loader=_StrictLoader)
+            data = yaml.load(s, Loader=_StrictLoader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""

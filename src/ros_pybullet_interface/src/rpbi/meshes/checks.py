@@ -51,9 +51,9 @@ def check_obj(lines: Iterable[bytes]) -> None:
             for word in words:
                 for index, number in enumerate(word.split(b"/")[:3]):
                     furthest[index] = max(furthest[index], abs(int(number or 0)))
-    for kind, (count, number) in zip(("v", "vt", "vn"), zip(counts.values(), furthest)):
-        if number > count:
-            raise ValueError(f"a face names '{kind}' {number} of {count}")
+    for name, count, most in zip(("v", "vt", "vn"), counts.values(), furthest):
+        if most > count:
+            raise ValueError(f"a face names '{name}' {most} of {count}")
 
 
 def _is_binary_stl(path: str) -> bool:

@@ -5,9 +5,6 @@ well is remembered by its content, in the user's cache folder, so that every mes
 """
 
 import enum
-import errno
-import hashlib
-import io
 import logging
 import os
 import signal
@@ -15,13 +12,12 @@ import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
-from custom_ros_tools.config import read_file
-from custom_ros_tools.errors import shortened
 from custom_ros_tools.processes.child import start_child
+
+from .copies import cache_folder, content_hash
 
 TRIAL = 3
 """Number of the present kind of trial; meshes that went well in another are tried again."""
@@ -33,10 +29,6 @@ LONGEST_TRIAL_S = 45.0
 """Time that a trial may take [s] of wall time."""
 MOST_TOGETHER = 100
 """Meshes that one process tries, as long as it lives."""
-MOST_FILE_BYTES = 1_000_000_000
-"""Length of a file."""
-MOST_FILES = 100
-"""Files that a mesh consists of, with its materials and textures."""
 
 log = logging.getLogger(__name__)
 
@@ -72,7 +64,7 @@ def faults_in(meshes: Iterable[Mesh]) -> dict[Mesh, str]:
             status = os.stat(mesh.file)
             key = mesh, status.st_size, status.st_mtime_ns
             if key not in _tried:
-                record = _folder() / f"{mesh.use.value}-{_hash_of(mesh.file)}"
+                record = cache_folder() / f"{mesh.use.value}-{content_hash(mesh.file, TRIAL)}"
                 if not _is_there(record):
                     unknown[mesh] = record
                 _tried.add(key)
@@ -136,45 +128,6 @@ def _words(returncode: int) -> str:
     if returncode < 0:
         return f"PyBullet crashes when it loads it ({signal.Signals(-returncode).name})"
     return f"PyBullet cannot load it (exit code {returncode})" if returncode else ""
-
-
-def _hash_of(file: str) -> str:
-    """Returns the hash of all that PyBullet reads of a mesh.
-
-    Raises:
-        OSError: If one of its files is there, but is no ordinary file, or if it names too many.
-    """
-    digest = hashlib.blake2b(f"{TRIAL} {version('pybullet')}".encode(), digest_size=16)
-    waiting, seen = [Path(file)], set()
-    while waiting:
-        path = waiting.pop()
-        if path in seen:
-            continue
-        seen.add(path)
-        if len(seen) > MOST_FILES:
-            raise OSError(errno.EMFILE, f"names more than {MOST_FILES} files")
-        try:
-            data = read_file(path, MOST_FILE_BYTES)
-        except OSError as error:
-            if len(seen) > 1 and os.path.exists(path):  # it may name what is not there
-                raise OSError(error.errno, f"names '{shortened(path.name)}', which {error.strerror}") from None
-            continue
-        digest.update(f"{path.suffix.lower()} {len(data)} ".encode() + data)
-        if path.suffix.lower() in (".obj", ".mtl"):
-            waiting += [path.parent / os.fsdecode(name) for name in _named_in(data)]
-    return digest.hexdigest()
-
-
-def _named_in(data: bytes) -> Iterator[bytes]:
-    """Yields the files that an OBJ file or its materials name."""
-    for line in io.BytesIO(data):
-        words = line.split(None, 1)
-        if len(words) == 2 and (words[0] == b"mtllib" or words[0].startswith(b"map_")) and b"\0" not in line:
-            yield words[1].rstrip()
-
-
-def _folder() -> Path:
-    return Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")) / "rpbi" / "meshes"
 
 
 def _is_there(record: Path) -> bool:

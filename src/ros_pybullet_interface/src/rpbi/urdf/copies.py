@@ -33,7 +33,8 @@ def for_pybullet(document: UrdfDocument) -> Element:
     Raises:
         ConfigError: If a mesh belongs to an unknown package or does not exist.
     """
-    robot, problems = as_read(document.root), list[Problem]()
+    robot = as_read(document.root)
+    problems: list[Problem] = []
     for parent in list(robot.iter()):
         for element in parent.findall("*[@filename]"):
             name = element.get("filename", "")

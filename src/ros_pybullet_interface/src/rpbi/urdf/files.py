@@ -6,6 +6,7 @@ from pathlib import Path
 
 from custom_ros_tools.config import replace_package
 from custom_ros_tools.errors import ConfigError, Problem, shortened
+from rpbi.meshes.copies import with_textures_that_exist
 from rpbi.temporary import temporary_folder
 
 PACKAGE = "package://"
@@ -38,6 +39,7 @@ def address_for_ros(mesh: str, source: Path) -> str:
 
     Returns:
         A `file://` address for a relative path, or a package that is unknown or lacks it; else what the URDF says.
+        Meshes whose textures are missing are copies without them.
 
     Raises:
         ConfigError: If it belongs to an unknown package and is not near the URDF.
@@ -49,7 +51,7 @@ def address_for_ros(mesh: str, source: Path) -> str:
         file = mesh_file(mesh, source)
     else:
         file = None if _is_in_its_package(mesh) else _near(mesh, source)
-    return mesh if file is None else f"file://{file.resolve()}"
+    return mesh if file is None else f"file://{with_textures_that_exist(file.resolve())}"
 
 
 def found_mesh(name: str, source: Path) -> Path:

@@ -11,7 +11,7 @@ import pybullet
 
 from custom_ros_tools.errors import ConfigError, Problem, shortened
 from rpbi.config.asset_files import ROBOT_DESCRIPTION
-from rpbi.engine.client import Client
+from rpbi.engine.client import MAXIMAL_COORDINATES, Client
 from rpbi.meshes.checks import mesh_file_problem
 from rpbi.meshes.trial import Mesh, Use, faults_in
 
@@ -185,8 +185,11 @@ def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[
 
 
 def _largest_radius(pb: Client, body_id: int, link: int) -> float:
-    """Returns an upper bound of how far the collision shape reaches from the centre of mass [m], inf without one."""
-    if not pb.getCollisionShapeData(body_id, link):
+    """Returns an upper bound of how far the collision shape reaches from the centre of mass [m].
+
+    It is inf without a shape, and in maximal coordinates, where PyBullet reports no shapes.
+    """
+    if pb.getDynamicsInfo(body_id, link)[10] == MAXIMAL_COORDINATES or not pb.getCollisionShapeData(body_id, link):
         return math.inf
     lower, upper = pb.getAABB(body_id, link)
     centre = pb.getBasePositionAndOrientation(body_id)[0] if link < 0 else pb.getLinkState(body_id, link)[0]
