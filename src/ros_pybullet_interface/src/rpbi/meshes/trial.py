@@ -16,17 +16,17 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from custom_ros_tools.child_process import start_child
+from custom_ros_tools.processes.child import start_child
 
 from .copies import cache_folder, content_hash
 
-TRIAL = 2
+TRIAL = 3
 """Number of the present kind of trial; meshes that went well in another are tried again."""
-MOST_BYTES = 4 * 2**30
+MOST_BYTES = 2 * 2**30
 """Memory that a trial may take."""
 MOST_CPU_S = 20
 """Time that a trial may take [s] of the processor."""
-LONGEST_TRIAL_S = 60.0
+LONGEST_TRIAL_S = 45.0
 """Time that a trial may take [s] of wall time."""
 MOST_TOGETHER = 100
 """Meshes that one process tries, as long as it lives."""

@@ -84,7 +84,8 @@ def without_shapes(document: UrdfDocument, links: Sequence[str] | None = None) -
     It loads in half a millisecond where meshes take up to some hundred. Every link has unit mass at its own frame, so
     that PyBullet's frames of mass centres are the links' frames.
     """
-    kept = [name for name in document.links if links is None or name in links]
+    root = document.root_link()
+    kept = sorted((name for name in document.links if links is None or name in links), key=lambda name: name != root)
     ends = {*kept}
     every = document.joint_elements
     tied = (one for one in every if links is None or {end_of(one, "parent"), end_of(one, "child")} <= ends)
@@ -195,6 +196,14 @@ def weighed_by_pybullet(document: UrdfDocument, is_fixed: bool) -> list[str]:
     silent = {link.get("name", "") for link in document.root.findall("link") if link.find("inertial") is None}
     missing = moving & silent - frame_masses(document, is_fixed).keys()
     return [link for link in document.links if link in missing]
+
+
+def put_root_first(robot: Element) -> None:
+    """Puts the root link of a robot before all others: PyBullet dies of others with URDF_MAINTAIN_LINK_ORDER."""
+    children = {end_of(joint, "child") for joint in robot.findall("joint")}
+    for root in [link for link in robot.findall("link") if link.get("name") not in children]:
+        robot.remove(root)
+        robot.insert(0, root)
 
 
 def put_first_visuals_last(robot: Element) -> None:
