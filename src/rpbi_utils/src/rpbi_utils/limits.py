@@ -18,6 +18,8 @@ MAX_DEPTH = 50
 """Levels of types within types."""
 MAX_CONNECTIONS = 20_000
 """Pairs of a topic and one of its publishers."""
+MAX_TOPICS = 1_000
+"""Topics that have messages; each becomes a file."""
 MAX_VALUES = 1_000_000
 """Values of one message, arrays counted by element unless they are kept whole; the cloud of a 640x480 camera passes."""
 MAX_NAME_BYTES = 1_000
