@@ -1,4 +1,7 @@
-"""Hostile bags of each kind, through each reader and replay; `robustness/bags.py` reads a thousand."""
+"""Hostile topics, indices, chunks, bytes and sessions, through each reader and replay.
+
+`robustness/bags.py` reads a thousand, of all kinds; definitions, names and columns are in unit tests.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +10,14 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 from ros_system import support_on_path
 
 ROBUSTNESS = Path(__file__).resolve().parents[3] / "robustness"
-FIRST_SEED = 5008
+FIRST_SEED = 5016
 
 
-@pytest.mark.parametrize("half", [0, 1])
-def test_a_hostile_bag_is_taken_or_refused_in_words(tmp_path: Path, half: int) -> None:
-    seeds = ["--first", str(FIRST_SEED + 8 * half), "--count", "8"]
+def test_a_hostile_bag_is_taken_or_refused_in_words(tmp_path: Path) -> None:
+    seeds = ["--first", str(FIRST_SEED), "--count", "8"]
     environment = {**os.environ, **support_on_path(), "TMPDIR": str(tmp_path)}
     command = [sys.executable, str(ROBUSTNESS / "bags.py"), *seeds]
     done = subprocess.run(command, capture_output=True, text=True, env=environment)
