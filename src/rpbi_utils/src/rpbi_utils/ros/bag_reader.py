@@ -57,7 +57,7 @@ class BagReader:
             self._bag = self._open()
             if not any_size:
                 self._refuse_bombs()
-            self.budget = Budget(self.path, self._bag.unfolded_bytes, any_size)
+            self.budget = Budget(self.path, self.path.stat().st_size, any_size)
             self._read_connections()
         except BaseException:
             self._file.close()
