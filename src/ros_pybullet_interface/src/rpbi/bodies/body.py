@@ -15,7 +15,7 @@ from custom_ros_tools.schema import ConfigModel
 from rpbi.config.pybullet_models import ObjectTf, ResetBaseVelocity
 from rpbi.control.external_wrenches import ExternalWrench, ExternalWrenches
 from rpbi.control.pose_follower import PoseFollower, TrackedBase
-from rpbi.engine.client import Client
+from rpbi.engine.client import MAXIMAL_COORDINATES, Client
 from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Pose, Twist, cross, minus, plus
 from rpbi.samples import BodyState
@@ -23,10 +23,8 @@ from rpbi.sensors.sensor import Sensor
 
 log = logging.getLogger(__name__)
 
-MAXIMAL_COORDINATES = 1
-"""PyBullet's type of bodies that the solver of rigid bodies moves, where `getDynamicsInfo` tells it."""
 MULTI_BODY = 2
-"""The same of what has joints in reduced coordinates, or could have."""
+"""PyBullet's type of bodies that have joints in reduced coordinates, or could have, in `getDynamicsInfo`."""
 UNNAMED_LINK = "link0"
 """PyBullet's name of the only link of a shape, which it leaves out in maximal coordinates."""
 

@@ -55,12 +55,12 @@ class ContactReader:
         self._are_finite = _finite(all_touches)
         by_body: dict[int, list[list[Touch]]] = {}
         links: tuple[int, ...] = ()
+        together: list[Touch] = []
         for touch in all_touches:
             if touch[8] > 0.0 and touch[9] == 0.0:
                 continue  # near, but not touching
             if touch[1:5] != links:
-                links = touch[1:5]
-                together: list[Touch] = []
+                links, together = touch[1:5], []
                 for body_id in {touch[1], touch[2]}:
                     by_body.setdefault(body_id, []).append(together)
             together.append(touch)
