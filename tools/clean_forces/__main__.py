@@ -30,7 +30,7 @@ def arm_keys(mode: str) -> dict[str, Any]:
 
 
 def late_targets(real_time_factor: float) -> Callable[[], float]:
-    """Returns delays in simulated time [s] of targets that are up to 15 ms late by the wall clock; always the same ones."""
+    """Returns delays of targets that are up to 15 ms late by the wall clock, in simulated time [s]; always the same."""
     chance = random.Random(1)
     return lambda: real_time_factor * chance.uniform(0.0, 0.015)
 
