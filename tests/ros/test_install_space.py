@@ -94,7 +94,7 @@ def test_an_example_runs_with_its_camera(ros, installed):
 
 def test_worlds_are_checked_and_bags_tabulated(installed):
     world = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"
-    assert "fine; 500 ticks a second" in _do(installed, f"rosrun ros_pybullet_interface check_world.py '{world}'")
+    assert "fine; 1000 ticks a second" in _do(installed, f"rosrun ros_pybullet_interface check_world.py '{world}'")
     assert "usage" in _do(installed, "rosrun rpbi_utils bag_to_table --help")
 
 

@@ -37,7 +37,7 @@ def numbers(text: str) -> list[float]:
 
 
 def test_a_world_tells_what_is_in_it(page):
-    assert page[0].splitlines()[-2:] == ["['work_area', 'floor', 'box', 'kuka_lwr']", "0 0.0 0.002"]
+    assert page[0].splitlines()[-2:] == ["['work_area', 'floor', 'box', 'kuka_lwr']", "0 0.0 0.001"]
 
 
 def test_samples_come_at_their_rates(page):
@@ -105,4 +105,4 @@ def test_another_python_does_not_find_the_packages(tmp_path):
 
 def test_the_page_on_speed_times_a_tick(tmp_path):
     (block,) = BLOCK.findall((ROOT / "docs/slow.md").read_text())
-    assert re.search(r"^\d+ us a tick of 2000 us$", run(block, tmp_path).stdout, re.MULTILINE)
+    assert re.search(r"^\d+ us a tick of 1000 us$", run(block, tmp_path).stdout, re.MULTILINE)

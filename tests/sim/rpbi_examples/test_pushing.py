@@ -1,22 +1,28 @@
 """The KUKA of the demo pushes its box to and fro, as its node has it do."""
 
 import math
+import sys
 from itertools import cycle, islice
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from custom_ros_tools.config import replace_package
+from rpbi.config.loading import load_world
 from rpbi.kinematics import Kinematics
 from rpbi.samples import ContactsSample
 from rpbi.world import World
 from rpbi_examples.motions import PlanarPose
 from rpbi_examples.pushing import NEAR_M, PLACES, Pusher, next_push
 
+sys.path.append(str(Path(__file__).resolve().parents[3] / "tools/clean_forces"))
+
+from pushes import COMPLIANT, PLANE, pushed  # noqa: E402
+
 WORLD = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"
-TICKS_A_TARGET = 10
-ROUNDS = 4
+ROUNDS = 2
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +36,7 @@ def kinematics():
 def session(kinematics):
     """Targets of the joints, sums of normal forces of the arm on the box, and where the box came to rest."""
     world, pusher = World.from_file(WORLD), Pusher(kinematics)
+    ticks_a_target = round(1.0 / (50 * world.config.timeStep))
     positions = tuple(world.bodies["kuka_lwr"].joint_positions().values())
     targets, forces, boxes = [positions], [], []
     for goal in islice(cycle(PLACES), ROUNDS):
@@ -41,7 +48,7 @@ def session(kinematics):
                     positions = move.at(number / count * move.duration_s)
                     targets.append(positions)
                     world.put("kuka_lwr/target", dict(zip(kinematics.joint_names, positions)))
-                    samples = [sample for _ in range(TICKS_A_TARGET) for sample in world.step()]
+                    samples = [sample for _ in range(ticks_a_target) for sample in world.step()]
                     forces += [force_of_arm(sample) for sample in samples if isinstance(sample, ContactsSample)]
             boxes.append((box_of(world), goal))
     world.close()
@@ -59,6 +66,10 @@ def force_of_arm(sample):
     return sum(point.normal_force for point in sample.points if point.other_body == "kuka_lwr")
 
 
+def test_the_demo_runs_at_1_khz_as_these_pushes_do():
+    assert load_world(WORLD).config.timeStep == 0.001
+
+
 def test_each_push_brings_the_box_to_its_place_and_hardly_turns_it(session):
     assert len(session.boxes) == ROUNDS
     for box, goal in session.boxes:
@@ -70,6 +81,22 @@ def test_it_pushes_with_the_friction_of_the_box_and_lets_go_of_it(session):
     touching = session.forces[session.forces > 0.0]
     assert 0.2 < len(touching) / len(session.forces) < 0.8
     assert touching.mean() == pytest.approx(0.8 * 9.81 * 0.7 * 1.0, rel=0.35)
+
+
+@pytest.mark.parametrize(("objects", "most_std_n"), [({}, 0.5), ({"box": COMPLIANT}, 0.2)])
+def test_at_constant_speed_the_push_is_the_friction_and_does_not_chatter(objects, most_std_n):
+    force = pushed(objects=objects, length_m=0.2).steady()
+    assert force.points.min() == 4.0
+    assert force.push == pytest.approx(force.friction, rel=0.05)
+    assert 0.9 < force.push.mean() / (0.8 * 9.81 * 0.7) < 1.5, "the ball rubs on the box, down or up"
+    assert force.push.std() < most_std_n
+    assert np.percentile(force.push, 99) < force.push.mean() + 3.0 * most_std_n
+
+
+def test_on_a_plane_it_would_chatter():
+    force = pushed(objects={"floor": PLANE}, length_m=0.2).steady()
+    assert force.points.mean() < 3.5
+    assert force.push.std() > 1.5 and force.push.max() > 12.0
 
 
 def test_all_joints_move_within_their_limits_and_speeds_and_no_move_begins_with_a_jump(session, kinematics):

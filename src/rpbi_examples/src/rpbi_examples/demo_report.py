@@ -103,11 +103,21 @@ def force_figures(push: pd.Series) -> dict[str, float]:
     return {"push_mean_n": round(float(touching.mean()), 2), "push_max_n": round(float(touching.max()), 2)}
 
 
-def plot_forces(push: pd.Series, wrist: pd.DataFrame, start_s: float, path: Path) -> None:
-    """Draws the force of the arm on the box [N], by time, and what the sensor in its wrist feels."""
+def plot_forces(push: pd.Series, friction: pd.Series, wrist: pd.DataFrame, start_s: float, path: Path) -> None:
+    """Draws the force of the arm on the box beside the friction that it overcomes [N], and what its wrist feels.
+
+    Args:
+        push: Force of the arm on the box [N], by time [s].
+        friction: Largest friction of the floor, mu N, likewise.
+        wrist: Samples of the force-torque sensor, by time.
+        start_s: The time that is drawn as 0.
+        path: Where to write.
+    """
     figure, (above, below) = plt.subplots(2, sharex=True, figsize=(9, 5))
-    above.plot(push.index - start_s, push, color="#e8731a", lw=1.2)
-    above.set_ylabel("arm on box [N]")
+    above.plot(friction.index - start_s, friction, color="#22333f", lw=2.2, alpha=0.35, label="mu N of the floor")
+    above.plot(push.index - start_s, push, color="#e8731a", lw=1.2, label="arm on box")
+    above.set_ylabel("force [N]")
+    above.legend(fontsize=8, ncols=2, loc="upper right")
     for axis, colour in zip("xyz", ("#c0392b", "#27864a", "#2c5f8a")):
         below.plot(wrist.index - start_s, wrist[f"wrench/force/{axis}"], color=colour, lw=1.0, label=axis)
     below.set_ylabel("force in the wrist [N]")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import math
 import os
 import signal
 import subprocess
@@ -25,7 +26,7 @@ from tf2_msgs.msg import TFMessage
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.timed_master import unused_port
 from custom_ros_tools.ros.transform_messages import position_in, quat_in
-from rpbi.config.loading import load_world
+from rpbi.config.loading import LoadedWorld, load_world
 from rpbi.geometry import Pose
 from rpbi_examples import demo_report
 from rpbi_examples.draw_rate import draw_rate_hz
@@ -197,8 +198,9 @@ def _report(bag: Path, expected_hz: dict[str, float], seconds: float, out: Path)
     error = demo_report.tracking_error(states, targets)
     demo_report.plot_efforts(states, list(error.index), out / "efforts.png")
     push = demo_report.contact_force(tables[CONTACTS], "kuka_lwr")
-    demo_report.plot_forces(push, tables[WRIST], states.index[0], out / "forces.png")
     world = load_world(WORLD)
+    friction = _friction(world, "box", "floor") * demo_report.contact_force(tables[CONTACTS], "floor")
+    demo_report.plot_forces(push, friction, tables[WRIST], states.index[0], out / "forces.png")
     assert world.config.rgbd_sensor is not None
     for picture in (out / "colour.png", out / "depth.png"):  # a very busy machine may draw none
         picture.unlink(missing_ok=True)
@@ -222,6 +224,12 @@ def _report(bag: Path, expected_hz: dict[str, float], seconds: float, out: Path)
     }  # fmt: skip
     (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     return summary
+
+
+def _friction(world: LoadedWorld, *names: str) -> float:
+    """Returns the coefficient of friction between two objects: the product of their own, as PyBullet has it."""
+    configs: dict[str, Any] = {item.config.name: item.config for item in world.objects}
+    return math.prod(configs[name].changeDynamics.lateralFriction for name in names)
 
 
 def _diagnostics(table: pd.DataFrame) -> dict[str, Any]:
