@@ -18,8 +18,8 @@ DT_S = 0.002
 EVERY = 10
 """Ticks between two targets of a stream at 50 Hz."""
 TICKS = 1500
-BUFFER_S = 0.02 - DT_S
-"""Delay by the jitter buffer, which counts the tick before which targets come."""
+BUFFER_S = 0.02 - 1.5 * DT_S
+"""Delay by the jitter buffer, which counts one and a half ticks for itself."""
 
 
 def swing(time_s: float) -> float:

@@ -120,7 +120,7 @@ def test_one_late_target_does_not_change_a_constant_velocity(late, has_stamps):
 def test_the_delay_is_constant_from_the_first_target_on():
     """It is the buffer without the tick before which targets come, beside one and a half periods."""
     positions = play([(n * PERIOD, 0.03 * n, 0) for n in range(40)], 40 * PERIOD, buffer_s=0.02)
-    lag = 1.5 * PERIOD + 0.02 / DT_S - 1.0
+    lag = 1.5 * PERIOD + 0.02 / DT_S - 1.5
     for tick in range(4 * PERIOD, 40 * PERIOD):
         assert positions[tick] == pytest.approx(0.03 / PERIOD * (tick + 1 - lag), abs=1e-9)
 
@@ -146,7 +146,7 @@ def test_a_stream_may_change_its_period(factor):
     ticks = [n * PERIOD for n in range(40)]
     ticks += [ticks[-1] + round(factor * PERIOD * (n + 1)) for n in range(160)]
     positions = play([(tick, 0.003 * tick, 0) for tick in ticks], ticks[-1], buffer_s=0.02)
-    lag = (1.5 * factor * PERIOD + 0.02 / DT_S - 1.0) * 0.003
+    lag = (1.5 * factor * PERIOD + 0.02 / DT_S - 1.5) * 0.003
     assert positions[-1] == pytest.approx(0.003 * ticks[-1] - lag, abs=0.5 * PERIOD * 0.003)
 
 
@@ -156,7 +156,7 @@ def test_a_clock_may_jump(jump_s):
     stamps = [stamp_ns(n * PERIOD) + (round(1e9 * (jump_s + 1000.0)) if n >= 40 else 10**12) for n in range(100)]
     positions = play([(n * PERIOD, 0.03 * n, stamps[n]) for n in range(100)], 98 * PERIOD, buffer_s=0.02)
     assert largest_change_of_velocity(positions[20 * PERIOD :]) < 0.6 * 1.5 / (PERIOD * DT_S)  # of a full stop
-    lag = 1.5 * PERIOD + 0.02 / DT_S - 1.0
+    lag = 1.5 * PERIOD + 0.02 / DT_S - 1.5
     assert positions[-1] == pytest.approx(0.003 * (98 * PERIOD - lag), abs=0.09)
 
 

@@ -15,7 +15,7 @@ EVERY_TICK = 1.5
 """Targets that are no farther apart than this many ticks act at once, too."""
 WINDOW = 32
 """Number of arrivals from which period, rate and delay are estimated."""
-SETTLING_S = 1.0
+SETTLING_S = 0.8
 """Time constant of changes of the delay [s]."""
 FIRST = 10
 """Number of targets during which the delay settles faster."""
@@ -88,7 +88,7 @@ class JitterBuffer:
 
     Args:
         dt_s: Length of a tick [s].
-        buffer_s: Delay in which late targets are still in time [s], with the tick before which they come; with 0,
+        buffer_s: Delay in which late targets are still in time [s], one and a half ticks of waiting included; with 0,
             targets are played as they come.
 
     Attributes:
@@ -97,7 +97,7 @@ class JitterBuffer:
 
     def __init__(self, dt_s: float, buffer_s: float) -> None:
         self._dt_ns = dt_s * 1e9
-        self._buffer = max(buffer_s / dt_s - 1.0, 0.0)
+        self._buffer = max(buffer_s / dt_s - 1.5, 0.0)
         self._settling = SETTLING_S / dt_s
         self._longest = LONGEST_PERIOD_S / dt_s
         self.extrapolation = buffer_s / dt_s / 2.0 + 3.0 if buffer_s else 0.0
@@ -176,8 +176,7 @@ class JitterBuffer:
             scale, sent = self._rate * self._interval, steps
         delays = [each.tick - tick - scale * time for each, time in zip(self._seen, sent)]
         least = min(delays)
-        bias = 2.0 * (sum(delays) / len(delays) - least) / len(delays) if len(delays) == WINDOW else 0.0
-        undelayed = least - bias
+        undelayed = least - 2.0 * (sum(delays) / len(delays) - least) / len(delays)
         self._out_of_step = self._out_of_step + 1 if undelayed < -self._buffer - 1.0 else 0
         return undelayed
 
