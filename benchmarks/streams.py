@@ -1,7 +1,8 @@
-"""Effort and lag of an iiwa that follows a swing of 50 targets a second, which jitter and stall, beside targets in time.
+"""Effort and lag of an iiwa that follows 50 targets a second with jitter and stalls, beside targets at every tick.
 
-The floor is the largest effort with targets at every tick. Offline cases depend on nothing but their seeds: with `--quick`
-five, else fifty, none of which the jitter buffer was tuned on. Live, a node sends targets beside two busy processes.
+The floor is the largest effort with targets at every tick. Offline cases depend on nothing but their seeds: five with
+`--quick`, else fifty, on none of which the jitter buffer was tuned. Live, a node sends targets beside two busy
+processes.
 """
 
 from __future__ import annotations

@@ -67,7 +67,9 @@ def test_a_stream_needs_no_more_effort_than_targets_at_every_tick(build):
     assert hold > 5.0 * ideal
 
 
-@pytest.mark.parametrize("mode, lag_s", [("smooth", 1.5 * EVERY * DT_S + BUFFER_S), ("linear", EVERY * DT_S + BUFFER_S)])
+@pytest.mark.parametrize(
+    "mode, lag_s", [("smooth", 1.5 * EVERY * DT_S + BUFFER_S), ("linear", EVERY * DT_S + BUFFER_S)]
+)
 def test_a_stream_is_followed_with_a_known_lag(build, mode, lag_s):
     position, velocity, _ = follow(build(mode), EVERY).T
     times_s = (np.arange(300, TICKS) + 1) * DT_S - lag_s
@@ -115,7 +117,9 @@ def follow_jittery(world: World, targets: list[tuple[float, float, int]], veloci
     return float(np.abs(effort).max()), float(-(error @ velocity) / (velocity @ velocity))
 
 
-@pytest.mark.parametrize("stamps, velocities", [("sample", False), ("sending", False), ("sending", True), ("none", False)])
+@pytest.mark.parametrize(
+    "stamps, velocities", [("sample", False), ("sending", False), ("sending", True), ("none", False)]
+)
 def test_jitter_costs_little_effort_and_lag(build, stamps, velocities):
     ideal = np.abs(follow(build(), 1, velocities)[100:, 2]).max()
     effort, lag_s = follow_jittery(build(), jittery(random.Random(7), stamps, 0.012), velocities)

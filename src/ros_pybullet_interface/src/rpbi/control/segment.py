@@ -56,7 +56,7 @@ class Segment(NamedTuple):
         return (after[0] - before[0]) / width, (after[1] - before[1]) / width, (after[2] - before[2]) / width
 
     def velocity(self, tick: float) -> Mapping[int, float]:
-        """Returns the velocities by joint index at a time [rad or m per tick], before and after it those at its ends."""
+        """Returns the velocities by joint index at a time [rad or m per tick], outside of it those at its ends."""
         if self.slopes is None:
             return {index: way / self.length for index, way in self.way.items()}
         u = min(max((tick - self.start) / self.length, 0.0), 1.0) if self.length else 0.0

@@ -85,7 +85,7 @@ class TargetStream:
     def _append(self, start: float, end: float, goal: Mapping[int, float], slopes: Mapping[int, float]) -> Segment:
         """Appends the way to a target, in place of all that is beyond its start."""
         segments = self._segments
-        leaving, before = self._goal, self._slopes
+        leaving, before = self._goal, self._slopes or None
         while segments and segments[-1].end > start + SAME_TIME:
             segment = segments.pop()
             before = before and segment.slopes and segment.velocity(start)
@@ -94,8 +94,8 @@ class TargetStream:
             if done.length > 0.0:
                 segments.append(done)
         way = {index: value - leaving[index] for index, value in goal.items()}
-        is_cubic = before and slopes and agree(way, end - start, before, slopes)
-        segments.append(Segment(start, end - start, goal, way, (before, slopes) if is_cubic else None))
+        ends = (before, slopes) if before and slopes and agree(way, end - start, before, slopes) else None
+        segments.append(Segment(start, end - start, goal, way, ends))
         self._velocities.append(segments[-1].velocity(end))
         return segments[-1]
 
@@ -131,12 +131,14 @@ class TargetStream:
         if last.slopes is None:
             first = then = {index: self._next_velocity(index) for index in last.way}
         else:
-            first, bend = last.slopes[1], last.acceleration_at_end()
+            first, bend = dict(last.slopes[1]), last.acceleration_at_end()
             then = {index: _lesser(value + length * bend[index], 2.0 * value) for index, value in first.items()}
         if length <= 0.0 or not any(first.values()):
             return
         rest = dict.fromkeys(first, 0.0)
-        self._extend(length, {index: length * (value + then[index]) / 2.0 for index, value in first.items()}, first, then)
+        self._extend(
+            length, {index: length * (value + then[index]) / 2.0 for index, value in first.items()}, first, then
+        )
         if not self._wanted_window:
             self._extend(self._period, {i: self._period * value / 2.0 for i, value in then.items()}, then, rest)
         beyond = self._segments[-1].goal
