@@ -111,7 +111,7 @@ def _follow(folder: Path, sent: Sequence[Sent], velocities: bool) -> tuple[float
     """Returns the largest effort [N m] and the mean lag [ms] of a robot that follows targets."""
     waiting, states = deque(sent), []
     with contextlib.closing(World.from_file(str(write_main(folder, _world(folder))))) as world:
-        arm = world.bodies["iiwa"]
+        arm: Any = world.bodies["iiwa"]
         for tick in range(round(SECONDS / DT_S)):
             while waiting and waiting[0].arrival_s <= tick * DT_S + 1e-9:
                 one = waiting.popleft()
