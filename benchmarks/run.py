@@ -20,7 +20,7 @@ from result import Result, table
 
 BENCHMARKS = (
     *("loop", "many", "load", "camera", "latency", "free_run", "reset", "tables"),
-    *("ik", "ik_nodes", "device", "mvn", "grasp", "guard", "physics"),
+    *("ik", "ik_nodes", "device", "mvn", "grasp", "guard", "contacts", "physics"),
 )
 WHEN_NAMED = ("dressing", "guard_faults", "haptics", "passivity", "press", "soak", "streams", "teleop")
 """Those that take too long to run with the others."""

@@ -55,6 +55,21 @@ def test_the_list_has_a_line_for_each_command(bare):
     assert all(f"\n{line}\n" in SECTIONS[command] for command, line in listed.items())
 
 
+def test_the_page_names_all_extras_and_all_benchmarks_that_run_only_when_named():
+    extras = {path.stem.removeprefix("requirements-") for path in ROOT.glob("requirements-*.txt")}
+    assert words_of("setup", "EXTRA") >= extras
+    (named,) = re.findall(
+        r"^WHEN_NAMED = \((.*?)\)", (ROOT / "benchmarks/run.py").read_text(), re.MULTILINE | re.DOTALL
+    )
+    assert words_of("bench", "NAME") >= set(re.findall(r"\w+", named))
+
+
+def words_of(command: str, argument: str) -> set[str]:
+    """Returns the words of the line that explains an argument of a command."""
+    (line,) = re.findall(rf"^    {argument} .*(?:\n {{10,}}.*)*", SECTIONS[command], re.MULTILINE)
+    return set(re.findall(r"\w+", line))
+
+
 def test_an_unknown_command_is_refused_with_the_list(bare):
     done = run([bare, "lanch"])
     assert done.returncode == 2
@@ -166,7 +181,7 @@ def test_launch_refuses_an_argument_that_the_launch_file_lacks():
     assert done.returncode == 2
     assert done.stderr == (
         "launch: unknown argument of run_kuka 'real_time_facotr': "
-        "known are guard, gui, headless, real_robot, real_time_factor, rviz, stand_in, use_sim_time; "
+        "known are guard, gui, headless, real_robot, real_time_factor, rviz, stand_in, start, use_sim_time; "
         "did you mean 'real_time_factor'?\n"
     )
 

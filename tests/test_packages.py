@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 import rospkg
+from clean_shell import in_clean_shell
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = sorted(path.parent for folder in ("src", "templates") for path in ROOT.glob(f"{folder}/**/package.xml"))
@@ -20,6 +21,11 @@ NOT_IN_DEBIAN = {
     "control_msgs",  # optional: trajectory actions are there if the user has it
     "depth_image_proc", "nodelet",  # optional: off unless the user asks
 }  # fmt: skip
+
+REPLACEABLE = {"ik_ros_examples": {"rpbi_examples"}, "keyboard": {"operator_node"}, "teleop": {"operator_node"}}
+"""Packages that stand-ins use undeclared: those of a workspace over this one, of the same names, need the stand-ins."""
+RELEASE = {"operator_node": "keyboard teleop", "rpbi_examples": "ik_ros_examples"}
+"""Packages of the release that are built over ours, with the packages of ours that they are built with."""
 
 
 def _declared(package: Path) -> set[str]:
@@ -48,7 +54,8 @@ def test_every_ros_package_that_is_used_is_declared(package: Path) -> None:
     known = set(rospkg.RosPack().list())
     imported = {name for name in _imported(package) if name in known or OF_ROS.fullmatch(name)}
     used = imported | _launched(package)
-    assert used - _declared(package) - {package.name} - NOT_IN_DEBIAN == set()
+    undeclared = {package.name} | NOT_IN_DEBIAN | REPLACEABLE.get(package.name, set())
+    assert used - _declared(package) - undeclared == set()
 
 
 @pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.name)
@@ -68,3 +75,29 @@ def test_packages_agree_on_who_maintains_them_and_under_which_licence() -> None:
     own = {facts(package) for package in PACKAGES if package.is_relative_to(ROOT / "src")}
     assert {(name, licence) for name, licence, _ in own} == {("ROS-PyBullet Interface developers", "LGPL-3.0-or-later")}
     assert len(own) == 1
+
+
+@pytest.mark.parametrize("tool", ["catkin_make", "catkin_make_isolated"])
+def test_packages_of_the_release_are_built_over_ours(tool: str, tmp_path: Path) -> None:
+    for name, needed in RELEASE.items():
+        package = tmp_path / "src" / name
+        package.mkdir(parents=True)
+        depends = "".join(f"<depend>{other}</depend>" for other in needed.split())
+        (package / "package.xml").write_text(
+            f"""<package format="2"><name>{name}</name><version>0.0.0</version><description>Its name.</description>
+            <maintainer email="nobody@example.org">Nobody</maintainer><license>BSD</license>
+            <buildtool_depend>catkin</buildtool_depend>{depends}</package>"""
+        )
+        (package / "CMakeLists.txt").write_text(
+            f"""cmake_minimum_required(VERSION 3.16)
+            project({name} C)
+            find_package(catkin REQUIRED COMPONENTS {needed})
+            catkin_package()"""
+        )
+    build = f"cd {tmp_path}; {tool} --no-color -DPYTHON_EXECUTABLE=/usr/bin/python3 -DCATKIN_ENABLE_TESTING=OFF"
+    setup = f"{'devel' if tool == 'catkin_make' else 'devel_isolated'}/setup.bash"
+    line = f"{build}; source {setup}; rospack find rpbi_examples; rospack find ik_ros_examples"
+    done = subprocess.run(in_clean_shell(line, ROOT / "devel/setup.bash"), capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    found = [Path(line).resolve() for line in done.stdout.splitlines()[-2:]]
+    assert found == [tmp_path / "src/rpbi_examples", ROOT / "src/compatibility/ik_ros_examples"]

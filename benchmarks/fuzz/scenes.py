@@ -16,6 +16,7 @@ from safe_robot.geometry.obstacles import Obstacle
 from safe_robot.guard import Guard
 from safe_robot.robot import GuardedRobot
 
+LWR = Path(__file__).resolve().parents[2] / "src/rpbi_examples/robots/kuka_lwr.urdf"
 PERIOD_S = 0.01
 LIMITS = {"velocity": 1.0, "acceleration": 8.0, "jerk": 200.0}
 MARGIN_M = 0.02
@@ -85,5 +86,6 @@ SCENES = {
         np.array((0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0)),
         {"table": ((0.7, 1.2, 0.1), (0.7, 0.0, 0.05)), "pole": ((0.08, 0.08, 1.2), (0.3, 0.5, 0.6))},
     ),
+    "lwr": Scene(LWR, np.array((0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0)), {"table": ((0.7, 1.2, 0.1), (0.7, 0.0, 0.05))}),
 }
-"""By how many joints they have; the links of the second one are meshes."""
+"""By how many joints they have, the links of the second one being meshes; and an arm of cylinders."""

@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 from node_world import main_config
 from release_types import MESSAGES, SERVICES
-from ros_system import SUPPORT
+from ros_system import SUPPORT, wait_until
+from roslaunch import substitution_args
 from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 from worlds import iiwa
 
-from custom_ros_tools.config import replace_package
 from ik_ros.lookup import make_solver
 
 PACKAGES = sorted({name.split("/")[0] for name in (*MESSAGES, *SERVICES)} | {"roscpp", "sensor_msgs", "std_srvs"})
@@ -68,27 +68,71 @@ def test_client_in_cpp_knows_all_types_and_is_served(ros, tmp_path, client):
     ]
 
 
-def test_files_and_nodes_of_its_examples_are_found_under_their_names(ros):
-    """What launch files of the release say of the package `ik_ros_examples`."""
-    arm = {"base_link": "lwr_arm_0_link", "tip_link": "end_effector_ball"}
-    solver = make_solver("trac_ik", {"urdf_filename": "{ik_ros_examples}/robots/kuka_lwr.urdf", **arm})
+FILES = {
+    "ik_ros_examples/robots/kuka_lwr.urdf": "end_effector_ball",
+    "ik_ros_examples/robots/kuka_lwr2.urdf": "lwr_world",
+    "ik_ros_examples/rviz/kuka_lwr_example.rviz": "rpbi/world",
+    "operator_node/configs/keyboard/keyboard_to_joy.yaml": "LEFT, RIGHT",
+    "operator_node/configs/keyboard/keyboard_scale.yaml": "axes_idx: [0, 1, 2]",
+    "teleop/configs/teleop_tf_demo_config.yaml": "target_frame_id: tf_target",
+    "teleop/configs/teleop_tf_demo_spacenav_config.yaml": "axes_idx: [1, 0, 2, 4, 3, 5]",
+}
+"""Files that launch files of the release name, with a text in each."""
+LAUNCH = """<launch>
+  <node pkg="ik_ros_examples" type="figure_eight_node.py" name="figure_eight"/>
+  <node pkg="tf" type="static_transform_publisher" name="tool" args="1 0 0 0 0 0 arm_tip tool 50"/>
+  <node pkg="operator_node" type="scale_node.py" name="scale">
+    <rosparam param="config" file="$(find operator_node)/configs/keyboard/keyboard_scale.yaml"/>
+    <param name="start_on_init" value="true"/>
+  </node>
+  <node pkg="teleop" type="teleop_tf_node.py" name="teleop">
+    <rosparam param="config" file="$(find teleop)/configs/teleop_tf_demo_config.yaml"/>
+    <param name="start_on_init" value="true"/>
+  </node>
+</launch>"""
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_files_are_found_under_their_names(name):
+    package, _, path = name.partition("/")
+    assert FILES[name] in Path(substitution_args.resolve_args(f"$(find {package})/{path}")).read_text()
+
+
+@pytest.mark.parametrize(("robot", "tip"), [("kuka_lwr", "end_effector_ball"), ("kuka_lwr2", "end_effector_sponge")])
+def test_solvers_take_its_robots(robot, tip):
+    chain = {"base_link": "lwr_arm_0_link", "tip_link": tip}
+    solver = make_solver("trac_ik", {"urdf_filename": f"{{ik_ros_examples}}/robots/{robot}.urdf", **chain})
     assert len(solver.joint_names) == 7
-    assert "rpbi/world" in Path(replace_package("{ik_ros_examples}/rviz/kuka_lwr_example.rviz")).read_text()
+
+
+def test_a_launch_file_starts_nodes_under_their_names(ros, tmp_path):
+    (tmp_path / "release.launch").write_text(LAUNCH)
     frames = ros.listen("/tf", TFMessage)
-    ros.start(["rosrun", "ik_ros_examples", "figure_eight_node.py"])
-    assert frames.wait_for(1)[0].transforms[0].child_frame_id == "figure_eight"
+    ros.start(["roslaunch", str(tmp_path / "release.launch")])
+    expected = {("figure_eight_base", "figure_eight"), ("arm_tip", "tool"), ("tf_start", "tf_target")}
+
+    def known() -> set[tuple[str, str]]:
+        transforms = [each for message in list(frames.messages) for each in message.transforms]
+        return {(each.header.frame_id, each.child_frame_id) for each in transforms}
+
+    wait_until(lambda: known() >= expected, f"{expected} are on /tf")
     assert not ros.call("toggle_figure_eight", SetBool, True).success, "it moves from the start"
+    assert not ros.call("operator_node/toggle", SetBool, True).success, "it is on from the start"
 
 
 SCRIPT = """
 import numpy as np
 from keyboard.msg import Key
-from std_srvs.srv import SetBool
+from sensor_msgs.msg import Joy
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import SetBool, SetBoolRequest
 
+from custom_ros_tools.config import load_configs
 from custom_ros_tools.keyboard import KeyDownSubscriber
 from custom_ros_tools.robot import JointStatePublisher, JointStateSubscriber, get_joint_state, resolve_joint_order
 from custom_ros_tools.ros_comm import ToggleService, get_srv_handler, get_srv_handlers
 from custom_ros_tools.tf import TfInterface
+from operator_node.node import OperatorNode, main
 from rpbi.ros_node import RosNode
 
 node = RosNode("script", anonymous=True)
@@ -116,7 +160,31 @@ tf.pos_quat_to_matrix(pos=[1, 0, 0], quat=[0, 0, 0, 1])
 toggle = ToggleService(name="toggle", enable_handler=lambda: (True, "on"), disable_handler=lambda: (False, "off"))
 handler = get_srv_handler(srv_name="toggle", srv_type=SetBool, persistent=True, headers=None)
 assert handler(True).message == "on" and handler(data=False).message == "off"
-assert get_srv_handlers({"toggle": SetBool}, persistent=False)["toggle"](True).success
+assert get_srv_handlers(srvs={"toggle": SetBool}, persistent=False)["toggle"](True).success
+assert toggle.toggle(req=SetBoolRequest(data=True)).message == "on"
+assert load_configs(s="a: 1") == {"a": 1}
+
+
+class Doubled(OperatorNode):
+    def __init__(self):
+        super().__init__()
+        self.factor = self.config["factor"]
+        self.post_init()
+
+    def callback(self, msg):
+        self.publish(signal=self.factor * np.array(msg.axes))
+
+
+node.set_param("~config", {"factor": 2.0})
+doubled = Doubled()
+signals, joy = [], node.Publisher("joy", Joy, queue_size=10)
+node.Subscriber("operator_node/signal", Float64MultiArray, lambda message: signals.append(message.data))
+assert doubled.start()[0] and not doubled.start()[0]
+while (1.0, -2.0) not in signals:
+    joy.publish(Joy(axes=[0.5, -1.0]))
+    node.sleep(0.02)
+assert doubled.stop()[0] and not doubled.stop()[0]
+assert callable(main)
 
 subscriber = JointStateSubscriber(topic_name="joint_states", joint_names=["b", "a"], ns="", callback=None)
 publisher = JointStatePublisher(topic_name="joint_states", joint_names=["a", "b"], queue_size=10)

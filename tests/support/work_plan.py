@@ -18,7 +18,14 @@ FIRST = ("ros/ik_ros", "ros/rpbi_examples", "gui", "ros")
 QUICK_FOLDERS = ("unit", "sim")
 """Folders all of whose tests are quick, as those of the top are; elsewhere those with the mark."""
 
-EXTRA_OF = {"pinocchio": "ik", "daqp": "ik", "casadi": "mpc", "cv2": "tags"}
+EXTRA_OF = {
+    "pinocchio": "ik",
+    "daqp": "ik",
+    "casadi": "mpc",
+    "cv2": "tags",
+    "nbclient": "notebook",
+    "nbformat": "notebook",
+}
 """Extra that has a module."""
 
 

@@ -14,6 +14,15 @@ FLOOR: dict[str, Any] = {
     "changeDynamics": {"lateralFriction": 1.0},
 }
 
+BOX_FLOOR: dict[str, Any] = {
+    **FLOOR,
+    "createCollisionShape": {
+        "shapeType": "GEOM_BOX",
+        "halfExtents": [2.0, 2.0, 0.5],
+        "collisionFramePosition": [0.0, 0.0, -0.5],
+    },
+}
+
 
 def ball(name: str = "ball", radius_m: float = 0.1, **more: Any) -> dict[str, Any]:
     """Returns the configuration of a ball."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import rospy
 from avatar_message import HEIGHT_M, message
-from geometry_msgs.msg import PoseArray
+from geometry_msgs.msg import PoseArray, Vector3
 from node_world import Rosout, main_config, publishing
 from ros_system import find_executable, wait_until
 from sensor_msgs.msg import JointState
@@ -20,6 +20,7 @@ from operator_node.avatar.anthropometry import segment_offsets
 from operator_node.avatar.urdf_offsets import urdf_offsets
 from operator_node.msg import SegmentForces
 from operator_node.mvn.segments import SEGMENTS
+from ros_pybullet_interface.msg import ContactPoint, Contacts
 
 HUMAN = {
     "name": "human",
@@ -73,8 +74,31 @@ def test_what_it_carries_is_felt_by_its_forearm(avatar):
 
     wait_until(carries, "the forearm feels the weight")
     assert forces.messages[-1].segments == list(SEGMENTS)
-    others = [force.z for name, force in zip(SEGMENTS, forces.messages[-1].forces) if name != "RightForeArm"]
-    assert not any(others)
+    newest = forces.messages[-1]
+    assert newest.sums[FOREARM] >= newest.largest[FOREARM] > 0.0
+    others = [n for n in range(len(SEGMENTS)) if n != FOREARM]
+    assert not any(newest.forces[n].z or newest.sums[n] or newest.largest[n] for n in others)
+
+
+def test_a_squeeze_is_the_sum_of_magnitudes_and_no_force_as_a_vector(avatar):
+    forces = avatar.listen("avatar/segment_forces", SegmentForces)
+    own = ContactPoint(link="Head", other_body="human", normal=Vector3(1, 0, 0), normal_force=9.0)
+    squeeze = [
+        ContactPoint(link="RightHand", other_body="plate", normal=Vector3(0, side, 0), normal_force=40.0)
+        for side in (-1, 1)
+    ]
+    hand, head = SEGMENTS.index("RightHand"), SEGMENTS.index("Head")
+    with publishing("/rpbi/human/contacts", Contacts) as publisher:
+        message = Contacts(points=[own, *squeeze])
+
+        def found() -> list[SegmentForces]:
+            publisher.publish(message)
+            return [each for each in forces.messages if each.sums[hand]]
+
+        wait_until(found, "the squeeze is summed up")
+        squeezed = found()[0]
+    assert (squeezed.sums[hand], squeezed.largest[hand], squeezed.sums[head]) == (80.0, 40.0, 0.0)
+    assert squeezed.forces[hand] == Vector3(0.0, 0.0, 0.0)
 
 
 def test_the_avatar_does_what_the_person_does_and_never_jumps(avatar, own_tf):

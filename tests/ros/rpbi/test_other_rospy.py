@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -95,3 +96,21 @@ def test_a_master_that_comes_back_is_noticed_though_nothing_is_registered_again(
 def test_the_rospy_that_is_here_is_as_expected(ros, tmp_path):
     process = ros.simulator(_config(tmp_path))
     assert registrations() and not _lines(ros, process, BUILT_OTHERWISE)
+
+
+ENDS_AS_IT_STARTS = """
+import rospy
+from std_msgs.msg import Empty
+from custom_ros_tools.ros.rospy_internals import DirectSending
+
+rospy.init_node("ends_as_it_starts", disable_signals=True)
+publisher = rospy.Publisher("topic", Empty, queue_size=1)
+rospy.signal_shutdown("interrupted")
+print("sends:", DirectSending.of(publisher, 1))
+"""
+
+
+def test_a_node_that_is_interrupted_as_it_starts_says_nothing_of_rospy(ros):
+    process = ros.start([sys.executable, "-c", ENDS_AS_IT_STARTS])
+    assert process.wait(120.0) == 0
+    assert ros.output(process) == "sends: None\n"

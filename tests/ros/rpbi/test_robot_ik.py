@@ -66,7 +66,7 @@ def node(module_ros):
     gripper = iiwa("gripper", start_ik_callback=True, initial_joint_position={"elbow": 60.0, "grip": 0.03})
     gripper["loadURDF"] = {"fileName": str(urdf), "useFixedBase": True, "basePosition": list(GRIPPER_AT)}
     robots = (
-        _iiwa("arm", start_ik_callback=True),
+        _iiwa("arm", start_ik_callback=True, strict=True),
         _iiwa("shown", is_visual_robot=True),
         {**_iiwa("drone"), "loadURDF": {"fileName": "kuka_iiwa/model.urdf", "basePosition": [5.0, 0.0, 1.0]}},
         gripper,
@@ -133,11 +133,15 @@ def test_velocity_is_the_way_from_the_current_position_by_time(ros, node, kinema
     assert len(_solve(ros, "arm", _problem(goal, dt=0.5)).solution.velocity) == 0
 
 
-def test_an_unreachable_target_is_no_success_and_the_best_stays_within_limits(ros, node, kinematics):
-    answer = _solve(ros, "arm", _problem(Pose((4.0, 0.0, 0.5))))
-    assert not answer.success
-    assert "'lbr_iiwa_link_7' misses its target by" in answer.message and "rad" in answer.message
-    assert (np.abs(answer.solution.position) <= kinematics.limits.upper).all()
+def test_a_strict_robot_refuses_a_target_out_of_reach_and_others_go_as_near_as_they_come(ros, node, kinematics):
+    refused, near = (_solve(ros, robot, _problem(Pose((4.0, 0.0, 0.5)))) for robot in ("arm", "shown"))
+    assert (refused.success, near.success) == (False, True)
+    assert near.message == f"as near as it comes: {refused.message}"
+    assert refused.message.startswith("'lbr_iiwa_link_7' misses its target by ") and "rad" in refused.message
+    assert near.solution.position == pytest.approx(refused.solution.position)
+    assert (np.abs(near.solution.position) <= kinematics.limits.upper).all()
+    missed_m = math.dist((BASE @ kinematics.forward(near.solution.position, LINK)).position, (4.0, 0.0, 0.5))
+    assert f"by {missed_m * 1e3:.4g} mm" in near.message
 
 
 @pytest.mark.parametrize(
@@ -205,7 +209,17 @@ def _hand(states):
     return [0.4 * f(shoulder) + 0.3 * f(shoulder + elbow) for f in (math.cos, math.sin)]
 
 
-def test_what_the_topic_cannot_solve_is_named_with_the_residual_and_moves_nothing(ros, node):
+def test_the_topic_moves_the_link_as_near_as_it_comes_with_a_warning(ros, node):
+    rosout = Rosout(ros)
+    states = ros.listen("/rpbi/gripper/joint_states", JointState)
+    away = np.add(GRIPPER_AT, (0.0, 2.0, 0.0))
+    with publishing("/rpbi/gripper/ik", CalculateInverseKinematicsProblem) as topic:
+        topic.publish(CalculateInverseKinematicsProblem(link_name="hand", targetPosition=away))
+        wait_until(lambda: math.dist(_hand(states), (0.0, 0.7)) < 5e-3, "the arm is stretched out towards it")
+    rosout.wait_for(["/rpbi/gripper/ik: as near as it comes: 'hand' misses its target by 1300 mm; 1 mm would do"])
+
+
+def test_the_topic_of_a_strict_robot_moves_nothing_and_names_the_residual(ros, node):
     rosout = Rosout(ros)
     states = ros.listen("/rpbi/arm/joint_states", JointState)
     before = states.wait_for(1)[-1].position
@@ -219,7 +233,7 @@ def test_what_the_topic_cannot_solve_is_named_with_the_residual_and_moves_nothin
 def test_the_topic_is_there_only_where_it_is_asked_for(ros, node):
     ours = registrations()
     assert ("subscribes", "/rpbi/arm/ik") in ours and ("serves", "/rpbi/arm/ik") in ours
-    assert ("subscribes", "/rpbi/shown/ik") not in ours and ("serves", "/rpbi/shown/ik") in ours
+    assert ("subscribes", "/rpbi/drone/ik") not in ours and ("serves", "/rpbi/drone/ik") in ours
 
 
 def test_service_and_topic_go_with_their_robot(ros, node, kinematics):

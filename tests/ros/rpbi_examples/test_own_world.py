@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
+import sys
 from pathlib import Path
+from xmlrpc.client import ServerProxy
 
 import pytest
 import rosgraph
@@ -14,7 +17,9 @@ from ros_system import wait_until
 from visualization_msgs.msg import MarkerArray
 from worlds import FLOOR, box, write_world
 
+from custom_ros_tools.ros.lifecycle.timed_master import unused_port
 from ros_pybullet_interface.msg import SimulationState
+from rpbi_examples.ros.running_simulators import running_simulators
 
 ROOT = Path(__file__).resolve().parents[3]
 TABLE_TOP_M = 0.5
@@ -40,6 +45,9 @@ def folder(tmp_path):
 
 
 RPBI = f"'{ROOT}/rpbi' launch world.yaml"
+LAUNCH = f"{sys.executable} '{ROOT}/src/rpbi_examples/nodes/launch.py' '{ROOT}/src/rpbi_examples/launch'"
+"""The program of `./rpbi launch`, which is quicker without setting up the workspace."""
+WORLD = f"{LAUNCH} world.yaml"
 ROSLAUNCH = "roslaunch rpbi_examples world.launch config:=world.yaml"
 
 
@@ -73,7 +81,7 @@ def places(ros):
 
 
 def test_two_of_one_file_run_on_one_master_each_with_its_own_frames(ros, folder):
-    left = launch(ros, folder, RPBI, ns="left", tf_prefix="left", use_sim_time="false")
+    left = launch(ros, folder, f"{RPBI} --ns left")
     more = {"use_sim_time": "false", "real_time_factor": 0.5}
     right = launch(ros, folder, ROSLAUNCH, ns="right", tf_prefix="right", **more)
     place = places(ros)
@@ -105,3 +113,37 @@ def test_a_world_that_cannot_be_built_ends_the_launch_with_all_that_is_wrong(ros
     assert "Traceback" not in printed
     with pytest.raises(rosgraph.MasterError):
         rosgraph.Master("/tests").lookupService("/rpbi/list_objects")
+
+
+def node_of(name):
+    """Returns the address of a node that answers."""
+    uri = rosgraph.Master("/tests").lookupNode(name)
+    return uri if ServerProxy(uri).getPid("/tests")[2] else None
+
+
+def test_a_running_simulator_is_stopped_only_on_purpose(ros, folder, ros_master):
+    simulator = "/ros_pybullet_interface"
+    dead = f"http://localhost:{unused_port()}"
+    rosgraph.Master(simulator).registerService("/rpbi/list_objects", "rosrpc://localhost:1", dead)
+    assert rosgraph.Master("/tests").lookupNode(simulator) == dead, "as if it had been killed"
+    first = launch(ros, folder, WORLD, use_sim_time="false")
+    come_up(ros, first, "/")
+    address = wait_until(lambda: node_of(simulator), "the first simulator answers")
+
+    second = launch(ros, folder, WORLD, use_sim_time="false")
+    assert second.wait(120.0) == 2
+    refused = (
+        f"launch: {simulator} runs already on the ROS master at {ros_master}, and this would stop it: run this on "
+    )
+    offered = "a master of its own with -p PORT, or in a namespace with --ns NAME if both have use_sim_time:=false; "
+    line = re.sub(r"-p \d+", "-p PORT", ros.output(second))
+    assert line == f"{refused}{offered}--replace stops the one that runs\n"
+
+    other = folder / "other.launch"
+    other.write_text('<launch><node pkg="rpbi_utils" type="stand_in_node.py" name="ros_pybullet_interface"/></launch>')
+    assert running_simulators(str(other), ros_master) == [], "what has no simulator may run"
+    assert node_of(simulator) == address and first.poll() is None
+
+    third = launch(ros, folder, f"{WORLD} --replace", use_sim_time="false")
+    first.wait(120.0)
+    assert come_up(ros, third, "/") and node_of(simulator) != address

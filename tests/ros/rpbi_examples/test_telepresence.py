@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from geometry_msgs.msg import Point, Vector3
+from geometry_msgs.msg import Point
 from node_world import Rosout, publishing
 from ros_system import wait_until
 from sensor_msgs.msg import JointState
@@ -17,7 +17,7 @@ ARM = ["RightShoulder", "RightUpperArm", "RightForeArm", "RightHand"]
 BAD = (
     ("/rpbi/panda/joint_states", JointState(name=JOINTS[:3], position=[0.0] * 3), "panda_joint4"),
     ("/rpbi/panda/joint_states", JointState(name=JOINTS), "expected positions of the joints, got none"),
-    ("/avatar/segment_forces", SegmentForces(segments=ARM[1:], forces=[Vector3()] * 3), "without RightShoulder"),
+    ("/avatar/segment_forces", SegmentForces(segments=ARM[1:], sums=[0] * 3, largest=[0] * 3), "without RightShoulder"),
     ("/rpbi/sleeve/surface", Marker(points=[Point()] * 4), "expected the 308 triangles of the sleeve"),
 )
 

@@ -232,6 +232,19 @@ def test_ctrl_c_closes_the_bag_and_leaves_no_process(ros: Any, tmp_path: Path) -
         os.killpg(process.pid, 0)
 
 
+def test_the_recorder_of_a_script_that_is_killed_closes_the_bag_and_ends(ros: Any, tmp_path: Path) -> None:
+    path = tmp_path / "a.bag"
+    with Counter(["/a"]) as counter:
+        process = ros.start([sys.executable, "-c", SCRIPT, str(path)])
+        wait_until(lambda: "recording" in ros.output(process), "it records")
+        first = counter.last
+        wait_until(lambda: counter.last > first + 10, "something is recorded")
+        process.kill()
+        process.wait()
+        wait_until(path.exists, "the recorder closes the bag")
+    assert len(bag_to_dataframes(path)["/a"]) > 0
+
+
 def test_without_a_master_it_does_not_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
     with pytest.raises(RecordingError, match="no ROS master at http://127.0.0.1:1"):

@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 import yaml
-from worlds import FLOOR, ball, box, write_world
+from worlds import BOX_FLOOR, ball, box, write_world
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -35,20 +35,20 @@ def package(folder: Path, name: str, floor: str) -> None:
     configs = folder / name / "configs"
     configs.mkdir(parents=True)
     (folder / name / "package.xml").write_text(f"<package><name>{name}</name></package>")
-    (configs / "floor.yaml").write_text(yaml.safe_dump({**FLOOR, "name": floor}))
+    (configs / "floor.yaml").write_text(yaml.safe_dump({**BOX_FLOOR, "name": floor}))
     (configs / "world.yaml").write_text("collision_objects: ['{rpbi_examples}/configs/floor.yaml']")
 
 
 def test_warnings_are_told_apart_from_errors_and_only_errors_fail(tmp_path):
     sunk = box(basePosition=[0.0, 0.0, 0.05])
-    write_world(tmp_path, collision=(FLOOR,), dynamic=(sunk,))
+    write_world(tmp_path, collision=(BOX_FLOOR,), dynamic=(sunk,))
     code, lines, told = check("world.yaml", tmp_path)
     assert (code, told) == (
         0,
         ["warning: floor.yaml: at the start, 'floor' and 'box' are in each other by 0.05 m, and will be pushed apart"],
     )
     assert lines[0] == "world.yaml: fine; 1000 ticks a second, 1 warning"
-    write_world(tmp_path, collision=(FLOOR,), dynamic=(ball(radius=1.0), {**sunk, "mass": 1.0}))
+    write_world(tmp_path, collision=(BOX_FLOOR,), dynamic=(ball(radius=1.0), {**sunk, "mass": 1.0}))
     code, lines, told = check("world.yaml", tmp_path)
     assert code == 1 and lines == []
     assert [line.split(": unknown key")[0] for line in told] == [

@@ -6,9 +6,9 @@ import math
 
 import pybullet
 import pytest
-from worlds import FLOOR, ball, box, iiwa, write_world
+from worlds import BOX_FLOOR, FLOOR, ball, box, iiwa, write_world
 
-from custom_ros_tools.errors import ConfigError
+from custom_ros_tools.errors import ConfigError, PhysicsError
 from rpbi.config.loading import load_object
 from rpbi.geometry import Pose
 from rpbi.samples import ContactArrowsSample, ContactsSample
@@ -152,6 +152,28 @@ def test_pybullet_is_asked_once_a_tick_for_all(build, monkeypatch):
     assert asked == [()] * 10
 
 
+@pytest.mark.parametrize("field", range(5, 14))
+def test_what_is_not_finite_is_refused_by_name_and_tick_and_only_where_it_is(build, monkeypatch, field):
+    world = build(resting_box("a"), resting_box("b", 0.3), floor={**FLOOR, "contacts": TOLD})
+    run(world, 10)
+    original = world.pb.getContactPoints
+
+    def spoilt() -> list[tuple]:
+        value = math.nan if field in (8, 9, 10, 12) else (0.0, math.inf, 0.0)
+        ends = {world.bodies["floor"].body_id, world.bodies["a"].body_id}
+        return [
+            touch[:field] + (value,) + touch[field + 1 :] if set(touch[1:3]) == ends else touch for touch in original()
+        ]
+
+    monkeypatch.setattr(world.pb, "getContactPoints", spoilt)
+    world.set_sensor_rate("floor", 0, 0.0)
+    world.set_sensor_rate("a", 0, 0.0)
+    run(world, 1)  # those on the other box are sound
+    world.set_sensor_rate("a", 0, 1000.0)
+    with pytest.raises(PhysicsError, match="a: contacts are not finite any more at tick 12"):
+        world.step()
+
+
 def test_arrows_are_the_forces_to_scale(build):
     world = build(resting_box(contacts={"arrows_hz": 100, "arrow_metres_per_newton": 0.02}))
     arrows = [sample for _ in range(500) for sample in world.step() if isinstance(sample, ContactArrowsSample)]
@@ -180,3 +202,61 @@ def test_without_the_key_there_are_none_and_a_visual_robot_has_none(build):
     robot = {"name": "ghost", "loadURDF": {"fileName": "kuka_iiwa/model.urdf"}, "is_visual_robot": True}
     with pytest.raises(ConfigError, match="contacts: a visual robot touches nothing"):
         load_object("visual_robot", {**robot, "contacts": {}}, "ghost.yaml")
+
+
+def _sliding(told, hz):
+    """Returns a box that slides over a plane, whose forces chatter, and then bumps into another."""
+    speed = {"linearVelocity": [1.0, 0.3, 0.0]}
+    boxes = resting_box(resetBaseVelocity=speed, contacts={**told, "hz": hz}), resting_box("other", 0.1)
+    boxes[1]["basePosition"][0] = 0.27
+    return boxes
+
+
+def test_means_add_up_to_all_that_was_felt_between_two_samples(build):
+    ticks, periods = 10, 20
+    each, mean = build(*_sliding({}, 1000)), build(*_sliding({"average": True}, 100))
+    for _ in range(periods):
+        felt = [run(each, 1)["box"] for _ in range(ticks)]
+        told = run(mean, ticks)["box"]
+        assert {point[:3] for point in told.points} == {point[:3] for one in felt for point in one.points}
+        for other in ("floor", "other"):
+            points = [point for one in felt for point in one.points if point.other_body == other]
+            means = [point for point in told.points if point.other_body == other]
+            assert len(means) == bool(points)
+            if points:
+                force = [sum(point.force[axis] for point in points) / ticks for axis in range(3)]
+                assert means[0].force == pytest.approx(force, abs=1e-9)
+                pressed = sum(point.normal_force for point in points)
+                assert means[0].normal_force == pytest.approx(pressed / ticks, rel=1e-6)
+                moment = sum(point.normal_force * point.position[0] for point in points)
+                assert pressed * means[0].position[0] == pytest.approx(moment, abs=1e-9) or not pressed
+                assert math.hypot(*means[0].normal) == pytest.approx(1.0)
+    assert each.state_hash() == mean.state_hash()
+
+
+def test_means_lose_no_impact_between_two_samples_and_the_last_tick_does(build):
+    lost = {}
+    for average in (False, True):
+        dropped = resting_box("box", 0.2, contacts={"hz": 10, "average": average})
+        world = build(dropped, floor=BOX_FLOOR)
+        samples = [sample for _ in range(1000) for sample in world.step() if isinstance(sample, ContactsSample)]
+        assert len(samples) == 10
+        lost[average] = MASS_KG * GRAVITY - sum(sample.force[2] for sample in samples) / 10
+    assert lost[True] == pytest.approx(0.0, abs=0.05)
+    assert abs(lost[False]) > 1.0
+
+
+def test_means_are_those_of_ticks_that_somebody_wants_and_stay_while_the_world_stands(build):
+    world = build(resting_box(contacts={"hz": 10, "average": True}))
+    (sensor, _) = world.sensors_of("box")
+    assert sensor.read(0).points == ()
+    run(world, 500)
+    first = sensor.read(world.clock.tick)
+    assert first.force[2] == pytest.approx(MASS_KG * GRAVITY, rel=0.01) and sensor.read(world.clock.tick) is first
+    for off in ({"wanted": False}, {"hz": 0.0}):
+        sensor.wanted, sensor.hz = True, 10.0
+        vars(sensor).update(off)
+        world.bodies["box"].teleport(Pose((0.0, 0.0, 5.0)))
+        run(world, 5)
+        sensor.wanted, sensor.hz = True, 10.0
+        assert sensor.read(world.clock.tick) is first, "nothing was kept"

@@ -399,13 +399,7 @@ def test_a_session_with_controllers_is_the_same_again(build):
 def test_the_controller_of_the_page_works(build, tmp_path, monkeypatch):
     page = (ROOT / "docs" / "controllers.md").read_text()
     (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
-    imports = """
-import numpy as np
-from pydantic import Field
-from custom_ros_tools.schema import NonNegative
-from rpbi.control.controllers import Controller, ControllerConfig
-"""
-    (tmp_path / "shaker_of_the_page.py").write_text(imports + code)
+    (tmp_path / "shaker_of_the_page.py").write_text(code)
     monkeypatch.syspath_prepend(str(tmp_path))
     world = build(lwr(controllers={"shake": {"type": "shaker_of_the_page:Shaker", "amplitude": 3.0}}))
     start = positions(world)

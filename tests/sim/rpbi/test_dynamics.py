@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import pybullet
 import pytest
 from worlds import FLOOR, box, iiwa, write_world
 
@@ -52,6 +53,15 @@ def test_box_slides_once_its_friction_is_lowered(make):
     run(world, 1000)
     acceleration = 9.81 * (math.sin(SLOPE) - 0.1 * math.cos(SLOPE))
     assert world.bodies["box"].base_pose().position[0] - held == pytest.approx(acceleration / 2, rel=0.05)
+
+
+def test_without_change_dynamics_an_object_has_what_pybullet_gives_it(make):
+    plain = {key: value for key, value in box().items() if key != "changeDynamics"}
+    bare = Client()
+    shape = bare.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[0.1] * 3)
+    expected = LinkDynamics(*bare.getDynamicsInfo(bare.createMultiBody(1.0, shape), -1))
+    bare.disconnect()
+    assert make(dynamic=(plain,)).dynamics("box") == expected
 
 
 def test_heavier_box_presses_harder(make):

@@ -64,6 +64,11 @@ def _links(*names):
     return "".join(map(LINK.format, names))
 
 
+def _chain(joints, kind):
+    ties = "".join(JOINT.format(f"j{index}", kind, index, index + 1) for index in range(joints))
+    return _urdf(_links(*range(joints + 1)), ties)
+
+
 FAULTS = {
     "two roots": (_urdf(_links("a", "b")), "expected one link that hangs on no joint, got a, b: is a joint missing?"),
     "two parents": (
@@ -80,7 +85,34 @@ FAULTS = {
         "link 'b' hangs on itself in the end",
     ),
     "no such link": (_urdf(_links("a"), JOINT.format("j", "fixed", "a", "x")), "ties link 'x', which there is not"),
-    "a long name": (_urdf(_links("a" * 5000)), "expected names of at most 250 bytes, got link 'aaa"),
+    "a long name": (_urdf(_links("a" * 5000)), "link.name: expected at most 250 bytes, got 5000: 'aaa"),
+    "a robot's long name": (
+        _urdf(_links("a")).replace('"r"', f'"{"r" * 1100}"'),
+        "robot.name: expected at most 250 bytes, got 1100",
+    ),
+    "a long text": (
+        _urdf(_links("a"), f'<material name="{"m" * 2000}"/>'),
+        "material.name: expected at most 250 bytes",
+    ),
+    "a format": (_urdf(_links("%p %p")), "link.name: expected a text without % and control characters, got '%p %p'"),
+    "a format as a type": (
+        _urdf(_links("a", "b"), JOINT.format("j", "%n", "a", "b")),
+        "joint.type: expected a text without % and control characters, got '%n'",
+    ),
+    "a format as an axis": (
+        _urdf(_links("a", "b"), JOINT.format("j", "revolute", "a", "b").replace("><", '><axis xyz="%s%n"/><', 1)),
+        "axis.xyz: expected a text without % and control characters, got '%s%n'",
+    ),
+    "a format as a material": (_urdf(_links("a"), '<material name="%n"/>'), "material '%n': material.name: expected"),
+    "a terminal's sequence": (_urdf(_links("a&#27;[2J&#10;").replace("&#27;", "\x7f")), r"got 'a\x7f[2J\n'"),
+    "a text for a number": (_urdf(MASSES.format("a", "heavy")), "mass.value: expected numbers, got 'heavy'"),
+    "nothing for a number": (_urdf(MASSES.format("a", "")), "mass.value: expected numbers, got ''"),
+    "two numbers for three": (
+        _urdf(_links("a", "b"), JOINT.format("j", "revolute", "a", "b").replace("><", '><axis xyz="0 1"/><', 1)),
+        "axis.xyz: expected three numbers, got '0 1'",
+    ),
+    "too many joints": (_chain(128, "revolute"), "expected at most 127 joints that are not fixed, got 128"),
+    "too many links": (_chain(2000, "fixed"), "expected at most 2000 links and as many joints, got 2001 links"),
     "no name": (_urdf(_links("")), "a link has no name"),
     "xacro": (_urdf(MASSES.format("a", "${mass}")), "'${mass}' is left of xacro"),
     "mass nan": (_urdf(MASSES.format("a", "nan")), "link 'a': mass.value: expected finite numbers, got 'nan'"),
@@ -98,7 +130,14 @@ FAULTS = {
         "no such mesh: no.obj (looked for beside it and in all folders above)",
     ),
     "deep": ("<robot>" + "<a>" * 100_000, "is not XML: "),
+    "deep, and closed": ("<robot>" + "<a>" * 100_000 + "</a>" * 100_000 + "</robot>", "in at most 100 others"),
+    "too long": ("<robot>" + " " * 2_000_000 + "</robot>", "expected at most 2000000"),
+    "comments that never end": ("<!-- " * 390_000, "is not XML"),
+    "robots that never begin": ("<robot" * 300_000, "is not XML"),
+    "robots that never end": ("<robot>" + "</robot " * 200_000, "is not XML"),
+    "meshes that never end": (_urdf(_links("a")) + "<mesh " * 300_000 + "</robot>", "is not XML"),
 }
+"""Some of them took a time that grows with the square of their length."""
 
 
 @pytest.mark.parametrize("case", FAULTS)

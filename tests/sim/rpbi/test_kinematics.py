@@ -186,6 +186,37 @@ def test_the_best_of_an_unreachable_target_is_the_arm_stretched_towards_it(iiwa_
     assert "0.01 rad" not in solution.message, "no orientation was asked for"
 
 
+def test_a_target_that_moves_on_out_of_reach_does_not_throw_the_arm_about(iiwa_arm):
+    link, q = "lbr_iiwa_link_7", np.array(ELBOW)
+    (x, y, z), quat = iiwa_arm.forward(ELBOW, link)
+    missed_m = []
+    for way_m in np.arange(0.025, 1.0, 0.025):
+        solution = iiwa_arm.solve(IKProblem(link, (x + way_m, y, z), quat, currentPosition=q))
+        assert np.abs(solution.positions - q).max() < 0.3
+        q = np.array(solution.positions)
+        missed_m.append(solution.position_error_m)
+    assert missed_m[0] < 1e-3 and np.all(np.diff(missed_m) > -1e-3), "it ends out of reach, further and further"
+    assert missed_m[-1] < 0.8
+
+
+def test_no_posture_nearby_is_nearer_to_a_target_out_of_reach(iiwa_arm):
+    link, generator = "lbr_iiwa_link_7", np.random.default_rng(3)
+
+    def off(q: np.ndarray) -> float:
+        here = iiwa_arm.forward(q, link)
+        angle = 2.0 * math.acos(min(1.0, abs(np.dot(here.quat_xyzw, goal.quat_xyzw))))
+        return math.hypot(math.dist(here.position, target) / 1e-3, angle / 0.01)
+
+    for goal in [iiwa_arm.forward(positions, link) for positions in _random_positions(iiwa_arm, 5)]:
+        target = tuple(1.6 / math.hypot(*goal.position) * np.array(goal.position))
+        solution = iiwa_arm.solve(IKProblem(link, target, goal.quat_xyzw, currentPosition=ELBOW))
+        least = off(np.array(solution.positions))
+        assert not solution.success and least > 100.0
+        for turn in generator.normal(0.0, 0.02, (100, 7)):
+            other = np.clip(solution.positions + turn, iiwa_arm.limits.lower, iiwa_arm.limits.upper)
+            assert off(other) > 0.999 * least
+
+
 def test_the_same_problem_has_the_same_answer_whatever_was_solved_before(iiwa_arm):
     goal = iiwa_arm.forward(_random_positions(iiwa_arm, 3)[2], "lbr_iiwa_link_7")
     problem = IKProblem("lbr_iiwa_link_7", *goal, currentPosition=ELBOW)

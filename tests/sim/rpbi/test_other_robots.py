@@ -13,7 +13,7 @@ import pytest
 from worlds import iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.urdf.files import description_for_ros
+from rpbi.urdf.copies import description_for_ros
 from rpbi.world import World
 
 DATA = Path(pybullet_data.getDataPath())
@@ -80,7 +80,7 @@ def test_package_with_three_slashes_is_package_with_two(build, tmp_path, monkeyp
         world = build(tmp_path / "x.urdf")
         [shape] = world.pb.getVisualShapeData(world.bodies["robot"].body_id)
         assert shape[4].decode() == str(package / "cube.obj")
-        [told] = re.findall("filename='(.*?)'", description_for_ros(str(tmp_path / "x.urdf")))
+        [told] = re.findall('filename="(.*?)"', description_for_ros(str(tmp_path / "x.urdf")))
         assert told in ("package://their_robot/cube.obj", f"file://{package}/cube.obj"), "RViz finds it"
     (tmp_path / "x.urdf").write_text("<robot name='x'>" + link("l0", mesh.replace("cube", "none")) + "</robot>")
     with pytest.raises(ConfigError, match="unknown ROS package"):

@@ -1,4 +1,4 @@
-"""What docs/python.md and the README show of worlds without ROS runs with the Python of .venv, nothing sourced."""
+"""Worlds without ROS, as pages and the README show them, run with the Python of .venv, nothing sourced."""
 
 from __future__ import annotations
 
@@ -101,3 +101,8 @@ def test_the_block_of_the_readme_runs(tmp_path):
 def test_another_python_does_not_find_the_packages(tmp_path):
     result = run("import rpbi.world", tmp_path, Path("/usr/bin/python3"))
     assert "No module named 'rpbi'" in result.stderr, "else the tests above show nothing"
+
+
+def test_the_page_on_speed_times_a_tick(tmp_path):
+    (block,) = BLOCK.findall((ROOT / "docs/slow.md").read_text())
+    assert re.search(r"^\d+ us a tick of 2000 us$", run(block, tmp_path).stdout, re.MULTILINE)

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pybullet
 import pytest
-from worlds import FLOOR, ball, box, iiwa, write_world
+from worlds import BOX_FLOOR, FLOOR, ball, box, iiwa, write_world
 
 from rpbi.world import World
-from rpbi.world_warnings import world_warnings
+from rpbi.world_warnings import PLANE_ADVICE, world_warnings
+
+ROOT = Path(__file__).resolve().parents[3]
+SHIPPED = [path for path in sorted(ROOT.glob("src/*/configs/**/*.yaml")) if "\ntimeStep:" in path.read_text()]
+"""The main files of all examples."""
 
 GRAVITY = {"setGravity": {"gravZ": -9.81}}
 PIN = """<robot name="pin"><link name="base"/>
@@ -37,12 +44,12 @@ def follower(name, tf_id, **more):
 
 def test_a_sound_world_has_none(warnings_of):
     resting = box(basePosition=[1.0, 0.0, 0.1])  # on the floor
-    assert warnings_of(collision=(FLOOR,), dynamic=(resting,), robots=(iiwa(),)) == []
+    assert warnings_of(collision=(BOX_FLOOR,), dynamic=(resting,), robots=(iiwa(),)) == []
 
 
 def test_no_gravity_is_told_if_something_could_fall_and_nobody_says_that_it_is_meant(tmp_path, warnings_of):
     weightless = {"name": "free", "loadURDF": {"fileName": "cube_small.urdf", "basePosition": [0, 0, 1]}}
-    path = write_world(tmp_path, dynamic=(ball(),), urdfs=(weightless,), robots=(iiwa(),), collision=(FLOOR,))
+    path = write_world(tmp_path, dynamic=(ball(),), urdfs=(weightless,), robots=(iiwa(),), collision=(BOX_FLOOR,))
     text = (tmp_path / "world.yaml").read_text().replace("setGravity:\n  gravZ: -9.81\n", "")
     (tmp_path / "world.yaml").write_text(text)
     world = World.from_file(path)
@@ -50,13 +57,13 @@ def test_no_gravity_is_told_if_something_could_fall_and_nobody_says_that_it_is_m
     world.close()
     assert "no gravity, and ball, free will not fall" in told
     assert not [each for each in warnings_of(dynamic=(ball(),), setGravity={"gravZ": 0.0}) if "gravity" in each]
-    assert warnings_of(robots=(iiwa(),), collision=(FLOOR,), setGravity={}) == []
+    assert warnings_of(robots=(iiwa(),), collision=(BOX_FLOOR,), setGravity={}) == []
 
 
 def test_bodies_in_each_other_are_told_with_the_depth(warnings_of):
     low = box("low", basePosition=[1.0, 0.0, 0.06])
     other = box("other", basePosition=[1.18, 0.0, 0.1])
-    told = warnings_of(collision=(FLOOR,), dynamic=(low, other), robots=(iiwa(),))
+    told = warnings_of(collision=(BOX_FLOOR,), dynamic=(low, other), robots=(iiwa(),))
     assert told == [
         "floor.yaml: at the start, 'floor' and 'low' are in each other by 0.04 m, and will be pushed apart",
         "low.yaml: at the start, 'low' and 'other' are in each other by 0.02 m, and will be pushed apart",
@@ -136,3 +143,54 @@ def test_a_robot_that_waits_for_another_is_told(warnings_of):
     assert (
         told == "iiwa.yaml: initial_joint_state_topic: the world only starts if joint states come on real/joint_states"
     )
+
+
+PLANE = "floor.yaml: createCollisionShape.shapeType: "
+ADVICE = "use a box, such as {shapeType: GEOM_BOX, halfExtents: [50, 50, 0.5], collisionFramePosition: [0, 0, -0.5]}"
+
+
+@pytest.mark.parametrize("height_m", [0.1, 0.1001, 3.0])
+def test_what_rests_on_a_plane_or_falls_onto_it_is_told_with_the_remedy(warnings_of, height_m):
+    thing = box(basePosition=[1.0, 0.0, height_m])
+    [told] = warnings_of(collision=(FLOOR,), dynamic=(thing,), robots=(iiwa(),))
+    assert told.startswith(f"{PLANE}'box' rests on this plane: planes lose contact points") and told.endswith(ADVICE)
+    assert warnings_of(collision=(BOX_FLOOR,), dynamic=(thing,), robots=(iiwa(),)) == []
+
+
+def test_many_on_a_plane_are_one_warning_and_urdfs_count_too(warnings_of):
+    boxes = tuple(box(f"box_{index}", basePosition=[0.5 * index, 0.0, 0.1]) for index in range(4))
+    cube = {"name": "cube", "loadURDF": {"fileName": "cube_small.urdf", "basePosition": [0, 3, 0.5]}}
+    [told] = warnings_of(collision=(FLOOR,), dynamic=boxes, urdfs=(cube,))
+    assert told.startswith(f"{PLANE}'box_0', 'box_1', 'box_2' and 2 more rest on this plane: ")
+    plane = {"name": "plane", "loadURDF": {"fileName": "plane_implicit.urdf"}}
+    [told] = warnings_of(dynamic=boxes[:1], urdfs=(plane,))
+    assert told.startswith("plane.yaml: loadURDF.fileName: 'box_0' rests on this plane: ")
+
+
+def test_a_ball_on_a_plane_a_box_on_a_table_a_wall_and_weightlessness_are_fine(warnings_of):
+    table = follower("table", "rpbi/table")
+    poses = [{"tf_id": "rpbi/table", "position": [3.0, 0.0, 0.1]}]
+    upon = box("upon", basePosition=[3.0, 0.0, 0.3])
+    balls = ball(basePosition=[1.0, 0.0, 0.1])
+    assert warnings_of(collision=(FLOOR, table), dynamic=(upon, balls), poses=poses) == []
+    wall = {**FLOOR, "createCollisionShape": {"shapeType": "GEOM_PLANE", "planeNormal": [1.0, 0.0, 0.0]}}
+    assert warnings_of(collision=(wall,), dynamic=(box(basePosition=[0.1, 0.0, 0.0]),)) == []
+    free = {"setGravity": {"gravZ": 0.0}}
+    assert warnings_of(collision=(FLOOR,), dynamic=(box(basePosition=[0.0, 0.0, 0.1]),), **free) == []
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: str(path.relative_to(ROOT / "src")))
+def test_no_shipped_world_has_anything_on_a_plane(path):
+    world = World.from_file(str(path), connection_mode=pybullet.DIRECT)
+    told = [str(warning) for warning in world_warnings(world) if PLANE_ADVICE in warning.message]
+    world.close()
+    assert told == []
+
+
+def test_no_page_and_no_template_shows_a_plane_to_copy():
+    texts = {path: path.read_text() for path in ROOT.glob("templates/**/*.yaml")}
+    texts |= {
+        path: "".join(re.findall("```yaml.*?```", path.read_text(), re.DOTALL)) for path in ROOT.glob("docs/*.md")
+    }
+    assert len(texts) > 40
+    assert [path.name for path, text in texts.items() if "GEOM_PLANE" in text] == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -114,6 +115,17 @@ def test_chain_has_the_names_and_order_of_the_authors_release(kuka: Kuka) -> Non
         "end_effector_joint_sponge",
         "end_effector_ball",
     }
+
+
+def test_the_one_with_a_sponge_is_the_same_arm_without_the_ball() -> None:
+    other = ElementTree.parse(ROBOTS / "kuka_lwr2.urdf").getroot()
+    expected = copy.deepcopy(URDF.getroot())
+    for ball in expected.findall("*[@name='end_effector_ball']"):
+        expected.remove(ball)
+    text = ElementTree.tostring(expected, "unicode").replace('"base"', '"lwr_world"')
+    assert ElementTree.canonicalize(text, strip_text=True) == ElementTree.canonicalize(
+        ElementTree.tostring(other, "unicode"), strip_text=True
+    )
 
 
 def test_limits_are_the_published_ones(kuka: Kuka) -> None:

@@ -72,6 +72,9 @@ def test_empty_text_is_an_empty_mapping() -> None:
     assert load_configs("# nothing\n") == {}
 
 
+LONG = f"1{':59' * 60}"[:57]
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [
@@ -86,6 +89,20 @@ def test_empty_text_is_an_empty_mapping() -> None:
         ("just text", "w.yaml: expected a mapping of keys to values, got str"),
         ("a: *nobody\n", "w.yaml: line 1, column 4: found undefined alias 'nobody'"),
         ("a: 1\n---\nb: 2\n", "w.yaml: line 2, column 1: but found another document"),
+        ("a: !!bool 3\n", "w.yaml: line 1, column 4: expected a value of the type bool, got '3'"),
+        ('a: !!int ""\n', "w.yaml: line 1, column 4: expected a value of the type int, got ''"),
+        ("a: [!!timestamp x]\n", "w.yaml: line 1, column 5: expected a value of the type timestamp, got 'x'"),
+        ("a: 2001-14-01\n", "w.yaml: line 1, column 4: expected a value of the type timestamp, got '2001-14-01'"),
+        pytest.param(
+            f"a: 1{':59' * 300}.0\n",
+            f"w.yaml: line 1, column 4: expected a value of the type float, got '{LONG}...'",
+            id="a float of many minutes",
+        ),
+        pytest.param(
+            f"a: 1{':59' * 1000}\n",
+            f"w.yaml: line 1, column 4: expected a value of the type int, got '{LONG}...'",
+            id="an integer of many minutes",
+        ),
         ("a: \x00", "w.yaml: is not YAML: unacceptable character #x0000: special characters are not allowed"),
     ],
 )

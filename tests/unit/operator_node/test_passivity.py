@@ -1,4 +1,4 @@
-"""A handle never gives out more energy than was put in, but for the leak of one tick; a sample of the benchmark."""
+"""A handle never gives out more energy than was put in, but for the leak; a sample of the benchmark."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ import pytest
 
 sys.path.append(str(Path(__file__).resolve().parents[3] / "benchmarks"))
 
-from passivity import LEAK_J, MAX_ACCELERATION, MAX_FORCE_N, SetUp, run_set_up, set_up
+from passivity import MAX_ACCELERATION, MAX_FORCE_N, SetUp, leak_j, run_set_up, set_up
 
 from operator_node.haptics.coupling import stiffest_n_per_m
 from operator_node.haptics.passivity import PassivityController
 
 CASES = 20
 TICKS = 3000
+COARSE = (19, 46, 69, 105)
+"""Seeds of set-ups in which a controller that does not know the device's resolution breaks the bound."""
 
 
 @pytest.fixture(scope="module")
@@ -35,6 +37,14 @@ def test_random_set_ups_are_passive(outcomes):
 
 def test_without_the_controller_many_are_not(outcomes):
     assert sum(not each.is_passive for each in outcomes[1]) >= 0.3 * CASES
+
+
+def test_a_coarse_device_is_passive_if_its_resolution_is_known_and_else_below_the_bound():
+    """The latter is the negative control: an energy that is counted from rounded positions is not the true one."""
+    cases = [set_up(seed)._replace(resolution_m=1e-5) for seed in COARSE]
+    known, unknown = ([run_set_up(case, TICKS, is_resolution_known=on) for case in cases] for on in (True, False))
+    assert all(each.is_passive for each in known), known
+    assert not any(each.is_passive for each in unknown), unknown
 
 
 def test_a_wall_that_needs_no_controller_is_left_alone():
@@ -75,9 +85,11 @@ def test_energy_that_was_given_out_is_not_forgotten_when_the_handle_is_taken_ane
 
 
 def test_bound_is_what_the_page_derives():
-    assert PassivityController(MAX_FORCE_N, MAX_ACCELERATION, 1.0, 0.001).floor_j == pytest.approx(-LEAK_J)
+    assert PassivityController(MAX_FORCE_N, MAX_ACCELERATION, 1.0, 0.001).floor_j == pytest.approx(-leak_j(0.0))
+    coarse = PassivityController(MAX_FORCE_N, MAX_ACCELERATION, 1.0, 0.001, resolution_m=2e-5)
+    assert coarse.floor_j == pytest.approx(-leak_j(2e-5)) and leak_j(2e-5) == pytest.approx(0.002866, abs=1e-6)
     assert PassivityController(10.0, 200.0, 1.0, 0.001, allowance_j=0.05).floor_j == pytest.approx(-0.052)
-    assert math.isclose(LEAK_J, 0.002)
+    assert math.isclose(leak_j(0.0), 0.002)
 
 
 def test_a_refill_gives_back_no_more_than_its_power():

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from custom_ros_tools.errors import ConfigError
+from rpbi.urdf.copies import description_for_ros, for_pybullet
 from rpbi.urdf.document import UrdfDocument
-from rpbi.urdf.files import description_for_ros, resolve_meshes
+from rpbi.urdf.elements import text_of
 
 
 def urdf(folder: Path, inner: str) -> str:
@@ -27,16 +28,15 @@ def meshes(text: str) -> list[str | None]:
     return [element.get("filename") for element in ElementTree.fromstring(text).iter("mesh")]
 
 
-def test_a_file_without_packages_is_loaded_as_it_is(tmp_path):
-    path = urdf(tmp_path, mesh("a.obj"))
-    assert resolve_meshes(path) == path
+def resolved(path: str) -> str:
+    return text_of(for_pybullet(UrdfDocument(path)))
 
 
 def test_a_folder_beside_or_above_stands_in_for_a_package_as_for_pybullet(tmp_path):
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes/a.obj").write_text("")
     path = urdf(tmp_path, mesh("package://meshes/a.obj"))
-    assert meshes(Path(resolve_meshes(path)).read_text()) == [str(tmp_path / "meshes/a.obj")]
+    assert meshes(resolved(path)) == [str(tmp_path / "meshes/a.obj")]
     assert meshes(description_for_ros(path)) == [f"file://{tmp_path}/meshes/a.obj"]
 
 
@@ -45,20 +45,20 @@ def test_meshes_of_a_package_that_another_of_its_name_hides_are_those_near_the_u
     path.parent.mkdir(parents=True)
     (path.parent / "own.obj").write_text("")
     path.write_text(f"<robot name='own'>{mesh('package://rpbi_examples/robots/own.obj')}</robot>")
-    assert meshes(Path(resolve_meshes(str(path))).read_text()) == [str(path.parent / "own.obj")]
+    assert meshes(resolved(str(path))) == [str(path.parent / "own.obj")]
     assert meshes(description_for_ros(str(path))) == [f"file://{path.parent}/own.obj"]
 
 
 def test_a_mesh_of_an_unknown_package_is_named(tmp_path):
     with pytest.raises(ConfigError, match="package://nope/a.obj: unknown ROS package 'nope'"):
-        resolve_meshes(urdf(tmp_path, mesh("package://nope/a.obj")))
+        resolved(urdf(tmp_path, mesh("package://nope/a.obj")))
 
 
 def test_comments_and_plugins_are_not_meshes(tmp_path):
     inner = "<!-- <mesh filename='package://nope/old.stl'/> --><plugin filename='libgazebo_ros_control.so'/>"
-    text = Path(resolve_meshes(urdf(tmp_path, inner + "<!-- package:// -->"))).read_text()
-    assert "libgazebo_ros_control.so" in text
-    assert "file://" not in description_for_ros(urdf(tmp_path, inner))
+    assert meshes(resolved(urdf(tmp_path, inner + "<!-- package:// -->"))) == []
+    text = description_for_ros(urdf(tmp_path, inner))
+    assert "libgazebo_ros_control.so" in text and "file://" not in text
 
 
 def test_ros_gets_relative_meshes_with_their_folder_and_those_of_packages_as_they_are(tmp_path):

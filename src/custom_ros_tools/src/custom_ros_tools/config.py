@@ -1,10 +1,12 @@
 """Configuration files: paths with ROS packages in them, and YAML that is safe to load."""
 
 import errno
+import gc
 import os
 import re
 import stat
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, cast
@@ -20,6 +22,9 @@ MOST_BYTES = 16_000_000
 """A YAML file or text may be so long."""
 MOST_VALUES = 1_000_000
 """And have so many values, with those that aliases (`*NAME`) repeat counted each time."""
+LONGEST_NUMBER = 1000
+"""Characters of a number."""
+_INT, _FLOAT = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
 _PACKAGE = re.compile(r"package://(?P<uri>[^/{}]+)|\{(?P<braces>[^{}]*)\}")
 
 
@@ -103,16 +108,17 @@ def load_config(path: str, most_bytes: int = MOST_BYTES) -> dict[str, Any]:
     return load_configs(text, path)
 
 
-def load_configs(text: str, file: str = "text") -> dict[str, Any]:
-    """Returns the mapping in a YAML text, which messages call `file`; an empty text is an empty mapping.
+def load_configs(s: str, file: str = "text", most_characters: int = MOST_BYTES) -> dict[str, Any]:
+    """Returns the mapping in the YAML text `s`, which messages call `file`; an empty text is an empty mapping.
 
     Raises:
         ConfigError: If it is not a YAML mapping, names a key twice, asks for Python objects, or is too large.
     """
-    if len(text) > MOST_BYTES:
-        raise ConfigError([Problem(file, "", f"has {len(text)} characters, expected at most {MOST_BYTES}")])
+    if len(s) > most_characters:
+        raise ConfigError([Problem(file, "", f"has {len(s)} characters, expected at most {most_characters}")])
     try:
-        data = yaml.load(text, Loader=_StrictLoader)
+        with _without_collections():
+            data = yaml.load(s, Loader=_StrictLoader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
@@ -132,6 +138,29 @@ def config_to_str(config: Mapping[str, Any]) -> str:
     return str(yaml.safe_dump(dict(config), sort_keys=False))
 
 
+@contextmanager
+def _without_collections() -> Iterator[None]:
+    """Keeps the garbage collector from going through what is just being parsed, which would stop all threads."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+def _dismantle(root: yaml.Node) -> None:
+    """Frees nodes one by one; freed all at once, they would stop all threads."""
+    waiting = [root]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, yaml.CollectionNode):
+            for child in node.value:
+                waiting += child if isinstance(child, tuple) else [child]
+            node.value = []
+
+
 class _StrictLoader(yaml.SafeLoader):
     """The safe loader, which moreover refuses a key that stands twice in one mapping, and texts that unfold too far."""
 
@@ -141,7 +170,23 @@ class _StrictLoader(yaml.SafeLoader):
             return None
         if _size(node, {}) > MOST_VALUES:
             raise yaml.YAMLError(f"its aliases repeat more than {MOST_VALUES} values")
-        return self.construct_document(node)
+        try:
+            return self.construct_document(node)
+        finally:
+            _dismantle(node)
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        is_number = isinstance(node, yaml.ScalarNode) and node.tag in (_INT, _FLOAT)
+        try:
+            if is_number and len(node.value) > LONGEST_NUMBER:  # it would be worked out digit by digit
+                raise ValueError("too long")
+            return super().construct_object(node, deep)
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
+            wanted = node.tag.removeprefix("tag:yaml.org,2002:")
+            got = shortened(node.value) if isinstance(node, yaml.ScalarNode) else f"a {node.id}"
+            raise yaml.constructor.ConstructorError(
+                None, None, f"expected a value of the type {shortened(wanted)}, got '{got}'", node.start_mark
+            ) from None
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         seen: dict[Any, yaml.Node] = {}

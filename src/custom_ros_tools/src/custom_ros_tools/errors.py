@@ -11,12 +11,21 @@ from dataclasses import dataclass
 LONGEST_QUOTE = 60
 """So much of what a file says is repeated in a message; it may be a file that nobody should see."""
 LONGEST_LINE = 2_000
-"""A line that says what is wrong is not longer."""
+"""Characters of a line that says what is wrong."""
+MOST_LINES = 100
+"""Lines of an answer that says what is wrong."""
 
 
 def shortened(text: str) -> str:
     """Returns a text that is to be quoted, with its end left out if it is long."""
     return text if len(text) <= LONGEST_QUOTE else f"{text[: LONGEST_QUOTE - 3]}..."
+
+
+def bounded(text: str) -> str:
+    """Returns a message with at most 100 lines of at most 2,000 characters, whatever of its caller it repeats."""
+    lines = text.split("\n")
+    kept = [line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}..." for line in lines[:MOST_LINES]]
+    return "\n".join([*kept, f"... and {len(lines) - MOST_LINES} lines more"] if len(lines) > MOST_LINES else kept)
 
 
 def closest(name: str, known: Iterable[str]) -> str | None:
@@ -57,8 +66,7 @@ class Problem:
 
     def __str__(self) -> str:
         text = ": ".join(part for part in (self.file, self.key, self.message) if part)
-        text = " ".join(text.splitlines())  # one line each, whatever the user's text holds
-        return text if len(text) <= LONGEST_LINE else f"{text[:LONGEST_LINE]}..."
+        return bounded(" ".join(text.splitlines()))  # one line each, whatever the user's text holds
 
 
 class ConfigError(InterfaceError):
@@ -83,7 +91,7 @@ class UnknownNameError(InterfaceError):
         known = f"known are {', '.join(self.known)}" if self.known else "there is none"
         match = closest(self.name, self.known)
         question = f"; did you mean '{match}'?" if match else ""
-        return f"unknown {self.kind} '{self.name}': {known}{question}"
+        return f"unknown {self.kind} '{shortened(self.name)}': {known}{question}"
 
 
 @dataclass(eq=False)

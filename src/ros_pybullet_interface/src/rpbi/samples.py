@@ -1,5 +1,7 @@
 """What sensors return: immutable values, all SI units, poses in `rpbi/world` unless said otherwise."""
 
+from collections.abc import Callable
+from functools import cached_property
 from typing import NamedTuple
 
 from .geometry import Pose, Quaternion, Twist, Vector, plus, scaled
@@ -106,7 +108,7 @@ class WrenchSample(NamedTuple):
 class ContactPoint(NamedTuple):
     """A point where a body touches another, or one of its links another one.
 
-    Forces are those on the body, as mean over the last tick.
+    Forces are those on the body, as mean over the last tick, or with `average` over all ticks since the last sample.
 
     Attributes:
         link: The body's link.
@@ -137,16 +139,31 @@ class ContactPoint(NamedTuple):
         return plus(scaled(self.normal_force, self.normal), plus(first, second))
 
 
-class ContactsSample(NamedTuple):
+class ContactsSample:
     """Where a body touches others.
 
     Attributes:
         name: The body.
-        points: All points that touch.
     """
 
-    name: str
-    points: tuple[ContactPoint, ...]
+    def __init__(self, name: str, points: Callable[[], tuple[ContactPoint, ...]]) -> None:
+        self.name = name
+        self._points = points
+
+    @cached_property
+    def points(self) -> tuple[ContactPoint, ...]:
+        """All points that touch; made when they are asked for, since many are not."""
+        return self._points()
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are of the same body and have the same points."""
+        return isinstance(other, ContactsSample) and (self.name, self.points) == (other.name, other.points)
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.points))
+
+    def __repr__(self) -> str:
+        return f"ContactsSample(name={self.name!r}, points={self.points!r})"
 
     @property
     def force(self) -> Vector:

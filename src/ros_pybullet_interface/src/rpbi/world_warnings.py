@@ -9,8 +9,10 @@ from custom_ros_tools.errors import Problem, closest, hint
 from rpbi.bodies import Body
 from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.bodies.robots.robot_config import RobotConfig
+from rpbi.bodies.shape_object import ShapeObject
 from rpbi.config.world import WORLD_FRAME
 from rpbi.engine.inputs import PoseInput
+from rpbi.geometry import dot, minus, scaled
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.urdf.joints import Joint
 from rpbi.world import World
@@ -18,10 +20,26 @@ from rpbi.world import World
 TOUCHING_M = 1e-3
 """Bodies that are in each other by less only touch: PyBullet has margins around meshes."""
 
+MAX_FALL_M = 100.0
+"""Height above a plane from which a body is expected to fall onto it."""
+MAX_NAMES = 3
+"""Bodies that a warning names; it counts the others."""
+PLANE_ADVICE = (
+    "planes lose contact points of what slides on them, and forces chatter; use a box, such as {shapeType: GEOM_BOX, "
+    "halfExtents: [50, 50, 0.5], collisionFramePosition: [0, 0, -0.5]}"
+)
+
 
 def world_warnings(world: World) -> list[Problem]:
     """Returns what looks wrong at the start of a world that has made no step yet, by the files that say it."""
-    return [*_Frames(world).warnings(), *_gravity(world), *_limits(world), *_topics(world), *_overlaps(world)]
+    return [
+        *_Frames(world).warnings(),
+        *_gravity(world),
+        *_limits(world),
+        *_topics(world),
+        *_overlaps(world),
+        *_planes(world),
+    ]
 
 
 def _file_of(world: World, name: str) -> str:
@@ -71,6 +89,46 @@ def _overlaps(world: World) -> Iterator[Problem]:
             (link, other_link), depth = deepest
             parts = f"{_named(one, link)} and {_named(other, other_link)} are in each other by {depth:.2g} m"
             yield Problem(_file_of(world, one.name), "", f"at the start, {parts}, and will be pushed apart")
+
+
+def _planes(world: World) -> Iterator[Problem]:
+    """Yields a warning for each plane on which bodies rest at the start, or onto which they fall."""
+    placed = [body for body in world.bodies.values() if _has_place(world, body)]
+    for plane in placed:
+        if _shape_kinds(plane) != {pybullet.GEOM_PLANE}:
+            continue
+        names = [f"'{body.name}'" for body in placed if _needs_points(body) and _is_below(world, plane, body)]
+        if names:
+            more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
+            rest = f"{', '.join(names[:MAX_NAMES])}{more} rest{'s' if len(names) == 1 else ''} on this plane"
+            key = "createCollisionShape.shapeType" if isinstance(plane, ShapeObject) else "loadURDF.fileName"
+            yield Problem(_file_of(world, plane.name), key, f"{rest}: {PLANE_ADVICE}")
+
+
+def _shape_kinds(body: Body) -> set[int]:
+    """Returns PyBullet's kinds of all collision shapes of a body."""
+    links = (-1, *body.link_indices)
+    return {shape[2] for link in links for shape in body.pb.getCollisionShapeData(body.body_id, link)}
+
+
+def _needs_points(body: Body) -> bool:
+    """Tells whether a body can fall and slide and stands on more than one contact point, as all but a ball do."""
+    return not _is_still(body, -1) and _shape_kinds(body) != {pybullet.GEOM_SPHERE}
+
+
+def _is_below(world: World, plane: Body, body: Body) -> bool:
+    """Tells whether a plane carries a body against gravity, now or once it has fallen."""
+    found = world.pb.getClosestPoints(body.body_id, plane.body_id, MAX_FALL_M)
+    if not found:
+        return False
+    nearest = min(found, key=lambda point: point[8])
+    lowest, below, normal, gap = nearest[5:9]
+    if dot(normal, world.pb.gravity) >= 0.0:
+        return False
+    if gap <= TOUCHING_M:
+        return True
+    ((hit, *_),) = world.pb.rayTest(lowest, minus(below, scaled(TOUCHING_M, normal)))
+    return bool(hit == plane.body_id)
 
 
 def _has_place(world: World, body: Body) -> bool:

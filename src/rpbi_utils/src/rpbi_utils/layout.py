@@ -11,6 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from custom_ros_tools.errors import shortened
+
+from .limits import MAX_NAME_BYTES, MAX_VALUES, LimitError
 from .message_type import BYTE_TYPES, SCALAR, VARIABLE, MessageType
 
 MAX_ARRAY_COLUMNS = 1000
@@ -68,6 +71,7 @@ def lay_out(message_type: MessageType, raw: bytes) -> Layout:
     more than `MAX_ARRAY_COLUMNS` numbers, are one value of kind `BYTES`.
 
     Raises:
+        LimitError: If it has too many values, or one whose path is too long.
         ValueError: If the message does not fit its type.
     """
     cursor = _Cursor(raw)
@@ -100,6 +104,8 @@ class _Cursor:
             if is_binary or count > MAX_ARRAY_COLUMNS:
                 self._take(path, BYTES, count * _SIZES[str(element)])
                 return
+        if isinstance(element, MessageType) and not element.fields:
+            return
         for index in range(count):
             self._read_value(element, f"{path}/{index}")
 
@@ -122,6 +128,10 @@ class _Cursor:
         return int(length)
 
     def _take(self, path: str, kind: str, size: int) -> None:
+        if len(path) > MAX_NAME_BYTES:
+            raise LimitError.over(f"{MAX_NAME_BYTES:,} bytes in a name", f"{len(path):,} in '{shortened(path)}'")
+        if len(self.layout.leaves) >= MAX_VALUES:
+            raise LimitError.over(f"{MAX_VALUES:,} values in a message", "more")
         self.layout.leaves[path] = Leaf(kind, self.at, size)
         self._advance(size)
 

@@ -3,7 +3,10 @@
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
+from custom_ros_tools.errors import shortened
+
 from .layout import MAX_ARRAY_COLUMNS, Layout, Leaf, lay_out
+from .limits import MAX_COLUMNS, MAX_NAME_BYTES, LimitError
 from .message_type import MessageType
 
 STAMP = "header/stamp"
@@ -31,12 +34,29 @@ def plan_rows(message_type: MessageType, raw: bytes) -> RowPlan:
     """Finds rows and columns for a serialised message and all that share its layout.
 
     Raises:
+        LimitError: If it has too many values, or a row too many columns or one with too long a name.
         ValueError: If the message does not fit its type.
     """
     layout = lay_out(message_type, raw)
-    rows, names, notes = PLANS.get(message_type.name, _one_row)(layout, raw)
+    try:
+        rows, names, notes = PLANS.get(message_type.name, _one_row)(layout, raw)
+    except (KeyError, ValueError):  # a value is not where the usual definition has it, or in too long an array
+        rows, names, notes = _one_row(layout, raw)
+        notes = [*notes, f"not as {message_type.name} usually is: one row a message"]
+    for row in rows:
+        _check_columns(row)
     fixed = layout.fixed + [leaf.span for leaf in names]
     return RowPlan([_rename_reserved(row) for row in rows], _merge(fixed), notes)
+
+
+def _check_columns(row: Columns) -> None:
+    """Raises a LimitError if a row has too many columns, or one with too long a name."""
+    if len(row) > MAX_COLUMNS:
+        raise LimitError.over(f"{MAX_COLUMNS:,} columns", f"{len(row):,} in one message")
+    for name in row:
+        if len(name) * 4 > MAX_NAME_BYTES and len(name.encode()) > MAX_NAME_BYTES:
+            got = f"{len(name.encode()):,} in '{shortened(name)}'"
+            raise LimitError.over(f"{MAX_NAME_BYTES:,} bytes in the name of a column", got)
 
 
 Plan = tuple[list[Columns], Iterable[Leaf], list[str]]  # rows, leaves that name columns, notes

@@ -4,6 +4,7 @@ import logging
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from custom_ros_tools.errors import MissingDependency
 
 from .layout import BYTES, NUMBER_DTYPES, Leaf
+from .limits import MAX_COLUMNS, Budget, LimitError
 from .message_type import MessageType
 from .row_plan import INDEX, RECORD_TIME, STAMP, Columns, plan_rows
 
@@ -24,6 +26,12 @@ _Piece = tuple[int, Array]
 FORMATS = ("parquet", "csv")
 BATCH_MESSAGES = 16_384
 BATCH_BYTES = 32 * 1024 * 1024
+LONGEST_STEM = 200
+"""Characters of a file's name of the topic, before a number; systems of files take 255 bytes."""
+MOST_PIECES = 500_000
+"""Pieces of all columns, some 200 bytes each beside their values, that are kept before they are merged."""
+OWN_COLUMNS = 3
+"""Columns that the builder keeps for itself: time, time of recording, number of the message."""
 
 _log = logging.getLogger(__name__)
 
@@ -51,10 +59,12 @@ class TableBuilder:
     Args:
         topic: Name of the topic, for the log.
         keep_binary: Whether binary arrays become columns of `bytes`; else they are left out.
+        budget: Time and cells that it may take, if they are limited.
     """
 
-    def __init__(self, topic: str, keep_binary: bool = False) -> None:
+    def __init__(self, topic: str, keep_binary: bool = False, budget: Budget | None = None) -> None:
         self._topic = topic
+        self._budget = budget
         self._keep_binary = keep_binary
         self._batch: list[tuple[MessageType, bytes, float]] = []
         self._batch_bytes = 0
@@ -64,10 +74,17 @@ class TableBuilder:
         self._record_time: list[Array] = []
         self._message: list[Array] = []
         self._columns: dict[str, list[_Piece]] = {}
+        self._pieces = self._merged_rows = 0
+        self._appeared: dict[str, tuple[int, int]] = {}
         self._notes: Counter[str] = Counter()
 
     def add(self, message_type: MessageType, raw: bytes, record_time_s: float) -> None:
-        """Adds a serialised message with the time at which it was recorded [s]."""
+        """Adds a serialised message with the time at which it was recorded [s].
+
+        Raises:
+            LimitError: If the table has too many columns, or one with too long a name; so does `table`.
+            BagError: If the budget is used up; so does `table`.
+        """
         self._batch.append((message_type, raw, record_time_s))
         self._batch_bytes += len(raw)
         if len(self._batch) >= BATCH_MESSAGES or self._batch_bytes >= BATCH_BYTES:
@@ -80,13 +97,15 @@ class TableBuilder:
         The column `record_time` [s] is the first; the others are grouped by field.
         """
         self._read_batch()
-        for note, count in self._notes.items():
-            _log.warning("%s: %s (messages: %d)", self._topic, note, count)
+        for note, times in self._notes.items():
+            _log.warning("%s: %s (messages: %d)", self._topic, note, times)
         time = np.concatenate([*self._time, np.empty(0)])
         record_time = np.concatenate([*self._record_time, np.empty(0)])
         order = np.lexsort((np.concatenate([*self._message, np.empty(0, int)]), time))  # stable
-        fields = list(dict.fromkeys(name.split("/")[0] for name in self._columns))
-        names = sorted(self._columns, key=lambda name: fields.index(name.split("/")[0]))  # stable
+        names = sorted(self._columns, key=self._appeared.__getitem__)
+        fields = dict.fromkeys(name.split("/")[0] for name in names)
+        places = {field: place for place, field in enumerate(fields)}
+        names.sort(key=lambda name: places[name.split("/")[0]])  # stable
         columns = {name: _join(self._columns.pop(name), self._rows)[order] for name in names}
         return pd.DataFrame({RECORD_TIME: record_time[order], **columns}, index=pd.Index(time[order], name=INDEX))
 
@@ -95,23 +114,53 @@ class TableBuilder:
         groups: dict[tuple[MessageType, int], list[int]] = {}
         for index, (message_type, raw, _) in enumerate(self._batch):
             groups.setdefault((message_type, len(raw)), []).append(index)
-        blocks: list[_Block] = []
         for (message_type, size), indices in groups.items():
             joined = b"".join(self._batch[index][1] for index in indices)
             matrix = np.frombuffer(joined, np.uint8).reshape(len(indices), size)
-            blocks += self._split_by_layout(message_type, matrix, np.array(indices))
-        blocks.sort(key=lambda block: int(block.indices[0]))  # columns come in the order of appearance
-        for block in blocks:
-            for row in block.rows:
-                self._read_rows(row, block.matrix, block.indices)
+            for block in self._split_by_layout(message_type, matrix, np.array(indices)):
+                self._read_block(block)
+        self._merge_pieces()
         self._messages += len(self._batch)
         self._batch, self._batch_bytes = [], 0
+
+    def _read_block(self, block: _Block) -> None:
+        """Reads all rows of messages of one layout.
+
+        Raises:
+            LimitError, BagError: If there are too many columns or cells, or the time is over.
+        """
+        first, places = self._messages + int(block.indices[0]), count()
+        for row in block.rows:
+            for name in row:
+                place = first, next(places)
+                self._appeared[name] = min(self._appeared.get(name, place), place)
+            self._read_rows(row, block.matrix, block.indices)
+        if len(self._columns) > MAX_COLUMNS:
+            raise LimitError.over(f"{MAX_COLUMNS:,} columns", f"{len(self._columns):,}")
+        if self._budget is not None:
+            self._budget.set_cells(self._topic, self._rows, len(self._columns) + OWN_COLUMNS)
+        self._pieces += sum(map(len, block.rows))
+        if self._pieces > MOST_PIECES:
+            self._merge_pieces()
+
+    def _merge_pieces(self) -> None:
+        """Makes one piece of those of each column that came since the last time, as each takes memory of its own."""
+        first, rows = self._merged_rows, self._rows - self._merged_rows
+        for pieces in self._columns.values():
+            new = [(start - first, values) for start, values in pieces if start >= first]
+            if len(new) > 1:
+                pieces[-len(new) :] = [(first, _join(new, rows))]
+        self._merged_rows, self._pieces = self._rows, 0
 
     def _split_by_layout(self, message_type: MessageType, matrix: Array, indices: Array) -> Iterator[_Block]:
         """Yields messages of one type and size, one layout at a time; `_Block` tells the arguments."""
         while len(indices):
+            if self._budget is not None:
+                self._budget.check_time(self._topic)
             try:
                 plan = plan_rows(message_type, self._batch[indices[0]][1])
+            except LimitError:
+                raise
             except ValueError as error:
                 _log.debug("%s: message %d: %s", self._topic, self._messages + indices[0], error)
                 self._notes["a message does not fit its type: left out"] += 1
@@ -120,11 +169,18 @@ class TableBuilder:
             same = np.ones(len(indices), bool)
             for start, stop in plan.fixed:
                 same &= (matrix[:, start:stop] == matrix[0, start:stop]).all(axis=1)
+                if np.count_nonzero(same) == 1:
+                    break
+            alike = int(np.count_nonzero(same))
             for note in plan.notes:
-                self._notes[note] += int(same.sum())
-            if same.all():
+                self._notes[note] += alike
+            if alike == len(indices):
                 yield _Block(plan.rows, matrix, indices)
                 return
+            if alike == 1:  # a view, which copies nothing
+                yield _Block(plan.rows, matrix[:1], indices[:1])
+                matrix, indices = matrix[1:], indices[1:]
+                continue
             yield _Block(plan.rows, matrix[same], indices[same])
             matrix, indices = matrix[~same], indices[~same]
 
@@ -137,7 +193,7 @@ class TableBuilder:
                 self._notes[f"'{name}' is binary or long: left out, unless asked for"] += len(indices)
                 continue
             values = _read_leaf(leaf, matrix)
-            if name == STAMP:
+            if name == STAMP and leaf.kind == "time":
                 time = np.where(values == 0.0, record_time, values)  # 0 is ROS for "no time"
             else:
                 self._columns.setdefault(name, []).append((self._rows, values))
@@ -194,16 +250,20 @@ def _join(pieces: list[_Piece], rows: int) -> Array:
 def file_stems(topics: Iterable[str]) -> dict[str, str]:
     """Finds a file name for each topic: `/kuka/joint_states` becomes `kuka.joint_states`.
 
-    Names are made of letters, digits, `_`, `-` and `.`; where two would be the same, the second ends with
-    `-2`.
+    Names are made of letters, digits, `_`, `-` and `.`, at most `LONGEST_STEM` of them; where two would be the same,
+    the second ends with `-2`.
     """
     stems: dict[str, str] = {}
+    used: Counter[str] = Counter()
     for topic in topics:
-        stem = re.sub(r"[^\w.-]", "_", topic.strip("/").replace("/", "."), flags=re.ASCII).strip(".") or "_"
-        number, unique = 1, stem
-        while unique in stems.values():
-            number += 1
-            unique = f"{stem}-{number}"
+        stem = (
+            re.sub(r"[^\w.-]", "_", topic.strip("/").replace("/", "."), flags=re.ASCII).strip(".")[:LONGEST_STEM] or "_"
+        )
+        unique = stem
+        while unique in used:
+            used[stem] += 1
+            unique = f"{stem}-{used[stem]}"
+        used[unique] += 1
         stems[topic] = unique
     return stems
 

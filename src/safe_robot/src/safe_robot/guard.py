@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from .check import Check, Inside, Situation, Violation
-from .commands.braking import Braking
+from .commands.braking import Brake, Braking, BrakingCommands
 from .commands.detour import can_keep_bounds
 from .commands.nearest import Nearest
+from .commands.pursuit import ROUNDING
 from .commands.shaping import Shaper
 from .commands.way_out import WayOut, find_way_out
 from .config import GuardConfig
@@ -43,11 +44,11 @@ class Decision(NamedTuple):
 
 
 class _Safe(NamedTuple):
-    """A command that is safe, and the commands that bring the robot to rest after it, k x n."""
+    """A command that is safe, and the braking after it."""
 
     command: tuple[float, ...]
     state: State
-    stop: np.ndarray
+    stop: BrakingCommands
 
 
 class Guard:
@@ -94,7 +95,8 @@ class Guard:
         self.is_halted = True
         self._state: State | None = None
         self._is_first = True
-        self._stop = np.empty((0, len(self.joint_names)))
+        self._target: tuple[float, ...] | None = None
+        self._stop = BrakingCommands.none(len(self.joint_names))
 
     @property
     def is_moving(self) -> bool:
@@ -114,7 +116,7 @@ class Guard:
     @property
     def stop_commands(self) -> np.ndarray:
         """The commands that bring the robot to rest from now on, k x n [rad or m], as they were found safe."""
-        return self._stop.copy()
+        return self._stop.position.copy()
 
     def way_out(self) -> WayOut | None:
         """Returns how the robot, where it was commanded to last, leaves the margins that it is in; None if in none."""
@@ -143,7 +145,7 @@ class Guard:
         self.is_halted = True
         if self._state is not None:
             self._state = State.at_rest(self._state.position)
-        self._stop = self._stop[:0]
+        self._stop = BrakingCommands.none(len(self.joint_names))
 
     def next_braking(self) -> tuple[float, ...] | None:
         """Returns what to command next after a halt, a period after the last command; None if the robot rests."""
@@ -200,20 +202,35 @@ class Guard:
         assert self._state is not None
         wanted = target
         if self._shaper is not None:  # controllers take the first command as rest, so it is where the robot stands
-            wanted = tuple(self._state.position.tolist()) if is_first else self._shaper.shaped(target, self._state)
+            wanted = tuple(self._state.position.tolist()) if is_first else self._shaper.shaped(target, self._state, self._way_to_rest)
         found = self._judged(wanted, situation, self.checks)
         if isinstance(found, Violation) and wanted != target and found.check in MENDED:
             wanted = tuple(self._way_to_rest[0].tolist())
             found = self._judged(wanted, situation, self.checks)
-        if isinstance(found, Violation):
-            return self._instead(target, found, situation)
+        before, self._target = self._target, target
+        violation = found if isinstance(found, Violation) else self._passes(target, before, found)
+        if violation is not None:
+            return self._instead(target, violation, situation)
         return Decision(self._sent(found), is_shaped=wanted != target)
+
+    def _passes(self, target: tuple[float, ...], before: tuple[float, ...] | None, safe: _Safe) -> Violation | None:
+        """Returns which joint goes past its target though the target stands still; only for the policy `limit`."""
+        if self.config.policy == "reject" or before is None or not len(safe.stop.position):
+            return None
+        assert self._state is not None
+        asked, end = np.array(target), safe.stop.position[-1]
+        past = np.sign(asked - self._state.position) * (end - asked) * (asked == before)
+        i = int(np.argmax(past))
+        if past[i] <= ROUNDING:
+            return None
+        unit = "rad" if self.robot.joints[i].is_revolute else "m"
+        return Violation("braking", f"joint '{self.joint_names[i]}'", float(end[i]), target[i], unit, True)
 
     @property
     def _way_to_rest(self) -> np.ndarray:
         """The commands of the braking that is known to be safe, k x n; one at least."""
         assert self._state is not None
-        return self._stop if len(self._stop) else self._state.position[None]
+        return self._stop.position if len(self._stop.position) else self._state.position[None]
 
     def _refused(self, violation: Violation) -> Decision:
         if self.config.policy == "reject" or self._is_first:
@@ -235,7 +252,7 @@ class Guard:
         found = self._first_target.judged(np.array(target), last, situation)
         if isinstance(found, Violation):
             return found
-        self._state, self._stop, self._is_first = found, found.position[None], False
+        self._state, self._stop, self._is_first = found, BrakingCommands.none(len(target)), False
         return None
 
     def _judged(self, command: Sequence[float], situation: Situation, checks: Sequence[Check]) -> _Safe | Violation:
@@ -244,14 +261,24 @@ class Guard:
         period_s = self.config.period_s
         position = np.array(command)
         state = self._state.then(position, period_s)
-        brake = self._braking.plan(state.velocity, state.acceleration)
+        brake = self._brake(state)
         motion = Motion(self.robot, self._state, position, period_s, brake)
         for check in checks:
             if violation := check.check(motion, situation):
                 return violation
         if brake is None:
             return self._cannot_brake(state)
-        return _Safe(tuple(command), state, motion.position[1:])
+        return _Safe(tuple(command), state, motion.braking_commands)
+
+    def _brake(self, state: State) -> Brake | None:
+        """Returns how joints come to rest after a command; those that were braking, and go on so, as before."""
+        if not len(self._stop.position):
+            return self._braking.plan(state.velocity, state.acceleration)
+        goes_on = (state.position == self._stop.position[0]) & (state.velocity != 0.0)
+        brake = self._braking.plan(np.where(goes_on, 0.0, state.velocity), np.where(goes_on, 0.0, state.acceleration))
+        if brake is None or not goes_on.any():
+            return brake
+        return brake.with_joints_of(self._stop.after_first().brake_from(state.position), goes_on)
 
     def _cannot_brake(self, state: State) -> Violation:
         share = np.abs(state.acceleration) / self.limits.acceleration
@@ -281,9 +308,9 @@ class Guard:
 
     def _brake_on(self) -> tuple[float, ...]:
         assert self._state is not None
-        if len(self._stop):
-            self._state = self._state.then(self._stop[0], self.config.period_s)
-            self._stop = self._stop[1:]
-        if not len(self._stop):
+        if len(self._stop.position):
+            self._state = self._state.then(self._stop.position[0], self.config.period_s)
+            self._stop = self._stop.after_first()
+        if not len(self._stop.position):
             self._state = State.at_rest(self._state.position)
         return tuple(self._state.position.tolist())

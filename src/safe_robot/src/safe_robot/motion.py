@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .commands.braking import Brake
+from .commands.braking import Brake, BrakingCommands
 from .robot import GuardedRobot
 
 WAYPOINT_SPACING = 0.15
@@ -68,6 +68,11 @@ class Motion:
             self.acceleration = np.concatenate((self.acceleration, brake.acceleration))
             self.jerk = np.concatenate((self.jerk, brake.jerk))
         self._link_positions: dict[str, np.ndarray] = {}
+
+    @property
+    def braking_commands(self) -> BrakingCommands:
+        """The braking."""
+        return BrakingCommands(self.position[1:], self.velocity[1:], self.acceleration[1:], self.jerk[1:])
 
     @cached_property
     def with_start(self) -> np.ndarray:

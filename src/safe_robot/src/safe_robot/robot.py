@@ -9,6 +9,7 @@ from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.transforms import matrix_of, quat_of
 from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.elements import UrdfJoint
+from rpbi.urdf.structure import check_structure
 
 MOST_OUTSIDE = 0.1
 """A telescopic joint starts at most so far outside its limits [rad or m]."""
@@ -41,6 +42,7 @@ class GuardedRobot:
     def __init__(self, urdf_path: str, joint_names: Sequence[str] = ()) -> None:
         self.urdf_path = urdf_path
         self.document = document = UrdfDocument(urdf_path, not_xml="expected well-formed XML")
+        check_structure(document)
         try:
             self._all = document.joints
         except ValueError as error:

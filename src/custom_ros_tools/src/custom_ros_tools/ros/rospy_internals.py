@@ -24,13 +24,21 @@ T = TypeVar("T")
 
 
 def _expecting(expected: str, loss: str, use: Callable[[], T]) -> T | None:
-    """Returns the result of a use of private parts; None and a warning if they are not as expected."""
+    """Returns the result of a use of private parts; None and a warning if they are not as expected.
+
+    Once rospy shuts down, its parts are as at no other time, which says nothing of how it is built.
+    """
     try:
         return use()
     except Exception as error:  # whatever a rospy of other making raises, the node goes on
-        rospy.logwarn(
-            "this rospy is built otherwise: expected %s, got %s: %s; %s", expected, type(error).__name__, error, loss
-        )
+        if not rospy.core.is_shutdown_requested():
+            rospy.logwarn(
+                "this rospy is built otherwise: expected %s, got %s: %s; %s",
+                expected,
+                type(error).__name__,
+                error,
+                loss,
+            )
         return None
 
 

@@ -34,9 +34,9 @@ def get_srv_handler(
     return rospy.ServiceProxy(srv_name, srv_type, persistent=persistent, headers=headers)
 
 
-def get_srv_handlers(services: Mapping[str, type], persistent: bool = False) -> dict[str, rospy.ServiceProxy]:
+def get_srv_handlers(srvs: Mapping[str, type], persistent: bool = False) -> dict[str, rospy.ServiceProxy]:
     """Does the same for several services, whose types are given by name; returns what calls them, by name."""
-    return {name: get_srv_handler(name, srv_type, persistent) for name, srv_type in services.items()}
+    return {name: get_srv_handler(name, srv_type, persistent) for name, srv_type in srvs.items()}
 
 
 def call_service(name: str, srv_type: type, *arguments: object) -> Any:
@@ -66,8 +66,9 @@ class ToggleService(rospy.Service):
 
     def __init__(self, name: str, enable_handler: Handler, disable_handler: Handler, **options: Any) -> None:
         self._enable, self._disable = enable_handler, disable_handler
-        super().__init__(name, SetBool, self._handle, **options)
+        super().__init__(name, SetBool, self.toggle, **options)
 
-    def _handle(self, request: SetBoolRequest) -> SetBoolResponse:
-        success, message = self._enable() if request.data else self._disable()
+    def toggle(self, req: SetBoolRequest) -> SetBoolResponse:
+        """Answers a request, which may be one that did not come from ROS."""
+        success, message = self._enable() if req.data else self._disable()
         return SetBoolResponse(success, message)

@@ -8,6 +8,7 @@ from rpbi.kinematics.limits import Limits
 from rpbi.urdf.copies import chain_urdf
 from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.elements import UrdfJoint
+from rpbi.urdf.structure import check_structure
 
 
 class Drive(NamedTuple):
@@ -51,6 +52,7 @@ class ChainDescription:
 
     def __init__(self, urdf_filename: str, base: str, tip: str) -> None:
         document = UrdfDocument(urdf_filename, not_xml="expected well-formed XML")
+        check_structure(document)
         for name in (base, tip):
             if name not in document.links:
                 raise UnknownNameError("link", name, document.links)

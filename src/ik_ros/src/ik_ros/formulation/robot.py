@@ -13,6 +13,7 @@ from rpbi.kinematics.limits import Limits
 from rpbi.urdf.copies import with_limited_joints
 from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.elements import MOVING
+from rpbi.urdf.structure import check_structure
 
 from .clearance import RobotShape
 
@@ -66,6 +67,7 @@ class Robot:
         self, urdf_path: str, floating: bool = False, joints: Sequence[str] = (), base: str | None = None
     ) -> None:
         document = UrdfDocument(urdf_path)
+        check_structure(document)
         types = document.joint_types
         if base is not None:
             _known("link", base, document.links)
@@ -91,7 +93,8 @@ class Robot:
         self.free = np.array([*range(FREE if floating else 0), *in_v], dtype=int)
         self._all_free = self.free.tolist() == list(range(self.model.nv))
         lower, upper = self.model.lowerPositionLimit[self._in_q], self.model.upperPositionLimit[self._in_q]
-        limited = (lower < upper) & [types[name] != "continuous" for name in self.joint_names]  # as in PyBullet
+        is_bounded = np.array([types[name] != "continuous" for name in self.joint_names], dtype=bool)
+        limited = (lower < upper) & is_bounded  # as in PyBullet
         self.lower, self.upper = np.where(limited, lower, -np.inf), np.where(limited, upper, np.inf)
         self.is_revolute = [types[name] != "prismatic" for name in self.joint_names]
         self.limits = Limits(self.lower.tolist(), self.upper.tolist(), self.is_revolute)

@@ -1,4 +1,4 @@
-"""A person who raises the right arm, holds it out and sways a little, as 23 segments."""
+"""A person who swings the right arm forward, holds it out and sways a little, as 23 segments."""
 
 import math
 
@@ -9,7 +9,7 @@ from operator_node.avatar.forward import segment_frame
 from operator_node.mvn.segments import SegmentFrame
 
 RAISING_S = 3.0
-"""Time in which the arm is raised [s]."""
+"""Time in which the arm is lowered from the T-pose, swung forward and raised, a third of it each [s]."""
 ARMS_DOWN_RAD = 1.3
 SWAY_RAD, SWAY_HZ = 0.02, 0.4
 """Nobody holds an arm quite still."""
@@ -40,14 +40,17 @@ class ArmHeldOut:
     def frame(self, time_s: float) -> SegmentFrame:
         """Returns the segments at a time [s]."""
         since_s = time_s - self._t_pose_s
-        raised, lowered = _smooth(since_s / RAISING_S), _smooth(since_s / (0.5 * RAISING_S)) if self._t_pose_s else 1.0
+        thirds = 3.0 * since_s / RAISING_S
+        # forward before up: on a way to the side the hand would meet who stands there
+        lowered, forward, raised = (_smooth(thirds - begun) for begun in range(3))
+        lowered = lowered if self._t_pose_s else 1.0
         up, ahead, elbow = self._held
         sway = SWAY_RAD * math.sin(2.0 * math.pi * SWAY_HZ * time_s + self._phase)
         hinges = {
             "jLeftShoulder_rotx": -lowered * ARMS_DOWN_RAD,
             "jRightShoulder_rotx": (1.0 - raised) * lowered * ARMS_DOWN_RAD + raised * up + sway,
-            "jRightShoulder_rotz": raised * ahead + sway,
-            "jRightElbow_rotz": raised * elbow,
+            "jRightShoulder_rotz": forward * ahead + sway,
+            "jRightElbow_rotz": forward * elbow,
         }
         return segment_frame(self._offsets, self._hips, LEVEL, hinges)
 

@@ -110,6 +110,7 @@ class HapticController:
             1.0 / sample_hz,
             config.energy_allowance_j,
             config.energy_refill_w,
+            device.resolution_m,
         )
         self.passivity.is_on = config.passivity
         self.stiffness_bound = stiffest_n_per_m(device.damping, config.damping, 1.0 / sample_hz)

@@ -46,6 +46,9 @@ class HapticConfig(ConfigModel):
     damping: NonNegative = Field(3.0, description="Of the device with a hand on it, for Colgate's bound [N s/m].")
     max_speed: Positive = Field(3.0, description="Faster than this no hand moves it: readings are refused [m/s].")
     max_acceleration: Positive = Field(200.0, description="No hand accelerates it more, for the leak bound [m/s^2].")
+    resolution_m: NonNegative = Field(
+        5e-5, description="Steps in which it measures each axis, for the leak bound; 0 is exact [m]."
+    )
 
 
 class HapticDevice(ABC):

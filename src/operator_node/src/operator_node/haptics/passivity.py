@@ -1,6 +1,8 @@
 """Time-domain passivity: the device never gives out more energy than the person has put in."""
 
-from rpbi.geometry import Vector, dot, scaled
+import math
+
+from rpbi.geometry import Vector, dot, minus, scaled
 
 from .vectors import ZERO, norm
 
@@ -24,6 +26,11 @@ class PassivityController:
     one sample may take the energy below zero by F a dt^2, with a largest force F: that is the leak. Every force is
     shortened to what keeps the energy above minus the leak, whatever such a hand does; it is never below `floor_j`.
 
+    Resolution: each measured position is off by up to e, the half diagonal of a cube of the device's steps. A measured
+    displacement may differ by 4 e more from the v dt before it. Forces times displacements are off by e times the last
+    force, once, and by e times each change of the force (summation by parts): changes are taken from the energy, and
+    what is needed to let go of the force is kept. So the leak is F (a dt^2 + 5 e).
+
     Allowance: energy that may be given out beside what was put in, once. Without it a hand at rest cannot be pushed by
     a tool that something else pushes, and a simulator that lags at the first touch is felt weaker until the next.
     A refill gives it back at a power, so that over a time t no more than floor and refill times t is given out.
@@ -38,6 +45,7 @@ class PassivityController:
         period_s: dt, the time between two samples [s].
         allowance_j: Energy that may be given out without having been put in [J].
         refill_w: How fast what was given out beyond what was put in is forgotten [W]; 0 is strictly passive.
+        resolution_m: Steps in which the device measures each axis [m].
 
     Attributes:
         energy_j: What the person has put in, less what was given back [J].
@@ -54,15 +62,18 @@ class PassivityController:
         period_s: float,
         allowance_j: float = 0.0,
         refill_w: float = 0.0,
+        resolution_m: float = 0.0,
     ) -> None:
         self.energy_j = 0.0
         self.interventions = 0
         self.is_on = True
-        self.floor_j = -allowance_j - max_force_n * max_acceleration * period_s**2
+        self._error_m = 0.5 * math.sqrt(3.0) * resolution_m
+        self._unforeseen_m = max_acceleration * period_s**2 + 4.0 * self._error_m
+        self.floor_j = -allowance_j - max_force_n * (self._unforeseen_m + self._error_m)
         self._allowance_j, self._refill_j = allowance_j, refill_w * period_s
         self._reserve_j = reserve_j
-        self._period_s, self._unforeseen = period_s, max_acceleration * period_s
-        self._held, self._was_cut = ZERO, False
+        self._period_s = period_s
+        self._held, self._before, self._was_cut = ZERO, ZERO, False
 
     def reset(self) -> None:
         """Forgets what the person has put in, but not what was given out: they take hold of the tool anew."""
@@ -71,9 +82,11 @@ class PassivityController:
     def observe(self, displacement: Vector) -> None:
         """Takes what the handle has moved since the last sample [m]."""
         given_j = dot(self._held, displacement)
+        changed_j = self._error_m * norm(minus(self._held, self._before))
+        self._before = self._held
         if self._was_cut:  # nobody knows at which part of the way
             given_j = max(given_j, 0.0)
-        self.energy_j = min(self.energy_j - given_j, self._reserve_j)
+        self.energy_j = min(self.energy_j - given_j - changed_j, self._reserve_j)
         if self.energy_j < 0.0:
             self.energy_j = min(self.energy_j + self._refill_j, 0.0)
         if self._was_cut:
@@ -103,8 +116,9 @@ class PassivityController:
             velocity: Of the handle [m/s].
         """
         if self.is_on:
-            left_j = max(self.energy_j - self.floor_j, 0.0)
-            worst_j = (dot(force, velocity) + norm(force) * self._unforeseen) * self._period_s
+            left_j = max(self.energy_j - self._error_m * norm(self._before) - self.floor_j, 0.0)
+            unforeseen_m = self._unforeseen_m + 2.0 * self._error_m
+            worst_j = dot(force, velocity) * self._period_s + norm(force) * unforeseen_m
             if worst_j > left_j:
                 self.interventions += 1
                 force = scaled(left_j / worst_j, force)

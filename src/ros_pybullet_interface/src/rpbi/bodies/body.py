@@ -15,7 +15,7 @@ from custom_ros_tools.schema import ConfigModel
 from rpbi.config.pybullet_models import ObjectTf, ResetBaseVelocity
 from rpbi.control.external_wrenches import ExternalWrench, ExternalWrenches
 from rpbi.control.pose_follower import PoseFollower, TrackedBase
-from rpbi.engine.client import Client
+from rpbi.engine.client import MAXIMAL_COORDINATES, Client
 from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Pose, Twist, cross, minus, plus
 from rpbi.samples import BodyState
@@ -23,10 +23,8 @@ from rpbi.sensors.sensor import Sensor
 
 log = logging.getLogger(__name__)
 
-MAXIMAL_COORDINATES = 1
-"""PyBullet's type of bodies that the solver of rigid bodies moves, where `getDynamicsInfo` tells it."""
 MULTI_BODY = 2
-"""The same of what has joints in reduced coordinates, or could have."""
+"""PyBullet's type of bodies that have joints in reduced coordinates, or could have, in `getDynamicsInfo`."""
 UNNAMED_LINK = "link0"
 """PyBullet's name of the only link of a shape, which it leaves out in maximal coordinates."""
 
@@ -60,8 +58,9 @@ class Body:
         self.joint_indices = tuple(range(pb.getNumJoints(body_id)))
         self.link_indices = self.joint_indices
         """PyBullet's indices of all links but the root."""
-        self._base_link: str = pb.getBodyInfo(body_id)[0].decode() or UNNAMED_LINK
-        self.root_link = self._base_link
+        self.root_link: str = pb.getBodyInfo(body_id)[0].decode() or UNNAMED_LINK
+        self._link_names = {index: pb.getJointInfo(body_id, index)[12].decode() for index in self.joint_indices}
+        self._link_names[-1] = self.root_link
         self._given_dynamics: dict[str, Any] = {}
         inertial = self.dynamics_info(-1)
         self.inertial_pose_in_base = Pose(inertial[3], inertial[4])
@@ -93,11 +92,6 @@ class Body:
     def link_name(self, index: int) -> str:
         """Returns the name of a link by PyBullet's index, -1 for the base."""
         return self._link_names[index]
-
-    @cached_property
-    def _link_names(self) -> dict[int, str]:
-        names = {index: self.pb.getJointInfo(self.body_id, index)[12].decode() for index in self.joint_indices}
-        return {-1: self._base_link, **names}
 
     def dynamics_info(self, link: int) -> tuple[Any, ...]:
         """Returns what PyBullet's `getDynamicsInfo` tells of a link, by index.

@@ -6,7 +6,7 @@ from custom_ros_tools.schema import Position, Quat
 from rpbi.config.pybullet_models import ChangeDynamics, CreateCollisionShape, CreateVisualShape, ObjectTf
 from rpbi.config.sensors import ContactsConfig
 from rpbi.engine.client import Client
-from rpbi.sensors.contact_arrows import contact_sensors
+from rpbi.sensors.contacts.arrows import contact_sensors
 from rpbi.sensors.sensor import Sensor
 
 from .body_config import BodyConfig

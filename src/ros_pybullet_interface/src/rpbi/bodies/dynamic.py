@@ -14,7 +14,7 @@ from rpbi.config.pybullet_models import (
 from rpbi.config.sensors import ContactsConfig
 from rpbi.engine.client import Client
 from rpbi.sensors.base_state import BaseStateSensor
-from rpbi.sensors.contact_arrows import contact_sensors
+from rpbi.sensors.contacts.arrows import contact_sensors
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
 
@@ -27,7 +27,7 @@ class DynamicObjectConfig(BodyConfig):
 
     createVisualShape: CreateVisualShape = Field(description="What it looks like.")
     createCollisionShape: CreateCollisionShape = Field(description="What it feels like.")
-    changeDynamics: ChangeDynamics = Field(description="Friction, restitution and the like.")
+    changeDynamics: ChangeDynamics | None = Field(None, description="Friction, restitution and the like.")
     baseMass: PositiveKilograms = Field(description="Mass.")
     basePosition: Position = Field((0.0, 0.0, 0.0), description="Start position.")
     baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Start orientation, x, y, z, w.")
@@ -49,7 +49,6 @@ class DynamicObject(ShapeObject):
     example = {
         "createVisualShape": {"shapeType": "GEOM_SPHERE", "radius": 0.1},
         "createCollisionShape": {"shapeType": "GEOM_SPHERE", "radius": 0.1},
-        "changeDynamics": {},
         "baseMass": 1.0,
         "tracked_tf": {"tf_id": "FRAME"},
         "broadcast_hz": 50.0,
@@ -74,7 +73,8 @@ class DynamicObject(ShapeObject):
             baseOrientation=config.baseOrientation,
             useMaximalCoordinates=config.useMaximalCoordinates,
         )
-        self.change_dynamics(-1, **config.changeDynamics.kwargs())
+        if config.changeDynamics is not None:
+            self.change_dynamics(-1, **config.changeDynamics.kwargs())
         self._start_base(config.resetBaseVelocity)
         self._track(config.tracked_tf)
         self.config = config

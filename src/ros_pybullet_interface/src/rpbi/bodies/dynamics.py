@@ -9,8 +9,9 @@ from pydantic.alias_generators import to_camel
 
 from custom_ros_tools.errors import PhysicsError, UnknownNameError
 from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.engine.client import MAXIMAL_COORDINATES
 
-from .body import MAXIMAL_COORDINATES, Body
+from .body import Body
 
 
 class LinkDynamics(NamedTuple):

@@ -17,7 +17,7 @@ from rpbi.geometry import Pose, Twist
 from rpbi.meshes.checks import soft_mesh_problems
 from rpbi.meshes.trial import Mesh, Use, faults_in
 from rpbi.samples import BodyState
-from rpbi.sensors.contact_arrows import contact_sensors
+from rpbi.sensors.contacts.arrows import contact_sensors
 from rpbi.sensors.sensor import Sensor
 from rpbi.sensors.surface import SurfaceSensor
 from rpbi.urdf.document import UrdfDocument

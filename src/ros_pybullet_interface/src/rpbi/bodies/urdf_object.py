@@ -10,7 +10,7 @@ from rpbi.config.sensors import ContactsConfig
 from rpbi.constraints.couplings import couple
 from rpbi.engine.client import Client
 from rpbi.sensors.base_state import BaseStateSensor
-from rpbi.sensors.contact_arrows import contact_sensors
+from rpbi.sensors.contacts.arrows import contact_sensors
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
 from rpbi.urdf.document import UrdfDocument, mimics_of

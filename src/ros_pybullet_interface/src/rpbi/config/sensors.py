@@ -43,6 +43,9 @@ class ContactsConfig(ConfigModel):
     """How a body's contacts are told."""
 
     hz: Hz = Field(50.0, description="Rate of `rpbi/NAME/contacts`.")
+    average: Switch = Field(
+        False, description="Whether these are means over all ticks since the last sample, not those of the last tick."
+    )
     arrows_hz: HzOrOff = Field(20.0, description="Rate of the arrows for RViz; 0 is off.")
     arrow_metres_per_newton: Annotated[Positive, Unit("m/N")] = Field(
         0.01, description="Length of an arrow by the force that it stands for."

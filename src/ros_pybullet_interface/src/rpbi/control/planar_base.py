@@ -14,10 +14,9 @@ from custom_ros_tools.schema import ConfigModel, Positive, Seconds, Unit
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose, Twist
 from rpbi.plain_values import as_tuple
-from rpbi.urdf.copies import mounted_on
+from rpbi.urdf.copies import for_pybullet, mounted_on
 from rpbi.urdf.document import UrdfDocument
-from rpbi.urdf.elements import UrdfJoint
-from rpbi.urdf.files import resolve_meshes, write_description
+from rpbi.urdf.elements import Element, UrdfJoint
 
 PLANAR_JOINTS = (0, 1, 2)
 """PyBullet's indices of the joints along x and y [m] and about z [rad], and of the links behind them."""
@@ -105,23 +104,24 @@ CATCH_UP_SPEED = (0.5, 0.5, 1.0)
 """How fast the base may make up for its lag [m/s, m/s, rad/s]; a greater lag is given up: something is in the way."""
 
 
-def with_planar_joints(path: str) -> str:
-    """Puts a massless chain of joints along x, along y and about z between the world and the root link of a URDF file.
+def with_planar_joints(document: UrdfDocument) -> Element:
+    """Puts a massless chain of joints along x, along y and about z between the world and the root link of a URDF.
 
     Returns:
-        A copy of it with the chain, which lasts as long as the process; its root is the fixed end of the chain.
+        What PyBullet reads of it, with the chain; its root is the fixed end of the chain.
 
     Raises:
         ConfigError: If the file is not a tree of links, or a mesh of it does not exist.
     """
-    document = UrdfDocument(path, source=resolve_meshes(path))
+    robot = for_pybullet(document)
     world, x, y, yaw = (f"planar_base/{name}" for name in ("world", "x", "y", "yaw"))
     chain = (
         UrdfJoint(x, "prismatic", world, x, axis=(1.0, 0.0, 0.0)),
         UrdfJoint(y, "prismatic", x, y, axis=(0.0, 1.0, 0.0)),
         UrdfJoint(yaw, "continuous", y, document.root_link(), axis=(0.0, 0.0, 1.0)),
     )
-    return write_description(mounted_on(document, chain))
+    mounted_on(robot, document.root_link(), chain)
+    return robot
 
 
 class PlanarBase:

@@ -1,10 +1,12 @@
 """One connection to PyBullet."""
 
 import ctypes
+import logging
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
-from functools import partial
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, nullcontext
+from functools import partial, wraps
 from typing import Any
 
 import pybullet
@@ -14,6 +16,80 @@ from rpbi.geometry import Vector
 
 WINDOWS = frozenset((pybullet.GUI, pybullet.GUI_SERVER, pybullet.GUI_MAIN_THREAD))
 """Modes in which PyBullet opens a window of its own; in others it is the server's, if there is one."""
+MAXIMAL_COORDINATES = 1
+"""PyBullet's type of bodies that the solver of rigid bodies moves, in `getDynamicsInfo`."""
+
+
+PRINTING = frozenset(
+    "resetSimulation loadURDF loadSDF loadMJCF loadSoftBody loadTexture loadPlugin createVisualShape "
+    "createCollisionShape createMultiBody createSoftBodyAnchor startStateLogging stopStateLogging vhacd".split()
+)
+"""Functions in which PyBullet may print something; the others are called often, and print nothing."""
+log = logging.getLogger("pybullet")
+
+
+class _Printed:
+    """The lines that PyBullet prints while a call lasts, on their way to the log.
+
+    It prints by C's `printf` and `fprintf`, to the streams that C's variables `stdout` and `stderr` name. These
+    variables are changed, not the file descriptors 1 and 2: Python's own output, that of other threads too, goes where
+    it always goes.
+    """
+
+    def __init__(self) -> None:
+        self._libc = ctypes.CDLL(None)
+        self._libc.fdopen.restype = ctypes.c_void_p
+        self._file = os.memfd_create("printed")
+        self._stream = ctypes.c_void_p(self._libc.fdopen(self._file, b"w"))
+        self._libc.setvbuf(self._stream, None, 2, 0)  # _IONBF of <stdio.h>
+        self._streams = [ctypes.c_void_p.in_dll(self._libc, name) for name in ("stdout", "stderr")]
+        self._originals = [stream.value for stream in self._streams]
+        self._depth = 0
+        self._lock = threading.RLock()
+
+    @contextmanager
+    def to_log(self) -> Iterator[None]:
+        """Logs what is printed while the block runs, in this thread or, from within C, in others."""
+        with self._lock:
+            if not self._depth:
+                self._originals = [stream.value for stream in self._streams]
+                self._name(self._stream.value for _ in self._streams)
+            self._depth += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._depth -= 1
+                if not self._depth:
+                    self._name(self._originals)
+                lines = self._take()
+            for line in lines:
+                log.info("%s", line)
+
+    def _name(self, streams: Iterable[int | None]) -> None:
+        for variable, stream in zip(self._streams, streams):
+            variable.value = stream
+
+    def _take(self) -> list[str]:
+        size = os.fstat(self._file).st_size
+        if not size:
+            return []
+        printed = os.pread(self._file, size, 0)
+        os.ftruncate(self._file, 0)
+        os.lseek(self._file, 0, os.SEEK_SET)
+        return [line for line in printed.decode(errors="replace").splitlines() if line.strip()]
+
+
+_printed = _Printed()
+
+
+def _logged(function: Callable[..., Any]) -> Callable[..., Any]:
+    @wraps(function)
+    def call(*arguments: Any, **options: Any) -> Any:
+        with _printed.to_log():
+            return function(*arguments, **options)
+
+    return call
 
 
 class Client:
@@ -31,11 +107,13 @@ class Client:
 
     def __init__(self, mode: int = pybullet.DIRECT, **options: Any) -> None:
         try:
-            with _screen() if mode in WINDOWS else nullcontext():
+            with _screen() if mode in WINDOWS else nullcontext(), _printed.to_log():
                 self.client_id: int = pybullet.connect(mode, **(options if mode != pybullet.DIRECT else {}))
         except pybullet.error as error:
             raise PhysicsError(f"PyBullet did not connect: {error}") from error
         self.has_window = mode != pybullet.DIRECT
+        self._window_prints = ExitStack()
+        """The log of what PyBullet's window prints between calls, in a thread of its own."""
         self.is_deformable = False
         """Whether soft bodies can be in its world, as told when that was set up."""
         self.gravity: Vector = (0.0, 0.0, 0.0)
@@ -44,10 +122,22 @@ class Client:
         """Parts that each step of its world is divided into, as told when that was set; 0 is one."""
         if self.client_id < 0:
             raise PhysicsError("PyBullet did not connect")
+        if mode in WINDOWS:
+            self._window_prints.enter_context(_printed.to_log())
+
+    def disconnect(self) -> None:
+        """Ends the connection.
+
+        Raises:
+            pybullet.error: If it has ended already.
+        """
+        with self._window_prints, _printed.to_log():
+            pybullet.disconnect(self.client_id)
 
     def __getattr__(self, name: str) -> Any:
         value = getattr(pybullet, name)
         if callable(value):
+            value = _logged(value) if name in PRINTING else value
             value = partial(value, physicsClientId=self.client_id)
         setattr(self, name, value)
         return value

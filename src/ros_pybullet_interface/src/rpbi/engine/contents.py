@@ -16,7 +16,7 @@ from rpbi.constraints.attachments import Attachments
 from rpbi.control.pose_follower import PoseFollower
 from rpbi.plugins import blaming
 from rpbi.sensors import sensor_class
-from rpbi.sensors.contacts import ContactReader
+from rpbi.sensors.contacts.contacts import ContactReader
 from rpbi.sensors.rgbd import RgbdSensor
 from rpbi.sensors.sensor import SensedWorld, Sensor
 

@@ -143,7 +143,7 @@ def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:
                 pb.removeBody(body_id)
             if isinstance(error, Exception):
                 blame(body_class(kind), f"making '{entry.name}'", error)
-            if isinstance(error, (pybullet.error, OverflowError)):
+            if isinstance(error, (pybullet.error, OverflowError, SystemError)):  # the last is a fault of PyBullet's
                 raise PhysicsError(f"{entry.name}: {error}") from error
             raise
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import numpy as np
 import pybullet
 
-from custom_ros_tools.errors import ConfigError, PhysicsError, Problem, UnknownNameError
+from custom_ros_tools.errors import PhysicsError, UnknownNameError
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose, normalized
 from rpbi.urdf.copies import without_shapes
@@ -18,7 +18,7 @@ from rpbi.urdf.elements import MOVING
 from rpbi.urdf.files import write_description
 from rpbi.urdf.joints import Joint
 from rpbi.urdf.loading import flags_for
-from rpbi.urdf.structure import structure_problems
+from rpbi.urdf.structure import check_structure
 
 from .chain import Chain, Target
 from .limits import Limits
@@ -48,8 +48,7 @@ class Kinematics:
 
     def __init__(self, urdf_path: str, scaling: float = 1.0, flags: int = 0) -> None:
         self._document = UrdfDocument(urdf_path, not_xml="expected well-formed XML")
-        if problems := list(structure_problems(self._document)):
-            raise ConfigError([Problem(urdf_path, "", problem) for problem in problems])
+        check_structure(self._document)
         self._scaling = scaling
         self._lock = threading.Lock()
         self._pb = Client(pybullet.DIRECT)
@@ -140,7 +139,7 @@ class Kinematics:
             write_description(without_shapes(self._document)),
             useFixedBase=True,
             globalScaling=self._scaling,
-            flags=flags_for(self._document, flags),
+            flags=flags_for(self._document.root, flags),
         )
         joints = Joint.all_of(pb, body_id)
         self._root_link = pb.getBodyInfo(body_id)[0].decode()

@@ -1,5 +1,7 @@
-"""Methods that say where to go from a configuration: to the target, or along its solutions to a rest posture."""
+"""Methods that say where to go from a configuration: to the target, near it, or along its solutions to a posture."""
 
+import math
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -7,6 +9,7 @@ import pybullet
 
 from .chain import Chain, Target
 from .limits import Limits
+from .residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
 
 Step = Callable[[np.ndarray, np.ndarray, int], np.ndarray]
 """A method that brings a link nearer to its target; limits are not considered.
@@ -14,6 +17,8 @@ Step = Callable[[np.ndarray, np.ndarray, int], np.ndarray]
 It takes m positions to start at [rad or m], which joints to leave where they are, and most iterations, and returns m
 positions.
 """
+BREAK_S = 5e-5
+"""Pause between stages, in which the simulation gets Python's lock [s]."""
 FROZEN = 1e6
 """Damping that keeps a joint where it is."""
 DAMPING = 1e-3
@@ -172,3 +177,36 @@ def _step(
         step[beyond] = np.clip(step, lower, upper)[beyond]
         free = free & ~beyond
     return step
+
+
+def go_near(chain: Chain, target: Target, limits: Limits, q: np.ndarray, steps: int) -> tuple[np.ndarray, float]:
+    """Goes downhill from a configuration to where the link is nearest to a target that it need not reach.
+
+    By L-BFGS-B (Byrd, Lu, Nocedal and Zhu, SIAM Journal on Scientific Computing 16(5), 1995).
+
+    Returns:
+        m positions [rad or m], and how far the link is from the target: the norm of distance and angle, each divided
+        by its tolerance.
+    """
+    from scipy.optimize import minimize  # slow to load, and seldom asked for
+
+    weights = 1.0 / np.array([POSITION_TOLERANCE_M] * 3 + [ORIENTATION_TOLERANCE_RAD] * 3)
+
+    def square(q: np.ndarray) -> tuple[float, np.ndarray]:
+        chain.set(q)
+        error = chain.error(target)
+        weighted = error * weights[: len(error)] ** 2
+        return float(error @ weighted), -2.0 * chain.jacobian(q, len(error)).T @ weighted
+
+    least, _ = square(q)
+    scale = max(least, 1.0)
+    found = minimize(
+        lambda q: tuple(part / scale for part in square(q)),
+        q,
+        jac=True,
+        method="L-BFGS-B",
+        bounds=list(zip(limits.lower, limits.upper)),
+        options={"maxiter": steps},
+        callback=lambda _: time.sleep(BREAK_S),
+    )
+    return found.x, math.sqrt(found.fun * scale)

@@ -10,7 +10,7 @@ import pybullet
 
 from .chain import Chain, Target
 from .limits import TURN, Limits
-from .methods import DampedLeastSquares, SelectivelyDampedLeastSquares, Step, towards_posture
+from .methods import BREAK_S, DampedLeastSquares, SelectivelyDampedLeastSquares, Step, go_near, towards_posture
 from .problem import PybulletProblem
 from .residual import POSITION_TOLERANCE_M, Residual
 
@@ -26,10 +26,10 @@ JOINT_ITERATIONS = 14_000
 """Most iterations for one problem, times the number of joints: 2,000 for 7 joints, some 20 ms."""
 THRESHOLD = 0.1
 """Residual at which the search stops, unless the problem says otherwise, see `Residual.size`."""
-BREAK_S = 5e-5
-"""Pause between stages, in which the simulation gets Python's lock [s]."""
 SEED = 0
 """Of the random starts."""
+MUCH_NEARER = 0.8
+"""Out of reach, the robot leaves the posture that it has for one that is off the target by so much less, as a part."""
 LEAST_WEIGHT = 1e-3
 """Least damping and least range of a joint, as a part of the largest."""
 
@@ -60,9 +60,15 @@ class Search:
         self._iterations_left = JOINT_ITERATIONS // max(1, len(current))
 
     def run(self) -> tuple[np.ndarray, Residual]:
-        """Returns the best m positions [rad or m] that were found, and how far off the target they are."""
+        """Returns the best m positions [rad or m] that were found, and how far off the target they are.
+
+        Those of a target out of reach are as near to it as the robot comes downhill from where it is, so that a target
+        that moves on does not throw the robot from one posture to another; unless another one is much nearer.
+        """
         q, residual = self._solution()
-        if len(self._rest) and residual.size <= 1.0:
+        if residual.size > 1.0 and self._current:
+            return self._nearest(q)
+        if len(self._rest):
             ranges = self._of_chain(self._problem.jointRanges)
             ranges = np.where(ranges > 0.0, ranges, TURN)  # PyBullet's -1 of joints without limits
             weights = np.maximum(ranges / ranges.max(), LEAST_WEIGHT)
@@ -84,6 +90,15 @@ class Search:
             if least.size <= 1.0:
                 break
         return best, least
+
+    def _nearest(self, best: np.ndarray) -> tuple[np.ndarray, Residual]:
+        task = self._chain, self._target, self._limits
+        steps = self._problem.maxNumIterations or ITERATIONS_A_START
+        q, off = go_near(*task, np.array(self._current), steps)
+        other, other_off = go_near(*task, best, steps)
+        if other_off < MUCH_NEARER * off:
+            q = other
+        return q, self._chain.residual(self._target, q)
 
     def _starts(self) -> Iterator[tuple[Step, list[float]]]:
         """Yields where to start: at the rest posture, where the robot is, and then at random, with the faster step."""

@@ -1,7 +1,9 @@
 """What is wrong with meshes that PyBullet would take without a word."""
 
 import math
+import os
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 
 from custom_ros_tools.config import read_file
@@ -32,13 +34,21 @@ def mesh_file_problem(path: str) -> str:
 
 
 def _is_binary_stl(path: str) -> bool:
-    data = read_file(path)
-    triangles = int.from_bytes(data[80:84], "little")
-    return len(data) > 84 and len(data) == 84 + 50 * triangles  # a header, and 50 bytes for each triangle
+    with open(path, "rb") as file:
+        triangles = int.from_bytes(file.read(84)[80:], "little")
+    size = os.path.getsize(path)
+    return size > 84 and size == 84 + 50 * triangles  # a header, and 50 bytes for each triangle
 
 
 def soft_mesh_problems(path: str) -> list[str]:
     """Returns what is wrong with the mesh of a soft body, a file that exists: a sentence for each fault."""
+    status = os.stat(path)
+    return list(_soft_mesh_problems(path, status.st_size, status.st_mtime_ns))
+
+
+@lru_cache(maxsize=32)
+def _soft_mesh_problems(path: str, size: int, changed_ns: int) -> list[str]:
+    """Does the same; files that are the same need not be read again, least of all in the simulation's thread."""
     kind = Path(path).suffix.lower()
     if kind not in SOFT_MESH_FORMATS:
         return [f"expected one of {', '.join(SOFT_MESH_FORMATS)}, got {path}"]

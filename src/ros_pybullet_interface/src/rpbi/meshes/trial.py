@@ -5,20 +5,19 @@ well is remembered by its content, in the user's cache folder, so that every mes
 """
 
 import enum
-import hashlib
 import logging
 import os
-import re
 import signal
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
-from custom_ros_tools.config import read_file
+from custom_ros_tools.child_process import start_child
+
+from .copies import cache_folder, content_hash
 
 TRIAL = 2
 """Number of the present kind of trial; meshes that went well in another are tried again."""
@@ -30,8 +29,6 @@ LONGEST_TRIAL_S = 60.0
 """Time that a trial may take [s] of wall time."""
 MOST_TOGETHER = 100
 """Meshes that one process tries, as long as it lives."""
-_NAMED = re.compile(rb"^\s*(?:mtllib|map_\w+)\s+(.*?)\s*$", re.MULTILINE)
-"""Files that an OBJ file and its materials name."""
 
 log = logging.getLogger(__name__)
 
@@ -67,7 +64,7 @@ def faults_in(meshes: Iterable[Mesh]) -> dict[Mesh, str]:
             status = os.stat(mesh.file)
             key = mesh, status.st_size, status.st_mtime_ns
             if key not in _tried:
-                record = _folder() / f"{mesh.use.value}-{_hash_of(mesh.file)}"
+                record = cache_folder() / f"{mesh.use.value}-{content_hash(mesh.file, TRIAL)}"
                 if not _is_there(record):
                     unknown[mesh] = record
                 _tried.add(key)
@@ -101,9 +98,9 @@ def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
     command = [sys.executable, "-P", "-m", __name__.rpartition(".")[0], str(writing)]
     with open(reading, "rb") as report:
         try:
-            process = subprocess.Popen(
+            process = start_child(
                 [*command, *(part for mesh in meshes for part in (mesh.use.value, mesh.file))],
-                stdin=subprocess.DEVNULL,
+                signal.SIGKILL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 pass_fds=[writing],
@@ -118,6 +115,8 @@ def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
         finally:
             process.kill()
             process.wait()
+            assert process.stdin is not None
+            process.stdin.close()
         lines = report.read().decode(errors="replace").splitlines()
     return [f"PyBullet cannot load it: {line}" if line else "" for line in lines], end or "it could not be tried"
 
@@ -129,27 +128,6 @@ def _words(returncode: int) -> str:
     if returncode < 0:
         return f"PyBullet crashes when it loads it ({signal.Signals(-returncode).name})"
     return f"PyBullet cannot load it (exit code {returncode})" if returncode else ""
-
-
-def _hash_of(file: str) -> str:
-    """Returns the hash of all that PyBullet reads of a mesh."""
-    digest = hashlib.blake2b(f"{TRIAL} {version('pybullet')}".encode(), digest_size=16)
-    waiting, seen = [Path(file)], set()
-    while waiting:
-        path = waiting.pop()
-        if path in seen:
-            continue
-        seen.add(path)
-        with suppress(OSError):  # it may name what is not there
-            data = read_file(path)
-            digest.update(f"{path.suffix.lower()} {len(data)} ".encode() + data)
-            if path.suffix.lower() in (".obj", ".mtl"):
-                waiting += [path.parent / os.fsdecode(name) for name in _NAMED.findall(data) if b"\0" not in name]
-    return digest.hexdigest()
-
-
-def _folder() -> Path:
-    return Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")) / "rpbi" / "meshes"
 
 
 def _is_there(record: Path) -> bool:

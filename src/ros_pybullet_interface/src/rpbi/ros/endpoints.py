@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import rospy
 
-from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
+from custom_ros_tools.errors import ConfigError, InterfaceError, Problem, bounded
 from custom_ros_tools.plugins import find, full_name
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.ros.rospy_internals import close_poller_with
@@ -72,6 +72,8 @@ class Service(NamedTuple):
         return " ".join((inspect.getdoc(self.handler) or "").split("\n\n")[0].split()) if self.handler else ""
 
 
+MOST_BYTES = 2_000_000
+"""Length of YAML in a request, or in a file that it names: reading takes time that the simulation wants."""
 _warn = ThrottledWarning()
 
 
@@ -84,7 +86,7 @@ def subscribe(topic: Topic, context: Any, owner: str = "") -> rospy.Subscriber:
         try:
             handler(context, message)
         except (InterfaceError, ValueError) as error:
-            _warn(name, f"message refused: {error}")
+            _warn(name, f"message refused: {bounded(str(error))}")
 
     subscriber = rospy.Subscriber(name, topic.message_type, take, queue_size=1, tcp_nodelay=True)
     close_poller_with(subscriber)
@@ -99,11 +101,12 @@ def serve(service: Service, context: Any, owner: str = "") -> rospy.Service:
     def handle(request: Any) -> Any:
         try:
             answer = handler(context, request)
-            return answer._asdict() if isinstance(answer, Answer) else answer
+            return {**answer._asdict(), "message": bounded(answer.message)} if isinstance(answer, Answer) else answer
         except (InterfaceError, ValueError) as error:
+            message = bounded(str(error))
             if "success" in response_type.__slots__:
-                return response_type(success=False, message=str(error))
-            raise rospy.ServiceException(str(error)) from error
+                return response_type(success=False, message=message)
+            raise rospy.ServiceException(message) from error
 
     return rospy.Service(service.name.format(name=owner), service.service_type, handle)
 

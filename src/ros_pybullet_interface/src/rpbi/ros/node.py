@@ -1,5 +1,6 @@
 """The simulator node: a world with ROS around it."""
 
+import gc
 import logging
 import os
 import sys
@@ -121,6 +122,8 @@ class SimulatorNode:
         window.serve(ask)
         for service in NODE_SERVICES:
             serve(service, context)
+        gc.collect()
+        gc.freeze()  # collections, which stop the loop, leave out what is there from the start
         if config.start_pybullet_after_initialization:
             self._simulation.start()
 

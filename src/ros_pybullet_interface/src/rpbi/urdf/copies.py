@@ -1,13 +1,75 @@
-"""Changed copies of a URDF, as text."""
+"""Changed copies of a URDF."""
 
 import copy
+import logging
 from collections.abc import Sequence
 
+from custom_ros_tools.errors import ConfigError, Problem, shortened
 from rpbi.geometry import scaled
 
 from .document import UrdfDocument
-from .elements import Element, UrdfJoint, end_of, inertial, joint_element, new_element, read_vector, text_of, words
-from .files import beside_or_above
+from .elements import (
+    Element,
+    UrdfJoint,
+    as_read,
+    end_of,
+    inertial,
+    joint_element,
+    new_element,
+    read_vector,
+    text_of,
+    words,
+)
+from .files import address_for_ros, beside_or_above, found_mesh
+
+log = logging.getLogger(__name__)
+
+
+def for_pybullet(document: UrdfDocument) -> Element:
+    """Returns what PyBullet reads of a URDF, with absolute names of files.
+
+    PyBullet knows nothing of ROS packages. Textures that are no ordinary files, or are not there, are left out.
+
+    Raises:
+        ConfigError: If a mesh belongs to an unknown package or does not exist.
+    """
+    robot = as_read(document.root)
+    problems: list[Problem] = []
+    for parent in list(robot.iter()):
+        for element in parent.findall("*[@filename]"):
+            name = element.get("filename", "")
+            try:
+                if element.tag != "texture":
+                    element.set("filename", str(found_mesh(name, document.source)))
+                elif (file := beside_or_above(name, document.source)) is not None:
+                    element.set("filename", str(file))
+                else:
+                    log.info("%s: no such texture: %s", document.path, shortened(name))
+                    parent.remove(element)
+            except ConfigError as error:
+                problems += error.problems
+            except OSError as error:
+                problems.append(Problem(document.path, "", str(error)))
+    if problems:
+        raise ConfigError(problems)
+    return robot
+
+
+def description_for_ros(path: str) -> str:
+    """Returns a URDF file as ROS wants it, which does not know where the file is.
+
+    Returns:
+        Its text, with relative mesh paths as `file://` addresses; paths of ROS packages stay.
+
+    Raises:
+        ConfigError: If it is no URDF, or a mesh belongs to an unknown package.
+    """
+    document = UrdfDocument(path)
+    robot = copy.deepcopy(document.root)
+    for tag in ("mesh", "texture"):
+        for element in robot.iterfind(f".//{tag}[@filename]"):
+            element.set("filename", address_for_ros(element.get("filename", ""), document.source))
+    return text_of(robot)
 
 
 def without_shapes(document: UrdfDocument, links: Sequence[str] | None = None) -> str:
@@ -19,7 +81,8 @@ def without_shapes(document: UrdfDocument, links: Sequence[str] | None = None) -
     kept = [name for name in document.links if links is None or name in links]
     ends = {*kept}
     every = document.joint_elements
-    joints = [one for one in every if links is None or {end_of(one, "parent"), end_of(one, "child")} <= ends]
+    tied = (one for one in every if links is None or {end_of(one, "parent"), end_of(one, "child")} <= ends)
+    joints = map(as_read, tied)
     bare = [new_element("link", inertial("1"), name=name) for name in kept]
     return text_of(new_element("robot", *bare, *joints, **document.root.attrib))
 
@@ -48,39 +111,33 @@ def with_limited_joints(document: UrdfDocument, base: str | None = None) -> str:
     return text_of(root)
 
 
-def mounted_on(document: UrdfDocument, joints: Sequence[UrdfJoint]) -> str:
-    """Returns a URDF with a chain of massless links above the root, and with absolute names of meshes.
+def mounted_on(robot: Element, root_link: str, joints: Sequence[UrdfJoint]) -> None:
+    """Puts a chain of massless links above the root of a robot.
 
     Args:
+        robot: The robot, which is changed.
+        root_link: The name of its root.
         joints: The joints of the chain, from its fixed end to the root.
     """
-    robot = _absolute(document)
-    root = next(link for link in robot.findall("link") if link.get("name") == joints[-1].child)
+    root = next(link for link in robot.findall("link") if link.get("name") == root_link)
     if root.find("inertial") is None:
         root.append(inertial("0"))  # PyBullet gives 1 kg to any link without, unless it is the fixed one
     robot.remove(root)
     links = [new_element("link", inertial("0"), name=joint.parent) for joint in joints]
     robot[:0] = [*links, root]  # in order, in case of URDF_MAINTAIN_LINK_ORDER
     robot.extend(map(joint_element, joints))
-    return text_of(robot)
 
 
-def for_window(document: UrdfDocument) -> str | None:
-    """Returns a URDF with the first visual of each link at its end, with absolute names of meshes.
+def put_first_visuals_last(robot: Element) -> None:
+    """Puts the first visual of each link of a robot at its end.
 
     PyBullet's window draws a whole link in the colour of its last visual; the first one is the link's main one, as
     a rule.
-
-    Returns:
-        Nothing if no link has several.
     """
-    robot = _absolute(document)
-    several = [link for link in robot.findall("link") if len(link.findall("visual")) > 1]
-    for link in several:
-        first = link.findall("visual")[0]
-        link.remove(first)
-        link.append(first)
-    return text_of(robot) if several else None
+    for link in robot.findall("link"):
+        if len(visuals := link.findall("visual")) > 1:
+            link.remove(visuals[0])
+            link.append(visuals[0])
 
 
 def chain_urdf(joints: Sequence[UrdfJoint]) -> str:
@@ -117,12 +174,3 @@ def _hang_on(robot: Element, base: str) -> None:
             robot.append(new_element("link", name=start))
             robot.append(new_element("joint", *between, origin, name=f"{start}/fixed", type="fixed"))
         link = parent
-
-
-def _absolute(document: UrdfDocument) -> Element:
-    """Returns a copy that may stand in another folder, since names of meshes and textures are absolute."""
-    robot = copy.deepcopy(document.root)
-    for element in robot.iterfind(".//*[@filename]"):
-        name = element.get("filename", "")
-        element.set("filename", str(beside_or_above(name, document.source) or name))
-    return robot

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import NamedTuple
 from xml.parsers import expat
@@ -10,11 +10,11 @@ from xml.parsers import expat
 from custom_ros_tools.config import read_file
 from custom_ros_tools.errors import ConfigError, Problem, shortened
 
-from .elements import Mimic, UrdfJoint, end_of, parse, read_joint, read_mimic
+from .elements import READ, Element, Mimic, UrdfJoint, end_of, parse, read_joint, read_mimic
 from .files import mesh_file
 
-MOST_BYTES = 64_000_000
-"""A file may be so long."""
+MOST_BYTES = 2_000_000
+"""Length of a file."""
 
 
 class Edge(NamedTuple):
@@ -33,18 +33,21 @@ class Attribute(NamedTuple):
         tag: The element that has it.
         key: Its name.
         text: What it says.
+        is_read: Whether PyBullet reads that element.
     """
 
     owner: str
     tag: str
     key: str
     text: str
+    is_read: bool
 
 
 class UrdfDocument:
     """The links and joints of a URDF file.
 
-    As PyBullet does, it ignores text around the robot and characters that XML does not allow.
+    As PyBullet does, it ignores text around the robot and characters that XML does not allow. Documents of the same
+    content share their elements and are equal.
 
     Args:
         path: The file, for messages; the meshes it names need not be there.
@@ -68,7 +71,7 @@ class UrdfDocument:
     def __init__(self, path: str, source: str | None = None, not_xml: str = "is not XML") -> None:
         self.path, self.source = path, Path(source or path)
         try:
-            self.root = parse(read_file(self.source, MOST_BYTES).decode(errors="replace"))
+            self.root = _robot_in(read_file(self.source, MOST_BYTES))
         except OSError as error:
             raise ConfigError([Problem(path, "", (error.strerror or str(error)).lower())]) from None
         except (expat.ExpatError, RecursionError) as error:
@@ -82,6 +85,12 @@ class UrdfDocument:
             Edge(joint.get("name", ""), end_of(joint, "parent"), end_of(joint, "child"))
             for joint in self.joint_elements
         ]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, UrdfDocument) and self.root is other.root
+
+    def __hash__(self) -> int:
+        return id(self.root)
 
     @cached_property
     def joints(self) -> dict[str, UrdfJoint]:
@@ -108,16 +117,15 @@ class UrdfDocument:
         return list(dict.fromkeys(mesh.get("filename", "") for mesh in found))
 
     def attributes(self) -> Iterator[Attribute]:
-        """Yields all that stands in its links and joints."""
+        """Yields all that stands in it."""
+        for key, text in self.root.attrib.items():
+            yield Attribute(self.tag, "robot", key, text, True)
         for owner in self.root:
+            name = f"{owner.tag} '{shortened(owner.get('name', ''))}'"
+            is_read = owner.tag in READ
             for element in owner.iter():
                 for key, text in element.attrib.items():
-                    yield Attribute(f"{owner.tag} '{shortened(owner.get('name', ''))}'", element.tag, key, text)
-
-    @property
-    def links_without_inertial(self) -> set[str]:
-        """Names of the links of which it tells neither mass nor inertia."""
-        return {link.get("name", "") for link in self.root.findall("link") if link.find("inertial") is None}
+                    yield Attribute(name, element.tag, key, text, is_read and element.tag in READ)
 
     @property
     def is_soft(self) -> bool:
@@ -154,15 +162,20 @@ class UrdfDocument:
         return roots[0]
 
 
+@lru_cache(maxsize=32)
+def _robot_in(data: bytes) -> Element:
+    """Returns the robot in a file's content; that of files that were read lately is there already."""
+    return parse(data.decode(errors="replace"))
+
+
 def mimics_of(path: str) -> dict[str, Mimic]:
     """Returns what joints of a URDF file follow others, by name; none if it cannot be read as PyBullet may do.
 
     Raises:
         ValueError: If a value makes no sense; it names the joint.
     """
-    with suppress(ConfigError, OSError):
-        if b"<mimic" in read_file(path, MOST_BYTES):  # saves most files the parsing
-            return UrdfDocument(path).mimics
+    with suppress(ConfigError):
+        return UrdfDocument(path).mimics
     return {}
 
 
@@ -173,7 +186,7 @@ def disabled_collisions(path: str) -> set[frozenset[str]]:
         ConfigError: If it cannot be read or is not well-formed.
     """
     try:
-        root = parse(read_file(path, MOST_BYTES).decode(errors="replace"))
+        root = _robot_in(read_file(path, MOST_BYTES))
     except (OSError, expat.ExpatError, RecursionError) as error:
         raise ConfigError([Problem(path, "", f"expected a SRDF file: {error}")]) from None
     return {frozenset((pair.get("link1", ""), pair.get("link2", ""))) for pair in root.iter("disable_collisions")}

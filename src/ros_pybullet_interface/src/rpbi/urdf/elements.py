@@ -9,11 +9,27 @@ from xml.parsers import expat
 
 from rpbi.geometry import Vector
 
-from .files import COMMENT, NOT_XML
-
 MOVING = ("revolute", "continuous", "prismatic")
 """Types of joints with one axis, which kinematics are solved for."""
-_ROBOT = re.compile(r"<robot\b.*</robot\s*>", re.DOTALL)
+READ = frozenset(
+    "robot material color texture specular link inertial mass inertia origin visual collision geometry box sphere "
+    "cylinder capsule mesh plane contact inertia_scaling lateral_friction rolling_friction restitution "
+    "spinning_friction friction_anchor stiffness damping joint parent child axis limit dynamics deformable "
+    "reduced_deformable collision_margin friction repulsion_stiffness gravity_factor neohookean corotated spring "
+    "num_modes stiffness_scale damping_coefficient cache_barycenter".split()
+)
+"""Elements that PyBullet reads, and gets."""
+MOST_TAGS = 50_000
+"""Tags in a file."""
+MOST_NESTED = 100
+"""Largest depth of elements; more are taken for no XML."""
+_NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""Characters that XML 1.0 does not allow (https://www.w3.org/TR/xml/#charsets); PyBullet does not mind them."""
+_ROBOT, _END_OF_ROBOT = re.compile(r"<robot\b"), re.compile(r"</robot\s*>")
+_DEFAULT = re.compile(r"\$\(optenv \w+ ([^()]*)\)")
+"""A variable of the environment in xacro, with what holds if it is not set."""
+_CHUNK = 1 << 16
+"""Characters that are parsed at once: in between, other threads go on."""
 _ZERO: Vector = (0.0, 0.0, 0.0)
 
 
@@ -66,24 +82,68 @@ class UrdfJoint(NamedTuple):
 
 
 def parse(text: str) -> Element:
-    """Returns the robot that stands in a text, as PyBullet finds it.
+    """Returns the robot that stands in a text, as PyBullet finds it, in a time that grows with its length alone.
 
     Raises:
         ExpatError: If it is not well-formed.
-        RecursionError: If it is nested too deeply.
+        RecursionError: If it is nested too deeply, or has too many elements.
     """
-    text = COMMENT.sub(lambda comment: _blank(comment[0]), NOT_XML.sub("", text))
-    robot = _ROBOT.search(text)
+    text = _without_comments(text)
+    if (tags := text.count("<")) > MOST_TAGS:
+        raise RecursionError(f"expected at most {MOST_TAGS} tags, got {tags}")
+    start, end = _ROBOT.search(text), _end_of_robot(text)
+    if start and start.start() < end:
+        text = _blank(text[: start.start()]) + text[start.start() : end]
     # Without namespaces: PyBullet knows none, and many files have prefixes that they do not declare.
     builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
-    parser.Parse(_blank(text[: robot.start()]) + robot[0] if robot else text, True)
-    return builder.close()
+    for index in range(0, len(text), _CHUNK):
+        parser.Parse(_NOT_XML.sub("", text[index : index + _CHUNK]), False)
+    parser.Parse("", True)
+    robot = builder.close()
+    _check_depth(robot)
+    if "$(optenv" in text:  # left of xacro in a robot of PyBullet's data
+        for element in robot.iter():
+            element.attrib.update({key: _DEFAULT.sub(r"\1", value) for key, value in element.attrib.items()})
+    return robot
+
+
+def _without_comments(text: str) -> str:
+    """Returns a text with spaces in the place of comments; XML allows no `--` in them, PyBullet does."""
+    parts, end = [], 0
+    while (start := text.find("<!--", end)) >= 0 and (stop := text.find("-->", start + 4)) >= 0:
+        parts += [text[end:start], _blank(text[start : stop + 3])]
+        end = stop + 3
+    return "".join((*parts, text[end:]))
+
+
+def _end_of_robot(text: str) -> int:
+    """Returns where the last robot ends, 0 if none does."""
+    start = len(text)
+    while (start := text.rfind("</robot", 0, start)) >= 0:
+        if match := _END_OF_ROBOT.match(text, start):
+            return match.end()
+    return 0
 
 
 def _blank(text: str) -> str:
     """Returns as many spaces, so that messages of the parser have the file's lines and columns."""
-    return re.sub(r"\S", " ", text)
+    return "\n".join(" " * len(line) for line in text.split("\n"))
+
+
+def _check_depth(root: Element) -> None:
+    level = [root]
+    for _ in range(MOST_NESTED):
+        level = [child for element in level for child in element]
+    if level:
+        raise RecursionError(f"expected elements in at most {MOST_NESTED} others")
+
+
+def as_read(element: Element) -> Element:
+    """Returns a copy of an element with what PyBullet reads of it: known elements and their attributes, no text."""
+    result = Element(element.tag, element.attrib)
+    result.extend([as_read(child) for child in element if child.tag in READ])
+    return result
 
 
 def read_joint(element: Element) -> UrdfJoint:

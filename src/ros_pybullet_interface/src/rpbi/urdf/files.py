@@ -1,20 +1,14 @@
-"""URDF files as PyBullet and ROS can read them."""
+"""Files of URDFs: where those are that they name, and how descriptions without a file get one."""
 
 import hashlib
-import re
 from functools import lru_cache
 from pathlib import Path
 
-from custom_ros_tools.config import read_file, replace_package
-from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.config import replace_package
+from custom_ros_tools.errors import ConfigError, Problem, shortened
+from rpbi.meshes.copies import with_textures_that_exist
 from rpbi.temporary import temporary_folder
 
-_FILENAME = re.compile(
-    r"""(?P<before><(?:mesh|texture)\b[^>]*?\bfilename\s*=\s*)(?P<quote>["'])(?P<path>.*?)(?P=quote)"""
-)
-NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""Characters that XML 1.0 does not allow (https://www.w3.org/TR/xml/#charsets); PyBullet does not mind them."""
-COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 PACKAGE = "package://"
 
 
@@ -24,48 +18,15 @@ def _folder() -> Path:
     return Path(temporary_folder("urdf").name)
 
 
-def _read(path: Path) -> str:
-    """Returns the text of a URDF file without its comments, and without characters that XML does not allow."""
-    return COMMENT.sub("", NOT_XML.sub("", read_file(path).decode()))
-
-
-def resolve_meshes(path: str) -> str:
-    """Makes the meshes of a URDF file loadable by PyBullet, which knows nothing of ROS packages.
-
-    Returns:
-        The file itself if it needs nothing, else that of a copy in which every `package://` path, and with them
-        every relative one, is absolute.
-
-    Raises:
-        ConfigError: If a mesh belongs to an unknown package or does not exist.
-    """
-    source = Path(path)
-    text = _read(source)
-    if PACKAGE not in text:
-        return path
-    problems: list[Problem] = []
-
-    def absolute(match: re.Match[str]) -> str:
-        try:
-            resolved = mesh_file(match["path"], source)
-        except ConfigError as error:
-            problems.extend(error.problems)
-            return match[0]
-        return f"{match['before']}{match['quote']}{resolved}{match['quote']}"
-
-    resolved_text = _FILENAME.sub(absolute, text)
-    if problems:
-        raise ConfigError(problems)
-    return _write(source.stem, resolved_text)
-
-
 def write_description(text: str) -> str:
     """Writes a robot description that has no file, such as that of the parameter server, into one of its own.
 
     Returns:
         The file, which lasts as long as the process.
     """
-    return _write("robot_description", text)
+    path = _folder() / f"robot_description-{hashlib.sha256(text.encode()).hexdigest()[:12]}.urdf"
+    path.write_text(text, encoding="utf-8")
+    return str(path)
 
 
 def is_temporary(path: str) -> bool:
@@ -73,29 +34,40 @@ def is_temporary(path: str) -> bool:
     return Path(path).parent == _folder()
 
 
-def description_for_ros(path: str) -> str:
-    """Returns a URDF file as ROS wants it, which does not know where the file is.
+def address_for_ros(mesh: str, source: Path) -> str:
+    """Returns how ROS finds a mesh or texture of which the URDF file `source` says `mesh`.
 
     Returns:
-        Its text, with relative mesh paths as `file://` addresses; paths of ROS packages stay.
+        A `file://` address for a relative path, or a package that is unknown or lacks it; else what the URDF says.
+        Meshes whose textures are missing are copies without them.
 
     Raises:
-        ConfigError: If a mesh belongs to an unknown package.
+        ConfigError: If it belongs to an unknown package and is not near the URDF.
     """
-    source = Path(path)
+    mesh = _with_two_slashes(mesh)
+    if "://" not in mesh:
+        file: Path | None = source.parent / mesh
+    elif _is_of_unknown_package(mesh):
+        file = mesh_file(mesh, source)
+    else:
+        file = None if _is_in_its_package(mesh) else _near(mesh, source)
+    return mesh if file is None else f"file://{with_textures_that_exist(file.resolve())}"
 
-    def address(match: re.Match[str]) -> str:
-        mesh = _with_two_slashes(match["path"])
-        if "://" not in mesh:
-            file: Path | None = source.parent / mesh
-        elif _is_of_unknown_package(mesh):
-            file = mesh_file(mesh, source)
-        else:
-            file = None if _is_in_its_package(mesh) else _near(mesh, source)
-        said = mesh if file is None else f"file://{file.resolve()}"
-        return f"{match['before']}{match['quote']}{said}{match['quote']}"
 
-    return _FILENAME.sub(address, _read(source))
+def found_mesh(name: str, source: Path) -> Path:
+    """Returns the mesh of which the URDF file `source` says `name`: in its package, or where PyBullet looks for it.
+
+    Raises:
+        ConfigError: If it is of an unknown package.
+        OSError: If there is none.
+    """
+    if name.startswith(PACKAGE):
+        return mesh_file(name, source)
+    found = beside_or_above(name.removeprefix("model://"), source)
+    if found is None:
+        looked = "looked for beside it and in all folders above"
+        raise FileNotFoundError(f"no such mesh: {shortened(name)} ({looked})")
+    return found
 
 
 def mesh_file(mesh: str, source: Path) -> Path:
@@ -148,9 +120,3 @@ def _is_of_unknown_package(mesh: str) -> bool:
     except ConfigError:
         return mesh.startswith(PACKAGE)
     return False
-
-
-def _write(stem: str, text: str) -> str:
-    path = _folder() / f"{stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}.urdf"
-    path.write_text(text, encoding="utf-8")
-    return str(path)

@@ -2,8 +2,8 @@
 
 import logging
 import math
+import tempfile
 from collections.abc import Callable, Collection, Mapping
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -11,22 +11,21 @@ import pybullet
 
 from custom_ros_tools.errors import ConfigError, Problem, shortened
 from rpbi.config.asset_files import ROBOT_DESCRIPTION
-from rpbi.engine.client import Client
+from rpbi.engine.client import MAXIMAL_COORDINATES, Client
 from rpbi.meshes.checks import mesh_file_problem
 from rpbi.meshes.trial import Mesh, Use, faults_in
 
-from .copies import for_window
+from .copies import for_pybullet, put_first_visuals_last
 from .document import UrdfDocument
-from .files import PACKAGE, beside_or_above, mesh_file, resolve_meshes, write_description
-from .structure import structure_problems, texts_for_numbers
+from .elements import Element, text_of
+from .files import found_mesh
+from .structure import check_structure, structure_problems
 
 log = logging.getLogger(__name__)
 
 MOST_JOINTS = 127
 """Joints of a robot that PyBullet can tell of, fixed ones too."""
 MESH_FORMATS = (".obj", ".stl", ".dae", ".cdf")
-MOST_PROBLEMS = 20
-"""So many faults of one file are told."""
 OTHER_FORMATS = {"sdf": "SDF", "world": "SDF", "gazebo": "SDF", "mujoco": "MJCF"}
 """Formats of robots that are not read, by the element at the top of their files."""
 PLACEHOLDER_FACTOR = 10.0
@@ -50,8 +49,14 @@ def urdf_problems(path: str) -> list[str]:
         return [f"{path}: expected <robot> at the top, got <{shortened(document.tag)}>"]
     if not document.links and not document.is_soft:
         return [f"{path}: the robot has no <link>"]
-    problems = list(islice(structure_problems(document), MOST_PROBLEMS)) or _mesh_problems(document)
+    problems = [*structure_problems(document), *_count_problems(document)] or _mesh_problems(document)
     return [f"{path}: {problem}" for problem in problems]
+
+
+def _count_problems(document: UrdfDocument) -> list[str]:
+    """Returns a sentence if there are too many joints for PyBullet even when it merges the fixed ones."""
+    moving = sum(kind != "fixed" for kind in document.joint_types.values())
+    return [f"expected at most {MOST_JOINTS} joints that are not fixed, got {moving}"] if moving > MOST_JOINTS else []
 
 
 def _mesh_problems(document: UrdfDocument) -> list[str]:
@@ -64,7 +69,7 @@ def _mesh_problems(document: UrdfDocument) -> list[str]:
                 problems[f"mesh '{shortened(name)}' is none of {', '.join(MESH_FORMATS)}"] = None
                 continue
             try:
-                file = str(_mesh_path(name, document.path))
+                file = str(found_mesh(name, document.source))
                 if fault := mesh_file_problem(file):
                     problems[f"mesh '{shortened(name)}': {fault}"] = None
                 elif not file.lower().endswith(".cdf"):
@@ -78,36 +83,22 @@ def _mesh_problems(document: UrdfDocument) -> list[str]:
     return list(problems)
 
 
-def _mesh_path(name: str, path: str) -> Path:
-    """Returns the file of a mesh, where PyBullet finds it once names of packages are resolved.
-
-    Raises:
-        ConfigError: If it is of an unknown package.
-        OSError: If there is none.
-    """
-    source = Path(path)
-    if name.startswith(PACKAGE):
-        return mesh_file(name, source)
-    found = beside_or_above(name.removeprefix("model://"), source)
-    if found is None:
-        looked = "looked for beside it and in all folders above"
-        raise FileNotFoundError(f"no such mesh: {shortened(name)} ({looked})")
-    return found
-
-
 def load_urdf(
     pb: Client,
     name: str,
     arguments: Mapping[str, Any],
-    prepare: Callable[[str], str] = resolve_meshes,
+    prepare: Callable[[UrdfDocument], Element] = for_pybullet,
     inertia_from_urdf: bool = False,
 ) -> int:
     """Loads a URDF file in which `urdf_problems` finds nothing, and returns PyBullet's id of the body.
 
+    PyBullet gets a file with what it reads, and nothing else, so that both understand the same: its own reader stops at
+    null characters, cuts long lines and ignores errors.
+
     Args:
         name: Name of the body, for messages.
         arguments: Those of `loadURDF`.
-        prepare: Returns a file that PyBullet can load in place of `fileName`.
+        prepare: Returns what PyBullet shall read of the URDF.
         inertia_from_urdf: Whether moments of inertia are the URDF's, else PyBullet guesses them unless `flags` say.
 
     Raises:
@@ -115,41 +106,44 @@ def load_urdf(
     """
     file: str = arguments["fileName"]
     try:
-        prepared = prepare(file)
-        document = UrdfDocument(prepared)
-        if texts := texts_for_numbers(document):
-            log.warning("%s: expected numbers, PyBullet takes these for 0: %s", name, ", ".join(texts[:3]))
-        if pb.has_window and (text := for_window(document)) is not None:
-            prepared = write_description(text)
+        document = UrdfDocument(file)
+        check_structure(document)
+        robot = prepare(document)
+        if pb.has_window:
+            put_first_visuals_last(robot)
         flags = arguments.get("flags") or 0
-        flags = flags_for(document, flags)
-        _warn_of_merging(name, document, flags & ~(arguments.get("flags") or 0))
+        flags = flags_for(robot, flags)
+        _warn_of_merging(name, robot, flags & ~(arguments.get("flags") or 0))
         if inertia_from_urdf:
             flags |= pybullet.URDF_USE_INERTIA_FROM_FILE
-        body_id = int(pb.loadURDF(**{**arguments, "fileName": prepared, "flags": flags}))
+        with tempfile.NamedTemporaryFile("w", suffix=".urdf", encoding="utf-8") as written:
+            written.write(text_of(robot))
+            written.flush()
+            body_id = int(pb.loadURDF(**{**arguments, "fileName": written.name, "flags": flags}))
         if not inertia_from_urdf:
             return body_id
-        _complete_inertias(pb, name, body_id, document.links_without_inertial, arguments.get("globalScaling") or 1.0)
+        without = {link.get("name", "") for link in robot.findall("link") if link.find("inertial") is None}
+        _complete_inertias(pb, name, body_id, without, arguments.get("globalScaling") or 1.0)
         return body_id
     except ConfigError as error:
         messages = [f"{problem.key or file}: {problem.message}" for problem in error.problems]
-    except (pybullet.error, OSError, UnicodeDecodeError) as error:
+    except (pybullet.error, OSError) as error:
         messages = [f"PyBullet could not load it: {error}"]
     raise ConfigError([Problem(name, "loadURDF.fileName", message) for message in messages])
 
 
-def flags_for(document: UrdfDocument, flags: int) -> int:
+def flags_for(robot: Element, flags: int) -> int:
     """Returns the flags by which PyBullet takes a URDF: of one with too many joints it merges the fixed ones.
 
     PyBullet loads more than 127, but then tells neither of joints nor of links where they are.
     """
-    return flags | (pybullet.URDF_MERGE_FIXED_LINKS if len(document.joint_types) > MOST_JOINTS else 0)
+    return flags | (pybullet.URDF_MERGE_FIXED_LINKS if len(robot.findall("joint")) > MOST_JOINTS else 0)
 
 
-def _warn_of_merging(name: str, document: UrdfDocument, added_flags: int) -> None:
+def _warn_of_merging(name: str, robot: Element, added_flags: int) -> None:
     if added_flags & pybullet.URDF_MERGE_FIXED_LINKS:
         message = "%s: %d joints are more than the %d that PyBullet takes: fixed ones are left out, with their links"
-        log.warning(message, name, len(document.joint_types), MOST_JOINTS)
+        log.warning(message, name, len(robot.findall("joint")), MOST_JOINTS)
 
 
 def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[str], scaling: float) -> None:
@@ -178,8 +172,11 @@ def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[
 
 
 def _largest_radius(pb: Client, body_id: int, link: int) -> float:
-    """Returns an upper bound of how far the collision shape reaches from the centre of mass [m], inf without one."""
-    if not pb.getCollisionShapeData(body_id, link):
+    """Returns an upper bound of how far the collision shape reaches from the centre of mass [m].
+
+    It is inf without a shape, and in maximal coordinates, where PyBullet reports no shapes.
+    """
+    if pb.getDynamicsInfo(body_id, link)[10] == MAXIMAL_COORDINATES or not pb.getCollisionShapeData(body_id, link):
         return math.inf
     lower, upper = pb.getAABB(body_id, link)
     centre = pb.getBasePositionAndOrientation(body_id)[0] if link < 0 else pb.getLinkState(body_id, link)[0]

@@ -4,15 +4,30 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator
+from functools import lru_cache
+from itertools import islice
 
-from custom_ros_tools.errors import shortened
+from custom_ros_tools.errors import ConfigError, Problem, shortened
 from custom_ros_tools.schema import FARTHEST_M, HEAVIEST_KG
 
-from .document import UrdfDocument
+from .document import Attribute, UrdfDocument
 from .joints import LARGEST
 
 LONGEST_NAME = 250
-"""Characters of a name; PyBullet copies names into fixed places on the stack."""
+"""Bytes of a name; PyBullet copies names into 1024 bytes on the stack."""
+LONGEST_TEXT = 1000
+"""Bytes of any other text; for names of files, the same holds."""
+MOST_LINKS = 2000
+"""Links of a robot, those on fixed joints too."""
+MOST_SHAPES = 2000
+"""Shapes of all links, to see or to touch."""
+MOST_ATTRIBUTES = 100_000
+"""Texts in a file."""
+MOST_PROBLEMS = 20
+"""Faults of one file that are reported."""
+_NAMES = {("robot", "name"), ("link", "name"), ("joint", "name"), ("material", "name"), ("joint", "type")}
+_UNSAFE = re.compile(r"[%\x00-\x1f\x7f-\x9f]")
+"""Characters that PyBullet's log, which takes texts of a URDF for printf formats, must not get."""
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*(e[-+]?\d+)?|\.\d+(e[-+]?\d+)?|nan|inf(inity)?)", re.IGNORECASE)
 _NUMBERS = {
     **dict.fromkeys((("origin", "xyz"), ("box", "size"), ("sphere", "radius")), FARTHEST_M),
@@ -22,14 +37,46 @@ _NUMBERS = {
     **{("inertia", key): LARGEST for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")},
     **{("dynamics", key): LARGEST for key in ("damping", "friction")},
     **{("limit", key): math.inf for key in ("lower", "upper", "effort", "velocity")},
+    **dict.fromkeys((("color", "rgba"), ("specular", "rgb")), LARGEST),
+    **{
+        (tag, "value"): LARGEST
+        for tag in (
+            *("lateral_friction", "rolling_friction", "spinning_friction", "restitution", "inertia_scaling"),
+            *("stiffness", "damping", "collision_margin", "friction", "repulsion_stiffness", "gravity_factor"),
+        )
+    },
 }
 """The largest number by element and attribute."""
+_VECTORS = {("origin", "xyz"), ("origin", "rpy"), ("axis", "xyz"), ("box", "size")}
+"""Attributes of three numbers."""
 
 
-def structure_problems(document: UrdfDocument) -> Iterator[str]:
-    """Yields a sentence for each fault: in what hangs on what, in names and in numbers."""
+def check_structure(document: UrdfDocument) -> None:
+    """Checks that a URDF describes a robot that PyBullet, and any other reader, survives.
+
+    Raises:
+        ConfigError: If it does not; it has the first faults.
+    """
+    if problems := structure_problems(document):
+        raise ConfigError([Problem(document.path, "", problem) for problem in problems])
+
+
+@lru_cache(maxsize=32)
+def structure_problems(document: UrdfDocument) -> tuple[str, ...]:
+    """Returns a sentence for each of the first faults: in what hangs on what, in names, in numbers and other texts."""
+    return tuple(islice(_problems(document), MOST_PROBLEMS))
+
+
+def _problems(document: UrdfDocument) -> Iterator[str]:
+    if len(document.links) > MOST_LINKS or len(document.edges) > MOST_LINKS:
+        counts = f"{len(document.links)} links and {len(document.edges)} joints"
+        yield f"expected at most {MOST_LINKS} links and as many joints, got {counts}"
+        return
+    if (shapes := sum(1 for _ in document.root.iter("geometry"))) > MOST_SHAPES:
+        yield f"expected at most {MOST_SHAPES} shapes, got {shapes}"
     yield from _name_problems(document)
     yield from _tree_problems(document)
+    yield from _mimic_problems(document)
     yield from _text_problems(document)
 
 
@@ -40,8 +87,6 @@ def _name_problems(document: UrdfDocument) -> Iterator[str]:
                 yield f"a {kind} has no name"
             elif count > 1:
                 yield f"{count} {kind}s are called '{shortened(name)}'; names are unique"
-            elif len(name.encode()) > LONGEST_NAME:
-                yield f"expected names of at most {LONGEST_NAME} bytes, got {kind} '{shortened(name)}'"
 
 
 def _tree_problems(document: UrdfDocument) -> Iterator[str]:
@@ -61,46 +106,68 @@ def _tree_problems(document: UrdfDocument) -> Iterator[str]:
         yield f"expected one link that hangs on no joint, got {', '.join(roots[:5])}: is a joint missing?"
     reaching: set[str] = {link for link in links if link not in parents}
     for link in document.links:
-        way = []
+        way: dict[str, None] = {}
         while link not in reaching and link in parents and link not in way:
-            way.append(link)
+            way[link] = None
             link = parents[link]
         if link in way:
             yield f"link '{shortened(link)}' hangs on itself in the end"
         reaching.update(way)
 
 
+def _mimic_problems(document: UrdfDocument) -> Iterator[str]:
+    leaders = {
+        joint.get("name", ""): mimic.get("joint", "")
+        for joint in document.joint_elements
+        if (mimic := joint.find("mimic")) is not None
+    }
+    for joint in leaders:
+        line, leader = {joint}, leaders[joint]
+        while leader in leaders and leader not in line:
+            line.add(leader)
+            leader = leaders[leader]
+        if leader == joint:
+            yield f"joint '{shortened(joint)}' mimics itself in the end"
+
+
 def _text_problems(document: UrdfDocument) -> Iterator[str]:
-    for owner, tag, key, text in document.attributes():
+    for count, attribute in enumerate(document.attributes()):
+        owner, tag, key, text, is_read = attribute
         what = f"{owner}: {shortened(tag)}.{shortened(key)}"
+        if count == MOST_ATTRIBUTES:
+            yield f"expected at most {MOST_ATTRIBUTES} attributes, got more"
+            return
         if tag.startswith("xacro:") or "${" in text:
             left = f"<{shortened(tag)}>" if tag.startswith("xacro:") else f"'{shortened(text)}'"
             yield f"{what}: {left} is left of xacro: expected a URDF, as the program xacro makes it"
-        elif (tag, key) in _NUMBERS and (problem := _number_problem(text, _NUMBERS[tag, key])):
+        elif is_read and (problem := _text_problem(attribute)):
+            yield f"{what}: {problem}"
+        elif (tag, key) in _NUMBERS and (problem := _number_problem(tag, key, text)):
             yield f"{what}: {problem}, got '{shortened(text)}'"
-        elif (tag, key) == ("mass", "value") and _number(text.strip() or "0") < 0.0:
-            yield f"{what}: must be >= 0 [kg], got '{shortened(text)}'"
 
 
-def texts_for_numbers(document: UrdfDocument) -> list[str]:
-    """Returns where a text stands in the place of a number; PyBullet takes it for 0."""
-    return [
-        f"{owner}: {tag}.{key} '{shortened(text)}'"
-        for owner, tag, key, text in document.attributes()
-        if (tag, key) in _NUMBERS and not all(map(_NUMBER.match, text.split()))
-    ]
-
-
-def _number_problem(text: str, largest: float) -> str:
-    for number in map(_number, text.split()):
-        if math.isnan(number):
-            return "expected finite numbers"
-        if abs(number) > largest:
-            return f"must be within +-{largest:g}"
+def _text_problem(attribute: Attribute) -> str:
+    """Returns why PyBullet must not get a text, which may end up on its stack and in its log."""
+    _, tag, key, text, _ = attribute
+    longest = LONGEST_NAME if (tag, key) in _NAMES or key == "link" else LONGEST_TEXT
+    if (size := len(text.encode())) > longest:
+        return f"expected at most {longest} bytes, got {size}: '{shortened(text)}'"
+    if _UNSAFE.search(text):
+        return f"expected a text without % and control characters, got {shortened(ascii(text))}"
     return ""
 
 
-def _number(word: str) -> float:
-    """Returns the number that a word begins with, 0 if it begins with none, as PyBullet reads it."""
-    match = _NUMBER.match(word)
-    return float(match[0]) if match else 0.0
+def _number_problem(tag: str, key: str, text: str) -> str:
+    largest, found = _NUMBERS[tag, key], [_NUMBER.match(word) for word in text.split()]
+    numbers = [float(match[0]) for match in found if match]  # PyBullet reads what a word begins with
+    if not found or len(numbers) < len(found):
+        return "expected numbers"
+    if any(map(math.isnan, numbers)):
+        return "expected finite numbers"
+    if any(abs(number) > largest for number in numbers):
+        return f"must be within +-{largest:g}"
+    if (tag, key) in _VECTORS and len(numbers) < 3:
+        return "expected three numbers"
+    if (tag, key) == ("mass", "value") and numbers[0] < 0.0:
+        return "must be >= 0 [kg]"
+    return ""

@@ -20,16 +20,15 @@ LARGEST_TURN_RATE = 1.5
 class Dressing:
     """Leads the cuff along a person's arm, wherever that is at the moment.
 
-    The nearer the force on it is to the limit the slower is the cuff; above the limit it goes back. It waits for a hand
-    that does not follow, so that the hand has never far to go when it can again.
+    The nearer a force on the arm is to its limit the slower is the cuff; above the limit it goes back. It waits for a
+    hand that does not follow, so that the hand has never far to go when it can again.
 
     Args:
-        force_limit_n: Force on the arm above which the cuff goes back [N].
         speed: Of the cuff where nothing is touched [m/s].
     """
 
-    def __init__(self, force_limit_n: float, speed: float) -> None:
-        self._limit_n, self._speed = force_limit_n, speed
+    def __init__(self, speed: float) -> None:
+        self._speed = speed
         self._left_m: float | None = None
         self._rested_s = 0.0
         self._ahead = np.array(AHEAD_AT_START)
@@ -44,19 +43,19 @@ class Dressing:
         """Whether the cuff is led no further, and has had time to get there."""
         return self._rested_s >= SETTLING_S
 
-    def target(self, arm: ArmPosition, cuff: Array, force_n: float, dt: float) -> HandTarget:
+    def target(self, arm: ArmPosition, cuff: Array, force_share: float, dt: float) -> HandTarget:
         """Returns where the robot's hand is to be.
 
         Args:
             arm: Where the person's arm is.
             cuff: Where the middle of the cuff is (3) [m].
-            force_n: Force on the arm [N].
+            force_share: Force on the arm as a share of its limit.
             dt: Time since the last target [s].
         """
         way = Way(arm)
         if self._left_m is None:
             self._left_m = way.length
-        speed = self._speed * max(-1.0, 1.0 - force_n / self._limit_n)
+        speed = self._speed * max(-1.0, 1.0 - force_share)
         if np.linalg.norm(way.place(way.length - self._left_m) - cuff) > LARGEST_LEAD_M:
             speed = min(speed, 0.0)
         self._left_m = min(max(self._left_m - speed * dt, 0.0), way.length)

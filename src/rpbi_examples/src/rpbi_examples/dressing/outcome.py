@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .force import ArmForce
 from .way import ArmPosition, Array
 
 AROUND, RINGS = 14, 12
@@ -22,26 +23,33 @@ class Outcome(NamedTuple):
     Attributes:
         past_elbow_m: How far the middle of the cuff is past the elbow, along the upper arm [m].
         is_around: Whether the arm is inside the cuff, and inside the ring of the sleeve that is nearest to the elbow.
-        peak_force_n: Largest force on the arm [N], as mean over 0.1 s.
+        peak_force_n: Largest force on the arm [N]: the sum of all magnitudes, as mean over 0.1 s.
+        peak_share: How much of a force's limit was used at most: of a contact, of a segment or of the arm.
     """
 
     past_elbow_m: float
     is_around: bool
     peak_force_n: float
+    peak_share: float
 
     @property
     def is_dressed(self) -> bool:
         """Whether the sleeve is past the elbow."""
         return self.is_around and self.past_elbow_m >= ENOUGH_M
 
+    @property
+    def is_within_limits(self) -> bool:
+        """Whether no force on the arm was ever above its limit."""
+        return self.peak_share <= 1.0
 
-def outcome(rings: Array, arm: ArmPosition, peak_force_n: float) -> Outcome:
+
+def outcome(rings: Array, arm: ArmPosition, force: ArmForce) -> Outcome:
     """Returns what became of it.
 
     Args:
         rings: Of the sleeve (11 x 14 x 3) [m].
         arm: Where the person's arm is.
-        peak_force_n: Largest force on the arm [N].
+        force: Forces on the arm so far.
     """
     upper_arm = arm.shoulder - arm.elbow
     upper_arm /= np.linalg.norm(upper_arm)
@@ -49,7 +57,7 @@ def outcome(rings: Array, arm: ArmPosition, peak_force_n: float) -> Outcome:
     past = float(np.dot(cuff - arm.elbow, upper_arm))
     nearest = min(rings, key=lambda ring: math.dist(ring.mean(axis=0), arm.elbow))
     around = _encloses(rings[0], arm.elbow + past * upper_arm, upper_arm) and _encloses(nearest, arm.elbow, upper_arm)
-    return Outcome(past, around, peak_force_n)
+    return Outcome(past, around, force.peak_n, force.peak_share)
 
 
 def rings_of(corners: ArrayLike) -> Array:

@@ -13,13 +13,14 @@ from operator_node.avatar.anthropometry import segment_offsets
 from operator_node.avatar.engagement import Engagement
 from operator_node.avatar.joints import HINGES
 from operator_node.avatar.retargeting import AvatarPose, Retargeting
+from operator_node.avatar.segment_forces import forces_by_segment
 from operator_node.emulators.arm_held_out import RAISING_S, ArmHeldOut
 from rpbi.geometry import Pose, Vector
 from rpbi.samples import ContactsSample, SurfaceSample
 from rpbi.world import World
 
 from .controller import TARGET_HZ, Dressing
-from .force import ARM_SEGMENTS, MeanForce
+from .force import ARM_SEGMENTS, ArmForce
 from .hand import HandSolver
 from .outcome import Outcome, outcome, rings_of
 from .way import ArmPosition
@@ -43,7 +44,7 @@ def run_trial(seed: int, force_limit_n: float = FORCE_LIMIT_N, speed: float = SP
     world = World.from_file(WORLD)
     try:
         height_m = np.random.default_rng((seed, 1)).uniform(*HEIGHTS_M)
-        trial = Trial(world, ArmHeldOut(height_m, seed), Dressing(force_limit_n, speed))
+        trial = Trial(world, ArmHeldOut(height_m, seed), Dressing(speed), force_limit_n)
         while not trial.is_over:
             trial.step()
         return trial.outcome()
@@ -58,13 +59,14 @@ class Trial:
         world: The example's, or one with more in it.
         person: Whose segments the avatar follows.
         dressing: The controller.
+        force_limit_n: Largest sum of forces on the arm [N].
 
     Attributes:
-        force_n: Force on the arm [N], as mean over 0.1 s.
+        force: Forces on the arm.
         cuff: Where the middle of the cuff is (3) [m].
     """
 
-    def __init__(self, world: World, person: ArmHeldOut, dressing: Dressing) -> None:
+    def __init__(self, world: World, person: ArmHeldOut, dressing: Dressing, force_limit_n: float) -> None:
         self._world, self._person, self._dressing = world, person, dressing
         human: Any = world.bodies["human"]
         robot: Any = world.bodies["panda"]
@@ -78,22 +80,16 @@ class Trial:
         first = np.array([positions[hinge] for hinge in HINGES])
         self._engagement.begin(AvatarPose(np.array(base.position), np.array(base.quat_xyzw), first))
         self._solver = HandSolver(robot.kinematics)
-        self._forces = MeanForce()
         self._corners: tuple[Vector, ...] = ()
         self._ticks = round(1.0 / (TARGET_HZ * world.clock.dt_s))
         self._number = 0
-        self.force_n = 0.0
+        self.force = ArmForce(force_limit_n)
         self.cuff = self._solver.cuff(self._positions())
 
     @property
     def time_s(self) -> float:
         """Time since the start [s]."""
         return self._number / TARGET_HZ
-
-    @property
-    def peak_force_n(self) -> float:
-        """Largest force on the arm [N], as mean over 0.1 s."""
-        return self._forces.peak_n
 
     @property
     def is_over(self) -> bool:
@@ -111,30 +107,26 @@ class Trial:
         for _ in range(self._ticks):
             for sample in self._world.step():
                 if isinstance(sample, ContactsSample) and sample.name == "human":
-                    self.force_n = self._forces.add(self._world.clock.time_s, _on_arm(sample))
+                    contacts = ((point.link, point.force) for point in sample.points if point.other_body != "human")
+                    self.force.add(self._world.clock.time_s, forces_by_segment(ARM_SEGMENTS, contacts))
                 elif isinstance(sample, SurfaceSample):
                     self._corners = sample.corners
         self.cuff = self._solver.cuff(now := self._positions())
         if self.time_s >= RAISING_S:
-            target = self._dressing.target(arm, self.cuff, self.force_n, dt)
+            target = self._dressing.target(arm, self.cuff, self.force.share, dt)
             if (found := self._solver.solve(target, now)) is not None:
                 self._world.put("panda/target", found)
         self._number += 1
 
     def outcome(self) -> Outcome:
         """Returns what has become of it."""
-        return outcome(rings_of(self._corners), self._arm(), self.peak_force_n)
+        return outcome(rings_of(self._corners), self._arm(), self.force)
 
     def _arm(self) -> ArmPosition:
         return ArmPosition(*(np.array(self._human.link_pose(link).position) for link in self._links))
 
     def _positions(self) -> tuple[float, ...]:
         return tuple(self._robot.joint_positions().values())
-
-
-def _on_arm(sample: ContactsSample) -> np.ndarray:
-    """Returns the sum of forces on the arm [N]."""
-    return np.sum([(0.0, 0.0, 0.0), *(p.force for p in sample.points if p.link in ARM_SEGMENTS)], axis=0)
 
 
 def main() -> int:
@@ -151,7 +143,8 @@ def main() -> int:
     for seed in arguments.seeds:
         outcomes[seed] = found = run_trial(seed, arguments.force_limit, arguments.speed)
         words = "past the elbow" if found.is_dressed else "NOT past the elbow"
-        print(f"seed {seed}: {words} ({found.past_elbow_m:.3f} m), peak force {found.peak_force_n:.2f} N", flush=True)
+        force = f"peak force {found.peak_force_n:.2f} N, {found.peak_share:.0%} of a limit"
+        print(f"seed {seed}: {words} ({found.past_elbow_m:.3f} m), {force}", flush=True)
     if arguments.out:
         figures = {seed: {**found._asdict(), "is_dressed": found.is_dressed} for seed, found in outcomes.items()}
         arguments.out.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")

@@ -28,7 +28,7 @@ from operator_node.msg import SegmentForces
 from rpbi.config.asset_files import find_file
 from rpbi.kinematics import Kinematics
 from rpbi_examples.dressing.controller import TARGET_HZ, Dressing
-from rpbi_examples.dressing.force import MeanForce, force_on_arm
+from rpbi_examples.dressing.force import ArmForce, forces_on_arm
 from rpbi_examples.dressing.hand import ROBOT, HandSolver
 from rpbi_examples.dressing.outcome import Outcome, outcome, rings_of
 from rpbi_examples.dressing.way import ArmPosition, Array, is_held_out
@@ -43,7 +43,7 @@ SEES_NOTHING_S = 1.0
 class TelepresenceParameters(ConfigModel):
     """Private parameters of `telepresence_node.py`."""
 
-    force_limit: Positive = Field(15.0, description="Force on the arm above which the cuff goes back [N].")
+    force_limit: Positive = Field(15.0, description="Sum of forces on the arm above which the cuff goes back [N].")
     speed: Positive = Field(0.1, description="Of the cuff where nothing is touched [m/s].")
     out: str = Field("", description="File that the outcome is written to, as JSON; empty: none.")
 
@@ -57,11 +57,11 @@ class TelepresenceNode:
 
     def __init__(self) -> None:
         self._config = config = private_parameters(TelepresenceParameters)
-        self._dressing, self._forces = Dressing(config.force_limit, config.speed), MeanForce()
+        self._dressing, self._force = Dressing(config.speed), ArmForce(config.force_limit)
         self._kinematics = Kinematics(find_file(ROBOT, ".", (pybullet_data.getDataPath(),)))
         self._solver = HandSolver(self._kinematics)
         self._tf, self._lock = TfInterface(), threading.Lock()
-        self._force_n, self._felt_s = 0.0, -math.inf
+        self._felt_s = -math.inf
         self._positions: tuple[float, ...] | None = None
         self._rings: Array | None = None
         self._targets = rospy.Publisher("rpbi/panda/joint_states/target", JointState, queue_size=1, tcp_nodelay=True)
@@ -94,9 +94,9 @@ class TelepresenceNode:
 
     def _lead(self, arm: ArmPosition, dt: float) -> None:
         with self._lock:
-            force_n = self._force_n
+            force_n, share = self._force.arm_n, self._force.share
         assert self._positions is not None
-        target = self._dressing.target(arm, self._solver.cuff(self._positions), force_n, dt)
+        target = self._dressing.target(arm, self._solver.cuff(self._positions), share, dt)
         found = self._solver.solve(target, self._positions)
         if found is None:
             self._warn("waiting", f"no joint positions nearby bring the robot's hand to {_rounded(target.position)} m")
@@ -130,11 +130,12 @@ class TelepresenceNode:
         arm = self._arm()
         if arm is None or self._rings is None:
             raise InterfaceError("the sleeve or the arm has gone: rpbi/sleeve/surface or TF of rpbi/human ceased")
-        return outcome(self._rings, arm, self._forces.peak_n)
+        return outcome(self._rings, arm, self._force)
 
     def _tell(self, found: Outcome) -> None:
         words = "is past the elbow" if found.is_dressed else "is NOT past the elbow"
-        rospy.loginfo("the sleeve %s (%.3f m); peak force %.2f N", words, found.past_elbow_m, found.peak_force_n)
+        force = f"peak force {found.peak_force_n:.2f} N, {found.peak_share:.0%} of a limit"
+        rospy.loginfo("the sleeve %s (%.3f m); %s", words, found.past_elbow_m, force)
         if self._config.out:
             figures: dict[str, Any] = {**found._asdict(), "is_dressed": found.is_dressed}
             Path(self._config.out).write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
@@ -158,10 +159,10 @@ class TelepresenceNode:
         self._rings = rings_of([(point.x, point.y, point.z) for point in message.points])
 
     def _take_forces(self, message: SegmentForces) -> None:
-        total = force_on_arm(message.segments, [(each.x, each.y, each.z) for each in message.forces])
+        forces = forces_on_arm(message.segments, message.sums, message.largest)
         with self._lock:
             self._felt_s = message.header.stamp.to_sec()
-            self._force_n = self._forces.add(self._felt_s, total)
+            self._force.add(self._felt_s, forces)
 
 
 def _rounded(position: tuple[float, ...]) -> str:

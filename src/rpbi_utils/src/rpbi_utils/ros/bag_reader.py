@@ -2,68 +2,21 @@
 
 from __future__ import annotations
 
-import bz2
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, NamedTuple
-
-import rosbag
-import rosbag.bag
+from typing import NamedTuple
 
 from custom_ros_tools.errors import shortened
+from rpbi_utils.bag_file import BagFile, NotABagError
 from rpbi_utils.errors import BagError
+from rpbi_utils.limits import MAX_ALL_DEFINITIONS_BYTES, Budget, LimitError
 from rpbi_utils.message_type import MessageType
 
 _ACTIVE_SUFFIX = ".active"
-_MAGIC = b"#ROSBAG V2.0\n"
 MOST_UNFOLDED = 2**30
 """Bytes that any bag may unfold to."""
 MOST_TIMES = 255
 """So many times its size a larger one may unfold to; LZ4, by which recorders compress, can do no more."""
-
-
-class _NoClasses:
-    """Stands in for rosbag's table of message classes while it reads: serialised messages need none.
-
-    rosbag makes a class of every message definition in a bag, serialised or not, by writing Python and importing it; a
-    definition may have any code in it.
-    """
-
-    @staticmethod
-    def get(_: str) -> type:
-        return _NoClasses
-
-
-class _BoundedBz2:
-    """Stands in for rosbag's bz2 while it reads: a chunk unfolds to what the largest one says, and no further."""
-
-    def __init__(self, most_bytes: int) -> None:
-        self._most_bytes = most_bytes
-
-    def decompress(self, data: bytes) -> bytes:
-        unfolded = bz2.BZ2Decompressor().decompress(data, self._most_bytes + 1)
-        if len(unfolded) > self._most_bytes:
-            raise ValueError("a chunk unfolds to more than it says")
-        return unfolded
-
-
-def _guarded(most_bytes: int, read: Any, *arguments: Any) -> Any:
-    """Returns what a function of rosbag returns, which makes no classes and unfolds no chunk to more than so much."""
-    module = rosbag.bag
-    before = module._message_types, module.bz2
-    module._message_types, module.bz2 = _NoClasses, _BoundedBz2(most_bytes)
-    try:
-        return read(*arguments)
-    finally:
-        module._message_types, module.bz2 = before
-
-
-def _require_reading_without_classes() -> None:
-    """Raises a RuntimeError if this rosbag would make classes all the same."""
-    connection = SimpleNamespace(md5sum="", datatype="std_msgs/Empty", msg_def="")
-    if _guarded(0, rosbag.bag._get_message_type, connection) is not _NoClasses:
-        raise RuntimeError("this rosbag is built otherwise: it would run code that a bag may have in its definitions")
 
 
 class BagMessage(NamedTuple):
@@ -80,15 +33,16 @@ class BagReader:
 
     Args:
         path: The file.
-        any_size: Whether it may unfold to more than `MOST_UNFOLDED` and `MOST_TIMES` its size.
+        any_size: Whether it may unfold to more than `MOST_UNFOLDED` and `MOST_TIMES` its size, and take any time.
 
     Attributes:
         types: The message types of each topic, in the order of their names; nearly always one a topic.
         md5sums: Their md5 sums.
         counts: Number of messages of each topic.
+        budget: Time and cells of tables that it may take.
 
     Raises:
-        BagError: If there is no such file, it is no complete bag, or it unfolds to more than it may.
+        BagError: If there is no such file, it is no complete bag, or it is larger than it may be.
     """
 
     def __init__(self, path: str | Path, any_size: bool = False) -> None:
@@ -96,79 +50,91 @@ class BagReader:
         try:
             if not self.path.is_file():
                 raise BagError(self.path, "there is no such file" if not self.path.exists() else "not a file")
-            with self.path.open("rb") as file:
-                begin = file.read(len(_MAGIC))
+            self._file = self.path.open("rb")
         except OSError as error:
-            raise BagError(self.path, str(error.strerror or error).lower()) from error
-        if begin != _MAGIC:  # rosbag imports whatever the much older formats name
-            raise BagError(self.path, f"not a ROS 1 bag (expected one that begins with {_MAGIC.decode().strip()})")
-        _require_reading_without_classes()
-        self.types: dict[str, set[MessageType]] = {}
-        self.md5sums: dict[str, set[str]] = {}
-        self._types: dict[tuple[str, str], MessageType] = {}
-        self._largest_chunk = 0
-        self._bag = self._open()
+            raise BagError(self.path, str(error.strerror or error)) from error
         try:
+            self._bag = self._open()
             if not any_size:
                 self._refuse_bombs()
-            self._largest_chunk = max((each.uncompressed_size for each in self._bag._chunk_headers.values()), default=0)
-            for each in sorted(self._bag._get_connections(), key=lambda connection: str(connection.topic)):
-                key = each.datatype, each.md5sum
-                if key not in self._types:
-                    self._types[key] = MessageType.parse(each.datatype, each.msg_def)
-                self.types.setdefault(each.topic, set()).add(self._types[key])
-                self.md5sums.setdefault(each.topic, set()).add(each.md5sum)
-            info = _guarded(0, self._bag.get_type_and_topic_info).topics
-            self.counts: dict[str, int] = {topic: info[topic].message_count for topic in self.types}
-        except BagError:
-            self._bag.close()
+            self.budget = Budget(self.path, self._bag.unfolded_bytes, any_size)
+            self._read_connections()
+        except BaseException:
+            self._file.close()
             raise
-        except Exception as error:  # as in `messages`
-            self._bag.close()
-            raise BagError(self.path, f"damaged: {_words(error)}") from error
 
     def __enter__(self) -> BagReader:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._bag.close()
+        self._file.close()
 
     def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
         """Yields the messages of some topics in the order in which they were recorded.
 
         Raises:
-            BagError: If the bag is damaged where a message should be.
+            BagError: If the bag is damaged where a message should be, or takes too much time; that of who reads it
+                between messages counts.
         """
-        if not topics:  # to rosbag, no topics means all
-            return
-        left = self._bag._uncompressed_size
-        try:
-            found = _guarded(0, lambda: self._bag.read_messages(topics=list(topics), raw=True))
-            while (item := _guarded(self._largest_chunk, next, found, None)) is not None:
-                topic, (datatype, raw, md5sum, *_), time = item
+        chosen = {number: each for number, each in self._types.items() if each[0] in topics}
+        left = self._bag.unfolded_bytes
+        found = self._bag.messages(chosen)
+        while True:
+            try:
+                number, raw, record_time_s = next(found)
+                topic, message_type = chosen[number]
                 left -= len(raw)
                 if left < 0:
                     raise ValueError("its index names messages more than once")
-                yield BagMessage(topic, self._types[datatype, md5sum], raw, time.to_sec())
-        except Exception as error:  # rosbag lets out what struct, bz2, lz4 and its own checks raise
-            message = f"damaged: {_words(error)}; what is left can be saved with 'rosbag reindex {self.path}'"
-            raise BagError(self.path, message) from error
+            except StopIteration:
+                return
+            except Exception as error:  # struct, bz2 and lz4 have errors of their own
+                message = f"damaged: {_words(error)}; what is left can be saved with 'rosbag reindex {self.path}'"
+                raise BagError(self.path, message) from error
+            self.budget.check_time(topic)
+            yield BagMessage(topic, message_type, raw, record_time_s)
 
-    def _open(self) -> rosbag.Bag:
+    def _open(self) -> BagFile:
         try:
-            return _guarded(0, rosbag.Bag, str(self.path))
-        except rosbag.ROSBagUnindexedException as error:
-            raise BagError(self.path, self._why_unindexed()) from error
-        except (rosbag.ROSBagException, UnicodeDecodeError) as error:
+            return BagFile(self._file)
+        except NotABagError as error:
             raise BagError(self.path, f"not a ROS 1 bag ({error})") from error
+        except LimitError as error:
+            raise BagError(self.path, str(error)) from error
         except OSError as error:
             raise BagError(self.path, str(error.strerror or error)) from error
         except Exception as error:  # as in `messages`
-            raise BagError(self.path, f"damaged, or not a ROS 1 bag ({_words(error)})") from error
+            raise BagError(self.path, self._why_unindexed()) from error
+
+    def _read_connections(self) -> None:
+        """Reads the types of all topics that have messages."""
+        self.types: dict[str, set[MessageType]] = {}
+        self.md5sums: dict[str, set[str]] = {}
+        self.counts: dict[str, int] = {}
+        self._types: dict[int, tuple[str, MessageType]] = {}
+        known: dict[tuple[str, str], MessageType] = {}
+        left = MAX_ALL_DEFINITIONS_BYTES
+        for number, each in sorted(self._bag.connections.items(), key=lambda item: item[1].topic):
+            if not self._bag.counts[number]:
+                continue
+            topic, key = each.topic, (each.datatype, each.definition)
+            try:
+                if key not in known:
+                    left -= len(each.definition)
+                    if left < 0:
+                        raise LimitError.over(f"{MAX_ALL_DEFINITIONS_BYTES:,} bytes of definitions in a bag", "more")
+                    known[key] = MessageType.parse(*key)
+            except ValueError as error:
+                what = str(error) if isinstance(error, LimitError) else f"damaged: {_words(error)}"
+                raise BagError(self.path, f"{shortened(topic)}: {what}") from error
+            self._types[number] = topic, known[key]
+            self.types.setdefault(topic, set()).add(known[key])
+            self.md5sums.setdefault(topic, set()).add(each.md5sum)
+            self.counts[topic] = self.counts.get(topic, 0) + self._bag.counts[number]
 
     def _refuse_bombs(self) -> None:
         """Raises a BagError if it unfolds to more than it may."""
-        unfolded, size = self._bag._uncompressed_size, self.path.stat().st_size
+        unfolded, size = self._bag.unfolded_bytes, self.path.stat().st_size
         if unfolded > max(MOST_UNFOLDED, MOST_TIMES * size):
             message = f"its {size / 1e6:.3g} MB unfold to {unfolded / 1e9:.3g} GB: more than {MOST_TIMES} times as much"
             raise BagError(self.path, f"{message}; --any-size, if you know who made it")

@@ -7,7 +7,9 @@ from pathlib import Path
 import pandas as pd
 from tqdm import tqdm
 
-from custom_ros_tools.errors import UnknownNameError
+from custom_ros_tools.errors import UnknownNameError, shortened
+from rpbi_utils.errors import BagError
+from rpbi_utils.limits import LimitError
 from rpbi_utils.tables import TableBuilder
 
 from .bag_reader import BagReader
@@ -39,25 +41,34 @@ def bag_to_dataframes(
         path: A `.bag` file, of any compression. No master and no message packages are needed.
         topics: Names of topics, or one name; by default all but those with binary data, such as images.
         images: Whether to include these by default. Their data are columns of `bytes`.
-        any_size: Whether the bag may unfold to more than 1 GiB and 255 times its size.
+        any_size: Whether the bag may unfold to more than 1 GiB and 255 times its size, and take more time and memory
+            than `rpbi_utils.limits` says.
         progress: Whether to show a progress bar.
 
     Returns:
         Tables by topic, sorted by name.
 
     Raises:
-        BagError: If there is no such file, it is no complete bag, or it unfolds to more than it may.
+        BagError: If there is no such file, it is no complete bag, it unfolds to more than it may, or a topic has more
+            than `rpbi_utils.limits` says.
         UnknownNameError: If the bag does not have a topic that was named.
     """
     with BagReader(path, any_size) as bag:
         chosen = _choose(bag, [topics] if isinstance(topics, str) else topics, images)
-        builders = {topic: TableBuilder(topic, images or topics is not None) for topic in chosen}
+        builders = {topic: TableBuilder(topic, images or topics is not None, bag.budget) for topic in chosen}
         total = sum(bag.counts[topic] for topic in chosen)
         messages = bag.messages(chosen)
         bar = tqdm(messages, total=total, unit=" messages", unit_scale=True, leave=False, disable=not progress)
-        for topic, message_type, raw, record_time_s in bar:
-            builders[topic].add(message_type, raw, record_time_s)
-    return {topic: builder.table() for topic, builder in builders.items()}
+        topic = ""
+        try:
+            for topic, message_type, raw, record_time_s in bar:
+                builders[topic].add(message_type, raw, record_time_s)
+            tables = {}
+            for topic in chosen:
+                tables[topic] = builders.pop(topic).table()
+        except LimitError as error:
+            raise BagError(bag.path, f"{shortened(topic)}: {error}; other topics can be read by their names") from error
+    return tables
 
 
 def _choose(bag: BagReader, topics: Iterable[str] | None, images: bool) -> list[str]:

@@ -20,6 +20,7 @@ import rosgraph
 import roslib.packages
 from rosgraph.names import get_ros_namespace, resolve_name
 
+from custom_ros_tools.child_process import start_child
 from custom_ros_tools.errors import MissingDependency
 from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, TimedTransport
 from rpbi_utils.errors import RecordingError
@@ -41,6 +42,8 @@ _log = logging.getLogger(__name__)
 
 class Recorder:
     """A `rosbag record` of some topics, as a context: what is published inside it is in the bag, compressed by LZ4.
+
+    When this process is killed, the recorder closes the bag and ends, too.
 
     On entry it waits until the recorder has subscribed to every topic and every publisher that is there
     sends to it; on exit it stops the recorder and waits until the bag is closed. It waits in wall time,
@@ -112,7 +115,9 @@ class Recorder:
         except OSError as error:
             raise RecordingError(self.path, f"cannot be written: {error}") from None
         self._output = tempfile.TemporaryFile()
-        self._process = subprocess.Popen(self._command(), stdout=self._output, stderr=subprocess.STDOUT)
+        self._process = start_child(  # Ctrl-C has it close the bag
+            self._command(), signal.SIGINT, stdout=self._output, stderr=subprocess.STDOUT
+        )
         try:
             self._wait_until_connected()
         except BaseException:  # Ctrl-C included: leave no process behind
@@ -177,7 +182,7 @@ class Recorder:
 
     def _end(self) -> bool:
         """Ends the process; returns whether it did so by itself."""
-        assert self._process is not None
+        assert self._process is not None and self._process.stdin is not None
         self._process.send_signal(signal.SIGINT)
         try:
             return self._process.wait(self._timeout_s) == 0
@@ -185,6 +190,8 @@ class Recorder:
             self._process.kill()
             self._process.wait()
             return False
+        finally:
+            self._process.stdin.close()
 
     def _raise_if_not_writing(self) -> None:
         for line in self._lines():

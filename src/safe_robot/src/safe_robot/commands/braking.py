@@ -5,7 +5,7 @@ command a period: v_k = (q_k - q_{k-1}) / T, a_k = (v_k - v_{k-1}) / T, j_k = (a
 """
 
 import math
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -32,6 +32,45 @@ class Brake(NamedTuple):
     velocity: np.ndarray
     acceleration: np.ndarray
     jerk: np.ndarray
+
+    def with_joints_of(self, other: "Brake", joints: np.ndarray) -> "Brake":
+        """Returns a braking in which some joints, n booleans, come to rest as in another one, of any length."""
+        rows = max(len(self.velocity), len(other.velocity))
+        return Brake(
+            *(
+                np.where(joints, _padded(theirs, rows, mode), _padded(own, rows, mode))
+                for own, theirs, mode in zip(self, other, ("edge", "constant", "constant", "constant"))
+            )
+        )
+
+
+class BrakingCommands(NamedTuple):
+    """The commands of a braking to n joints, a period apart: each a k x n array.
+
+    Attributes:
+        position: [rad or m].
+        velocity: [rad/s or m/s].
+        acceleration: [rad/s^2 or m/s^2].
+        jerk: [rad/s^3 or m/s^3].
+    """
+
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    jerk: np.ndarray
+
+    @classmethod
+    def none(cls, n: int) -> "BrakingCommands":
+        """Returns no commands, k = 0, to n joints."""
+        return cls(*np.empty((4, 0, n)))
+
+    def after_first(self) -> "BrakingCommands":
+        """Returns all commands but the first."""
+        return BrakingCommands(*(each[1:] for each in self))
+
+    def brake_from(self, position: np.ndarray) -> Brake:
+        """Returns them as a braking that begins at n positions [rad or m]."""
+        return Brake(self.position - position, *self[1:])
 
 
 class Braking:
@@ -136,6 +175,11 @@ class Braking:
         is_within = jerk <= self._max_jerk * self._period_s**3
         is_within &= peak <= self._max_acceleration * self._period_s**2
         return is_within
+
+
+def _padded(values: np.ndarray, rows: int, mode: Literal["edge", "constant"]) -> np.ndarray:
+    """Returns k x n values with rows after them, which repeat the last one or are 0; 0 where there is no row."""
+    return np.pad(values, ((0, rows - len(values)), (0, 0)), mode if len(values) else "constant")
 
 
 def _jerk_line(length: int) -> np.ndarray:

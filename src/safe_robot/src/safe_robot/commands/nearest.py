@@ -64,7 +64,7 @@ class Nearest:
 
     def _commands(self, target: np.ndarray, state: State, stop: np.ndarray) -> Iterator[np.ndarray]:
         """Yields what is worth judging, the best first; each one because the last was not safe."""
-        best, slowest = pursue(target, state, self._limits, self._braking, self._period_s)
+        best, slowest = pursue(target, state, self._limits, self._braking, self._period_s, stop)
         for wanted in self._detours(best, slowest, state, stop) if self._keeps_bounds else [best]:
             best = wanted
             yield best

@@ -33,12 +33,25 @@ def pursue(
     limits: JointLimits,
     braking: Braking,
     period_s: float,
+    stop: np.ndarray,
     acceleration: np.ndarray | None = None,
 ) -> Pursuit:
     """Returns what comes nearest to n targets, a period later, without any joint having to go past its.
 
     It keeps the limits of joints; whether the command is safe is for checks to say. What comes nearest to
     n accelerations [rad/s^2 or m/s^2], if they are given, takes the place of what comes nearest to the targets.
+
+    The shortest braking from a new state may be longer than what is left of the one before, and go past a target that
+    the latter stays before. Such joints go on with the latter.
+
+    Args:
+        target: n positions [rad or m].
+        state: State before the command.
+        limits: Limits of the joints.
+        braking: Finds how they come to rest.
+        period_s: Time between two commands [s].
+        stop: The commands of the present braking, k x n [rad or m].
+        acceleration: n accelerations.
     """
     target = np.clip(target, limits.lower, limits.upper)
     exact = state.then(target, period_s).acceleration if acceleration is None else acceleration
@@ -62,5 +75,8 @@ def pursue(
         stays = (way * (end - target) <= ROUNDING) & (fastest_on <= speed)
         last = np.where(stays.any(axis=0), STEPS - stays[::-1].argmax(axis=0), 0)
         at = shares[last, joints]
+        if width == 1.0:
+            goes_on = ~stays.any(axis=0) & (way * (stop[-1] - target) <= ROUNDING)
     chosen = slowest + at * (fastest - slowest)
-    return Pursuit(*(state.position + period_s * (state.velocity + period_s * each) for each in (chosen, slowest)))
+    wanted, other = (state.position + period_s * (state.velocity + period_s * each) for each in (chosen, slowest))
+    return Pursuit(np.where(goes_on, stop[0], wanted), other)

@@ -46,11 +46,16 @@ class Shaper:
         self._limits, self._braking, self._period_s = limits, braking, period_s
         self._is_behind = False
 
-    def shaped(self, target: tuple[float, ...], state: State) -> tuple[float, ...]:
+    def shaped(self, target: tuple[float, ...], state: State, stop: np.ndarray) -> tuple[float, ...]:
         """Returns what comes after a state on the way to n positions [rad or m].
 
         Positions that can be commanded are returned themselves, and so are those that are a jump or outside limits by
         more than `OVERSHOOT`.
+
+        Args:
+            target: n positions [rad or m].
+            state: Where the robot is.
+            stop: The commands that bring it to rest from there, k x n [rad or m].
         """
         asked = np.array(target)
         position = asked.clip(self._limits.lower, self._limits.upper)
@@ -61,7 +66,7 @@ class Shaper:
             return tuple(position.tolist())
         self._is_behind = True
         acceleration = self._smooth(position, state)
-        wanted = pursue(position, state, self._limits, self._braking, self._period_s, acceleration).wanted
+        wanted = pursue(position, state, self._limits, self._braking, self._period_s, stop, acceleration).wanted
         return tuple(wanted.tolist())
 
     def _can_be(self, position: np.ndarray, state: State) -> bool:

@@ -16,7 +16,7 @@ LEAST_SPACING_M = 0.01
 """The braking is tried no more densely than this [m], however small the margin is."""
 ROUNDING_M = 1e-9
 """Distances that differ by less are equal [m]."""
-KEPT_M = 1e-4
+KEPT_M = 3e-4
 """So much more than the margin is kept where a command is chosen, since distances are taken to be linear there [m]."""
 LOOSE_M = 0.01
 """A bound that is that much below the distance is made anew [m]."""
@@ -86,20 +86,22 @@ class Proximity:
         suspects = np.flatnonzero(is_unsure.any(axis=0))
         if not len(suspects):
             return None
-        spacing_m = max(2.0 * self._margin_m, LEAST_SPACING_M)
-        marks = self._sparse(motion.travelled @ self._furthest, spacing_m)
-        section = np.clip(np.searchsorted(rows, marks, side="right") - 1, 0, len(is_unsure) - 1)
-        return self._measured(motion, near[suspects], marks[is_unsure.any(axis=1)[section]])
+        all_rows = np.arange(len(motion.position))
+        section = np.clip(np.searchsorted(rows, all_rows, side="right") - 1, 0, len(is_unsure) - 1)
+        return self._measured(motion, near[suspects], all_rows[is_unsure.any(axis=1)[section]])
 
     def _measured(self, motion: Motion, suspects: np.ndarray, rows: np.ndarray) -> TooNear | None:
-        """Returns the first of some pairs that comes too near in some rows of a motion, by measuring if need be."""
+        """Returns the first of some pairs that comes too near in some rows of a motion, by measuring if need be.
+
+        Rows far from each other are tried first, since a motion that is not safe shows there soonest.
+        """
         frames = self._distances.frames(motion.position[rows])
         bounds = self._separation.lower_bounds(frames, suspects)
         travelled = motion.travelled[rows] @ self._reach[suspects].T
-        free_to = np.full(len(suspects), -np.inf)  # how far a pair can go without being too near
+        order = self._coarse_to_fine(motion.travelled[rows] @ self._furthest)
         placed, least_m = -1, self._margin_m + ROUNDING_M
-        for at, k in np.argwhere(~(bounds > least_m)).tolist():
-            if travelled[at, k] < free_to[k] or bounds[at, k] > least_m:
+        for at, k in ((order[i], k) for i, k in np.argwhere(~(bounds[order] > least_m)).tolist()):
+            if bounds[at, k] > least_m:
                 continue
             i, row = int(suspects[k]), int(rows[at])
             if placed != row:
@@ -113,8 +115,9 @@ class Proximity:
                 return TooNear(self._pairs[i], distance, row > 0)
             if not distance < bounds[at, k] + LOOSE_M:
                 self._separation.learn(i, contact.directions, frames[at])
-                bounds[at:, k] = self._separation.lower_bounds(frames[at:], suspects[k : k + 1])[:, 0]
-            free_to[k] = travelled[at, k] + distance - least_m
+                bounds[:, k] = self._separation.lower_bounds(frames, suspects[k : k + 1])[:, 0]
+            way = np.abs(travelled[:, k] - travelled[at, k])
+            bounds[:, k] = np.maximum(bounds[:, k], distance - way)
         return None
 
     def _known_near(self, q: np.ndarray) -> np.ndarray:
@@ -126,11 +129,12 @@ class Proximity:
         known: np.ndarray = self._known_m - np.einsum("...n,...n->...", np.abs(q - self._known_at), self._reach)
         return known
 
-    def _sparse(self, travelled: np.ndarray, spacing_m: float) -> np.ndarray:
-        """Returns rows, the first and the last among them, between which nothing moves further than a spacing."""
-        marks = np.arange(spacing_m, travelled[-1], spacing_m)
-        rows = np.searchsorted(travelled, marks, side="right").tolist()
-        return np.array(list(dict.fromkeys((0, *rows, len(travelled) - 1))))
+    def _coarse_to_fine(self, travelled: np.ndarray) -> np.ndarray:
+        """Returns all of k rows: the first, those between which something moves by a spacing, the last, all others."""
+        spacing_m = max(2.0 * self._margin_m, LEAST_SPACING_M)
+        marks = np.arange(travelled[0] + spacing_m, travelled[-1], spacing_m)
+        coarse = np.searchsorted(travelled, marks, side="right").tolist()
+        return np.array(list(dict.fromkeys((0, *coarse, len(travelled) - 1, *range(len(travelled))))))
 
     def _is_further(self, motion: Motion, i: int, distance: float, row: int) -> bool:
         """Returns whether a pair that is too near was no further apart before the motion."""

@@ -28,6 +28,7 @@ from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.rospy_internals import keep_accepting
 
 from .master_watch import MasterWatch
+from .timed_master import address_fault
 
 T = TypeVar("T")
 
@@ -54,6 +55,8 @@ def init_node(name: str, loggers: Iterable[str] = (), anonymous: bool = False, r
     _attach_logging({"custom_ros_tools", *loggers})
     _allow_many_files()
     MasterWatch()
+    if fault := address_fault():
+        rospy.logwarn(fault)
 
 
 def run_node(

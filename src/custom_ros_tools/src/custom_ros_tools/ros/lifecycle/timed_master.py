@@ -1,6 +1,7 @@
-"""The ROS master, asked without waiting for ever, and where there is room for another one."""
+"""The ROS master: asked without waiting for ever, whether its side reaches this node, and where another one has room."""
 
 import http.client
+import os
 import random
 import socket
 from typing import Any
@@ -38,6 +39,49 @@ def timed_master(uri: str | None = None) -> Any:
     Its calls return (code, message, value) and raise one of MASTER_FAILURES if the master does not answer.
     """
     return ServerProxy(uri or rosgraph.get_master_uri(), TimedTransport(TIMEOUT_S))
+
+
+def address_fault() -> str | None:
+    """Returns in one line why others cannot, or may not, reach this node by the address that it gives; None if they can.
+
+    The address is that of ROS_HOSTNAME, ROS_IP or this computer's name. It has to be one of this computer; where the
+    master is reached by a network, none that only this computer reaches, and if the master is on another computer, the
+    one from which this computer reaches it.
+    """
+    variable = next((name for name in ("ROS_HOSTNAME", "ROS_IP") if os.environ.get(name)), None)
+    given = rosgraph.network.get_host_name()
+    what = f"{variable} is {given}" if variable else f"the name of this computer, which nodes here go by, is {given}"
+    uri = rosgraph.get_master_uri()
+    try:
+        master = socket.gethostbyname(rosgraph.network.parse_http_host_and_port(uri)[0])
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.connect((master, 1))  # sends nothing
+            ours = str(probe.getsockname()[0])
+    except (OSError, ValueError):
+        return None
+    remedy = f"export ROS_IP={ours} in this terminal"
+    try:
+        address = socket.gethostbyname(given)
+    except OSError:
+        return f"{what}, which is no address and does not resolve: other nodes cannot reach this one; {remedy}"
+    if not _is_of_this_computer(address):
+        return f"{what}, which is no address of this computer: other nodes cannot reach this one; {remedy}"
+    if address.startswith("127.") and not ours.startswith("127."):
+        where = f"({address}) " if address != given else ""
+        return f"{what}, {where}which only this computer reaches, but the ROS master is at {uri}; {remedy}"
+    if address != ours and not _is_of_this_computer(master):
+        by = f"this computer reaches the ROS master at {uri} from {ours}"
+        return f"{what}, but {by}: nodes there may not reach this one; if so, {remedy}"
+    return None
+
+
+def _is_of_this_computer(address: str) -> bool:
+    with socket.socket() as probe:
+        try:
+            probe.bind((address, 0))
+        except OSError:
+            return False
+        return True
 
 
 def unused_port() -> int:

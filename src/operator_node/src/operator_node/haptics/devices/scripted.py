@@ -20,6 +20,7 @@ class ScriptedConfig(HapticConfig):
 
     max_force_n: Positive = Field(10.0, description="The largest force that it is sent [N].")
     workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")
+    resolution_m: NonNegative = Field(0.0, description="It is exact [m].")
     seed: Count = Field(0, description="Of what differs from press to press.")
     depth_m: Metres = Field(0.04, description="How far down the hand goes; some 15 % more or less by the seed.")
     hold_s: Positive = Field(1.2, description="How long it stays below [s]; some 15 % more or less by the seed.")

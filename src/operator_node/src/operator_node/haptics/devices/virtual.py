@@ -10,7 +10,7 @@ import time
 
 from pydantic import Field
 
-from custom_ros_tools.schema import Positive, PositiveMetres, Switch
+from custom_ros_tools.schema import NonNegative, Positive, PositiveMetres, Switch
 from operator_node.device import DeviceError
 from operator_node.haptics.device import DeviceEnded, HapticConfig, HapticReading
 from operator_node.haptics.vectors import ZERO, within
@@ -31,6 +31,7 @@ class VirtualConfig(HapticConfig):
 
     max_force_n: Positive = Field(10.0, description="The largest force that it is sent [N].")
     workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")
+    resolution_m: NonNegative = Field(0.0, description="It is exact [m].")
     returns: Switch = Field(
         False, description="Whether the handle goes back to the middle when it is let go, for speeds rather than ways."
     )

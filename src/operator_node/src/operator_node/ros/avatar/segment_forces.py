@@ -1,46 +1,59 @@
-"""`segment_forces_node.py`: contacts of the avatar in, the force on each segment out."""
+"""`segment_forces_node.py`: contacts of the avatar in, the forces on each segment out."""
 
+import numpy as np
 import rospy
 from geometry_msgs.msg import Vector3
 
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
+from operator_node.avatar.anthropometry import Array
 from operator_node.avatar.parameters import SegmentForcesParameters
+from operator_node.avatar.segment_forces import forces_by_segment
 from operator_node.msg import SegmentForces
 from operator_node.mvn.segments import SEGMENTS
-from ros_pybullet_interface.msg import Contacts
+from ros_pybullet_interface.msg import ContactPoint, Contacts
 
 QUEUE_SIZE = 100
 
 
 class SegmentForcesNode:
-    """Adds up what each segment of the avatar feels.
+    """Adds up the forces on each segment of the avatar.
 
     Raises:
         ConfigError: If a parameter is wrong.
     """
 
     def __init__(self) -> None:
-        name = private_parameters(SegmentForcesParameters).robot_name
+        self._name = name = private_parameters(SegmentForcesParameters).robot_name
         self._publisher = rospy.Publisher("avatar/segment_forces", SegmentForces, queue_size=QUEUE_SIZE)
         rospy.Subscriber(f"rpbi/{name}/contacts", Contacts, self._take, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
     def _take(self, message: Contacts) -> None:
-        forces = {segment: Vector3() for segment in SEGMENTS}
-        for point in message.points:
-            parts = (
-                (point.normal, point.normal_force),
-                (point.friction_direction_1, point.friction_force_1),
-                (point.friction_direction_2, point.friction_force_2),
+        contacts = [(point.link, _force(point)) for point in message.points if point.other_body != self._name]
+        sizes = forces_by_segment(SEGMENTS, ((segment, force.tolist()) for segment, force in contacts))
+        sums = {segment: np.zeros(3) for segment in SEGMENTS}
+        for segment, force in contacts:
+            if segment in sums:
+                sums[segment] += force
+        self._publisher.publish(
+            SegmentForces(
+                message.header,
+                list(SEGMENTS),
+                [Vector3(*force.tolist()) for force in sums.values()],
+                [each.sum_n for each in sizes.values()],
+                [each.largest_n for each in sizes.values()],
             )
-            total = forces.get(point.link)
-            if total is None:
-                continue
-            for direction, size in parts:
-                total.x += direction.x * size
-                total.y += direction.y * size
-                total.z += direction.z * size
-        self._publisher.publish(SegmentForces(message.header, list(SEGMENTS), list(forces.values())))
+        )
+
+
+def _force(point: ContactPoint) -> Array:
+    """Returns the whole force of a contact on the body (3) [N]."""
+    parts = (
+        (point.normal, point.normal_force),
+        (point.friction_direction_1, point.friction_force_1),
+        (point.friction_direction_2, point.friction_force_2),
+    )
+    return np.sum([size * np.array((direction.x, direction.y, direction.z)) for direction, size in parts], axis=0)
 
 
 def main() -> None:

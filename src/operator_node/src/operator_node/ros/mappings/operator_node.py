@@ -55,11 +55,11 @@ class OperatorNode(ABC):
         self._publisher = rospy.Publisher(
             "operator_node/signal", Float64MultiArray, queue_size=QUEUE_SIZE, tcp_nodelay=True
         )
-        operator = Toggle("operator node", self._start, self._end)
+        self._toggle = Toggle("operator node", self._start, self._end)
         if parameters.start_on_init:
-            operator.on()
+            self.start()
         self._joy = WatchedInput("joy", Joy, self._take, parameters.input_timeout_s)
-        ToggleService("operator_node/toggle", operator.on, operator.off)
+        ToggleService("operator_node/toggle", self.start, self.stop)
         rospy.on_shutdown(self._end)
         WallTimer(LOOK_HZ, self._look)
         if parameters.repeat_hz:
@@ -76,19 +76,27 @@ class OperatorNode(ABC):
             ValueError: If it makes no sense; it says why.
         """
 
-    def publish(self, array: ArrayLike) -> None:
+    def start(self) -> tuple[bool, str]:
+        """Switches it on; returns whether that changed anything, and a message."""
+        return self._toggle.on()
+
+    def stop(self) -> tuple[bool, str]:
+        """Switches it off; returns whether that changed anything, and a message."""
+        return self._toggle.off()
+
+    def publish(self, signal: ArrayLike) -> None:
         """Publishes a signal, one or more numbers.
 
         Raises:
             ValueError: If it is empty or not finite.
         """
-        signal = tuple(np.asarray(array, dtype=float).ravel().tolist())
-        if not signal or not all(map(math.isfinite, signal)):
-            raise ValueError(f"its signal must be finite, got {', '.join(f'{v:g}' for v in signal) or 'none'}")
+        values = tuple(np.asarray(signal, dtype=float).ravel().tolist())
+        if not values or not all(map(math.isfinite, values)):
+            raise ValueError(f"its signal must be finite, got {', '.join(f'{v:g}' for v in values) or 'none'}")
         with self._lock:
             if self._is_on:
-                self._in_force = signal
-                self._publisher.publish(Float64MultiArray(data=signal))
+                self._in_force = values
+                self._publisher.publish(Float64MultiArray(data=values))
 
     def spin(self) -> None:
         """Waits until ROS shuts down."""
@@ -131,3 +139,8 @@ class OperatorNode(ABC):
         with self._lock:
             if any(self._in_force):
                 self._publisher.publish(Float64MultiArray(data=self._in_force))
+
+
+def main(node: type[OperatorNode]) -> None:
+    """Runs the node of a subclass until ROS shuts down."""
+    node().spin()

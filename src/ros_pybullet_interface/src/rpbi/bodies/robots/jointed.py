@@ -14,8 +14,8 @@ from rpbi.sensors.base_state import BaseStateSensor
 from rpbi.sensors.force_torque import ForceTorqueSensor
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
+from rpbi.urdf.copies import for_pybullet
 from rpbi.urdf.document import mimics_of
-from rpbi.urdf.files import resolve_meshes
 from rpbi.urdf.joints import Joint, JointModel, JointTarget
 from rpbi.urdf.loading import load_urdf
 
@@ -45,8 +45,8 @@ class JointedBody(Body):
     force_torque_sensors: tuple[ForceTorqueSensor, ...] = ()
     base_joints: ClassVar[int] = 0
     """How many joints `prepare_urdf` puts between the world and the root link."""
-    prepare_urdf = staticmethod(resolve_meshes)
-    """Returns a URDF file that PyBullet can load in place of the configured one."""
+    prepare_urdf = staticmethod(for_pybullet)
+    """Returns what PyBullet reads of the configured URDF."""
 
     def __init__(self, pb: Client, config: RobotConfig, fixed_base: bool = False) -> None:
         arguments = config.loadURDF.kwargs()

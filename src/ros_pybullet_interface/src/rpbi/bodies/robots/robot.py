@@ -23,7 +23,7 @@ from rpbi.control.trajectories.follower import TrajectoryFollower
 from rpbi.engine.client import Client
 from rpbi.engine.inputs import Input
 from rpbi.geometry import Pose
-from rpbi.sensors.contact_arrows import contact_sensors
+from rpbi.sensors.contacts.arrows import contact_sensors
 from rpbi.sensors.controller_state import ControllerStateSensor
 from rpbi.sensors.force_torque import ForceTorqueSensor
 from rpbi.sensors.joint_state import JointStateSensor

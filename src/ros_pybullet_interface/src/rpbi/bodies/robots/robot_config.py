@@ -136,6 +136,9 @@ class RobotConfig(BodyConfig):
     start_ik_callback: Switch = Field(
         False, description="Whether it moves to what inverse kinematics finds for problems on the topic `ik`."
     )
+    strict: Switch = Field(
+        False, description="Whether `ik` refuses targets out of reach, else the link goes as near as it comes."
+    )
     contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
     color_alpha: float | None = Field(None, ge=0.0, le=1.0, description="Opacity of the whole robot, 0 to 1.")
 

@@ -10,12 +10,13 @@ from rpbi.ros.robots.trajectory_messages import CONTROLLER
 from rpbi.world import World
 
 from .interface_table import OF_WINDOW, PUBLISHES, SERVES, SUBSCRIBES, Endpoint, endpoints, of_body, of_camera
-from .reference_world import JOINT
+from .reference_world import CONTROLLERS, JOINT
 
 INTRODUCTION = """\
 What the node `ros_pybullet_interface_node.py` has in ROS. `./rpbi check WORLD.yaml` tells the same of your own world.
 
-- `NAME` stands for the name of an object, `JOINT` for that of a joint, `LINK` for that of a link.
+- `NAME` stands for the name of an object, `JOINT` for that of a joint, `LINK` for that of a link, `CONTROLLER` for
+  that of a [controller](controllers.md) in a robot's YAML.
 - Names without `/` in front are relative: a namespace moves them.
 - All that is of one tick has that tick's stamp. Rates are in the world's time unless they are said to be in wall time.
 - Keys such as `broadcast_hz` set the rate or open the topic; they stand in [config_reference.md](config_reference.md).
@@ -82,13 +83,16 @@ def interface_page(world: World, definitions: Mapping[str, str]) -> str:
 
 
 def _owners(of_bodies: Mapping[str, Iterable[Endpoint]]) -> dict[Endpoint, list[str]]:
-    """Returns which types of bodies have what; the names of bodies and joints in it are replaced."""
+    """Returns the types of bodies that have each endpoint; placeholders stand for names of the reference world."""
     owners: dict[Endpoint, list[str]] = {}
+    placeholders = {f"/{JOINT}/": "/JOINT/", **{f"/{name}/": "/CONTROLLER/" for name in CONTROLLERS}}
     for body, rows in of_bodies.items():
         for row in rows:
             if row.type.startswith("control_msgs/") and not row.name.endswith("/state"):
                 continue
-            name = row.name.replace(f"rpbi/{body}/", "rpbi/NAME/").replace(f"/{JOINT}/", "/JOINT/")
+            name = row.name.replace(f"rpbi/{body}/", "rpbi/NAME/")
+            for example, placeholder in placeholders.items():
+                name = name.replace(example, placeholder)
             type_name = row.type.replace("control_msgs/", "ros_pybullet_interface/")  # fields and md5 are the same
             kinds = owners.setdefault(Endpoint(row.kind, name, type_name, "", row.meaning), [])
             if body not in kinds:

@@ -13,6 +13,8 @@ FOLLOWED = "FRAME"
 """TF frame that its bodies follow."""
 (JOINT,) = BODY_TYPES["robot"].example["enabled_joint_force_torque_sensors"]
 """Joint of its robots that has a force-torque sensor."""
+CONTROLLERS = tuple(BODY_TYPES["robot"].example["controllers"])
+"""Names of its robots' controllers."""
 
 _FILE = "reference"
 _MAIN = {

@@ -1,14 +1,14 @@
 """Services of controllers that live in the tick."""
 
-import yaml
 from cob_srvs.srv import SetStringRequest
 
+from custom_ros_tools.config import load_configs
 from custom_ros_tools.errors import ConfigError
 from ros_pybullet_interface.srv import SwitchControllersRequest
 from rpbi.bodies import Body
 from rpbi.bodies.robots.robot import Robot
 from rpbi.control.controllers.manager import ControllerSwitch, NewGains
-from rpbi.ros.endpoints import Answer
+from rpbi.ros.endpoints import MOST_BYTES, Answer
 from rpbi.ros.services.body_context import BodyContext
 
 
@@ -45,15 +45,13 @@ def set_gains(context: BodyContext, request: SetStringRequest) -> Answer:
     One that is active begins again where the robot is.
 
     Raises:
-        ValueError: If the text is no mapping, or a value is refused.
+        ConfigError: If the text is no mapping.
+        ValueError: If a value is refused.
     """
     name = context.owner.split("/", 1)[1]
-    try:
-        changes = yaml.safe_load(request.data)
-    except yaml.YAMLError as error:
-        raise ValueError(f"expected YAML such as '{{stiffness: 200}}', got {request.data!r}: {error}") from None
-    if not isinstance(changes, dict) or not changes:
-        raise ValueError(f"expected a mapping such as '{{stiffness: 200}}', got {request.data!r}")
+    changes = load_configs(request.data, "data", MOST_BYTES)
+    if not changes:
+        raise ValueError("data: expected a mapping such as '{stiffness: 200}', got nothing")
     fixed = changes.keys() & {"type", "active", "joints", "state_hz"}
     if fixed:
         raise ValueError(f"cannot be changed while it runs: {', '.join(sorted(fixed))}")

@@ -4,9 +4,11 @@ import math
 from dataclasses import fields, replace
 from typing import Any, cast
 
+import rospy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
 from ros_pybullet_interface.srv import CalculateInverseKinematicsRequest
 from rpbi.bodies import Body
@@ -19,6 +21,7 @@ from rpbi.urdf.joints import JointTarget
 
 NEAR_M, NEAR_RAD = 0.01, 0.02
 """A link that was moved has arrived within these: joints within 0.01 rad of their goals may add up to as much."""
+_warn = ThrottledWarning()
 
 
 def moved_by_ik(body: Body) -> tuple[str, ...]:
@@ -31,20 +34,22 @@ def inverse_kinematics(
 ) -> tuple[bool, str, JointState]:
     """Returns joint positions that bring a link to a pose; moves nothing.
 
-    They are those of all joints that a motor can move.
+    They are those of all joints that a motor can move. Out of reach they bring it as near as it comes, which is a
+    success unless the robot is `strict`.
 
     Raises:
         InterfaceError: If the robot has no such link or has gone.
         ValueError: If a field of the problem does not make sense.
     """
     solution = solve_for_robot(context, request.problem)
+    success, message = _judged(context, solution)
     state = JointState(
         header=Header(stamp=to_ros_time(context.world.clock.stamp_ns)),
         name=solution.joint_names,
         position=solution.positions,
         velocity=_velocities(request.problem, solution),
     )
-    return solution.success, solution.message, state
+    return success, message, state
 
 
 def move_by_ik(context: BodyContext, problem: CalculateInverseKinematicsProblem) -> None:
@@ -52,11 +57,15 @@ def move_by_ik(context: BodyContext, problem: CalculateInverseKinematicsProblem)
 
     Raises:
         InterfaceError: If the robot has no such link or has gone.
-        ValueError: If a field of the problem does not make sense, or there is no solution: then nothing moves.
+        ValueError: If a field of the problem does not make sense, or the target is out of reach of a robot that is
+            `strict`: then nothing moves.
     """
     solution = solve_for_robot(context, problem)
+    success, message = _judged(context, solution)
+    if not success:
+        raise ValueError(message)
     if not solution.success:
-        raise ValueError(solution.message)
+        _warn(rospy.resolve_name(f"rpbi/{context.name}/ik"), message)
     velocity = dict(zip(solution.joint_names, _velocities(problem, solution)))
     target = JointTarget(
         solution.chain, solution.chain_positions, [velocity[name] for name in solution.chain] if velocity else ()
@@ -107,6 +116,13 @@ def solve_for_robot(context: BodyContext, message: CalculateInverseKinematicsPro
         currentPosition=problem.currentPosition or tuple(positions.values()),
     )
     return robot.kinematics.solve(in_base)
+
+
+def _judged(context: BodyContext, solution: PybulletSolution) -> tuple[bool, str]:
+    """Returns whether a solution is a success, and a message."""
+    if solution.success or context.body.config.strict:
+        return solution.success, solution.message
+    return True, f"as near as it comes: {solution.message}"
 
 
 def _velocities(problem: CalculateInverseKinematicsProblem, solution: PybulletSolution) -> list[float]:

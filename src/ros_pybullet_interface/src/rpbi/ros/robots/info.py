@@ -17,7 +17,7 @@ from rpbi.config.asset_files import find_file
 from rpbi.ros.publishers.sample_topics import joint_state_message
 from rpbi.ros.services.body_context import BodyContext
 from rpbi.sensors.joint_state import JointStateSensor
-from rpbi.urdf.files import description_for_ros
+from rpbi.urdf.copies import description_for_ros
 from rpbi.urdf.joints import Joint
 
 

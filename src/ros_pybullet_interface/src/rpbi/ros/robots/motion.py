@@ -59,7 +59,7 @@ def move_to_eff_state(context: BodyContext, request: ResetEffStateRequest) -> An
 
 
 def set_control_mode(context: BodyContext, request: SetStringRequest) -> Answer:
-    """Switches to `POSITION_CONTROL`, `VELOCITY_CONTROL` or `TORQUE_CONTROL`.
+    """Switches to `POSITION_CONTROL`, `VELOCITY_CONTROL`, `TORQUE_CONTROL` or `IMPEDANCE_CONTROL`.
 
     Raises:
         ValueError: If the text is none of these.

@@ -1,5 +1,6 @@
 """All that a body has in ROS beside its samples and inputs: tables, and how it is opened and closed."""
 
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import wait
 from contextlib import ExitStack
@@ -52,6 +53,8 @@ SAMPLES = 100
 """How many samples of a force-torque sensor are averaged."""
 LOOK_AGAIN_AFTER_S = 0.2
 """How often it is seen whether samples still come [s] of wall time."""
+LONGEST_ZEROING_S = 60.0
+"""Wall time within which all samples come [s]; beyond it, the old zero stays."""
 
 
 def set_pose(context: BodyContext, request: SetTransformRequest) -> Answer:
@@ -80,8 +83,8 @@ def zero_force_torque(context: BodyContext, _: Any) -> tuple[()]:
     """Takes the mean of the next 100 samples of that force-torque sensor for zero.
 
     Raises:
-        InterfaceError: If the simulation is stopped or the sensor is off, before or meanwhile, or the robot goes; the
-            old zero stays then.
+        InterfaceError: If the simulation is stopped or the sensor is off, before or meanwhile, the robot goes, or the
+            samples take more than a minute; the old zero stays then.
     """
     body = context.body
     sensor = next(each for each in body.force_torque_sensors if each.name == context.owner)
@@ -103,7 +106,12 @@ def zero_force_torque(context: BodyContext, _: Any) -> tuple[()]:
             sensor.cancel_zeroing()
             raise InterfaceError(f"the simulation was stopped before {SAMPLES} samples had come; the old zero stays")
         refuse_if_off()
+        if time.monotonic() > end_s and not zeroing.mean.done():
+            sensor.cancel_zeroing()
+            at_rate = f"the sensor has {sensor.hz:g} Hz in the world's time"
+            raise InterfaceError(f"not {SAMPLES} samples within {LONGEST_ZEROING_S:g} s: {at_rate}; the old zero stays")
 
+    end_s = time.monotonic() + LONGEST_ZEROING_S
     zeroing = context.ask_body(start, body)
     while not wait([zeroing.mean], timeout=LOOK_AGAIN_AFTER_S).done:
         context.ask_body(check, body)

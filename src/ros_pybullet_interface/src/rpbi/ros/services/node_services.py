@@ -52,7 +52,7 @@ from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.config.pybullet_world_models import SetGravity, SetPhysicsEngineParameter
 from rpbi.config.sensors import RgbdSensorConfig
 from rpbi.engine.clock import NS_PER_S
-from rpbi.ros.endpoints import Answer, Service
+from rpbi.ros.endpoints import MOST_BYTES, Answer, Service
 from rpbi.ros.headers import to_ros_time
 from rpbi.ros.object_lifecycle import ObjectLifecycle
 from rpbi.ros.publishers.sample_topics import address
@@ -63,9 +63,9 @@ from .hands import apply_wrench, attach, detach
 
 log = logging.getLogger(__name__)
 
+MOST_STEPS = 1_000_000
+"""Ticks of one request, which is answered when they are done."""
 YAML_SUFFIXES = (".yaml", ".yml")
-MOST_BYTES = 2_000_000
-"""So long may a file be that a service names; reading takes time that the simulation wants."""
 NO_FOLDER = "~config"
 """Stands for the path of a YAML that came without one."""
 OBJECT_TYPES = {
@@ -115,8 +115,10 @@ def _step(node: NodeContext, _: Any) -> Answer:
 
 
 def _step_n(node: NodeContext, request: StepNRequest) -> tuple[bool, str, int, genpy.Time]:
-    """Goes many ticks on, as fast as it goes, if the world stands still."""
+    """Goes many ticks on, a million at most, as fast as it goes, if the world stands still."""
     try:
+        if request.steps > MOST_STEPS:
+            raise InterfaceError(f"steps: expected at most {MOST_STEPS}, got {request.steps}; ask again for more")
         tick, stamp_ns = node.ask.wait_for(node.ask(lambda: node.simulation.step_n(request.steps)))
         return True, f"{request.steps} ticks done", tick, to_ros_time(stamp_ns)
     except InterfaceError as error:
@@ -172,7 +174,7 @@ def _read_object(node: NodeContext, asked: PybulletObject) -> tuple[dict[str, An
 
 def _read_text(node: NodeContext, text: str, key: str) -> tuple[dict[str, Any], str, str]:
     """Does the same with YAML text under a key: all of it, or `file` and the keys that differ."""
-    data = load_configs(text, key)
+    data = load_configs(text, key, MOST_BYTES)
     if FILE not in data:
         return data, key, NO_FOLDER
     try:
@@ -238,7 +240,7 @@ def _change_object_dynamics(node: NodeContext, request: ChangeObjectDynamicsRequ
 
 def _change_dynamics(node: NodeContext, request: ChangeDynamicsRequest) -> Answer:
     """Changes the keys of `changeDynamics` that the YAML text in it has."""
-    change = ChangeDynamics.parse(load_configs(request.config, "config"), "config")
+    change = ChangeDynamics.parse(load_configs(request.config, "config", MOST_BYTES), "config")
     keys = ", ".join(change.kwargs())
     if not keys:
         raise InterfaceError("config: expected keys of changeDynamics, such as lateralFriction; got none")
@@ -264,7 +266,7 @@ def _set_gravity(node: NodeContext, request: SetGravityRequest) -> Answer:
 
 def _set_engine_parameter(node: NodeContext, request: SetStringRequest) -> Answer:
     """Changes the keys of `setPhysicsEngineParameter` that the YAML text in it has, until the next reset."""
-    data = load_configs(request.data, "data")
+    data = load_configs(request.data, "data", MOST_BYTES)
     if "fixedTimeStep" in data:
         raise InterfaceError("data: fixedTimeStep: cannot change while the world runs; write timeStep in the main file")
     change = SetPhysicsEngineParameter.parse(data, "data")

@@ -4,26 +4,33 @@ from rpbi.bodies.body import Body
 from rpbi.config.sensors import ContactsConfig
 from rpbi.geometry import plus, scaled
 from rpbi.samples import ContactArrowsSample
+from rpbi.sensors.sensor import SensedWorld, Sensor
 
-from .contacts import ContactsSensor
-from .sensor import Sensor
+from .contacts import ContactReader, ContactsSensor
+from .mean import MeanContactsSensor
 
 
 class ContactArrowsSensor(Sensor):
-    """An arrow for each force on a body."""
+    """An arrow for each force on a body in the last tick."""
 
     sample_type = ContactArrowsSample
 
-    def __init__(self, contacts: ContactsSensor, hz: float, metres_per_newton: float) -> None:
-        super().__init__(contacts.name, hz)
-        self._contacts = contacts
+    def __init__(self, body: Body, hz: float, metres_per_newton: float) -> None:
+        super().__init__(body.name, hz)
+        self._body = body
+        self._reader: ContactReader | None = None
         self._metres_per_newton = metres_per_newton
+
+    def enter(self, world: SensedWorld) -> None:
+        """Takes what the world knows of all contacts."""
+        self._reader = world.contacts
 
     def read(self, tick: int) -> ContactArrowsSample:
         """Reads the contacts and scales their forces; where there is none there is no arrow."""
+        assert self._reader is not None  # the world sees to it
         arrows = (
             (point.position, plus(point.position, scaled(self._metres_per_newton, point.force)))
-            for point in self._contacts.points(tick)
+            for point in self._reader.sample(self._body, tick).points
         )
         return ContactArrowsSample(self.name, tuple((start, end) for start, end in arrows if start != end))
 
@@ -32,7 +39,7 @@ def contact_sensors(body: Body, config: ContactsConfig | None) -> tuple[Sensor, 
     """Returns the sensors of a body's contacts; none if they are not asked for."""
     if config is None:
         return ()
-    contacts = ContactsSensor(body, config.hz)
+    contacts = (MeanContactsSensor if config.average else ContactsSensor)(body, config.hz)
     if not config.arrows_hz:
         return (contacts,)
-    return (contacts, ContactArrowsSensor(contacts, config.arrows_hz, config.arrow_metres_per_newton))
+    return (contacts, ContactArrowsSensor(body, config.arrows_hz, config.arrow_metres_per_newton))

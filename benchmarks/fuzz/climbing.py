@@ -1,0 +1,123 @@
+"""Hill climbing on the smallest distance that a guard lets a robot come to, brakings included."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from safe_robot.guard import Guard
+
+from .oracle import Oracle
+from .scenes import MARGIN_M, Scene
+
+GOALS, LONGEST = 3, 15
+"""A course has this many goals, each of which is asked for in at most this many periods."""
+SPREAD, FINEST = 0.3, 0.003
+"""Standard deviations of the changes of goals at first and at last [rad]."""
+CHANGED = 0.3
+"""Share of the numbers of a course that a change changes."""
+AROUND_M = 0.023
+"""A course begins no further from something than this [m]."""
+SAMPLES, NEAR_M = 3, 0.03
+"""Of a braking this many rows are judged, and all of them if one is nearer to something than this [m]."""
+TOLERANCE_M = 1e-6
+"""Distances below the margin by no more than this count as the margin [m]."""
+
+
+class Course(NamedTuple):
+    """Targets for a robot.
+
+    Attributes:
+        start: n positions at which the robot stands at first [rad].
+        goals: Positions that are asked for one after the other, GOALS x n [rad].
+        periods: Number of periods for which each goal is asked for.
+    """
+
+    start: np.ndarray
+    goals: np.ndarray
+    periods: np.ndarray
+
+
+class Climber:
+    """Changes courses so that the robot comes nearer and nearer to things.
+
+    Every command counts, and so does every braking that the guard holds ready after one, since a target that is no
+    target would have it sent. Pairs that are within `FAR_M` of each other at the home of the scene are left out.
+
+    Args:
+        scene: The robot and the boxes around it.
+        guard: A guard of that robot.
+        generator: Source of random numbers.
+    """
+
+    def __init__(self, scene: Scene, guard: Guard, generator: np.random.Generator) -> None:
+        self._scene, self._guard, self._generator = scene, guard, generator
+        self._oracle = Oracle(scene)
+        self._oracle.judge_only(scene.boxes)
+
+    def climb(self, steps: int) -> tuple[float, Course]:
+        """Returns the smallest distance that one climb ends with [m], and its course.
+
+        It ends before, when it has found a distance below the margin.
+        """
+        best = self._random_course()
+        least_m = self.smallest_distance(best)
+        for step in range(steps):
+            if least_m < MARGIN_M - TOLERANCE_M:
+                break
+            course = self._changed(best, SPREAD * (FINEST / SPREAD) ** (step / steps))
+            found_m = self.smallest_distance(course)
+            if found_m <= least_m:
+                best, least_m = course, found_m
+        return least_m, best
+
+    def smallest_distance(self, course: Course) -> float:
+        """Returns the smallest distance at any command of a course, and of the brakings after it [m]."""
+        guard, around = self._guard, self._scene.around
+        guard.rest()
+        guard.start()
+        start = around._replace(measured=dict(zip(guard.joint_names, course.start.tolist())))
+        if guard.decide(course.start.tolist(), start).command is None:
+            return math.inf  # it begins too near to itself
+        least_m = self._oracle.nearest(course.start)
+        ready = np.empty((0, len(course.start)))
+        for goal in np.repeat(course.goals, course.periods, axis=0).tolist():
+            decision = guard.decide(goal, around)
+            assert decision.command is not None
+            followed, ready = ready, guard.stop_commands
+            if len(followed) and decision.command == tuple(followed[0].tolist()) and len(ready) == len(followed) - 1:
+                continue  # the braking goes on, and has been judged
+            least_m = min(least_m, self._smallest_of(np.array([decision.command, *ready])))
+        return least_m
+
+    def _smallest_of(self, rows: np.ndarray) -> float:
+        """Returns the smallest distance in k configurations [m]; where nothing is near, of some of them."""
+        some = rows[np.linspace(0, len(rows) - 1, SAMPLES).astype(int)]
+        least_m = min(map(self._oracle.nearest, some))
+        return least_m if least_m > NEAR_M else min(map(self._oracle.nearest, rows))
+
+    def _random_course(self) -> Course:
+        """Returns a course that begins just outside the margin; some of the joints have other goals."""
+        inside = outside = self._scene.home
+        while self._oracle.nearest(inside) > MARGIN_M:
+            inside = np.clip(self._moved(self._scene.home, 2.0), self._oracle.lower, self._oracle.upper)
+        while not self._may_start(outside):
+            middle = (inside + outside) / 2.0
+            inside, outside = (inside, middle) if self._oracle.nearest(middle) > MARGIN_M else (middle, outside)
+        goals = self._moved(np.tile(outside, (GOALS, 1)), SPREAD)
+        return Course(outside, goals, self._generator.integers(2, LONGEST, GOALS))
+
+    def _changed(self, course: Course, spread: float) -> Course:
+        start = self._moved(course.start, spread / 10.0)
+        periods = np.clip(np.rint(self._moved(course.periods, 2.0)), 1, LONGEST).astype(int)
+        return Course(start if self._may_start(start) else course.start, self._moved(course.goals, spread), periods)
+
+    def _moved(self, values: np.ndarray, spread: float) -> np.ndarray:
+        by = self._generator.normal(0.0, spread, values.shape)
+        return values + by * (self._generator.random(values.shape) < CHANGED)
+
+    def _may_start(self, q: np.ndarray) -> bool:
+        is_within_limits = ((q > self._oracle.lower) & (q < self._oracle.upper)).all()
+        return bool(is_within_limits and MARGIN_M + TOLERANCE_M < self._oracle.nearest(q) < AROUND_M)

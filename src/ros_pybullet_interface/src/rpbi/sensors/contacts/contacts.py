@@ -1,0 +1,123 @@
+"""Where bodies touch each other, and what they feel there."""
+
+from collections.abc import Iterable, Mapping
+from functools import partial
+from itertools import chain
+from math import dist, isfinite
+from typing import Any
+
+from custom_ros_tools.errors import PhysicsError
+from rpbi.bodies.body import Body
+from rpbi.engine.client import Client
+from rpbi.geometry import scaled
+from rpbi.samples import ContactPoint, ContactsSample
+from rpbi.sensors.sensor import SensedWorld, Sensor
+
+Touch = tuple[Any, ...]
+"""A contact point as PyBullet's `getContactPoints` returns it."""
+
+
+class ContactReader:
+    """Contacts of the last tick, by body; PyBullet is asked once a tick, for all of them."""
+
+    def __init__(self, pb: Client, bodies: Mapping[str, Body]) -> None:
+        self._pb, self._bodies = pb, bodies
+        self._touches: dict[int, list[list[Touch]]] | None = None
+        """Contact points by body id, as either end, those between the same two links together; None if PyBullet has
+        to be asked."""
+        self._by_id: dict[int, Body] = {}
+        self._factor = 1.0
+        self._are_finite = True
+
+    def outdate(self) -> None:
+        """Has PyBullet asked again: the world has moved on or has other bodies."""
+        self._touches = None
+
+    def sample(self, body: Body, tick: int) -> ContactsSample:
+        """Returns where a body touches others or, with one of its links, another of its own, in the last tick.
+
+        Raises:
+            PhysicsError: If a number in it is not finite any more.
+        """
+        if self._touches is None:
+            self._touches = self._ask()
+        touches = self._touches.get(body.body_id, [])
+        if not self._are_finite and not _finite(chain.from_iterable(touches)):
+            raise PhysicsError(f"{body.name}: contacts are not finite any more at tick {tick}")
+        return ContactsSample(body.name, partial(_points, body, touches, self._by_id, self._factor))
+
+    def _ask(self) -> dict[int, list[list[Touch]]]:
+        self._by_id = {body.body_id: body for body in self._bodies.values()}
+        # PyBullet divides the impulse of the last sub-step by the whole time step.
+        self._factor = max(1, self._pb.sub_steps)
+        # Asked for one body, PyBullet turns normals towards it but not friction; asked for all, it turns nothing.
+        all_touches = self._pb.getContactPoints()
+        self._are_finite = _finite(all_touches)
+        by_body: dict[int, list[list[Touch]]] = {}
+        links: tuple[int, ...] = ()
+        together: list[Touch] = []
+        for touch in all_touches:
+            if touch[8] > 0.0 and touch[9] == 0.0:
+                continue  # near, but not touching
+            if touch[1:5] != links:
+                links, together = touch[1:5], []
+                for body_id in {touch[1], touch[2]}:
+                    by_body.setdefault(body_id, []).append(together)
+            together.append(touch)
+        return by_body
+
+
+def _finite(touches: Iterable[Touch]) -> bool:
+    """Tells whether all numbers of contact points are finite: `dist` is, if those of both its vectors are."""
+    sizes = [dist(t[5], t[6]) + dist(t[7], t[11]) + dist(t[7], t[13]) + t[8] + t[9] + t[10] + t[12] for t in touches]
+    return isfinite(sum(sizes))
+
+
+def _points(
+    body: Body, touches: list[list[Touch]], by_id: Mapping[int, Body], factor: float
+) -> tuple[ContactPoint, ...]:
+    """Returns contacts as one of their bodies sees them; PyBullet tells what the second one does to the first."""
+    points = []
+    for together in touches:
+        _, first, second, first_link, second_link, *_ = together[0]
+        is_first = first == body.body_id
+        sign, on_body = (1.0, 5) if is_first else (-1.0, 6)
+        other, own_link, link = (second, first_link, second_link) if is_first else (first, second_link, first_link)
+        names = body.link_name(own_link), by_id[other].name, by_id[other].link_name(link)
+        points += [
+            ContactPoint(
+                *names,
+                touch[on_body],
+                scaled(sign, touch[7]),
+                -touch[8],
+                factor * touch[9],
+                (scaled(sign, touch[11]), scaled(sign, touch[13])),
+                (factor * touch[10], factor * touch[12]),
+            )
+            for touch in together
+        ]
+    return tuple(points)
+
+
+class ContactsSensor(Sensor):
+    """All contact points of a body in the last tick."""
+
+    sample_type = ContactsSample
+
+    def __init__(self, body: Body, hz: float) -> None:
+        super().__init__(body.name, hz)
+        self._body = body
+        self._reader: ContactReader | None = None
+
+    def enter(self, world: SensedWorld) -> None:
+        """Takes what the world knows of all contacts."""
+        self._reader = world.contacts
+
+    def read(self, tick: int) -> ContactsSample:
+        """Reads the contacts; there are none before the first tick.
+
+        Raises:
+            PhysicsError: If a number in them is not finite any more.
+        """
+        assert self._reader is not None  # the world sees to it
+        return self._reader.sample(self._body, tick)

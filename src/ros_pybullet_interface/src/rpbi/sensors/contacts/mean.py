@@ -1,0 +1,70 @@
+"""Contacts of a body as means over the ticks between two samples."""
+
+from collections.abc import Iterable
+from functools import partial, reduce
+from math import hypot
+
+from rpbi.bodies.body import Body
+from rpbi.geometry import Vector, cross, minus, plus, scaled
+from rpbi.samples import ContactPoint, ContactsSample
+
+from .contacts import ContactsSensor
+
+
+class MeanContactsSensor(ContactsSensor):
+    """Contacts of a body as means over all ticks since the last sample, one for each two links that touched."""
+
+    def __init__(self, body: Body, hz: float) -> None:
+        super().__init__(body, hz)
+        self._ticks: list[ContactsSample] = []
+        self._latest: ContactsSample | None = None
+
+    def after_step(self, tick: int) -> None:
+        """Keeps the contacts of the tick, if anybody is to get their mean."""
+        if self.wanted and self.hz:
+            self._ticks.append(super().read(tick))
+        else:
+            self._ticks.clear()
+
+    def read(self, tick: int) -> ContactsSample:
+        """Returns the means; while the world stands still, the last ones again."""
+        if self._ticks:
+            self._latest = ContactsSample(self.name, partial(_mean_points, self._ticks))
+            self._ticks = []
+        return self._latest or super().read(tick)
+
+
+def _mean_points(samples: list[ContactsSample]) -> tuple[ContactPoint, ...]:
+    """Returns a mean over samples, one a tick, for each two links: a tick in which they did not touch counts as 0 N."""
+    by_links: dict[tuple[str, ...], list[ContactPoint]] = {}
+    for sample in samples:
+        for point in sample.points:
+            by_links.setdefault(point[:3], []).append(point)
+    return tuple(_mean(points, len(samples)) for points in by_links.values())
+
+
+def _mean(points: list[ContactPoint], ticks: int) -> ContactPoint:
+    """Returns the point with the mean force of these, at their centre of pressure."""
+    pressed = sum(point.normal_force for point in points)
+    weights = [point.normal_force / pressed if pressed else 1.0 / len(points) for point in points]
+    pressure = _total(scaled(point.normal_force / ticks, point.normal) for point in points)
+    friction = minus(_total(scaled(1.0 / ticks, point.force) for point in points), pressure)
+    normal, along = _unit(pressure, points[-1].normal), _unit(friction, points[-1].friction_directions[0])
+    return ContactPoint(
+        *points[-1][:3],
+        _total(map(scaled, weights, (point.position for point in points))),
+        normal,
+        sum(weight * point.depth for weight, point in zip(weights, points)),
+        hypot(*pressure),
+        (along, cross(normal, along)),
+        (hypot(*friction), 0.0),
+    )
+
+
+def _total(vectors: Iterable[Vector]) -> Vector:
+    return reduce(plus, vectors)
+
+
+def _unit(vector: Vector, default: Vector) -> Vector:
+    size = hypot(*vector)
+    return scaled(1.0 / size, vector) if size else default

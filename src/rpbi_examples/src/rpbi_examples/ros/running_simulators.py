@@ -1,0 +1,125 @@
+"""Simulators that run on a ROS master already when a launch file is to be run."""
+
+import time
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+from xmlrpc.client import ServerProxy
+
+import rosgraph
+import roslaunch.config
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, TIMEOUT_S, TimedTransport
+
+LONGEST_END_S = 60.0
+"""Time that a simulator, and the launch that it belongs to, may take to end [s]; longer is an error."""
+_CALLER = "/rpbi_launch"
+_PACKAGE = "ros_pybullet_interface"
+_POLL_S = 0.1
+
+
+class RunningNode(NamedTuple):
+    """A node that answers.
+
+    Attributes:
+        name: Its full name.
+        uri: Address of its XML-RPC interface.
+    """
+
+    name: str
+    uri: str
+
+    def stop(self, master: str) -> None:
+        """Stops it, and waits until it has ended with the `roslaunch` on this machine that it belongs to, if any.
+
+        Args:
+            master: Address of its ROS master, which may end with that `roslaunch`.
+
+        Raises:
+            InterfaceError: If it does not end within `LONGEST_END_S`.
+        """
+        launch = self._launch_process(master)
+        end_s = time.monotonic() + LONGEST_END_S
+        with suppress(*MASTER_FAILURES):  # it may end before it has answered
+            _proxy(self.uri).shutdown(_CALLER, "replaced by another simulator")
+        while _answers(self.uri) or (launch is not None and _is_running(launch)):
+            if time.monotonic() > end_s:
+                raise InterfaceError(f"{self.name} at {self.uri} did not end within {LONGEST_END_S:g} s")
+            time.sleep(_POLL_S)
+
+    def _launch_process(self, master: str) -> int | None:
+        """Returns the process id of the `roslaunch` that started the node, None if there is none on this machine."""
+        _, _, uris = _proxy(master).getParam(_CALLER, "/roslaunch/uris")
+        for uri in uris.values() if isinstance(uris, dict) else ():
+            host, _ = rosgraph.network.parse_http_host_and_port(uri)
+            if not rosgraph.network.is_local_address(host):
+                continue
+            try:
+                _, _, (active, _) = _proxy(uri).list_processes()
+                # named NAMESPACE/NAME-NUMBER
+                if any(f"/{process.rpartition('-')[0]}" == self.name for process, _ in active):
+                    return int(_proxy(uri).get_pid()[2])
+            except MASTER_FAILURES:  # it was killed, and is registered still
+                continue
+        return None
+
+
+def master_of(port: str | None) -> str:
+    """Returns the address of the master that `roslaunch` uses, with the port given to it, if any."""
+    return rosgraph.network.create_local_xmlrpc_uri(int(port)) if port else rosgraph.get_master_uri()
+
+
+def running_simulators(file: str, master: str) -> list[RunningNode]:
+    """Returns the simulators that would end if a launch file were run, since its nodes have the same names.
+
+    Nodes that were killed stay registered with the master; they do not count.
+    """
+    publishers, subscribers, services = _state(master)
+    registered = {node for _, nodes in (*publishers, *subscribers, *services) for node in nodes}
+    if registered <= {"/rosout"}:  # saves reading the file, which may run xacro
+        return []
+    config = roslaunch.config.load_config_default([file], None, assign_machines=False)
+    names = {rosgraph.names.ns_join(node.namespace, node.name) for node in config.nodes if node.package == _PACKAGE}
+    return _running(registered & names, master)
+
+
+def clocks(master: str) -> list[RunningNode]:
+    """Returns the nodes that publish the time by which nodes on a master live."""
+    publishers, _, _ = _state(master)
+    return _running({node for topic, nodes in publishers for node in nodes if topic == "/clock"}, master)
+
+
+def _state(master: str) -> list[list[tuple[str, list[str]]]]:
+    """Returns publishers, subscribers and services with their nodes; none if no master answers, as before a launch."""
+    try:
+        return _proxy(master).getSystemState(_CALLER)[2]
+    except MASTER_FAILURES:
+        return [[], [], []]
+
+
+def _running(names: Iterable[str], master: str) -> list[RunningNode]:
+    """Returns those nodes that answer, by name."""
+    nodes = [RunningNode(name, _proxy(master).lookupNode(_CALLER, name)[2]) for name in sorted(names)]
+    return [node for node in nodes if node.uri and _answers(node.uri)]
+
+
+def _proxy(uri: str) -> Any:
+    return ServerProxy(uri, TimedTransport(TIMEOUT_S))
+
+
+def _answers(uri: str) -> bool:
+    try:
+        _proxy(uri).getPid(_CALLER)
+    except MASTER_FAILURES:
+        return False
+    return True
+
+
+def _is_running(process: int) -> bool:
+    """Returns whether there is such a process, and it has not ended; see proc_pid_stat(5)."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False

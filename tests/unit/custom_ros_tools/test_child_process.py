@@ -1,0 +1,38 @@
+"""Children that end with their parent."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+
+from ros_system import is_running, wait_until
+
+PARENT = """
+import signal, subprocess, threading, time
+from custom_ros_tools.child_process import start_child
+
+children = []
+def start():
+    children.append(start_child(["sleep", "1000"], signal.SIGKILL, stdout=subprocess.DEVNULL))
+    children.append(subprocess.Popen(["sleep", "1000"], stdout=subprocess.DEVNULL))
+thread = threading.Thread(target=start)
+thread.start()
+thread.join()
+time.sleep(0.1)
+print(*(child.pid for child in children), *(child.poll() for child in children), flush=True)
+time.sleep(1000)
+"""
+
+
+def test_a_child_outlives_the_thread_that_starts_it_and_not_a_parent_that_is_killed():
+    parent = subprocess.Popen([sys.executable, "-c", PARENT], stdout=subprocess.PIPE, text=True)
+    assert parent.stdout is not None
+    child, control, *codes = parent.stdout.readline().split()
+    assert codes == ["None", "None"]
+    parent.kill()
+    parent.communicate()
+    wait_until(lambda: not is_running(int(child)), "the child has ended")
+    assert is_running(int(control)), "a child that is started otherwise outlives its parent"
+    os.kill(int(control), signal.SIGKILL)

@@ -1,0 +1,83 @@
+"""Files made from meshes: whole or not at all, and with nothing in them that is not there."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pybullet_data
+import pytest
+
+from rpbi.meshes.copies import cache_folder, kept
+from rpbi.urdf.copies import description_for_ros
+
+PANDA = f"{pybullet_data.getDataPath()}/franka_panda/panda.urdf"
+"""In the materials of one of its meshes stand paths of a computer that ran Windows."""
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def missing_textures(meshes):
+    """Returns the textures that the meshes' materials name and RViz would not find."""
+    missing = []
+    for mesh in map(Path, meshes):
+        for name in re.findall(r"^mtllib (.*)$", mesh.read_text(), re.MULTILINE):
+            if (mesh.parent / name).is_file():
+                textures = re.findall(r"^map_Kd (.*)$", (mesh.parent / name).read_text(), re.MULTILINE)
+                missing += [texture for texture in textures if not (mesh.parent / texture).is_file()]
+    return missing
+
+
+def test_what_ros_gets_of_a_robot_names_no_texture_that_is_missing(cache):
+    data = Path(PANDA).parent / "meshes"
+    assert len(missing_textures(data.glob("*/*.obj"))) == 5, "else there is nothing to mend"
+    meshes = set(re.findall(r'"file://(.*?\.obj)"', description_for_ros(PANDA)))
+    assert len(meshes) == 18 and missing_textures(meshes) == []
+    (copied,) = [mesh for mesh in meshes if mesh.startswith(str(cache))]
+    assert Path(copied).read_bytes() == (data / "collision/link6.obj").read_bytes()
+
+
+def test_where_no_cache_can_be_written_ros_gets_the_files_as_they_are(tmp_path, monkeypatch):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    assert len(missing_textures(set(re.findall(r'"file://(.*?\.obj)"', description_for_ros(PANDA))))) == 5
+
+
+WRITES = """
+import sys, time
+from rpbi.meshes.copies import kept
+
+def make(folder):
+    for number in range(20):
+        (folder / str(number)).write_text(sys.argv[1])
+        time.sleep(0.002)
+
+print(len(list(kept("shared", make).iterdir())))
+"""
+
+
+def test_of_several_processes_one_makes_a_folder_and_all_see_it_whole(cache):
+    processes = [
+        subprocess.Popen([sys.executable, "-c", WRITES, str(number)], stdout=subprocess.PIPE, text=True)
+        for number in range(3)
+    ]
+    assert [process.communicate()[0] for process in processes] == ["20\n"] * 3
+    assert len({path.read_text() for path in (cache_folder() / "shared").iterdir()}) == 1
+    assert os.listdir(cache_folder()) == ["shared"]
+
+
+def test_a_folder_that_could_not_be_made_is_not_there():
+    def fail(folder):
+        (folder / "half").touch()
+        raise RuntimeError("interrupted")
+
+    with pytest.raises(RuntimeError):
+        kept("half", fail)
+    assert list(cache_folder().iterdir()) == []

@@ -1,0 +1,33 @@
+"""Arguments that docs promise of every example."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from roslaunch.config import load_config_default
+
+LAUNCH_FILES = sorted((Path(__file__).parents[3] / "src/rpbi_examples/launch").glob("*.launch"))
+WITHOUT_WORLD = "mvn"
+GIVEN = ["start:=false", "real_time_factor:=0.5", "gui:=true", "headless:=true"]
+
+
+@pytest.mark.parametrize("path", LAUNCH_FILES, ids=lambda path: path.stem)
+def test_every_example_hands_them_to_its_simulators(path):
+    if path.stem == WITHOUT_WORLD:
+        assert "simulator.launch" not in path.read_text()
+        return
+    given = [*GIVEN, "config:=world.yaml"] if path.stem == "world" else GIVEN
+    loaded = load_config_default([(str(path), given)], None, assign_machines=False)
+    simulators = [node for node in loaded.nodes if node.package == "ros_pybullet_interface"]
+    assert len(simulators) == (2 if path.stem == "tracking_example" else 1)
+    for node in simulators:
+        config = f"{node.namespace}{node.name}/config/"
+        assert {
+            name.removeprefix(config): each.value for name, each in loaded.params.items() if name.startswith(config)
+        } == {
+            "start_pybullet_after_initialization": False,
+            "real_time_factor": 0.5,
+            "connect/connection_mode": "GUI",
+            **({"tf_prefix": node.namespace.strip("/")} if node.namespace != "/" else {}),
+        }
