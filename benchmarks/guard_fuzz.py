@@ -1,6 +1,7 @@
 """Hostile targets for the guard, judged by an oracle that knows nothing of it.
 
     ./rpbi shell -c 'python3 benchmarks/guard_fuzz.py --robot seven --targets 1000000 --seed 0'
+    ./rpbi shell -c 'python3 benchmarks/guard_fuzz.py --robot lwr --geometry exact --targets 0 --climbs 30'
 
 Not one of the benchmarks that `./rpbi bench` runs. Each line that it prints ends with numbers that can be added up over
 several runs with other seeds. It ends with 1 if a command was not safe.
@@ -13,10 +14,11 @@ import sys
 import time
 
 import numpy as np
+from fuzz.climbing import TOLERANCE_M, Climber
 from fuzz.hostile import fuzz
 from fuzz.leaving import leave_margin
 from fuzz.oracle import Oracle
-from fuzz.scenes import SCENES
+from fuzz.scenes import MARGIN_M, SCENES
 
 SHOWN = 20
 """Of faults no more are printed."""
@@ -31,6 +33,8 @@ def main() -> int:
     parser.add_argument("--geometry", choices=("hulls", "exact"), default="hulls", help="of the guard (hulls)")
     parser.add_argument("--targets", type=int, default=100_000, help="for each policy")
     parser.add_argument("--states", type=int, default=0, help="states inside the margin; only of two joints")
+    parser.add_argument("--climbs", type=int, default=0, help="hill climbs on the smallest distance; policy limit only")
+    parser.add_argument("--steps", type=int, default=100, help="of each climb (100)")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     if options.states and options.robot != "two":
@@ -67,6 +71,15 @@ def main() -> int:
             f"seconds={time.process_time() - began_s:.0f}"
         )
         is_safe &= not left.stuck
+    if options.climbs:
+        guard = scene.guard("limit", geometry=options.geometry)
+        for seed in range(options.seed, options.seed + options.climbs):
+            climber = Climber(scene, guard, np.random.default_rng(seed), options.geometry)
+            found_m, course = climber.climb(options.steps)
+            print(f"climb robot={options.robot} seed={seed} geometry={options.geometry} nearest_mm={1e3 * found_m:.5f}")
+            if found_m < MARGIN_M - TOLERANCE_M:
+                print(f"inside the margin: {course}", flush=True)
+                is_safe = False
     return 0 if is_safe else 1
 
 

@@ -44,12 +44,18 @@ def _obj(random: Random) -> bytes:
     for _ in range(random.choice((0, 1, 4, 12, 200))):
         lines.append("f " + " ".join(_corner(random, corners) for _ in range(random.choice((3, 3, 3, 4, 1, 0, 60)))))
     if random.random() < 0.2:
-        lines.append(random.choice(("s off", "o %n", "g " + "a" * 9000, "f", "v", "vn", "l 1 2", "\n" * 50_000, "mtllib")))
+        lines.append(
+            random.choice(("s off", "o %n", "g " + "a" * 9000, "f", "v", "vn", "l 1 2", "\n" * 50_000, "mtllib"))
+        )
     return "\n".join(lines).encode(errors="replace")
 
 
 def _corner(random: Random, count: int) -> str:
-    index = random.randint(1, max(count, 1)) if random.random() < 0.97 else random.choice((0, -1, count + 1, 2**31, -(2**31)))
+    index = (
+        random.randint(1, max(count, 1))
+        if random.random() < 0.97
+        else random.choice((0, -1, count + 1, 2**31, -(2**31)))
+    )
     return random.choice((f"{index}", f"{index}/{index}", f"{index}//{index}", f"{index}/{index}/{index}"))
 
 
@@ -82,12 +88,15 @@ def _dae(random: Random) -> bytes:
     scale = random.choice(("1", "nan", "", "1e30"))
     matrix = " ".join(number(random) for _ in range(random.choice((16, 16, 0, 3))))
     text = (
-        f'<COLLADA><asset><unit meter="{scale}"/><up_axis>Z_UP</up_axis></asset><library_geometries><geometry id="g"><mesh>'
+        f'<COLLADA><asset><unit meter="{scale}"/><up_axis>Z_UP</up_axis></asset>'
+        '<library_geometries><geometry id="g"><mesh>'
         f'<source id="s"><float_array id="a" count="{count}">{corners}</float_array><technique_common>'
-        f'<accessor source="#a" count="4" stride="{random.choice((3, 3, 0, -3, 10**6))}"/></technique_common></source>'
+        f'<accessor source="#a" count="4" stride="{random.choice((3, 3, 0, -3, 10**6))}"/>'
+        f"</technique_common></source>"
         f'<vertices id="v"><input semantic="POSITION" source="#{random.choice("sssvg")}"/></vertices>'
-        f'<triangles count="{triangles}"><input semantic="VERTEX" source="#v" offset="{random.choice((0, 0, 0, 5, -1))}"/>'
-        f'<p>{indices}</p></triangles></mesh></geometry></library_geometries><library_visual_scenes><visual_scene id="w">'
+        f'<triangles count="{triangles}"><input semantic="VERTEX" source="#v" offset="{random.choice((0, 0, 5, -1))}"/>'
+        f"<p>{indices}</p></triangles></mesh></geometry></library_geometries>"
+        '<library_visual_scenes><visual_scene id="w">'
         f'<node><matrix>{matrix}</matrix><instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>'
         f'<scene><instance_visual_scene url="#{random.choice("wwwx")}"/></scene></COLLADA>'
     )

@@ -59,7 +59,10 @@ def hostile(kind: str, seed: int, folder: Path) -> tuple[tuple[str, dict[str, ob
         entry = _mesh_entry(random, write_mesh(random, folder), folder)
         return entry, {"world": lambda: _build(folder, entry)}
     file, of_kind = write_yaml(random, folder)
-    return (KINDS[of_kind], file), {"file": lambda: load_config(str(file)), "world": lambda: _build_with(folder, KINDS[of_kind], file)}
+    return (KINDS[of_kind], file), {
+        "file": lambda: load_config(str(file)),
+        "world": lambda: _build_with(folder, KINDS[of_kind], file),
+    }
 
 
 def _urdf_entry(random: Random, path: Path) -> Entry:
@@ -67,7 +70,13 @@ def _urdf_entry(random: Random, path: Path) -> Entry:
     if random.random() < 0.1:
         load["flags"] = random.choice(("URDF_MERGE_FIXED_LINKS", "URDF_USE_SELF_COLLISION", "URDF_MAINTAIN_LINK_ORDER"))
     section, more = random.choice(
-        (("urdfs", {}), ("urdfs", {}), ("robots", {}), ("robots", {"is_visual_robot": True}), ("robots", {"planar_base": {}}))
+        (
+            ("urdfs", {}),
+            ("urdfs", {}),
+            ("robots", {}),
+            ("robots", {"is_visual_robot": True}),
+            ("robots", {"planar_base": {}}),
+        )
     )
     config = {**(GOOD["robot"] if section == "robots" else {}), "name": "it", "loadURDF": load, **more}
     return section, config

@@ -46,7 +46,8 @@ class WatchedNode:
         """Starts it, and waits until it serves."""
         arm = iiwa(controllers={"springs": {"type": "joint_impedance", "active": False}})
         rospy.set_param(
-            "/ros_pybullet_interface/config", main_config(self._folder, collision=(FLOOR,), dynamic=(ball(),), robots=(arm,))
+            "/ros_pybullet_interface/config",
+            main_config(self._folder, collision=(FLOOR,), dynamic=(ball(),), robots=(arm,)),
         )
         program = str(Path(__file__).with_name("watched_node.py"))
         self.process = self._ros.start([sys.executable, program, str(self.pauses)])
@@ -60,7 +61,7 @@ class WatchedNode:
         return new
 
     def longest_pauses(self, since_s: float) -> tuple[float, float, float]:
-        """Returns its longest pause since a time [s], as it was, without waiting for a processor, and without loading."""
+        """Returns its longest pause since a time [s]: as it was, less its waiting for a processor, and less loading."""
         rows = [json.loads(line) for line in self.pauses.read_text().splitlines()[-2000:] if line.endswith("]")]
         rows = [row for row in rows if row[0] >= since_s]
         own = [gap - waited for _, gap, waited, _ in rows]
@@ -103,7 +104,9 @@ def outcomes_in_node(workplace: Any, kind: str, seeds: range, folder: Path) -> I
     for column, name in enumerate(("all", "without waiting for a processor", "without that and PyBullet's loading")):
         for verdict in ("refused", "taken"):
             rows = sorted((row for row in worst if row[4] == verdict), key=lambda row: -row[column])[:5]
-            print(f"{kind}: longest pauses [ms], {verdict}, {name}:", *(f"{1e3 * r[column]:.1f} ({r[3]})" for r in rows))
+            print(
+                f"{kind}: longest pauses [ms], {verdict}, {name}:", *(f"{1e3 * r[column]:.1f} ({r[3]})" for r in rows)
+            )
 
 
 def _ask(ros: RosSystem, node: WatchedNode, what: Any) -> tuple[str, str]:
@@ -147,5 +150,3 @@ def _services() -> set[str]:
 def _add(ros: RosSystem, kind: str, filename: str = "", config: str = "") -> Any:
     asked = PybulletObject(getattr(PybulletObject, kind), filename, config)
     return ros.call("/rpbi/add_pybullet_object", AddPybulletObject, asked)
-
-

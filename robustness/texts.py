@@ -6,12 +6,41 @@ from collections.abc import Callable
 from random import Random
 
 NUMBERS = (
-    *("0", "-0", "1", "-1", "1e-300", "1e300", "-1e300", "1e6", "999999", "1e9", "nan", "-nan", "inf", "-inf", "NaN(1)"),
+    *(
+        "0",
+        "-0",
+        "1",
+        "-1",
+        "1e-300",
+        "1e300",
+        "-1e300",
+        "1e6",
+        "999999",
+        "1e9",
+        "nan",
+        "-nan",
+        "inf",
+        "-inf",
+        "NaN(1)",
+    ),
     *("", " ", "x", "1x", "0x10", "0x7fffffff", "1e", "1e+", ".", "--1", "1,5", "1_000", "9" * 5000, "0." + "0" * 3000),
     *("%s%n", "%p %p %p", "%99999999d", "${mass}", "$(optenv A 1)", "$(optenv A", "1\t2", "\u0661\u0662"),
 )
 NAMES = (
-    *("", " ", "world", "base", "a", "link0", "a" * 250, "a" * 251, "a" * 1023, "a" * 1100, "a" * 70_000, "\u00e4" * 200),
+    *(
+        "",
+        " ",
+        "world",
+        "base",
+        "a",
+        "link0",
+        "a" * 250,
+        "a" * 251,
+        "a" * 1023,
+        "a" * 1100,
+        "a" * 70_000,
+        "\u00e4" * 200,
+    ),
     *("%s%s%s%s", "%n", "%p", "%1000000000c", "../" * 300, "/dev/zero", "/proc/kmsg", "/proc/self/mem", "C:\\x", "-"),
     *("\u202e", "\U0001f600", "a\tb", "a b", "{rpbi}/x", "package://", "package://x", "model://", "file:///etc/passwd"),
 )
@@ -53,7 +82,17 @@ def _flip(random: Random, data: bytearray, at: int) -> None:
 
 
 def _overwrite(random: Random, data: bytearray, at: int) -> None:
-    values = (b"\0", b"\xff\xff\xff\xff", b"\0\0\0\x80", b"\0\0\xc0\x7f", b"%n%n", b"<!--", b"]]>", b'"', b"\x7f\xff\xff\xff")
+    values = (
+        b"\0",
+        b"\xff\xff\xff\xff",
+        b"\0\0\0\x80",
+        b"\0\0\xc0\x7f",
+        b"%n%n",
+        b"<!--",
+        b"]]>",
+        b'"',
+        b"\x7f\xff\xff\xff",
+    )
     value = random.choice(values)
     data[at : at + len(value)] = value
 

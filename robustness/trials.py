@@ -67,7 +67,7 @@ def outcomes(kind: str, seeds: range, folder: Path) -> Iterator[Outcome]:
 
 
 def _of_batch(kind: str, seeds: list[int], folder: Path) -> Iterator[Outcome]:
-    """Yields the outcomes of files in a process, up to the first that ends it; one called `all` ends those of a file."""
+    """Yields the outcomes of files in a process, up to the first that ends it; `all` is the last one of a file."""
     reading, writing = os.pipe()
     sys.stdout.flush()
     child = os.fork()

@@ -24,7 +24,19 @@ WORKPLACE = Workplace()
 from robustness.trials import Outcome, outcomes  # noqa: E402
 
 COUNTS = {"urdf": 2000, "mesh": 500, "yaml": 1000}
-HEAD = ("files", "number", "readers", "taken", "refused", "signals", "tracebacks", "silent", "hangs", "code", "longest [s]")
+HEAD = (
+    "files",
+    "number",
+    "readers",
+    "taken",
+    "refused",
+    "signals",
+    "tracebacks",
+    "silent",
+    "hangs",
+    "code",
+    "longest [s]",
+)
 
 
 def main() -> None:

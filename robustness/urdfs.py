@@ -89,7 +89,9 @@ def _link(random: Random, called: str) -> str:
         for _ in range(random.choice((0, 1, 1, 1, 3))):
             more = [_material(random)] if kind == "visual" and random.random() < 0.3 else []
             concave = {"concave": "yes"} if random.random() < 0.05 else {}
-            parts.append(_element(kind, {"name": name(random, "x"), **concave}, _origin(random), _geometry(random), *more))
+            parts.append(
+                _element(kind, {"name": name(random, "x"), **concave}, _origin(random), _geometry(random), *more)
+            )
     if random.random() < 0.1:
         inner = [_element(tag, {"value": number(random, 0.2)}) for tag in random.sample(_CONTACT, 3)]
         parts.append(_element("contact", {}, *inner))
@@ -127,7 +129,16 @@ def _geometry(random: Random) -> str:
 
 
 def _mesh(random: Random) -> str:
-    files = (str(DATA / "cube.obj"), "package://cube.obj", "cube.obj", FIFO, "x.cdf", "/dev/zero.obj", "x.obj?%n", ".obj")
+    files = (
+        str(DATA / "cube.obj"),
+        "package://cube.obj",
+        "cube.obj",
+        FIFO,
+        "x.cdf",
+        "/dev/zero.obj",
+        "x.obj?%n",
+        ".obj",
+    )
     return files[0] if random.random() < 0.7 else random.choice((*files, *NAMES))
 
 
@@ -147,13 +158,20 @@ def _joint(random: Random, index: int, parent: str, child: str) -> str:
         parts.append(_element("axis", {"xyz": axis}))
     if random.random() < 0.9:
         lower, upper = sorted((random.uniform(-3, 3), random.uniform(-3, 3)))
-        limits = {"lower": f"{lower:g}", "upper": f"{upper:g}", "effort": positive(random), "velocity": positive(random)}
+        limits = {
+            "lower": f"{lower:g}",
+            "upper": f"{upper:g}",
+            "effort": positive(random),
+            "velocity": positive(random),
+        }
         parts.append(_element("limit", limits))
     if random.random() < 0.3:
         parts.append(_element("dynamics", {"damping": number(random), "friction": positive(random)}))
     if random.random() < 0.15:
         leader = f"joint{random.randrange(index + 2)}"
-        parts.append(_element("mimic", {"joint": leader, "multiplier": number(random, 0.2), "offset": number(random, 0.1)}))
+        parts.append(
+            _element("mimic", {"joint": leader, "multiplier": number(random, 0.2), "offset": number(random, 0.1)})
+        )
     return _element("joint", {"name": name(random, f"joint{index}"), "type": kind}, *parts)
 
 
@@ -161,8 +179,9 @@ def _chain(random: Random, count: int, kind: str, shape: str = "") -> str:
     mass = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
     parts = [f'<link name="l{index}">{mass}{shape}</link>' for index in range(count + 1)]
     for index in range(count):
-        ends = f'<parent link="l{index}"/><child link="l{index + 1}"/><limit lower="-1" upper="1" effort="1" velocity="1"/>'
-        parts.append(f'<joint name="j{index}" type="{kind}">{ends}</joint>')
+        ends = f'<parent link="l{index}"/><child link="l{index + 1}"/>'
+        limits = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+        parts.append(f'<joint name="j{index}" type="{kind}">{ends}{limits}</joint>')
     if random.random() < 0.5:
         parts.reverse()
     return _element("robot", {"name": "chain"}, *parts)
@@ -177,7 +196,9 @@ _LARGE = (
     lambda random: "<robot " * 50_000 + "</robot " * 50_000,
     lambda random: "<robot name='r'><link name='a'/>" + "<mesh filename='" * 20_000 + "</robot>",
     lambda random: "<robot name='r'>" + "<link>" * random.choice((90, 200, 50_000)) + "</robot>",
-    lambda random: f"<robot name='r'><link name='a'/><gazebo>{'<x a=' + quoteattr('y' * 90) + '/>'}</gazebo></robot>" * 2000,
+    lambda random: (
+        f"<robot name='r'><link name='a'/><gazebo>{'<x a=' + quoteattr('y' * 90) + '/>'}</gazebo></robot>" * 2000
+    ),
     lambda random: "<robot name='r'><link name='a'/>" + "<x/>" * 400_000 + "</robot>",
     lambda random: "<robot name='r'><link name='a'" + " b='c'" * 1000 + "/></robot>",
     lambda random: "<robot name='r'><link name='a'/>" + " " * 1_900_000 + "</robot>",

@@ -1,7 +1,7 @@
 """The simulator node, with a file of its pauses: `watched_node.py FILE ARGUMENTS ...`.
 
-Each line has, as JSON: the time at which a tick began [s, monotonic], how long after the one before [s], how much of that
-its thread waited for a processor, and how much it spent on adding and removing objects, most of it in PyBullet.
+Each line has, as JSON: the time at which a tick began [s, monotonic], how long after the one before [s], how much of
+that its thread waited for a processor, and how much it spent on adding and removing objects, most of it in PyBullet.
 """
 
 from __future__ import annotations

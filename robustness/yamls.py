@@ -32,14 +32,59 @@ GOOD = {
     "visual_object": {"createVisualShape": {"shapeType": "GEOM_BOX", "halfExtents": [1, 1, 1]}},
 }
 BAD: tuple[Any, ...] = (
-    *(None, True, -1, 0, 1, 2**31, 2**63, 10**400, 1e300, float("nan"), float("inf"), [], {}, [[]], {"a": {}}, [1, 2, 3]),
+    *(
+        None,
+        True,
+        -1,
+        0,
+        1,
+        2**31,
+        2**63,
+        10**400,
+        1e300,
+        float("nan"),
+        float("inf"),
+        [],
+        {},
+        [[]],
+        {"a": {}},
+        [1, 2, 3],
+    ),
     *("", "x", "GEOM_MESH", ["x"] * 100, {"x": "y"}, "this:x", "os:system", "a" * 100_000, {1: 2}, {"type": "this:x"}),
 )
 TAGGED = (
     *("!!bool 3", '!!int ""', "!!timestamp x", "!!float x", "!!binary x", "!!set [a]", "!!omap x", "!!pairs [1]"),
     *("!!python/object/apply:os.mknod [canary]", "!!python/name:os.system", "!!map x", "!!seq x", "!!null x", "!x y"),
-    *("2001-99-99", "2001-01-01 99:99:99", "1:1:1:1", "0b", "0x", "0o9", ".inf", "-.nan", "? a", "<<: x", "*a", "&a *a"),
-    *("&a [*a]", "{<<: *a}", "{<<: [1]}", "%TAG ! x", "|", ">-", "'", '"\\x', '"\\ud800"', "@", "`", "\t", "---", "..."),
+    *(
+        "2001-99-99",
+        "2001-01-01 99:99:99",
+        "1:1:1:1",
+        "0b",
+        "0x",
+        "0o9",
+        ".inf",
+        "-.nan",
+        "? a",
+        "<<: x",
+        "*a",
+        "&a *a",
+    ),
+    *(
+        "&a [*a]",
+        "{<<: *a}",
+        "{<<: [1]}",
+        "%TAG ! x",
+        "|",
+        ">-",
+        "'",
+        '"\\x',
+        '"\\ud800"',
+        "@",
+        "`",
+        "\t",
+        "---",
+        "...",
+    ),
     *("1" * 5000, "1" + ":59" * 5000, "1" + ":59" * 5000 + ".0", "[" * 500, "{" * 3000, "- " * 3000, "? " * 2000, "\0"),
 )
 
@@ -60,10 +105,10 @@ def write_yaml(random: Random, folder: Path) -> tuple[Path, str]:
             at = random.randrange(len(lines))
             lines[at] = lines[at].partition(":")[0] + ": " + random.choice((*TAGGED, *NUMBERS, *NAMES))
             text = "\n".join(lines)
-        elif chance < 0.8:
+        elif chance < 0.77:
             text += random.choice(_LARGE)(random)
     content = text.encode(errors="replace")
-    path.write_bytes(spoil(random, content) if chance >= 0.8 else content)
+    path.write_bytes(spoil(random, content) if chance >= 0.77 else content)
     return path, kind
 
 

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from safe_robot.geometry.distances import Geometry, LinkDistances
 from safe_robot.guard import Guard
 
-from .oracle import Oracle
 from .scenes import MARGIN_M, Scene
 
 GOALS, LONGEST = 3, 15
@@ -44,18 +44,24 @@ class Climber:
     """Changes courses so that the robot comes nearer and nearer to things.
 
     Every command counts, and so does every braking that the guard holds ready after one, since a target that is no
-    target would have it sent. Pairs that are within `FAR_M` of each other at the home of the scene are left out.
+    target would have it sent. Distances are those of links to boxes as the guard measures them, but at every command.
 
     Args:
         scene: The robot and the boxes around it.
         guard: A guard of that robot.
         generator: Source of random numbers.
+        geometry: `hulls` or `exact`, as the guard has it.
     """
 
-    def __init__(self, scene: Scene, guard: Guard, generator: np.random.Generator) -> None:
+    def __init__(
+        self, scene: Scene, guard: Guard, generator: np.random.Generator, geometry: Geometry = "hulls"
+    ) -> None:
         self._scene, self._guard, self._generator = scene, guard, generator
-        self._oracle = Oracle(scene)
-        self._oracle.judge_only(scene.boxes)
+        self._distances = LinkDistances(guard.robot, geometry)
+        boxes = scene.around.obstacles or ()
+        self._distances.place_obstacles(boxes)
+        links = [link for link in self._distances.links if self._distances.reach((link, 0)).any()]
+        self._pairs = [(link, i) for link in links for i in range(len(boxes))]
 
     def climb(self, steps: int) -> tuple[float, Course]:
         """Returns the smallest distance that one climb ends with [m], and its course.
@@ -81,7 +87,7 @@ class Climber:
         start = around._replace(measured=dict(zip(guard.joint_names, course.start.tolist())))
         if guard.decide(course.start.tolist(), start).command is None:
             return math.inf  # it begins too near to itself
-        least_m = self._oracle.nearest(course.start)
+        least_m = self._nearest(course.start)
         ready = np.empty((0, len(course.start)))
         for goal in np.repeat(course.goals, course.periods, axis=0).tolist():
             decision = guard.decide(goal, around)
@@ -92,20 +98,24 @@ class Climber:
             least_m = min(least_m, self._smallest_of(np.array([decision.command, *ready])))
         return least_m
 
+    def _nearest(self, q: np.ndarray) -> float:
+        self._distances.place(q)
+        return min(self._distances.distance(pair, math.inf, NEAR_M) for pair in self._pairs)
+
     def _smallest_of(self, rows: np.ndarray) -> float:
         """Returns the smallest distance in k configurations [m]; where nothing is near, of some of them."""
         some = rows[np.linspace(0, len(rows) - 1, SAMPLES).astype(int)]
-        least_m = min(map(self._oracle.nearest, some))
-        return least_m if least_m > NEAR_M else min(map(self._oracle.nearest, rows))
+        least_m = min(map(self._nearest, some))
+        return least_m if least_m > NEAR_M else min(map(self._nearest, rows))
 
     def _random_course(self) -> Course:
         """Returns a course that begins just outside the margin; some of the joints have other goals."""
         inside = outside = self._scene.home
-        while self._oracle.nearest(inside) > MARGIN_M:
-            inside = np.clip(self._moved(self._scene.home, 2.0), self._oracle.lower, self._oracle.upper)
+        while self._nearest(inside) > MARGIN_M:
+            inside = np.clip(self._moved(self._scene.home, 2.0), self._guard.limits.lower, self._guard.limits.upper)
         while not self._may_start(outside):
             middle = (inside + outside) / 2.0
-            inside, outside = (inside, middle) if self._oracle.nearest(middle) > MARGIN_M else (middle, outside)
+            inside, outside = (inside, middle) if self._nearest(middle) > MARGIN_M else (middle, outside)
         goals = self._moved(np.tile(outside, (GOALS, 1)), SPREAD)
         return Course(outside, goals, self._generator.integers(2, LONGEST, GOALS))
 
@@ -119,5 +129,5 @@ class Climber:
         return values + by * (self._generator.random(values.shape) < CHANGED)
 
     def _may_start(self, q: np.ndarray) -> bool:
-        is_within_limits = ((q > self._oracle.lower) & (q < self._oracle.upper)).all()
-        return bool(is_within_limits and MARGIN_M + TOLERANCE_M < self._oracle.nearest(q) < AROUND_M)
+        is_within_limits = ((q > self._guard.limits.lower) & (q < self._guard.limits.upper)).all()
+        return bool(is_within_limits and MARGIN_M + TOLERANCE_M < self._nearest(q) < AROUND_M)

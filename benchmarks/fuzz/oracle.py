@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from xml.etree import ElementTree
 
 import numpy as np
@@ -42,8 +42,9 @@ class Oracle:
             self._model, xml, pinocchio.GeometryType.COLLISION, package_dirs=[str(scene.urdf.parent)]
         )
         self._add_pairs({f"{name}_0" for name in scene.boxes})
-        self._data = self._model.createData()
-        self._watch()
+        self._data, self._found = self._model.createData(), self._shapes.createData()
+        for request in self._found.collisionRequests:
+            request.security_margin = WATCHED_M
         self.lower, self.upper = self._model.lowerPositionLimit, self._model.upperPositionLimit
         self.nearest_m = math.inf
         self.worst = dict.fromkeys(LIMITS, 0.0)
@@ -58,11 +59,6 @@ class Oracle:
                 if not is_tied:
                     self._shapes.addCollisionPair(pinocchio.CollisionPair(i, j))
 
-    def _watch(self) -> None:
-        self._found = self._shapes.createData()
-        for request in self._found.collisionRequests:
-            request.security_margin = WATCHED_M
-
     def place(self, q: Sequence[float]) -> None:
         """Judges where a command puts the robot."""
         q = np.asarray(q)
@@ -76,19 +72,6 @@ class Oracle:
         if not nearest > 0.0:
             self.faults.append(f"in collision: {q}, {nearest:.3g} m")
         self.nearest_m = min(self.nearest_m, nearest)
-
-    def nearest(self, q: Sequence[float]) -> float:
-        """Returns the smallest distance of any pair, however far apart it is [m]."""
-        self._place(np.asarray(q))
-        return min(map(self._distance, range(len(self._shapes.collisionPairs))))
-
-    def judge_only(self, names: Iterable[str]) -> None:
-        """Judges the distances to some boxes only, by name."""
-        shapes = {f"{name}_0" for name in names}
-        for numbers in [(pair.first, pair.second) for pair in self._shapes.collisionPairs]:
-            if not shapes & {self._shapes.geometryObjects[i].name for i in numbers}:
-                self._shapes.removeCollisionPair(pinocchio.CollisionPair(*numbers))
-        self._watch()
 
     def distances(self, q: Sequence[float]) -> np.ndarray:
         """Returns how far the things of each pair are apart, at most `FAR_M` [m]."""

@@ -10,10 +10,8 @@ from pathlib import Path
 import pytest
 from node_world import main_config
 from release_types import MESSAGES, SERVICES
-from ros_system import SUPPORT, wait_until
+from ros_system import SUPPORT
 from roslaunch import substitution_args
-from std_srvs.srv import SetBool
-from tf2_msgs.msg import TFMessage
 from worlds import iiwa
 
 from ik_ros.lookup import make_solver
@@ -78,18 +76,6 @@ FILES = {
     "teleop/configs/teleop_tf_demo_spacenav_config.yaml": "axes_idx: [1, 0, 2, 4, 3, 5]",
 }
 """Files that launch files of the release name, with a text in each."""
-LAUNCH = """<launch>
-  <node pkg="ik_ros_examples" type="figure_eight_node.py" name="figure_eight"/>
-  <node pkg="tf" type="static_transform_publisher" name="tool" args="1 0 0 0 0 0 arm_tip tool 50"/>
-  <node pkg="operator_node" type="scale_node.py" name="scale">
-    <rosparam param="config" file="$(find operator_node)/configs/keyboard/keyboard_scale.yaml"/>
-    <param name="start_on_init" value="true"/>
-  </node>
-  <node pkg="teleop" type="teleop_tf_node.py" name="teleop">
-    <rosparam param="config" file="$(find teleop)/configs/teleop_tf_demo_config.yaml"/>
-    <param name="start_on_init" value="true"/>
-  </node>
-</launch>"""
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -103,21 +89,6 @@ def test_solvers_take_its_robots(robot, tip):
     chain = {"base_link": "lwr_arm_0_link", "tip_link": tip}
     solver = make_solver("trac_ik", {"urdf_filename": f"{{ik_ros_examples}}/robots/{robot}.urdf", **chain})
     assert len(solver.joint_names) == 7
-
-
-def test_a_launch_file_starts_nodes_under_their_names(ros, tmp_path):
-    (tmp_path / "release.launch").write_text(LAUNCH)
-    frames = ros.listen("/tf", TFMessage)
-    ros.start(["roslaunch", str(tmp_path / "release.launch")])
-    expected = {("figure_eight_base", "figure_eight"), ("arm_tip", "tool"), ("tf_start", "tf_target")}
-
-    def known() -> set[tuple[str, str]]:
-        transforms = [each for message in list(frames.messages) for each in message.transforms]
-        return {(each.header.frame_id, each.child_frame_id) for each in transforms}
-
-    wait_until(lambda: known() >= expected, f"{expected} are on /tf")
-    assert not ros.call("toggle_figure_eight", SetBool, True).success, "it moves from the start"
-    assert not ros.call("operator_node/toggle", SetBool, True).success, "it is on from the start"
 
 
 SCRIPT = """

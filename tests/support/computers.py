@@ -8,10 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from pathlib import Path
-from typing import Any
 
-import rosgraph
 from ros_system import SUPPORT, RosSystem, find_executable, wait_until
 
 MASTER_PORT = 11500

@@ -1,15 +1,14 @@
-"""An operator on another computer: swings a joint by targets, and prints what comes back, as JSON lines.
+"""An operator on another computer: swings a joint by targets, others stay, and prints what comes back, as JSON lines.
 
-Arguments: the topic of joint states, the topic of targets, the joint, targets a second, and the swing's amplitude [rad].
-Lines have the number of joint states so far, the ROS time and the stamp of the newest [s], its position, effort and the
-newest target; `lag_s` is how long ago the swing was where the joint is now, on average over the last two seconds.
+Arguments: the topic of joint states, the topic of targets, the joint, targets a second and the swing's amplitude [rad].
+Lines have the number of joint states so far, the stamp of the newest [s], its position, the newest target and the
+largest effort since the last line; `lag_s` is how far positions are behind the swing, on average over two seconds.
 """
 
 from __future__ import annotations
 
 import json
 import math
-import sys
 import threading
 import time
 from collections import deque
@@ -24,9 +23,9 @@ PERIOD_S, REPORT_S = 4.0, 0.25
 def main() -> None:
     """Runs until the master's node ends it."""
     states, targets, joint, hz, amplitude = rospy.myargv()[1:]
-    rospy.init_node("operator", disable_rostime=True)
+    rospy.init_node("operator")
     publisher = rospy.Publisher(targets, JointState, queue_size=100, tcp_nodelay=True)
-    recent: deque[tuple[float, float, float]] = deque(maxlen=4000)
+    recent: deque[tuple[float, float]] = deque(maxlen=4000)
     count, newest, effort_max = 0, None, 0.0
 
     def take(message: JointState) -> None:
@@ -35,13 +34,13 @@ def main() -> None:
         count += 1
         newest = message
         effort_max = max(effort_max, abs(message.effort[index]))
-        recent.append((time.monotonic() - start_s, message.position[index], abs(message.effort[index])))
+        recent.append((time.monotonic() - start_s, message.position[index] - begin))
 
     def report() -> None:
         nonlocal effort_max
         while not rospy.is_shutdown():
             time.sleep(REPORT_S)
-            if newest is not None:
+            if newest is not None and recent:
                 index = newest.name.index(joint)
                 line = {
                     "count": count,
@@ -54,15 +53,24 @@ def main() -> None:
                 effort_max = 0.0
                 print(json.dumps(line), flush=True)
 
-    start_s, target = time.monotonic(), 0.0
+    start_s, begin, target = time.monotonic(), 0.0, 0.0  # until the first target
     rospy.Subscriber(states, JointState, take, queue_size=1000, tcp_nodelay=True)
     threading.Thread(target=report, daemon=True).start()
-    due_s = start_s
+    while newest is None and not rospy.is_shutdown():
+        time.sleep(0.01)
+    names, others = newest.name, list(newest.position)
+    begin = others[names.index(joint)]
+    recent.clear()
+    start_s = due_s = time.monotonic()
+    stamp = rospy.Time()
     while not rospy.is_shutdown():
-        target = swing(time.monotonic() - start_s, float(amplitude))
-        message = JointState(name=[joint], position=[target])
-        message.header.stamp = rospy.Time.from_sec(time.time())
-        publisher.publish(message)
+        target = begin + swing(time.monotonic() - start_s, float(amplitude))
+        position = [target if name == joint else value for name, value in zip(names, others, strict=True)]
+        message = JointState(name=names, position=position)
+        message.header.stamp = rospy.get_rostime()
+        if message.header.stamp > stamp:  # simulated time may come late, and stand still meanwhile
+            publisher.publish(message)
+            stamp = message.header.stamp
         due_s += 1.0 / float(hz)
         time.sleep(max(0.0, due_s - time.monotonic()))
 
@@ -72,9 +80,9 @@ def swing(time_s: float, amplitude: float) -> float:
     return 0.5 * amplitude * (1.0 - math.cos(2.0 * math.pi * time_s / PERIOD_S))
 
 
-def lag_s(samples: list[tuple[float, float, float]], amplitude: float) -> float:
+def lag_s(samples: list[tuple[float, float]], amplitude: float) -> float:
     """Returns by how much positions of the last two seconds are behind the swing, to 2 ms."""
-    rows = np.array([each[:2] for each in samples if each[0] > samples[-1][0] - PERIOD_S / 2])
+    rows = np.array([each for each in samples if each[0] > samples[-1][0] - PERIOD_S / 2])
     shifts = np.arange(0.0, 1.0, 0.002)
     errors = [
         np.mean((rows[:, 1] - 0.5 * amplitude * (1 - np.cos(2 * np.pi * (rows[:, 0] - shift) / PERIOD_S))) ** 2)

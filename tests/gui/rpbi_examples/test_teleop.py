@@ -1,29 +1,29 @@
 """Real key presses, mouse drags, and joystick and 6-D mouse by what stands in for them, move the arm of the example.
 
-With the environment variable TELEOP_DEVICES=all they all do, else the keys, which leaves half a minute to other tests.
+With it moves what stands in for a real robot.
 """
 
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
 import rospy
 from ros_system import RosSystem, stop_group, wait_until
-from sensor_msgs.msg import Joy
+from sensor_msgs.msg import JointState, Joy
 from std_msgs.msg import Float64MultiArray
 
 from operator_node.emulators.spacenavd import SpacenavDaemon
+from operator_node.parser import reconstruct_interface_log_msg
 
 SLOW_S = 120.0
+REAL = "rpbi/real/joint_states/target"
 TARGET, TIP = "rpbi/teleop_tip", "rpbi/kuka_lwr/end_effector_ball"
 AWAY, RIGHT, UP = np.array([-1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 """Directions of a person who stands behind the arm, in the world."""
 SPEED = "speed:=0.4"
-all_devices = pytest.mark.skipif(os.environ.get("TELEOP_DEVICES") != "all", reason="runs with TELEOP_DEVICES=all")
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def example(ros_master, screen, tmp_path_factory) -> Iterator[RosSystem]:
     """The example, in which the arm is at its target."""
     system = RosSystem(tmp_path_factory.mktemp("teleop"))
     try:
-        arguments = ("teleop.launch", "headless:=true", "ik_hz:=30", SPEED)
+        arguments = ("teleop.launch", "headless:=true", "ik_hz:=30", "logger:=true", "real_robot:=true", SPEED)
         process = system.start(["roslaunch", "rpbi_examples", *arguments], **screen.environment)
         wait_until(lambda: "the arm tracks its target" in system.output(process), "the arm is there", SLOW_S)
         yield system
@@ -97,7 +97,34 @@ def test_keys_move_the_arm(screen, follows):
         follows(direction, nothing, lambda: screen.run("xdotool", "keyup", key))  # noqa: B023 (it is called here)
 
 
-@all_devices
+def test_what_stands_in_for_a_real_robot_has_followed(example):
+    arm, real = (example.listen(topic, JointState) for topic in ("rpbi/kuka_lwr/joint_states", REAL))
+
+    def follows() -> bool:
+        if not (arm.messages and real.messages):
+            return False
+        there, here = (dict(zip(each.messages[-1].name, each.messages[-1].position)) for each in (real, arm))
+        return all(abs(there[name] - here[name]) < 0.02 for name in there)
+
+    wait_until(follows, "it stands where the arm does", SLOW_S)
+
+
+def test_the_logger_has_the_signals_of_the_last_second(example, screen):
+    windows = example.listen("operator_node/window", Float64MultiArray)
+    screen.run("xdotool", "search", "--sync", "--name", "keyboard", "windowfocus", "--sync", "keydown", "Left")
+    try:
+
+        def has_them() -> bool:
+            if not windows.messages:
+                return False
+            times_s, signals = reconstruct_interface_log_msg(windows.messages[-1], Nd=3)
+            return 0.5 < times_s[-1] - times_s[0] <= 1.0 and bool((signals[0, -5:] < 0.0).all())
+
+        wait_until(has_them, "the window has the signal to the left")
+    finally:
+        screen.run("xdotool", "keyup", "Left")
+
+
 def test_mouse_moves_the_arm(example, screen, follows):
     with device(example, screen, "mouse"):
         screen.run(
@@ -107,7 +134,6 @@ def test_mouse_moves_the_arm(example, screen, follows):
         follows(-RIGHT, nothing, lambda: screen.run("xdotool", "mouseup", "1"))
 
 
-@all_devices
 def test_joystick_moves_the_arm(example, screen, follows):
     with device(example, screen, "joystick", "virtual:=true"):
         stick, joy = rospy.Publisher("joy/virtual", Joy, queue_size=10), example.listen("joy", Joy)
@@ -120,7 +146,6 @@ def test_joystick_moves_the_arm(example, screen, follows):
         stick.unregister()
 
 
-@all_devices
 def test_6d_mouse_moves_the_arm(example, screen, follows, tmp_path):
     cap = SpacenavDaemon(tmp_path / "spnav.sock")
     with device(example, screen, "spacenav", SPNAV_SOCKET=str(cap.path)):
@@ -129,7 +154,6 @@ def test_6d_mouse_moves_the_arm(example, screen, follows, tmp_path):
     cap.close()
 
 
-@all_devices
 def test_virtual_haptic_device_moves_the_arm(example, screen, follows):
     with device(example, screen, "virtual"):
         screen.run("xdotool", "search", "--sync", "--name", "Virtual haptic device", "windowraise")

@@ -32,6 +32,7 @@ from worlds import FLOOR, ball, iiwa
 from custom_ros_tools.ros.lifecycle.run_node import MOST_FILES
 from custom_ros_tools.ros.tf_listener import END_OF_TIME_S
 from ros_pybullet_interface.msg import PybulletObject
+from ros_pybullet_interface.srv import StepN
 
 NODE = "/ros_pybullet_interface"
 CALLS, MESSAGES = 400, 100
@@ -145,6 +146,23 @@ def test_garbage_in_services_is_answered(ros, node):
                 pytest.fail(f"{name} does not answer {request}")
     assert len(answers) == CALLS
     assert not any("$6$" in answer or "root:" in answer for answer in answers)
+    ros.call("/rpbi/reset", Trigger)
+    _is_well(ros, node)
+
+
+def test_long_texts_are_not_repeated_and_work_without_end_is_refused(ros, node):
+    long = "a" * 20_000
+    for name in _of_node(2):
+        request = rosservice.get_service_class_by_name(name)._request_class()
+        for field, type_name in zip(request.__slots__, request._slot_types):
+            if type_name.startswith("string"):
+                setattr(request, field, long if type_name == "string" else [long])
+        if hasattr(request, "pybullet_object"):
+            request.pybullet_object.config = f"{long}: {long}"
+        assert len(_answer(name, request)) < 6_000, name
+    ros.call("/rpbi/stop", Trigger)
+    answer = ros.call("/rpbi/step_n", StepN, 2**32 - 1)
+    assert not answer.success and answer.message.startswith("steps: expected at most 1000000, got 4294967295")
     ros.call("/rpbi/reset", Trigger)
     _is_well(ros, node)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import pytest
 import rospy
@@ -55,7 +56,7 @@ def commands(listened):
 
 
 @pytest.mark.quick
-def test_world_goes_at_another_pace_and_tells_it(ros, simulator):
+def test_world_goes_at_another_pace_and_tells_it_and_once_why_it_cannot(ros, simulator):
     states, diagnostics = ros.listen("/rpbi/state", SimulationState), ros.listen("/diagnostics", DiagnosticArray)
     answer = ros.call("/rpbi/set_real_time_factor", SetRealTimeFactor, 0.1)
     assert (answer.success, answer.message) == (True, "0.1, was 1")
@@ -71,6 +72,15 @@ def test_world_goes_at_another_pace_and_tells_it(ros, simulator):
         "it goes as fast as it goes",
     )
     assert not states.messages[-1].commands, "pace is no matter of the world"
+
+    def said():
+        return re.findall(r"too slow: real-time factor .* instead of .*: .* \(docs/slow.md\)", ros.output(simulator))
+
+    ros.call("/rpbi/set_real_time_factor", SetRealTimeFactor, 1e4)
+    wait_until(said, "why it is slower than asked for")
+    diagnostics.messages.clear()
+    diagnostics.wait_for(1)
+    assert len(said()) == 1
 
 
 def test_gravity_is_a_command_and_a_reset_brings_it_back(ros, simulator):

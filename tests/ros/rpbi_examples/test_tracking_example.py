@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+from apriltag_ros.msg import AprilTagDetectionArray
 from geometry_msgs.msg import TransformStamped
 from node_world import Rosout
 from ros_system import RosSystem, wait_until
@@ -58,3 +59,17 @@ def test_the_twin_has_the_box_where_vicon_sees_it_and_drops_it_where_it_does_not
     since_s = seen.header.stamp.to_sec()  # TF may be heard before
     tracked = frames(tf, "twin/rpbi/world", "tracked/box", since_s)
     assert tracked and all(min(math.dist((p.x, p.y), (q.x, q.y)) for q in path) < 0.02 for p in tracked[::20])
+
+
+def test_the_twin_has_the_box_where_a_camera_detects_its_tag(ros):
+    ros.start(["roslaunch", "rpbi_examples", "tracking_example.launch", "headless:=true", "tracker:=april_tags"])
+    tf = ros.listen("/tf", TFMessage)
+    seen = ros.listen("/lab/tag_detections", AprilTagDetectionArray)
+    wait_until(lambda: any(each.detections for each in seen.messages), "the tag is detected", SLOW_S)
+
+    def lifted():
+        return [p for p in frames(tf, "twin/rpbi/world", "twin/rpbi/box")[1:] if abs(p.z - CARRIED_Z) < 0.02]
+
+    wait_until(lambda: len(lifted()) > 20, "the twin lifts the box", SLOW_S)
+    path = frames(tf, "lab/figure_eight_base", "lab/figure_eight")
+    assert all(min(math.dist((p.x, p.y), (q.x, q.y)) for q in path) < 0.03 for p in lifted()[10::5])

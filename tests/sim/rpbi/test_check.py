@@ -45,7 +45,7 @@ def test_warnings_are_told_apart_from_errors_and_only_errors_fail(tmp_path):
     code, lines, told = check("world.yaml", tmp_path)
     assert (code, told) == (
         0,
-        ["warning: floor.yaml: at the start, 'floor' and 'box' are in each other by 0.05 m, and will be pushed apart"],
+        ["warning: floor.yaml: at the start, 'floor' and 'box' overlap by 0.05 m, and will be pushed apart"],
     )
     assert lines[0] == "world.yaml: fine; 1000 ticks a second, 1 warning"
     write_world(tmp_path, collision=(BOX_FLOOR,), dynamic=(ball(radius=1.0), {**sunk, "mass": 1.0}))
@@ -55,6 +55,23 @@ def test_warnings_are_told_apart_from_errors_and_only_errors_fail(tmp_path):
         "error: ball.yaml: radius",
         "error: box.yaml: mass",
         "world.yaml: 2 errors",
+    ]
+
+
+def test_meshes_that_are_missing_are_told_together_with_all_else(tmp_path):
+    mesh = "<visual><geometry><mesh filename='none.stl'/></geometry></visual>"
+    (tmp_path / "cup.urdf").write_text(f"<robot name='cup'><link name='cup'>{mesh}</link></robot>")
+    cup = {"loadURDF": {"fileName": "cup.urdf"}}
+    write_world(tmp_path, dynamic=(box(baseMas=1.0),), urdfs=({**cup, "name": "a"}, {**cup, "name": "b", "hz": 1}))
+    code, lines, told = check("world.yaml", tmp_path)
+    assert (code, lines) == (1, [])
+    missing = f"loadURDF.fileName: {tmp_path}/cup.urdf: no such mesh: none.stl"
+    assert [line.split(" (looked")[0].split("; ")[0] for line in told] == [
+        "error: box.yaml: baseMas: unknown key 'baseMas'",
+        "error: b.yaml: hz: unknown key 'hz'",
+        f"error: a.yaml: {missing}",
+        f"error: b.yaml: {missing}",
+        "world.yaml: 4 errors",
     ]
 
 

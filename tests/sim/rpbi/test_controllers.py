@@ -223,7 +223,7 @@ def test_a_cartesian_spring_goes_to_its_target_at_the_largest_stiffness(build):
         pose = Pose((x, y + 0.004 * number, z), tuple(-part for part in quat))  # the same orientation
         world.put("lwr/hold/target", PoseTarget(pose, round(1e9 + 2e7 * number)))
         run(world, 20)
-    run(world, 800)
+    run(world, 1200)
     assert controller._pose().position == pytest.approx((x, y + 0.1, z), abs=1e-4)
     assert world.bodies["lwr"].controllers.sample("lwr", "hold").values["turn/x"] == pytest.approx(0.0, abs=1e-3)
 

@@ -105,6 +105,10 @@ FAULTS = {
     ),
     "a format as a material": (_urdf(_links("a"), '<material name="%n"/>'), "material '%n': material.name: expected"),
     "a terminal's sequence": (_urdf(_links("a&#27;[2J&#10;").replace("&#27;", "\x7f")), r"got 'a\x7f[2J\n'"),
+    "no type": (
+        _urdf(_links("a", "b"), JOINT.format("j", "fixed", "a", "b").replace("type", "kind")),
+        "joint 'j': type: expected one of revolute, continuous, prismatic, fixed, floating, planar, spherical, got ''",
+    ),
     "a text for a number": (_urdf(MASSES.format("a", "heavy")), "mass.value: expected numbers, got 'heavy'"),
     "nothing for a number": (_urdf(MASSES.format("a", "")), "mass.value: expected numbers, got ''"),
     "two numbers for three": (
@@ -130,7 +134,7 @@ FAULTS = {
         "no such mesh: no.obj (looked for beside it and in all folders above)",
     ),
     "deep": ("<robot>" + "<a>" * 100_000, "is not XML: "),
-    "deep, and closed": ("<robot>" + "<a>" * 100_000 + "</a>" * 100_000 + "</robot>", "in at most 100 others"),
+    "deep, and closed": ("<robot>" + "<a>" * 20_000 + "</a>" * 20_000 + "</robot>", "in at most 100 others"),
     "too long": ("<robot>" + " " * 2_000_000 + "</robot>", "expected at most 2000000"),
     "comments that never end": ("<!-- " * 390_000, "is not XML"),
     "robots that never begin": ("<robot" * 300_000, "is not XML"),
@@ -180,6 +184,12 @@ BROKEN = {
     "collision, no scene": (COLLISION, "no.dae", "<COLLADA/>", "PyBullet cannot load it"),
     "visual, nothing": (VISUAL, "empty.obj", "# nothing", "PyBullet cannot load it: it gets nothing out of it"),
     "collision, nothing": (COLLISION, "empty.obj", "# nothing", "PyBullet cannot load it"),
+    "corners that there are not": (
+        COLLISION,
+        "few.obj",
+        "v 0 0 0\nf 1 1 9",
+        "PyBullet cannot load it: a face names 'v' 9",
+    ),
 }
 
 

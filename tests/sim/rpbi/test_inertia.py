@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
+import pybullet_data
 import pytest
 from worlds import iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.samples import JointStateSample
+from rpbi.samples import JointStateSample, LinkPoseSample, WrenchSample
+from rpbi.urdf.copies import frame_masses
+from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
+from rpbi.world_warnings import world_warnings
 
 DT_S = 0.001
 BOX = '<collision><geometry><box size="0.1 0.2 0.3"/></geometry></collision>'
@@ -119,3 +123,96 @@ def test_flags_of_the_user_stay(build, tmp_path):
     body_id = world.bodies["bell"].body_id
     assert world.pb.getDynamicsInfo(body_id, 0)[2] == pytest.approx((0.01, 0.02, 0.025))
     assert not world.pb.getCollisionShapeData(body_id, 0)
+
+
+FRAME = (
+    '<link name="{name}"/><joint name="to_{name}" type="fixed"><parent link="{parent}"/><child link="{name}"/></joint>'
+)
+"""A link that is a mere frame."""
+
+
+def with_frames(urdf, *parents):
+    """Returns a URDF with a mere frame on each of these links."""
+    frames = [FRAME.format(name=f"frame{number}", parent=parent) for number, parent in enumerate(parents)]
+    return urdf.replace("</robot>", "".join(frames) + "</robot>")
+
+
+WRIST = f"""<robot name="arm"><link name="base"/><link name="tool">{inertial(1e-3, 1e-3, 1e-3, 0.5)}{BOX}</link>
+<joint name="wrist" type="fixed"><parent link="base"/><child link="tool"/><origin xyz="0 0 1"/></joint></robot>"""
+
+
+def test_a_frame_at_a_tool_weighs_nothing(build, tmp_path):
+    (tmp_path / "arm.urdf").write_text(with_frames(WRIST, "tool", "frame0"))
+    sensors = {
+        "enabled_joint_force_torque_sensors": [{"joint": "wrist", "hz": 1 / DT_S}],
+        "broadcast_link_states": True,
+    }
+    arm = iiwa("arm", loadURDF={"fileName": str(tmp_path / "arm.urdf"), "useFixedBase": True}, **sensors)
+    world = build(robots=(arm,), setGravity={"gravZ": -9.81})
+    samples = [*world.step(), *world.read_rest()]
+    (wrench,) = [sample for sample in samples if isinstance(sample, WrenchSample)]
+    assert wrench.force == pytest.approx((0.0, 0.0, 0.5 * 9.81), abs=1e-6)
+    (links,) = [sample for sample in samples if isinstance(sample, LinkPoseSample)]
+    assert {frame.rpartition("/")[2] for frame in links.frames} >= {"tool", "frame0", "frame1"}, "they stay"
+    assert world_warnings(world) == []
+
+
+@pytest.mark.parametrize("is_fixed", [True, False])
+def test_what_moves_moves_as_without_frames(build, tmp_path, is_fixed):
+    """A bell on a hinge, or thrown with its hinge, the root of which is a frame then."""
+    bell = swinging(inertial(0.3, 0.2, 0.1, mass=2.0).replace("<mass", '<origin xyz="0 0.1 -0.2"/><mass'))
+    if not is_fixed:
+        bell = bell.replace('<link name="frame"/>', f'<link name="frame">{inertial(0.1, 0.1, 0.1)}{BOX}</link>')
+    framed = with_frames(bell, "lump", "frame", "frame0")
+    if not is_fixed:
+        foot = FRAME.format(name="foot", parent="").replace(
+            'parent link=""/><child link="foot"', 'parent link="foot"/><child link="frame"'
+        )
+        framed = framed.replace("</robot>", f"{foot}</robot>")
+    objects = []
+    for name, text in (("bare", bell), ("framed", framed)):
+        (tmp_path / f"{name}.urdf").write_text(text)
+        load = {"fileName": str(tmp_path / f"{name}.urdf"), "useFixedBase": is_fixed, "basePosition": [0, 0, 1]}
+        start = (
+            {}
+            if is_fixed
+            else {"resetBaseVelocity": {"linearVelocity": [1.0, 0.0, 2.0], "angularVelocity": [1.0, 2.0, 3.0]}}
+        )
+        objects.append({"name": name, "loadURDF": load, **start})
+    moves = []
+    for each in objects:
+        world = build(urdfs=(each,), setGravity={"gravY": -4.0, "gravZ": -9.81})
+        body = world.bodies[each["name"]]
+        for _ in range(300):
+            world.step()
+        hinge = next(i for i in body.joint_indices if world.pb.getJointInfo(body.body_id, i)[1] == b"hinge")
+        moves.append((*body.base_pose().position, *world.pb.getJointState(body.body_id, hinge)[:2]))
+    assert moves[1] == pytest.approx(moves[0], rel=1e-4, abs=1e-6)
+    assert abs(moves[0][3]) > 0.05, "it swings"
+
+
+def test_links_whose_mass_nobody_says_are_told_if_they_can_move(build, tmp_path):
+    (tmp_path / "bell.urdf").write_text(with_frames(swinging(""), "lump"))
+    load = {"fileName": str(tmp_path / "bell.urdf")}
+    fixed = build(urdfs=({"name": "bell", "loadURDF": {**load, "useFixedBase": True}},), setGravity={"gravZ": -9.81})
+    (told,) = world_warnings(fixed)
+    assert (told.key, told.message) == (
+        "loadURDF.fileName",
+        "without <inertial>, PyBullet gives 1 kg to each of these links: lump",
+    )
+    free = build(urdfs=({"name": "bell", "loadURDF": load},), setGravity={"gravZ": -9.81})
+    assert world_warnings(free)[0].message.endswith(": frame, lump"), "nothing is fixed to its root"
+
+
+def test_a_urdf_without_frames_is_loaded_as_it_is():
+    for file in ("kuka_iiwa/model.urdf", "franka_panda/panda.urdf", "r2d2.urdf", "humanoid/humanoid.urdf"):
+        document = UrdfDocument(f"{pybullet_data.getDataPath()}/{file}")
+        assert frame_masses(document, is_fixed=True) == {}
+
+
+def test_a_root_that_is_called_world_stays_fixed(build):
+    load = {"fileName": f"{pybullet_data.getDataPath()}/xarm/xarm6_robot.urdf"}
+    world = build(urdfs=({"name": "arm", "loadURDF": load},), setGravity={"gravZ": -9.81})
+    for _ in range(10):
+        world.step()
+    assert world.bodies["arm"].base_pose().position == (0.0, 0.0, 0.0)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import pybullet
 import pybullet_data
 import pytest
 from worlds import iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError
+from rpbi.kinematics import Kinematics
 from rpbi.urdf.copies import description_for_ros
 from rpbi.world import World
 
@@ -66,6 +69,15 @@ def test_every_robot_of_pybullets_data_loads_and_holds_still(build, name):
         world.step()
     assert len(world.bodies["robot"].joints) > 5
     assert description_for_ros(str(DATA / f"{name}.urdf")).count("package://") == 0
+
+
+def test_a_root_that_is_not_the_first_link_is_kept_in_the_order_of_links(tmp_path):
+    joint = "<joint name='j' type='fixed'><parent link='b'/><child link='a'/></joint>"
+    (tmp_path / "x.urdf").write_text(f"<robot name='x'>{link('a')}{link('b')}{joint}</robot>")
+    load = {"fileName": "x.urdf", "flags": "URDF_MAINTAIN_LINK_ORDER"}  # without it, PyBullet ends with signal 11
+    with contextlib.closing(World.from_file(write_world(tmp_path, urdfs=({"name": "x", "loadURDF": load},)))) as world:
+        assert [world.bodies["x"].link_name(index) for index in (-1, 0)] == ["b", "a"]
+    assert Kinematics(str(tmp_path / "x.urdf"), flags=pybullet.URDF_MAINTAIN_LINK_ORDER).joint_names == ()
 
 
 def test_package_with_three_slashes_is_package_with_two(build, tmp_path, monkeypatch):

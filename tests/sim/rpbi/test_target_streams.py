@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import random
+from collections import deque
 
 import numpy as np
 import pytest
@@ -16,6 +18,8 @@ DT_S = 0.002
 EVERY = 10
 """Ticks between two targets of a stream at 50 Hz."""
 TICKS = 1500
+BUFFER_S = 0.02 - 1.5 * DT_S
+"""Delay by the jitter buffer, which counts one and a half ticks for itself."""
 
 
 def swing(time_s: float) -> float:
@@ -63,7 +67,9 @@ def test_a_stream_needs_no_more_effort_than_targets_at_every_tick(build):
     assert hold > 5.0 * ideal
 
 
-@pytest.mark.parametrize("mode, lag_s", [("smooth", 1.5 * EVERY * DT_S), ("linear", EVERY * DT_S)])
+@pytest.mark.parametrize(
+    "mode, lag_s", [("smooth", 1.5 * EVERY * DT_S + BUFFER_S), ("linear", EVERY * DT_S + BUFFER_S)]
+)
 def test_a_stream_is_followed_with_a_known_lag(build, mode, lag_s):
     position, velocity, _ = follow(build(mode), EVERY).T
     times_s = (np.arange(300, TICKS) + 1) * DT_S - lag_s
@@ -75,11 +81,57 @@ def test_a_stream_is_followed_with_a_known_lag(build, mode, lag_s):
 def test_velocities_are_fed_forward(build):
     """A stream that tells them lags by one period, targets at every tick do not lag at all."""
     times_s = (np.arange(300, TICKS) + 1) * DT_S
-    for every, lag_s in ((EVERY, EVERY * DT_S), (1, DT_S)):
+    for every, lag_s in ((EVERY, EVERY * DT_S + BUFFER_S), (1, DT_S)):
         position = follow(build(), every, velocities=True)[:, 0]
         assert position == pytest.approx([swing(each - lag_s) for each in times_s], abs=1e-3)
     without = follow(build(), 1)[:, 0]
     assert np.abs(without - [swing(each) for each in times_s]).max() > 0.02
+
+
+def jittery(rng: random.Random, stamps: str, jitter_s: float, stall_s: float = 0.0) -> list[tuple[float, float, int]]:
+    """Returns arrival [s], time of the sample [s] and stamp [ns] of targets at 50 Hz, one of them with a stall."""
+    targets, latest_s = [], 0.0
+    for number in range(round(TICKS / EVERY)):
+        sample_s = number * EVERY * DT_S
+        late_s = stall_s if stall_s and number == 100 else rng.uniform(0.0, jitter_s)
+        latest_s = max(latest_s, sample_s + late_s)
+        stamp_s = {"sample": sample_s, "sending": latest_s, "none": -1.0}[stamps]
+        targets.append((latest_s, sample_s, round(1e9 * (1.0 + stamp_s))))
+    return targets
+
+
+def follow_jittery(world: World, targets: list[tuple[float, float, int]], velocities: bool) -> tuple[float, float]:
+    """Returns the largest effort [N m] of the first joint and its mean lag [s]."""
+    arm = world.bodies["iiwa"]
+    index, waiting, states = arm.model[FIRST].index, deque(targets), []
+    for tick in range(TICKS):
+        while waiting and waiting[0][0] <= tick * DT_S + 1e-9:
+            _, sample_s, stamp_ns = waiting.popleft()
+            velocity = [swing_velocity(sample_s)] if velocities else []
+            world.put("iiwa/target", JointTarget([FIRST], [swing(sample_s)], velocity, stamp_ns=stamp_ns))
+        world.step()
+        position, _, _, effort = arm.pb.getJointState(arm.body_id, index)
+        time_s = (tick + 1) * DT_S
+        states.append((position - swing(time_s), swing_velocity(time_s), effort))
+    error, velocity, effort = np.array(states)[400:].T
+    return float(np.abs(effort).max()), float(-(error @ velocity) / (velocity @ velocity))
+
+
+@pytest.mark.parametrize(
+    "stamps, velocities", [("sample", False), ("sending", False), ("sending", True), ("none", False)]
+)
+def test_jitter_costs_little_effort_and_lag(build, stamps, velocities):
+    ideal = np.abs(follow(build(), 1, velocities)[100:, 2]).max()
+    effort, lag_s = follow_jittery(build(), jittery(random.Random(7), stamps, 0.012), velocities)
+    assert effort < 1.2 * ideal
+    assert lag_s < 0.051
+
+
+@pytest.mark.parametrize("velocities", [False, True])
+def test_a_stall_costs_little_effort(build, velocities):
+    ideal = np.abs(follow(build(), 1, velocities)[100:, 2]).max()
+    effort, _ = follow_jittery(build(), jittery(random.Random(0), "sending", 0.0, 0.03), velocities)
+    assert effort < 1.5 * ideal
 
 
 def test_a_single_target_acts_at_the_next_tick(build):

@@ -65,8 +65,8 @@ def test_bodies_in_each_other_are_told_with_the_depth(warnings_of):
     other = box("other", basePosition=[1.18, 0.0, 0.1])
     told = warnings_of(collision=(BOX_FLOOR,), dynamic=(low, other), robots=(iiwa(),))
     assert told == [
-        "floor.yaml: at the start, 'floor' and 'low' are in each other by 0.04 m, and will be pushed apart",
-        "low.yaml: at the start, 'low' and 'other' are in each other by 0.02 m, and will be pushed apart",
+        "floor.yaml: at the start, 'floor' and 'low' overlap by 0.04 m, and will be pushed apart",
+        "low.yaml: at the start, 'low' and 'other' overlap by 0.02 m, and will be pushed apart",
     ]
 
 
@@ -83,9 +83,7 @@ def test_bodies_that_follow_a_frame_are_looked_at_where_the_main_file_puts_it(wa
     thing = box("thing", basePosition=[3.0, 0.0, 0.15])
     poses = [{"tf_id": "rpbi/table", "position": [3.0, 0.0, 0.0]}]
     told = warnings_of(collision=(table,), dynamic=(thing,), poses=poses)
-    assert told == [
-        "table.yaml: at the start, 'table' and 'thing' are in each other by 0.05 m, and will be pushed apart"
-    ]
+    assert told == ["table.yaml: at the start, 'table' and 'thing' overlap by 0.05 m, and will be pushed apart"]
     at_origin = box("thing", basePosition=[0.0, 0.0, 0.15])
     assert warnings_of(collision=(table,), dynamic=(at_origin,), poses=poses) == []
 
@@ -194,3 +192,11 @@ def test_no_page_and_no_template_shows_a_plane_to_copy():
     }
     assert len(texts) > 40
     assert [path.name for path, text in texts.items() if "GEOM_PLANE" in text] == []
+
+
+def test_bodies_in_maximal_coordinates_of_which_pybullet_tells_no_shapes_have_warnings_too(warnings_of):
+    cube = {"name": "cube", "loadURDF": {"fileName": "cube_small.urdf", "useMaximalCoordinates": True}}
+    found = warnings_of(
+        collision=(FLOOR,), urdfs=({**cube, "loadURDF": {**cube["loadURDF"], "basePosition": [0, 0, 1]}},)
+    )
+    assert any("cube" in each for each in found)

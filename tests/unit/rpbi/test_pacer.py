@@ -3,7 +3,7 @@
 import pytest
 
 from rpbi.engine import pacer
-from rpbi.engine.pacer import MAX_DEBT_S, Pacer
+from rpbi.engine.pacer import MAX_DEBT_S, Load, Pacer
 
 
 @pytest.fixture
@@ -92,3 +92,16 @@ def test_a_start_after_a_stop_makes_nothing_up(wall):
     assert pace.is_due()
     assert not pace.is_due()
     assert pace.overruns == 0
+
+
+@pytest.mark.parametrize(
+    ("spent", "said"),
+    [
+        (Load(1.0, 0.4, 0.45, 0.3, 400), "the simulation got 40 % of a processor, since the machine is busy"),
+        (Load(1.0, 0.4, 0.9, 0.3, 400), "got 40 % of a processor, other threads of the node 50 %"),
+        (Load(1.0, 0.98, 1.0, 0.8, 400), "PyBullet takes 2 ms for a step of 1 ms"),
+        (Load(1.0, 0.98, 1.0, 0.2, 400), "sensors, controllers and messages take 2 ms a tick, PyBullet 0.5 ms"),
+    ],
+)
+def test_what_slows_a_world_down_is_named(spent, said):
+    assert said in spent.reason(0.001)

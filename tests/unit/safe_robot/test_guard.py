@@ -41,8 +41,10 @@ def test_reject_sends_nothing_from_the_first_unsafe_target_on_until_it_is_starte
     assert decide(guard, (0.0, 0.0)).command == (0.0, 0.0)
     decision = decide(guard, (0.1, 0.0))
     assert decision.command is None and decision.is_halted
-    assert decision.violation == Violation("joint_velocity", "joint 'slide'", pytest.approx(10.0), 0.95, "m/s")
-    assert str(decision.violation) == "joint_velocity: joint 'slide' would have 10 m/s; the limit is 0.95"
+    assert decision.violation == Violation(
+        "joint_velocity", "joint 'slide'", pytest.approx(10.0), 0.95, "m/s", quantity="velocity"
+    )
+    assert str(decision.violation) == "joint_velocity: joint 'slide': velocity is 10 m/s, limit 0.95 m/s"
     assert decide(guard, (0.0, 0.0)) == Decision(None, is_halted=True)
     guard.start()
     assert decide(guard, (0.0, 0.0)).command == (0.0, 0.0)
@@ -228,6 +230,20 @@ class TestInsideTheMargin:
         assert out.is_locked or out.direction[1] == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize("jerk", [200.0, 300.0, 1000.0])
+def test_a_joint_passes_no_target_that_stands_still(tmp_path, jerk):
+    """Neither by going on after a target that it reaches too fast, nor by another braking than the one before."""
+    robot, generator = slider(tmp_path), np.random.default_rng(0)
+    for target in generator.uniform(-0.9, 0.9, (12, 2)):
+        guard = guard_of(robot, policy="limit", limits={**LIMITS, "jerk": jerk})
+        decide(guard, (0.0, 0.0))
+        commands = [decide(guard, target).command for _ in range(250)]
+        assert commands[-1] == tuple(target)
+        assert (np.sign(target) * (np.array(commands) - target)).max() <= 1e-9
+        shares = worst_shares([(0.0, 0.0), *commands], {**LIMITS, "jerk": jerk}, PERIOD_S)
+        assert max(shares.values()) <= 1.0 + 1e-6, shares
+
+
 class TestBadConfiguration:
     """What is wrong is named with file, key, what was expected and what came."""
 
@@ -244,6 +260,10 @@ class TestBadConfiguration:
              "guard.yaml: limits.velocity.slid: unknown joint; did you mean 'slide'?"),
             ({"checks": {"joint_velocty": {}}}, "guard.yaml: checks.joint_velocty: unknown check.*'joint_velocity'"),
             ({"policy": "stop"}, "guard.yaml: policy"),
+            ({"period_s": 1e-300}, "guard.yaml: period_s: must be >= 1e-05"),
+            ({"limits": {"acceleration": 1e-6}}, "guard.yaml: limits: expected limits with which braking takes"),
+            ({"joint_names": []}, r"guard.yaml: joint_names: expected a joint, got \[\]"),
+            ({"joint_names": ["turn"] * 2}, "guard.yaml: joint_names: expected each joint once, got text 'turn' twice"),
         ],
     )  # fmt: skip
     def test_it_is_named(self, tmp_path, config, message):

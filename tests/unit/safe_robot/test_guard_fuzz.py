@@ -8,16 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from safe_robot.geometry.proximity import Proximity
+
 pytest.importorskip("pinocchio")
 pytest.importorskip("daqp")
 sys.path.append(str(Path(__file__).resolve().parents[3] / "benchmarks"))
+from fuzz.climbing import TOLERANCE_M, Climber  # noqa: E402
 from fuzz.grid import Grid  # noqa: E402
 from fuzz.hostile import fuzz  # noqa: E402
 from fuzz.leaving import Driver, fault_of, is_locked, leave_margin, leave_with_smaller_margin  # noqa: E402
 from fuzz.oracle import Oracle  # noqa: E402
 from fuzz.scenes import LIMITS, MARGIN_M, SCENES  # noqa: E402
 
-TWO, SEVEN = SCENES["two"], SCENES["seven"]
+TWO, SEVEN, LWR = (SCENES[name] for name in ("two", "seven", "lwr"))
+SEED, STEPS = 11, 8
+"""A climb that finds a braking inside the margin, if there is one."""
 
 
 @pytest.mark.parametrize("policy", ["limit", "reject"])
@@ -42,6 +47,22 @@ def test_the_oracle_finds_what_a_bad_guard_lets_through(scene, bad):
 def test_from_inside_the_margin_the_robot_gets_away():
     left = leave_margin(TWO, Oracle(TWO), 5, np.random.default_rng(2))
     assert left.straight == 5 and not left.stuck and left.slowest >= 0.95, left
+
+
+@pytest.mark.parametrize("is_mended", [True, False])
+def test_hill_climbing_finds_no_braking_inside_the_margin_unless_rows_are_left_out(monkeypatch, is_mended):
+    """A wrist that swings its flange through the lowest point is nearest to the table between two sparse rows."""
+    every = Proximity._coarse_to_fine
+
+    def sparse(self, travelled):
+        rows = every(self, travelled)
+        return rows[: rows.tolist().index(len(rows) - 1) + 1]
+
+    if not is_mended:
+        monkeypatch.setattr(Proximity, "_coarse_to_fine", sparse)
+    climber = Climber(LWR, LWR.guard("limit"), np.random.default_rng(SEED))
+    least_m, course = climber.climb(STEPS)
+    assert (least_m >= MARGIN_M - TOLERANCE_M) == is_mended, course
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -59,6 +60,8 @@ class World:
         """What entered it since it was built or reset."""
         self.resets = 0
         """How often it was reset."""
+        self.physics_s = 0.0
+        """Wall time that PyBullet's steps took [s]."""
         self.loaded = loaded
         """What it was built from, and is again when it is reset."""
         connect = self.config.connect.kwargs()
@@ -340,7 +343,9 @@ class World:
         watching = self._sensors.watching
         if watching:
             self._sensors.act("before_step")
+        begin_s = time.perf_counter()
         self.pb.stepSimulation()
+        self.physics_s += time.perf_counter() - begin_s
         self.contacts.outdate()
         self.clock.advance()
         if watching:

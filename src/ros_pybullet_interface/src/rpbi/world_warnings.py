@@ -1,8 +1,9 @@
 """What is probably not meant in a world, although it can be built."""
 
-from collections.abc import Iterator
-from itertools import combinations
+import math
+from collections.abc import Iterator, Sequence
 
+import numpy as np
 import pybullet
 
 from custom_ros_tools.errors import Problem, closest, hint
@@ -11,19 +12,25 @@ from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.bodies.robots.robot_config import RobotConfig
 from rpbi.bodies.shape_object import ShapeObject
 from rpbi.config.world import WORLD_FRAME
+from rpbi.engine.client import MAXIMAL_COORDINATES
 from rpbi.engine.inputs import PoseInput
 from rpbi.geometry import dot, minus, scaled
+from rpbi.meshes.triangles import volumes
 from rpbi.sensors.link_pose import LinkPoseSensor
+from rpbi.urdf.copies import weighed_by_pybullet
+from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.joints import Joint
 from rpbi.world import World
 
+CONCAVE_SHARE = 0.05
+"""Share of a mesh's volume that its convex hull may add without a warning."""
 TOUCHING_M = 1e-3
-"""Bodies that are in each other by less only touch: PyBullet has margins around meshes."""
+"""Bodies that overlap by less only touch: PyBullet has margins around meshes."""
 
 MAX_FALL_M = 100.0
 """Height above a plane from which a body is expected to fall onto it."""
 MAX_NAMES = 3
-"""Bodies that a warning names; it counts the others."""
+"""Bodies or links that a warning names; it counts the others."""
 PLANE_ADVICE = (
     "planes lose contact points of what slides on them, and forces chatter; use a box, such as {shapeType: GEOM_BOX, "
     "halfExtents: [50, 50, 0.5], collisionFramePosition: [0, 0, -0.5]}"
@@ -35,6 +42,8 @@ def world_warnings(world: World) -> list[Problem]:
     return [
         *_Frames(world).warnings(),
         *_gravity(world),
+        *_masses(world),
+        *_hulls(world),
         *_limits(world),
         *_topics(world),
         *_overlaps(world),
@@ -55,6 +64,32 @@ def _gravity(world: World) -> Iterator[Problem]:
     if free:
         message = f"missing, so there is no gravity, and {', '.join(free)} will not fall; write {{gravZ: -9.81}}, or 0"
         yield Problem(world.loaded.file, "setGravity", message)
+
+
+def _masses(world: World) -> Iterator[Problem]:
+    for item in world.loaded.objects:
+        load, body = getattr(item.config, "loadURDF", None), world.bodies[item.config.name]
+        if load is None or body.is_soft or not body.has_physics:
+            continue
+        is_fixed = bool(load.useFixedBase) or getattr(item.config, "planar_base", None) is not None
+        if links := weighed_by_pybullet(UrdfDocument(load.fileName), is_fixed):
+            message = f"without <inertial>, PyBullet gives 1 kg to each of these links: {_some(links)}"
+            yield Problem(item.file, "loadURDF.fileName", message)
+
+
+def _hulls(world: World) -> Iterator[Problem]:
+    for item in world.loaded.objects:
+        shape = getattr(item.config, "createCollisionShape", None)
+        if shape is None or shape.shapeType != pybullet.GEOM_MESH or shape.fileName is None:
+            continue
+        is_exact = bool((shape.flags or 0) & pybullet.GEOM_FORCE_CONCAVE_TRIMESH)
+        if is_exact or getattr(item.config, "convexDecomposition", None) or not (found := volumes(shape.fileName)):
+            continue
+        mesh_m3, hull_m3 = (abs(math.prod(shape.meshScale or (1.0,))) * volume for volume in found)
+        if hull_m3 - mesh_m3 > CONCAVE_SHARE * mesh_m3:
+            added = f"which adds {hull_m3 - mesh_m3:.2g} m^3 to its {mesh_m3:.2g} m^3"
+            message = f"the concave mesh collides as its convex hull, {added}; see convexDecomposition"
+            yield Problem(item.file, "createCollisionShape.fileName", message)
 
 
 def _limits(world: World) -> Iterator[Problem]:
@@ -80,15 +115,24 @@ def _topics(world: World) -> Iterator[Problem]:
 
 def _overlaps(world: World) -> Iterator[Problem]:
     """Yields a warning for each pair of bodies that are in each other, unless nothing can push them apart."""
-    solid = [body for body in world.bodies.values() if _has_place(world, body)]
-    for one, other in combinations(solid, 2):
+    for one, other in _neighbours([body for body in world.bodies.values() if _has_place(world, body)]):
         found = world.pb.getClosestPoints(one.body_id, other.body_id, 0.0)
         depths = {(point[3], point[4]): -point[8] for point in sorted(found, key=lambda point: -point[8])}
         depths = {links: depth for links, depth in depths.items() if not _are_still(one, other, *links)}
         if depths and (deepest := max(depths.items(), key=lambda item: item[1]))[1] > TOUCHING_M:
             (link, other_link), depth = deepest
-            parts = f"{_named(one, link)} and {_named(other, other_link)} are in each other by {depth:.2g} m"
+            parts = f"{_named(one, link)} and {_named(other, other_link)} overlap by {depth:.2g} m"
             yield Problem(_file_of(world, one.name), "", f"at the start, {parts}, and will be pushed apart")
+
+
+def _neighbours(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
+    """Yields the pairs of bodies whose bounding boxes meet."""
+    links = [[body.pb.getAABB(body.body_id, index) for index in (-1, *body.joint_indices)] for body in bodies]
+    lower = np.array([np.min([box[0] for box in boxes], axis=0) for boxes in links]).reshape(-1, 3)
+    upper = np.array([np.max([box[1] for box in boxes], axis=0) for boxes in links]).reshape(-1, 3)
+    meet = np.all(lower[:, None] <= upper[None], axis=2)
+    for one, other in np.argwhere(np.triu(meet & meet.T, 1)):
+        yield bodies[one], bodies[other]
 
 
 def _planes(world: World) -> Iterator[Problem]:
@@ -99,14 +143,20 @@ def _planes(world: World) -> Iterator[Problem]:
             continue
         names = [f"'{body.name}'" for body in placed if _needs_points(body) and _is_below(world, plane, body)]
         if names:
-            more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
-            rest = f"{', '.join(names[:MAX_NAMES])}{more} rest{'s' if len(names) == 1 else ''} on this plane"
+            rest = f"{_some(names)} rest{'s' if len(names) == 1 else ''} on this plane"
             key = "createCollisionShape.shapeType" if isinstance(plane, ShapeObject) else "loadURDF.fileName"
             yield Problem(_file_of(world, plane.name), key, f"{rest}: {PLANE_ADVICE}")
 
 
+def _some(names: Sequence[str]) -> str:
+    more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
+    return ", ".join(names[:MAX_NAMES]) + more
+
+
 def _shape_kinds(body: Body) -> set[int]:
-    """Returns PyBullet's kinds of all collision shapes of a body."""
+    """Returns PyBullet's kinds of all collision shapes of a body, none in maximal coordinates, where it tells none."""
+    if body.dynamics_info(-1)[10] == MAXIMAL_COORDINATES:
+        return set()
     links = (-1, *body.link_indices)
     return {shape[2] for link in links for shape in body.pb.getCollisionShapeData(body.body_id, link)}
 

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import csv
+import math
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 TOUCHED_M = 0.001
 """From this depth on the tool counts as touching [m]."""
 RELEASED_S = 0.5
 """A press is over when the tool has not touched for so long [s]."""
-STEADY_S = 0.3
-"""How long the force is looked at where it is steadiest [s]."""
+SHORTEST_S = 0.3
+"""Presses that are shorter are not judged [s]."""
 LONGEST_GAP_S = 0.05
-"""Without a sample for longer, the simulator stood still, and nothing tells how steady the force was [s]."""
+"""Without a sample for longer, the simulator stood still, and that time of a press does not count [s]."""
+SHORTEST_SHARE = 0.5
+"""A press is not judged if less of its time counts."""
 
 
 class Sample(NamedTuple):
@@ -39,38 +43,48 @@ class Sample(NamedTuple):
 
 
 class PressReport(NamedTuple):
-    """How a press went.
+    """How a whole press went, from the first touch to the last.
+
+    Means are over time. Those of force and stiffness times depth are the same for any motion: what damping and inertia
+    of box and arm add while it goes in is taken back while it comes out.
 
     Attributes:
-        depth_m: How deep the tool was in the box, where the force was steadiest [m].
-        measured_n: Force on the tool then [N].
-        felt_n: Force on the handle then [N].
-        predicted_n: Stiffness times depth [N].
-        expected_n: The same on the handle, by the scale of the force [N].
+        duration_s: Time in which the tool touched [s].
+        depth_m: Mean depth of the tool in the box [m].
+        measured_n: Mean force on the tool [N].
+        predicted_n: Stiffness times mean depth [N].
+        scatter_n: Force on the tool less stiffness times depth, as root of the mean square [N].
+        felt_n: Mean force on the handle [N].
+        expected_n: The same by force on the tool and scale [N].
         peak_n: Largest force on the handle [N].
     """
 
+    duration_s: float
     depth_m: float
     measured_n: float
-    felt_n: float
     predicted_n: float
+    scatter_n: float
+    felt_n: float
     expected_n: float
     peak_n: float
 
     @property
     def error(self) -> float:
-        """How far the force on the tool is from what stiffness and depth predict, as a share of that."""
+        """How far the mean force on the tool is from what stiffness and depth predict, as a share of that."""
         return abs(self.measured_n - self.predicted_n) / self.predicted_n
 
     @property
     def felt_error(self) -> float:
-        """The same of the force on the handle."""
+        """How far the mean force on the handle is from what force on the tool and scale predict, as a share of that."""
         return abs(self.felt_n - self.expected_n) / self.expected_n
 
     def __str__(self) -> str:
         tool = f"{self.measured_n:.2f} N on the tool, by stiffness {self.predicted_n:.2f} N ({self.error:.1%} off)"
         handle = f"{self.felt_n:.2f} N on the handle, by scale {self.expected_n:.2f} N ({self.felt_error:.1%} off)"
-        return f"steady force at a depth of {self.depth_m * 1e3:.1f} mm: {tool}; {handle}, at most {self.peak_n:.2f} N"
+        return (
+            f"mean of the press of {self.duration_s:.1f} s at a depth of {self.depth_m * 1e3:.1f} mm: {tool}, "
+            f"scattered by {self.scatter_n:.2f} N; {handle}, at most {self.peak_n:.2f} N"
+        )
 
 
 class Press:
@@ -100,31 +114,33 @@ class Press:
         return self._has_touched and self.samples[-1].time_s - self._released_s > RELEASED_S
 
     def report(self) -> PressReport | None:
-        """Returns how it went; None if the tool was not pressed for `STEADY_S`."""
-        touching = [each for each in self.samples if self._depth_m(each) > TOUCHED_M]
-        if not touching or touching[-1].time_s - touching[0].time_s < STEADY_S:
+        """Returns how it went; None if the tool was pressed for less than 0.3 s, or the simulator stood still."""
+        times_s, depths_m, measured_n, felt_n = np.array(
+            [(each.time_s, self._depth_m(each), each.measured_n, each.felt_n) for each in self.samples]
+        ).T
+        touching = np.flatnonzero(depths_m > TOUCHED_M)
+        if not touching.size or times_s[touching[-1]] - times_s[touching[0]] < SHORTEST_S:
             return None
-        deepest_m = max(map(self._depth_m, touching))
-        windows, first = [], 0
-        for last, sample in enumerate(touching):
-            if last and sample.time_s - touching[last - 1].time_s > LONGEST_GAP_S:
-                first = last
-            while sample.time_s - touching[first].time_s > STEADY_S:
-                first += 1
-            window = touching[first : last + 1]
-            is_whole = sample.time_s - window[0].time_s > STEADY_S - LONGEST_GAP_S
-            if is_whole and min(map(self._depth_m, window)) > 0.5 * deepest_m:
-                windows.append(window)
-        if not windows:
+        duration_s = float(times_s[touching[-1]] - times_s[touching[0]])
+        gaps_s = np.diff(times_s, prepend=times_s[0])
+        counted = (depths_m > 0.0) & (gaps_s <= LONGEST_GAP_S)
+        counted[: touching[0]] = counted[touching[-1] + 1 :] = False
+        weights_s = gaps_s * counted
+        if weights_s.sum() < SHORTEST_SHARE * duration_s:
             return None
-        steady = min(windows, key=_unsteadiness)
-        depth_m = float(np.median([self._depth_m(each) for each in steady]))
+
+        def mean(values: NDArray[np.float64]) -> float:
+            return float(np.average(values, weights=weights_s))
+
+        off_n = measured_n - self._stiffness * depths_m
         return PressReport(
-            depth_m,
-            float(np.median([each.measured_n for each in steady])),
-            float(np.median([each.felt_n for each in steady])),
-            self._stiffness * depth_m,
-            self._force_scale * self._stiffness * depth_m,
+            duration_s,
+            mean(depths_m),
+            mean(measured_n),
+            self._stiffness * mean(depths_m),
+            math.sqrt(mean(off_n**2)),
+            mean(felt_n),
+            self._force_scale * mean(measured_n),
             max(abs(each.felt_n) for each in self.samples),
         )
 
@@ -168,8 +184,3 @@ class Press:
         figure = Figure(figsize=(7.0, 5.0), dpi=120, layout="tight")
         self.draw(figure)
         figure.savefig(path)
-
-
-def _unsteadiness(window: list[Sample]) -> float:
-    """Returns how much both forces change [N]."""
-    return float(sum(np.std([getattr(each, name) for each in window]) for name in ("measured_n", "felt_n")))

@@ -18,6 +18,8 @@ MAX_DEPTH = 50
 """Levels of types within types."""
 MAX_CONNECTIONS = 20_000
 """Pairs of a topic and one of its publishers."""
+MAX_TOPICS = 1_000
+"""Topics that have messages; each becomes a file."""
 MAX_VALUES = 1_000_000
 """Values of one message, arrays counted by element unless they are kept whole; the cloud of a 640x480 camera passes."""
 MAX_NAME_BYTES = 1_000
@@ -29,7 +31,7 @@ MAX_CELLS = 200_000_000
 BASE_TIME_S = 30.0
 """Processor time for any bag."""
 TIME_PER_MB_S = 2.0
-"""Processor time for each MB that a bag unfolds to; messages of which no two are alike need a fifth of it."""
+"""Processor time for each MB of the file, compressed as it is; ordinary bags need less than a tenth of it."""
 
 
 class LimitError(ValueError):
@@ -46,16 +48,16 @@ class Budget:
 
     Args:
         path: The bag, for errors.
-        unfolded_bytes: Bytes that it unfolds to.
+        file_bytes: Size of its file.
         unlimited: Whether all is allowed.
         clock: Returns the processor time [s].
     """
 
     def __init__(
-        self, path: Path, unfolded_bytes: int, unlimited: bool, clock: Callable[[], float] = time.thread_time
+        self, path: Path, file_bytes: int, unlimited: bool, clock: Callable[[], float] = time.thread_time
     ) -> None:
         self._path, self._unlimited, self._clock = path, unlimited, clock
-        self._time_s = BASE_TIME_S + TIME_PER_MB_S * unfolded_bytes / 1e6
+        self._time_s = BASE_TIME_S + TIME_PER_MB_S * file_bytes / 1e6
         self._end_s = clock() + self._time_s
         self._cells: dict[str, int] = {}
         self._all_cells = 0

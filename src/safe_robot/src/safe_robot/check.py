@@ -33,6 +33,8 @@ class Violation(NamedTuple):
         limit: What is allowed, in `unit`.
         unit: The unit of both.
         is_while_braking: Whether it is not the target itself but the braking from it that is not safe.
+        quantity: The quantity of the subject that value and limit are of; empty if the subject itself is one.
+        words: The same in words and what to do about it, in place of a sentence of the other attributes.
     """
 
     check: str
@@ -41,13 +43,16 @@ class Violation(NamedTuple):
     limit: float
     unit: str
     is_while_braking: bool = False
+    quantity: str = ""
+    words: str = ""
 
     def __str__(self) -> str:
-        if math.isnan(self.limit):
-            return f"{self.check}: {self.subject}"
-        while_braking = " while braking from there" if self.is_while_braking else ""
-        value = f"{self.value:.6g} {self.unit}{while_braking}"
-        return f"{self.check}: {self.subject} would have {value}; the limit is {self.limit:.6g}"
+        if self.words or math.isnan(self.limit):
+            return f"{self.check}: {self.words or self.subject}"
+        subject = f"{self.subject}: {self.quantity}" if self.quantity else self.subject
+        while_braking = " while braking" if self.is_while_braking else ""
+        numbers = f"{self.value:.6g} {self.unit}, limit {self.limit:.6g} {self.unit}"
+        return f"{self.check}: {subject}{while_braking} is {numbers}"
 
 
 class Inside(NamedTuple):
@@ -148,12 +153,15 @@ class Check(ABC):
         """Returns what is nearer than its margin in a configuration of n positions; it is called after `check`."""
         return ()
 
-    def first_above(self, values: np.ndarray, limit: np.ndarray, unit: tuple[str, str]) -> Violation | None:
+    def first_above(
+        self, values: np.ndarray, limit: np.ndarray, quantity: str, unit: tuple[str, str]
+    ) -> Violation | None:
         """Returns the first of k x n sizes that is above n limits.
 
         Args:
             values: Sizes, none negative.
             limit: n limits, or k x n.
+            quantity: Name of the quantity.
             unit: The unit for a joint that turns, and for one that slides.
         """
         is_inside = values <= limit
@@ -161,9 +169,12 @@ class Check(ABC):
             return None
         row, i = divmod(int(np.argmin(is_inside)), values.shape[1])
         most = float(np.broadcast_to(limit, values.shape)[row, i])
-        return self.of_joint(i, float(values[row, i]), most, unit, row > 0)
+        return self.of_joint(i, float(values[row, i]), most, quantity, unit, row > 0)
 
-    def of_joint(self, i: int, value: float, limit: float, unit: tuple[str, str], is_while_braking: bool) -> Violation:
+    def of_joint(
+        self, i: int, value: float, limit: float, quantity: str, unit: tuple[str, str], is_while_braking: bool
+    ) -> Violation:
         """Returns the violation of a joint."""
-        words = unit[0] if self.robot.joints[i].is_revolute else unit[1]
-        return Violation(self.name, f"joint '{self.robot.joint_names[i]}'", value, limit, words, is_while_braking)
+        which = unit[0] if self.robot.joints[i].is_revolute else unit[1]
+        subject = f"joint '{self.robot.joint_names[i]}'"
+        return Violation(self.name, subject, value, limit, which, is_while_braking, quantity)

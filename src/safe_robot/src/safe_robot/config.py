@@ -1,10 +1,11 @@
 """What a guard is told."""
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from custom_ros_tools.schema import ConfigModel, ListOf, NonNegative, Seconds, Switch, Text, optional
+from custom_ros_tools.schema.type_names import shown
 
 from .commands.shaping import ShapingConfig
 from .limits import LimitsConfig
@@ -23,7 +24,7 @@ class GuardConfig(ConfigModel):
         description="What is sent after a halt in the middle of a motion: nothing; or, one each period_s, the braking"
         " that was found safe with the last command.",
     )
-    period_s: Seconds = Field(
+    period_s: Annotated[Seconds, Field(ge=1e-5, le=10.0)] = Field(
         0.009,
         description="Time between two commands: none follows another sooner, and each counts as so much time. A few"
         " percent less than that between two targets, so that late ones can be caught up with.",
@@ -40,6 +41,15 @@ class GuardConfig(ConfigModel):
         0.05, description="How far the first target may be from where the robot is [rad or m]."
     )
     checks: dict[str, dict[str, Any]] = Field({}, description="Options of checks by name.")
+
+    @field_validator("joint_names", mode="before")
+    @classmethod
+    def _check_joint_names(cls, value: Any) -> Any:
+        if isinstance(value, list) and not value:
+            raise ValueError("expected a joint, got []; leave the key out to guard all joints")
+        if isinstance(value, list) and (twice := [name for i, name in enumerate(value) if name in value[:i]]):
+            raise ValueError(f"expected each joint once, got {shown(twice[0])} twice")
+        return value
 
 
 class NodeConfig(ConfigModel):

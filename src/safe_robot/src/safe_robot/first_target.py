@@ -15,6 +15,11 @@ from .robot import MOST_OUTSIDE, GuardedRobot
 SLOW_S = 1e6
 """How long the way from where the robot is to the first target is taken to last [s]: it is not judged by speed."""
 
+UNKNOWN = (
+    "no measured positions of all guarded joints on joint_states/measured; publish them there, or, where nothing"
+    " measures the robot, set start_from to target"
+)
+
 
 class FirstTarget:
     """Judges the first target after a start.
@@ -45,7 +50,7 @@ class FirstTarget:
         """
         there = self._whereabouts(target, last, situation)
         if there is None:
-            return Violation("start", "measured positions", math.inf, 0.0, "as age, since there are none of all joints")
+            return Violation("start", "measured positions", math.inf, 0.0, "s", words=UNKNOWN)
         violation = self._far_from(there, target) or self._far_outside(there)
         if violation is not None:
             return violation
@@ -74,7 +79,12 @@ class FirstTarget:
             return None
         i = int(np.argmin(is_near))
         subject = f"joint '{self._robot.joint_names[i]}'"
-        return Violation("start", subject, float(distance[i]), tolerance, "of distance to where the robot is")
+        return Violation(
+            "start", subject, float(distance[i]), tolerance, self._unit(i), quantity="distance of the target"
+        )
+
+    def _unit(self, i: int) -> str:
+        return "rad" if self._robot.joints[i].is_revolute else "m"
 
     def _far_outside(self, there: np.ndarray) -> Violation | None:
         """Returns which joint is so far outside its limits that it is not known how far links reach."""
@@ -83,5 +93,12 @@ class FirstTarget:
             joint, position = self._robot.joints[i], float(there[i])
             outside = max(joint.lower - position, position - joint.upper)
             if not outside <= MOST_OUTSIDE:
-                return Violation("start", f"joint '{name}'", outside, MOST_OUTSIDE, "outside of its limits")
+                return Violation(
+                    "start",
+                    f"joint '{name}'",
+                    outside,
+                    MOST_OUTSIDE,
+                    self._unit(i),
+                    quantity="distance beyond its limits",
+                )
         return None

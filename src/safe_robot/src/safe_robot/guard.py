@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from custom_ros_tools.errors import ConfigError, Problem
+
 from .check import Check, Inside, Situation, Violation
 from .commands.braking import Brake, Braking, BrakingCommands
 from .commands.detour import can_keep_bounds
@@ -84,14 +86,17 @@ class Guard:
         self.joint_names = robot.joint_names
         self.limits = JointLimits.of(robot, config.limits, file)
         self.checks = make_checks(config.checks, robot, self.limits, file)
-        self._braking = Braking(self.limits.velocity, self.limits.acceleration, self.limits.jerk, config.period_s)
+        try:
+            self._braking = Braking(self.limits.velocity, self.limits.acceleration, self.limits.jerk, config.period_s)
+        except ValueError as error:
+            raise ConfigError([Problem(file, "limits", str(error))]) from None
         shape = (self.limits, self._braking, config.period_s)
         self._shaper = None if config.shape is None else Shaper(config.shape, *shape)
         self._first_target = FirstTarget(config, robot, self.checks, file)
         self._watches = {check.name for check in self.checks if check.watches}
         self._nearest = Nearest(self.limits, self._braking, self.checks, config.period_s)
         if config.policy == "limit" and not can_keep_bounds():
-            log.warning("%s: policy limit comes less near to targets without DAQP: run `./rpbi setup ik`", file)
+            log.warning("%s: policy limit tracks targets less closely without DAQP: run `./rpbi setup ik`", file)
         self.is_halted = True
         self._state: State | None = None
         self._is_first = True
@@ -202,14 +207,19 @@ class Guard:
         assert self._state is not None
         wanted = target
         if self._shaper is not None:  # controllers take the first command as rest, so it is where the robot stands
-            wanted = tuple(self._state.position.tolist()) if is_first else self._shaper.shaped(target, self._state, self._way_to_rest)
+            wanted = (
+                tuple(self._state.position.tolist())
+                if is_first
+                else self._shaper.shaped(target, self._state, self._way_to_rest)
+            )
         found = self._judged(wanted, situation, self.checks)
         if isinstance(found, Violation) and wanted != target and found.check in MENDED:
             wanted = tuple(self._way_to_rest[0].tolist())
             found = self._judged(wanted, situation, self.checks)
         before, self._target = self._target, target
-        violation = found if isinstance(found, Violation) else self._passes(target, before, found)
-        if violation is not None:
+        if isinstance(found, Violation):
+            return self._instead(target, found, situation)
+        if violation := self._passes(target, before, found):
             return self._instead(target, violation, situation)
         return Decision(self._sent(found), is_shaped=wanted != target)
 
@@ -224,7 +234,7 @@ class Guard:
         if past[i] <= ROUNDING:
             return None
         unit = "rad" if self.robot.joints[i].is_revolute else "m"
-        return Violation("braking", f"joint '{self.joint_names[i]}'", float(end[i]), target[i], unit, True)
+        return Violation("braking", f"joint '{self.joint_names[i]}'", float(end[i]), target[i], unit, True, "position")
 
     @property
     def _way_to_rest(self) -> np.ndarray:
@@ -240,10 +250,17 @@ class Guard:
     def _input_problem(self, target: tuple[float, ...]) -> Violation | None:
         n = len(self.joint_names)
         if len(target) != n:
-            return Violation("input", "the number of joints", len(target), n, "joints")
+            return Violation(
+                "input",
+                "the number of joints",
+                len(target),
+                n,
+                "joints",
+                words=f"expected {n} positions, got {len(target)}",
+            )
         for name, position in zip(self.joint_names, target):
             if not math.isfinite(position):
-                return Violation("input", f"joint '{name}'", position, math.inf, "as position")
+                return Violation("input", f"joint '{name}'", position, math.inf, "rad or m", quantity="position")
         return None
 
     def _take_start(self, target: tuple[float, ...], situation: Situation) -> Violation | None:
@@ -284,7 +301,8 @@ class Guard:
         share = np.abs(state.acceleration) / self.limits.acceleration
         i = int(np.argmax(share))
         subject, limit = f"joint '{self.joint_names[i]}'", float(self.limits.acceleration[i])
-        return Violation("braking", subject, float(abs(state.acceleration[i])), limit, "of acceleration", True)
+        unit = "rad/s^2" if self.robot.joints[i].is_revolute else "m/s^2"
+        return Violation("braking", subject, float(abs(state.acceleration[i])), limit, unit, True, "acceleration")
 
     def _sent(self, safe: _Safe) -> tuple[float, ...]:
         self._state, self._stop = safe.state, safe.stop

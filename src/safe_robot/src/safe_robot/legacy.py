@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from custom_ros_tools.errors import ConfigError, Problem
+from custom_ros_tools.schema.type_names import shown
 
 CHECKERS = {
     "jointpositionlimit": "joint_position",
@@ -46,11 +47,11 @@ def translated(given: Mapping[str, Any], joint_names: list[str], file: str) -> d
         ConfigError: If one is not as the release has it.
     """
     config = {key: value for key, value in given.items() if key not in KEYS}
-    limits: dict[str, Any] = dict(config.get("limits", {}))
-    checks: dict[str, dict[str, Any]] = {name: dict(options) for name, options in config.get("checks", {}).items()}
+    limits = dict(_mapping(given, "limits", file))
+    checks = {name: dict(_mapping(config["checks"], name, file, "checks.")) for name in _mapping(given, "checks", file)}
     if "joint_name_order" in given:
-        config["joint_names"] = joint_names = _words(given["joint_name_order"])
-    for name, options in given.get("checker", {}).items():
+        config["joint_names"] = joint_names = _words(given["joint_name_order"], "joint_name_order", file)
+    for name, options in _mapping(given, "checker", file).items():
         if name not in CHECKERS or not isinstance(options, Mapping):
             raise _wrong(file, f"checker.{name}", f"one of {', '.join(CHECKERS)}, with 'active'", name)
         checks.setdefault(CHECKERS[name], {})["active"] = options.get("active", True)
@@ -64,22 +65,32 @@ def translated(given: Mapping[str, Any], joint_names: list[str], file: str) -> d
             limits[ours] = dict(zip(joint_names, numbers))
     if "safe_distance" in given:
         checks.setdefault("self_collision", {})["margin_m"] = given["safe_distance"]
-    links = [link for key in LINKS for link in _words(given.get(key, []))]
+    links = [link for key in LINKS for link in _words(given.get(key, []), key, file)]
     box = {axis: _axis(given[key], key, file) for key, axis in AXES.items() if key in given}
     if links:
         checks.setdefault("link_box", {})["boxes"] = dict.fromkeys(links, box)
     return config | ({"limits": limits} if limits else {}) | ({"checks": checks} if checks else {})
 
 
-def _words(value: Any) -> list[str]:
-    return value.split() if isinstance(value, str) else list(value)
+def _mapping(given: Mapping[str, Any], key: str, file: str, above: str = "") -> Mapping[str, Any]:
+    value = given.get(key, {})
+    if not isinstance(value, Mapping):
+        raise _wrong(file, above + key, "a mapping", value)
+    return value
+
+
+def _words(value: Any, key: str, file: str) -> list[str]:
+    words = value.split() if isinstance(value, str) else value
+    if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
+        raise _wrong(file, key, "names, as a list or with spaces between them", value)
+    return words
 
 
 def _numbers(value: Any, count: int, key: str, file: str) -> list[float]:
     """Returns the numbers of a text, or a list, or of one number."""
     try:
         numbers = [float(word) for word in (str(value).split() if not isinstance(value, list) else value)]
-    except ValueError:
+    except (TypeError, ValueError):
         numbers = []
     if len(numbers) != count or any(map(math.isnan, numbers)):
         raise _wrong(file, key, f"{count} numbers with spaces between them", value)
@@ -91,4 +102,4 @@ def _axis(value: Any, key: str, file: str) -> list[float | None]:
 
 
 def _wrong(file: str, key: str, expected: str, got: Any) -> ConfigError:
-    return ConfigError([Problem(file, key, f"expected {expected}, got '{got}'")])
+    return ConfigError([Problem(file, key, f"expected {expected}, got {shown(got)}")])

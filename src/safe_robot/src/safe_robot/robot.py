@@ -47,6 +47,10 @@ class GuardedRobot:
             self._all = document.joints
         except ValueError as error:
             raise ConfigError([Problem(urdf_path, "", str(error))]) from None
+        for name, joint in self._all.items():
+            if joint.mimic is not None and joint.mimic.joint not in self._all:
+                message = f"joint '{name}' mimics '{joint.mimic.joint}', which there is not"
+                raise ConfigError([Problem(urdf_path, "", message)])
         self._root = document.root_link()
         movable = [name for name, joint in self._all.items() if joint.is_moving and joint.mimic is None]
         for name in joint_names:

@@ -29,6 +29,8 @@ def from_base(q: np.ndarray) -> Pose:
     return Pose((x, y, z), (qx, qy, qz, qw))
 
 
+MOST_JOINTS = 500
+"""Joints that move; the memory that Pinocchio takes grows with their square."""
 FREE = 6
 """Ways in which a floating base moves."""
 
@@ -69,6 +71,13 @@ class Robot:
         document = UrdfDocument(urdf_path)
         check_structure(document)
         types = document.joint_types
+        moving = {name: kind for name, kind in types.items() if kind != "fixed"}
+        if len(moving) > MOST_JOINTS:
+            message = f"expected at most {MOST_JOINTS} joints that are not fixed, got {len(moving)}"
+            raise ConfigError([Problem(urdf_path, "", message)])
+        for name, kind in moving.items():
+            if kind not in MOVING:
+                raise ConfigError([Problem(urdf_path, name, f"expected a joint of one axis, got a {kind} one")])
         if base is not None:
             _known("link", base, document.links)
         try:
@@ -80,9 +89,6 @@ class Robot:
         self.is_floating = floating
         base_joints = 2 if floating else 1  # the world, and the root's own
         self.all_joints = tuple(self.model.names)[base_joints:]
-        for name in self.all_joints:
-            if types[name] not in MOVING:
-                raise ConfigError([Problem(urdf_path, name, f"expected a joint of one axis, got a {types[name]} one")])
         self._still = frozenset(types) - frozenset(self.all_joints)
         frames = (frame.name for frame in self.model.frames if frame.type == pin.BODY)
         self.links = tuple(name for name in frames if name in document.links)

@@ -10,7 +10,7 @@ from rpbi.sensors.contacts.arrows import contact_sensors
 from rpbi.sensors.sensor import Sensor
 
 from .body_config import BodyConfig
-from .shape_object import MaximalCoordinates, ShapeObject
+from .shape_object import Decomposition, MaximalCoordinates, ShapeObject
 
 
 class CollisionObjectConfig(BodyConfig):
@@ -22,6 +22,7 @@ class CollisionObjectConfig(BodyConfig):
     basePosition: Position = Field((0.0, 0.0, 0.0), description="Position, with object_tf until TF comes.")
     baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Orientation, x, y, z, w; likewise.")
     useMaximalCoordinates: MaximalCoordinates = False
+    convexDecomposition: Decomposition = None
     object_tf: ObjectTf | None = Field(None, description="TF frame to follow; without it, it stays where it is.")
     contacts: ContactsConfig | None = Field(None, description="Its contacts, as topics; {} has the usual settings.")
 
@@ -44,6 +45,7 @@ class CollisionObject(ShapeObject):
             config.name,
             config.createVisualShape,
             config.createCollisionShape,
+            config.convexDecomposition,
             basePosition=config.basePosition,
             baseOrientation=config.baseOrientation,
             useMaximalCoordinates=config.useMaximalCoordinates,

@@ -19,7 +19,7 @@ from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
 
 from .body_config import BodyConfig
-from .shape_object import MaximalCoordinates, ShapeObject
+from .shape_object import Decomposition, MaximalCoordinates, ShapeObject
 
 
 class DynamicObjectConfig(BodyConfig):
@@ -32,6 +32,7 @@ class DynamicObjectConfig(BodyConfig):
     basePosition: Position = Field((0.0, 0.0, 0.0), description="Start position.")
     baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Start orientation, x, y, z, w.")
     useMaximalCoordinates: MaximalCoordinates = False
+    convexDecomposition: Decomposition = None
     resetBaseVelocity: ResetBaseVelocity | None = Field(None, description="Start velocity.")
     tracked_tf: ObjectTf | None = Field(
         None, description="TF frame to follow while it is seen; physics moves it in between, and without it always."
@@ -68,6 +69,7 @@ class DynamicObject(ShapeObject):
             config.name,
             config.createVisualShape,
             config.createCollisionShape,
+            config.convexDecomposition,
             baseMass=config.baseMass,
             basePosition=config.basePosition,
             baseOrientation=config.baseOrientation,

@@ -1,16 +1,33 @@
 """Files that a configuration names, looked at before PyBullet gets them: some would end the process."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from typing import Any
 
 import pybullet
 
 from custom_ros_tools.errors import ConfigError, Problem
-from rpbi.config.pybullet_models import CreateCollisionShape, CreateVisualShape, LoadSoftBody, LoadURDF
+from rpbi.config.pybullet_models import (
+    CreateCollisionShape,
+    CreateVisualShape,
+    LoadSoftBody,
+    LoadURDF,
+    PybulletModel,
+)
 from rpbi.meshes.checks import mesh_problems, soft_mesh_problems
+from rpbi.meshes.decomposition import convex_parts
 from rpbi.meshes.trial import Mesh, Use, faults_in
 from rpbi.urdf.loading import urdf_problems
 
 from .body_config import BodyConfig
+from .shape_object import ConvexDecomposition
+
+_PARTS: dict[str, type[PybulletModel]] = {
+    "createVisualShape": CreateVisualShape,
+    "createCollisionShape": CreateCollisionShape,
+    "loadURDF": LoadURDF,
+    "loadSoftBody": LoadSoftBody,
+}
 
 
 def check_files(config: BodyConfig) -> None:
@@ -19,16 +36,32 @@ def check_files(config: BodyConfig) -> None:
     Raises:
         ConfigError: If one cannot be loaded; it has everything that is wrong.
     """
-    problems = [Problem(config.name, key, message) for key, message in _problems(config)]
+    parts = {key: getattr(config, key) for key in type(config).model_fields}
+    problems = [Problem(config.name, key, message) for key, message in file_problems(parts)]
     if problems:
         raise ConfigError(problems)
 
 
-def _problems(config: BodyConfig) -> Iterator[tuple[str, str]]:
-    """Yields key and message of each fault."""
+def parts_with_files(data: object, file: str, context: Mapping[str, Any]) -> dict[str, PybulletModel]:
+    """Returns the parts of an object that may name files, those that are right of one that is not right as a whole.
+
+    Args:
+        data: What its YAML says.
+        file: Name of the YAML file.
+        context: The same as of `load_object`.
+    """
+    parts = {}
+    for key, model in _PARTS.items():
+        with suppress(ConfigError):
+            if isinstance(data, Mapping) and key in data:
+                parts[key] = model.parse(data[key], file, context)
+    return parts
+
+
+def file_problems(parts: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yields key and message of each fault in the files that parts of an object name, by their keys."""
     meshes: dict[Mesh, str] = {}
-    for key in type(config).model_fields:
-        asked = getattr(config, key)
+    for key, asked in parts.items():
         if isinstance(asked, (CreateVisualShape, CreateCollisionShape)):
             found = [(f"{key}.{inner}", message) for inner, message in mesh_problems(asked)]
             yield from found
@@ -44,8 +77,26 @@ def _problems(config: BodyConfig) -> Iterator[tuple[str, str]]:
                     problems = soft_mesh_problems(file)
                     yield from ((f"{key}.{inner}", message) for message in problems)
                     meshes |= {} if problems else {Mesh(Use.SOFT, file): f"{key}.{inner}"}
-    for mesh, fault in faults_in(meshes).items():
+    faults = faults_in(meshes)
+    for mesh, fault in faults.items():
         yield meshes[mesh], f"{fault}: {mesh.file}"
+    shape, decomposition = parts.get("createCollisionShape"), parts.get("convexDecomposition")
+    if not faults and isinstance(shape, CreateCollisionShape) and isinstance(decomposition, ConvexDecomposition):
+        if problem := _decomposition_problem(shape, decomposition):
+            yield "convexDecomposition", problem
+
+
+def _decomposition_problem(shape: CreateCollisionShape, decomposition: ConvexDecomposition) -> str:
+    """Returns why a shape cannot be divided into convex parts, empty if it can, and then is."""
+    if shape.shapeType != pybullet.GEOM_MESH or shape.fileName is None:
+        return "expected a createCollisionShape of GEOM_MESH with a fileName"
+    if (shape.flags or 0) & pybullet.GEOM_FORCE_CONCAVE_TRIMESH:
+        return "with the flag GEOM_FORCE_CONCAVE_TRIMESH a mesh collides as it is; remove one of the two"
+    try:
+        convex_parts(shape.fileName, decomposition.model_dump())
+    except ValueError as error:
+        return str(error)
+    return ""
 
 
 def _use_of(shape: CreateVisualShape | CreateCollisionShape) -> Use | None:

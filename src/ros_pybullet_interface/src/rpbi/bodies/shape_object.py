@@ -2,11 +2,12 @@
 
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
-from custom_ros_tools.schema import Switch
-from rpbi.config.pybullet_models import CreateCollisionShape, CreateVisualShape
+from custom_ros_tools.schema import AlsoTakes, Expects, Fraction, Switch
+from rpbi.config.pybullet_models import CreateCollisionShape, CreateVisualShape, PybulletModel
 from rpbi.engine.client import Client
+from rpbi.meshes.decomposition import convex_parts
 
 from .body import Body
 
@@ -19,11 +20,38 @@ MaximalCoordinates = Annotated[
 ]
 
 
+class ConvexDecomposition(PybulletModel):
+    """How V-HACD divides a concave mesh into convex parts, each of which collides as its hull."""
+
+    resolution: Annotated[int, Field(ge=10_000, le=64_000_000)] = Field(
+        100_000, description="Voxels that the mesh is filled with: more take longer, and show finer parts."
+    )
+    concavity: Fraction = Field(0.0025, description="Share of concavity that a part may keep; less makes more parts.")
+    maxNumVerticesPerCH: Annotated[int, Field(ge=4, le=1024)] = Field(64, description="Corners of a part, at most.")
+    minVolumePerCH: Annotated[float, Field(ge=0.0, le=0.01)] = Field(
+        0.0001, description="Volume of a part, at least, as a share of the mesh's."
+    )
+
+
+def _of_a_switch(given: Any) -> Any:
+    return given if not isinstance(given, bool) else {} if given else None
+
+
+Decomposition = Annotated[
+    ConvexDecomposition | None,
+    BeforeValidator(_of_a_switch),
+    AlsoTakes({"type": "boolean"}),
+    Expects("true, false or a mapping"),
+    Field(description="Whether its mesh collides as convex parts, not as one hull: true, or parameters of V-HACD."),
+]
+
+
 class ShapeObject(Body):
     """An object whose shape comes from `createVisualShape` and `createCollisionShape`.
 
     Args:
         collision: Collision shape, None for an object that nothing can touch.
+        decomposition: How its mesh is divided into convex parts, None for one hull.
         multi_body: Other arguments of `createMultiBody`; without `baseMass` it stays whatever pushes it.
 
     Raises:
@@ -36,10 +64,14 @@ class ShapeObject(Body):
         name: str,
         visual: CreateVisualShape,
         collision: CreateCollisionShape | None = None,
+        decomposition: ConvexDecomposition | None = None,
         **multi_body: Any,
     ) -> None:
         multi_body["baseVisualShapeIndex"] = pb.createVisualShape(**visual.kwargs())
         if collision is not None:
-            multi_body["baseCollisionShapeIndex"] = pb.createCollisionShape(**collision.kwargs())
+            arguments = collision.kwargs()
+            if decomposition is not None:
+                arguments["fileName"] = convex_parts(arguments["fileName"], decomposition.model_dump())
+            multi_body["baseCollisionShapeIndex"] = pb.createCollisionShape(**arguments)
         super().__init__(pb, name, pb.createMultiBody(**multi_body))
         self.visual = visual

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from custom_ros_tools.config import load_config, replace_package
 from custom_ros_tools.errors import ConfigError, Problem
+from rpbi.bodies.file_checks import file_problems, parts_with_files
 
 from .asset_files import ROBOT_DESCRIPTION, find_file, find_folder
 from .legacy import MAIN
@@ -89,6 +90,8 @@ class _Reader:
         self._robot_description = robot_description
         self._problems: list[Problem] = []
         self._owner_of: dict[str, str] = {}
+        self._parts: list[tuple[str, Mapping[str, Any]]] = []
+        """Parts of objects that may name files, with the file that says so."""
 
     def read(self) -> LoadedWorld:
         """Returns the world, or raise a ConfigError with all problems."""
@@ -100,6 +103,9 @@ class _Reader:
         objects = tuple(self._objects()) if isinstance(self._data, Mapping) else ()
         further = tuple(self._further_cameras()) if isinstance(self._data, Mapping) else ()
         if self._problems:
+            # Else the world finds these itself, when it is built
+            for file, parts in self._parts:
+                self._problems += [Problem(file, key, message) for key, message in file_problems(parts)]
             raise ConfigError(self._problems)
         config = WorldConfig.from_main_file(content)
         first = () if config.rgbd_sensor is None else (CameraConfig(config.rgbd_sensor, self._file),)
@@ -111,6 +117,7 @@ class _Reader:
         for section in object_sections():
             for data, file, context in self._files(section):
                 with self._noting_problems(file):
+                    self._parts.append((file, parts_with_files(data, file, context)))
                     kind = type_of(section, data)
                     yield ObjectConfig(kind, load_object(kind, data, file, context), file, context["file"])
         self._claim_name(self._data.get("rgbd_sensor"), self._file, "rgbd_sensor.name")

@@ -301,10 +301,14 @@ class Motors:
         joint = self._model.joints[index]
         if self.mode in POSITION_MODES:
             self._limit_reports.take(joint, value, "it goes to the limit")
-            return joint.nearest_allowed(value)
+            return self.nearest_allowed(index, value)
         if self.mode == pybullet.VELOCITY_CONTROL:
             return min(max(value, -joint.max_velocity), joint.max_velocity)
         return min(max(value, -self._effort_limits[index]), self._effort_limits[index])
+
+    def nearest_allowed(self, index: int, position: float) -> float:
+        """Returns the position [rad or m] within the limits of a joint that is nearest to one."""
+        return self._model.joints[index].nearest_allowed(position)
 
     def _drive(self, index: int, value: float) -> None:
         """Sets the set point of one motor; PyBullet keeps it. Under torque control and impedance it is released."""

@@ -2,125 +2,29 @@
 
 Targets come some times a second, ticks many times. A motor that gets each target as a step closes it within a few
 ticks, with all the effort it has. So a target that follows another one soon is a knot: the set points go there on a
-line that takes as long as the targets are apart, and a moving average over the same time rounds the corners. For a
-regular stream that is a quadratic B-spline; it lags by one and a half periods and never leaves the hull of its targets.
-Targets that tell velocities too are joined by cubics, which lag by one period.
+line that takes as long as the targets are apart, and a moving average over one period rounds the corners. For a
+regular stream that is a quadratic B-spline, which lags by one and a half periods. Targets with velocities are joined by
+cubics, which lag by one period. The delay of the jitter buffer comes on top.
+
+A target that is too late even for the buffer must not stop the robot from full speed. The set points go on at the last
+velocity for a while, then slow down and come back to the last target.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Mapping
 
+from .jitter_buffer import JitterBuffer
 from .motors import POSITION_MODES, Command, Motors, joined
+from .segment import Segment, agree
 
-LONGEST_PERIOD_S = 0.2
-"""Targets that are farther apart than this [s] are no stream: each acts at once."""
-REMEMBERED = 32
-"""Arrivals that tell how far apart targets are, and how late they come."""
-ALWAYS = 1.5
-"""Targets that are no farther apart than this many ticks need no interpolation."""
-SHORTEST = 0.8
-"""A segment takes this share of the period at least, when it has to catch up."""
-DRIFT = 0.1
-"""Stamps count as long as they run as fast as the world's time within this share."""
-
-
-class Segment(NamedTuple):
-    """The way of some joints from one target to the next.
-
-    Attributes:
-        start: When it begins [ticks].
-        length: How long it takes [ticks].
-        window: Length of the moving average [ticks]; 0 is none.
-        goal: The target by joint index [rad or m].
-        way: How far it is from the target before.
-        slopes: Velocities at both ends by joint index [rad or m per tick], None if it is a line.
-    """
-
-    start: float
-    length: float
-    window: float
-    goal: Mapping[int, float]
-    way: Mapping[int, float]
-    slopes: tuple[Mapping[int, float], Mapping[int, float]] | None
-
-    def is_over(self, tick: float) -> bool:
-        """Returns whether the goal is reached at a time."""
-        return tick >= self.start + self.length + self.window
-
-    def share(self, tick: float) -> float:
-        """Returns how much of a line is done at a time, averaged over the window: from 0 to 1, never falling."""
-        late = tick - self.start
-        if not self.window:
-            return min(max(late / self.length, 0.0), 1.0)
-        return (self._covered(late) - self._covered(late - self.window)) / self.window
-
-    def _covered(self, late: float) -> float:
-        """Returns the integral of the share without the average."""
-        if late <= 0.0:
-            return 0.0
-        return late * late / (2.0 * self.length) if late < self.length else late - self.length / 2.0
-
-    def done(self, index: int, share: float) -> float:
-        """Returns how far a joint has come [rad or m]; of a cubic (Hermite), the share is that of the time."""
-        if self.slopes is None:
-            return self.way[index] * share
-        first, last = self.slopes[0][index] * self.length, self.slopes[1][index] * self.length
-        rest = 1.0 - share
-        return share * share * (3.0 - 2.0 * share) * self.way[index] + share * rest * (first * rest - last * share)
-
-
-class Arrivals:
-    """Tells when to play each target of a stream, from when it came and, where senders stamp, when it was sent.
-
-    Targets are delayed so that the intervals of their stamps are kept: by as much as the latest of late came too late,
-    but by no more than a buffer. Stamps that are 0 or of another clock do not count; then targets are played as they
-    come.
-
-    Args:
-        dt_s: Length of a tick [s].
-        buffer_s: Longest delay of a target that came in time [s].
-    """
-
-    def __init__(self, dt_s: float, buffer_s: float) -> None:
-        self._dt_ns = dt_s * 1e9
-        self._buffer = buffer_s / dt_s
-        self._longest = LONGEST_PERIOD_S / dt_s
-        self._seen: deque[tuple[int, int]] = deque(maxlen=REMEMBERED)
-        self._end = 0.0
-
-    def add(self, tick: int, stamp_ns: int) -> tuple[float, float, float]:
-        """Takes a target that comes before a tick.
-
-        Returns:
-            Start and length of the way to it and the period of the stream [ticks]. The period is 0 if it is not part of
-            a stream; it has no way to go then, nor if the period is at most ALWAYS.
-        """
-        seen = self._seen
-        if seen and tick - seen[-1][0] > self._longest:
-            seen.clear()
-        seen.append((tick, stamp_ns))
-        sent = self._sent()
-        period = (sent[-1] - sent[0]) / max(len(sent) - 1, 1)
-        if period <= ALWAYS:
-            self._end = float(tick)
-            return self._end, 0.0, period
-        late = [arrival - time for (arrival, _), time in zip(seen, sent)]
-        start = max(float(tick), self._end)
-        planned = sent[-1] + min(max(late), min(late) + self._buffer) + period
-        self._end = max(planned, start + SHORTEST * period)
-        return start, self._end - start, period
-
-    def _sent(self) -> list[float]:
-        """Returns when the targets were sent, in ticks counted from the newest, by their stamps if these make sense."""
-        tick, stamp_ns = self._seen[-1]
-        by_arrival = [float(each - tick) for each, _ in self._seen]
-        by_stamp = [(each - stamp_ns) / self._dt_ns for _, each in self._seen]
-        rises = all(before < after for before, after in zip(by_stamp, by_stamp[1:]))
-        allowed = self._longest / 2.0 - DRIFT * by_arrival[0]
-        return by_stamp if rises and abs(by_stamp[0] - by_arrival[0]) <= allowed else by_arrival
+ADAPTATION_PERIODS = 4.0
+"""Time constant with which the window of the moving average follows the period [periods]."""
+SAME_TIME = 1e-9
+"""Difference of times that is an error of rounding [ticks]."""
+RETURN_PERIODS = 5.0
+"""Time in which a stream that went on beyond its last target comes back to it [periods]."""
 
 
 class TargetStream:
@@ -129,63 +33,141 @@ class TargetStream:
     Args:
         held: Where the joints are held now by index [rad or m].
         smooth: Whether lines are averaged.
+        limited: Returns a position of a joint by index within its limits.
     """
 
-    def __init__(self, arrivals: Arrivals, held: Mapping[int, float], smooth: bool) -> None:
+    def __init__(
+        self,
+        buffer: JitterBuffer,
+        held: Mapping[int, float],
+        smooth: bool,
+        limited: Callable[[int, float], float] = lambda index, value: value,
+    ) -> None:
         self.joints = frozenset(held)
-        self._arrivals, self._smooth = arrivals, smooth
+        self._buffer, self._smooth, self._limited = buffer, smooth, limited
         self._segments: deque[Segment] = deque()
         self._base = self._goal = held
         self._slopes: Mapping[int, float] = {}
+        self._velocities: deque[Mapping[int, float]] = deque(maxlen=3)
+        """Velocities at the last targets by joint index [rad or m per tick]."""
+        self._period = 0.0
+        self._window = self._lagging_window = self._wanted_window = 0.0
         self.set_points = held
         """Where the joints are to be now."""
         self.rests = True
         """Whether there is nothing to do until the next target."""
 
-    def take(self, tick: int, goal: Mapping[int, float], slopes: Mapping[int, float], stamp_ns: int) -> None:
-        """Takes a target that comes before a tick.
+    def push(self, tick: int, goal: Mapping[int, float], slopes: Mapping[int, float], stamp_ns: int) -> None:
+        """Adds a target that comes before a tick.
 
         Args:
             goal: Positions by joint index [rad or m].
             slopes: Velocities by joint index [rad or m per tick], empty if they are not given.
             stamp_ns: When it was sent, by the sender's clock [ns], 0 if that is not known.
         """
-        start, length, period = self._arrivals.add(tick, stamp_ns)
-        if period <= ALWAYS:
+        playout = self._buffer.add(tick, stamp_ns, goal)
+        if playout.is_immediate:
             self._segments.clear()
+            self._velocities.clear()
             self._base = goal
-            has_lead = period > 0.0 and slopes
+            has_lead = playout.period > 0.0 and slopes
             self.set_points = {index: value - slopes[index] for index, value in goal.items()} if has_lead else goal
+            self._period = 0.0
         else:
-            way = {index: value - self._goal[index] for index, value in goal.items()}
-            ends = (self._slopes, slopes)
-            is_cubic = all(ends) and _agree(way, length, *ends)
-            window = period if self._smooth and not is_cubic else 0.0
-            self._segments.append(Segment(start, length, window, goal, way, ends if is_cubic else None))
+            slopes = {index: velocity * playout.speed for index, velocity in slopes.items()}
+            segment = self._append(max(playout.start, float(tick)), playout.end, goal, slopes)
+            self._wanted_window = playout.period if self._smooth and segment.slopes is None else 0.0
+            if not self._period:
+                self._window = self._lagging_window = self._wanted_window
+            self._period = playout.period
         self._goal, self._slopes, self.rests = goal, slopes, False
+
+    def _append(self, start: float, end: float, goal: Mapping[int, float], slopes: Mapping[int, float]) -> Segment:
+        """Appends the way to a target, in place of all that is beyond its start."""
+        segments = self._segments
+        leaving, before = self._goal, self._slopes or None
+        while segments and segments[-1].end > start + SAME_TIME:
+            segment = segments.pop()
+            before = before and segment.slopes and segment.velocity(start)
+            done = segment.cut(start)
+            leaving = done.goal
+            if done.length > 0.0:
+                segments.append(done)
+        way = {index: value - leaving[index] for index, value in goal.items()}
+        ends = (before, slopes) if before and slopes and agree(way, end - start, before, slopes) else None
+        segments.append(Segment(start, end - start, goal, way, ends))
+        self._velocities.append(segments[-1].velocity(end))
+        return segments[-1]
 
     def advance(self, tick: float) -> Mapping[int, float]:
         """Goes on to a time, and returns where the joints are to be then by index [rad or m]."""
-        while self._segments and self._segments[0].is_over(tick):
-            self._base = self._segments.popleft().goal
-        self.rests = not self._segments and self.set_points == self._base
+        segments = self._segments
+        if segments and segments[-1].end <= tick and not segments[-1].is_beyond:
+            self._go_beyond()
+        if self._window != self._wanted_window:
+            self._adapt_window()
+        while segments and segments[0].end + self._window <= tick:
+            self._base = segments.popleft().goal
+        self.rests = not segments and self.set_points == self._base
         positions = dict(self._base)
-        share = 1.0
-        for segment in self._segments:
-            share = min(share, segment.share(tick))  # so that no target counts more than one before it
+        for segment in segments:
+            basis = segment.basis(tick, self._window)
             for index in positions:
-                positions[index] += segment.done(index, share)
+                positions[index] += segment.covered(index, basis)
         self.set_points = positions
         return positions
 
+    def _adapt_window(self) -> None:
+        """Changes the window slowly, since its changes move the set points: a low-pass of second order."""
+        share = 1.0 / max(ADAPTATION_PERIODS * self._period, 1.0)
+        self._lagging_window += share * (self._wanted_window - self._lagging_window)
+        self._window += share * (self._lagging_window - self._window)
+        if abs(self._wanted_window - self._window) + abs(self._wanted_window - self._lagging_window) < 1e-6:
+            self._window = self._lagging_window = self._wanted_window
 
-def _agree(way: Mapping[int, float], length: float, first: Mapping[int, float], last: Mapping[int, float]) -> bool:
-    """Returns whether velocities fit the way; many senders fill them with zeros."""
-    return all(
-        abs(distance - length * (first[index] + last[index]) / 2.0)
-        <= length * max(abs(first[index]), abs(last[index])) / 2.0 + 1e-9
-        for index, distance in way.items()
-    )
+    def _go_beyond(self) -> None:
+        """Goes on from the last target at its velocity, slows down and comes back to it."""
+        last, length = self._segments[-1], self._buffer.extrapolation
+        if last.slopes is None:
+            first = then = {index: self._next_velocity(index) for index in last.way}
+        else:
+            first, bend = dict(last.slopes[1]), last.acceleration_at_end()
+            then = {index: _lesser(value + length * bend[index], 2.0 * value) for index, value in first.items()}
+        if length <= 0.0 or not any(first.values()):
+            return
+        rest = dict.fromkeys(first, 0.0)
+        self._extend(
+            length, {index: length * (value + then[index]) / 2.0 for index, value in first.items()}, first, then
+        )
+        if not self._wanted_window:
+            self._extend(self._period, {i: self._period * value / 2.0 for i, value in then.items()}, then, rest)
+        beyond = self._segments[-1].goal
+        back = {index: value - beyond[index] for index, value in last.goal.items()}
+        self._extend(RETURN_PERIODS * self._period, back, rest, rest)
+
+    def _extend(
+        self, length: float, way: Mapping[int, float], first: Mapping[int, float], last: Mapping[int, float]
+    ) -> None:
+        """Appends a cubic beyond the last target; joints stop at their limits."""
+        before = self._segments[-1]
+        goal = {index: self._limited(index, value + way[index]) for index, value in before.goal.items()}
+        stopped = {index for index, value in before.goal.items() if goal[index] != value + way[index]}
+        slopes = tuple({i: 0.0 if i in stopped else value for i, value in each.items()} for each in (first, last))
+        within = {index: value - before.goal[index] for index, value in goal.items()}
+        self._segments.append(Segment(before.end, length, goal, within, (slopes[0], slopes[1]), True))
+
+    def _next_velocity(self, index: int) -> float:
+        """Returns the velocity of a line to the next target as far as the last three ways agree on it, else 0."""
+        if len(self._velocities) < 3:
+            return 0.0
+        first, second, third = (each[index] for each in self._velocities)
+        change = _lesser(third - second, second - first)
+        return third + change if abs(third - second) <= 2.0 * abs(change) else _lesser(second, third)
+
+
+def _lesser(a: float, b: float) -> float:
+    """Returns the smaller one of two numbers of the same sign, else 0."""
+    return 0.0 if a * b <= 0.0 else min(a, b, key=abs)
 
 
 class TargetStreams:
@@ -194,7 +176,7 @@ class TargetStreams:
     Args:
         dt_s: Length of a tick [s].
         smooth: Whether corners are rounded.
-        buffer_s: Longest delay of targets to even out how late they come [s].
+        buffer_s: Delay in which late targets are still in time [s].
     """
 
     def __init__(self, motors: Motors, dt_s: float, smooth: bool, buffer_s: float) -> None:
@@ -244,9 +226,11 @@ class TargetStreams:
         if joints not in self._streams:
             self.drop(joints)
             held = {index: self._motors.targets[index] for index in joints}
-            self._streams[joints] = TargetStream(Arrivals(self._dt_s, self._buffer_s), held, self._smooth)
+            self._streams[joints] = TargetStream(
+                JitterBuffer(self._dt_s, self._buffer_s), held, self._smooth, self._motors.nearest_allowed
+            )
         slopes = {index: command.velocities[index] * self._dt_s for index in joints} if command.velocities else {}
-        self._streams[joints].take(tick, goal, slopes, command.stamp_ns)
+        self._streams[joints].push(tick, goal, slopes, command.stamp_ns)
 
     def _drive(self, tick: int, stream: TargetStream) -> None:
         before = stream.set_points

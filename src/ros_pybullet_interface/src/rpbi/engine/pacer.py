@@ -1,9 +1,15 @@
 """Keeps ticks in step with the wall clock."""
 
+from __future__ import annotations
+
 import time
+from typing import NamedTuple
 
 MAX_DEBT_S = 0.25
 """How late a tick may be and still be caught up with; of one that is later, all the lateness is given up [s]."""
+
+LEAST_SHARE = 0.8
+"""Share of a processor below which the lack of it is what slows a simulation down."""
 
 MAX_SLEEP_S = 0.005
 """Longest sleep between two looks at requests, however slow the motion [s]."""
@@ -73,3 +79,53 @@ class Pacer:
         factor = self._window_ticks * self._dt_s / max(now_s - self._window_start_s, 1e-9)
         self._window_start_s, self._window_ticks = now_s, 0
         return factor
+
+
+class Load(NamedTuple):
+    """Time that was spent until now [s].
+
+    Attributes:
+        wall_s: Of the wall clock.
+        loop_s: Of the processor, in the thread that runs the world.
+        process_s: Of the processor, in all threads of the process.
+        physics_s: In PyBullet's steps, by the wall clock.
+        ticks: Ticks that were made.
+    """
+
+    wall_s: float
+    loop_s: float
+    process_s: float
+    physics_s: float
+    ticks: int
+
+    @classmethod
+    def now(cls, physics_s: float, ticks: int) -> Load:
+        """Returns that of this process; called in the thread that runs the world."""
+        return cls(time.monotonic(), time.thread_time(), time.process_time(), physics_s, ticks)
+
+    def since(self, before: Load) -> Load:
+        """Returns what was spent since an earlier time."""
+        wall_s, loop_s, process_s, physics_s = (now - then for now, then in zip(self[:4], before[:4]))
+        return Load(wall_s, loop_s, process_s, physics_s, self.ticks - before.ticks)
+
+    def reason(self, dt_s: float) -> str:
+        """Returns why a world that spent this is slower than it should be, and what to do about it.
+
+        Args:
+            dt_s: Simulated time of a tick [s].
+        """
+        elsewhere = self.process_s - self.loop_s
+        if self.loop_s < LEAST_SHARE * self.wall_s:
+            got = f"the simulation got {100 * self.loop_s / self.wall_s:.0f} % of a processor"
+            if elsewhere > (1.0 - LEAST_SHARE) * self.wall_s:
+                others = f"other threads of the node {100 * elsewhere / self.wall_s:.0f} %"
+                return f"{got}, {others}; send it fewer messages, call fewer services"
+            return f"{got}, since the machine is busy; end other programs, or set a lower real_time_factor"
+        tick_ms, physics_ms = (1e3 * spent_s / max(self.ticks, 1) for spent_s in (self.wall_s, self.physics_s))
+        if physics_ms > tick_ms / 2:
+            took = f"PyBullet takes {physics_ms:.2g} ms for a step of {1e3 * dt_s:.2g} ms"
+            return f"{took}; use simpler collision shapes, fewer contacts or a larger timeStep"
+        took = (
+            f"sensors, controllers and messages take {tick_ms - physics_ms:.2g} ms a tick, PyBullet {physics_ms:.2g} ms"
+        )
+        return f"{took}; lower the rates of sensors and topics"

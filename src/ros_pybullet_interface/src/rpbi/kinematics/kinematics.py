@@ -17,7 +17,7 @@ from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.elements import MOVING
 from rpbi.urdf.files import write_description
 from rpbi.urdf.joints import Joint
-from rpbi.urdf.loading import flags_for
+from rpbi.urdf.loading import check_joints, flags_for
 from rpbi.urdf.structure import check_structure
 
 from .chain import Chain, Target
@@ -49,6 +49,7 @@ class Kinematics:
     def __init__(self, urdf_path: str, scaling: float = 1.0, flags: int = 0) -> None:
         self._document = UrdfDocument(urdf_path, not_xml="expected well-formed XML")
         check_structure(self._document)
+        check_joints(urdf_path, self._document.root)
         self._scaling = scaling
         self._lock = threading.Lock()
         self._pb = Client(pybullet.DIRECT)

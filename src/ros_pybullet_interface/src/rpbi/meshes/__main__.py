@@ -5,9 +5,9 @@ may well crash, which is what it is for.
 """
 
 import ctypes
+import io
 import math
 import os
-import resource
 import struct
 import sys
 import tempfile
@@ -18,7 +18,8 @@ import pybullet
 
 from custom_ros_tools.config import read_file
 
-from .trial import MOST_BYTES, MOST_CPU_S, Use
+from .checks import check_obj
+from .trial import MOST_CPU_S, Use, limit_resources
 
 GETS_NOTHING = b"cannot extract anything useful"
 """What PyBullet says of a mesh that it leaves out; nothing else tells it of a visual one."""
@@ -26,10 +27,7 @@ GETS_NOTHING = b"cannot extract anything useful"
 
 def main() -> None:
     """Tries all meshes that the arguments name."""
-    for limit, most in ((resource.RLIMIT_AS, MOST_BYTES), (resource.RLIMIT_CPU, MOST_CPU_S), (resource.RLIMIT_CORE, 0)):
-        already = resource.getrlimit(limit)[0]
-        most = most if already == resource.RLIM_INFINITY else min(already, most)
-        resource.setrlimit(limit, (most, most))
+    limit_resources(MOST_CPU_S)
     report, *meshes = sys.argv[1:]
     said = tempfile.TemporaryFile()
     os.dup2(said.fileno(), 1)
@@ -37,7 +35,7 @@ def main() -> None:
     pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD)
     for use, file in zip(meshes[::2], meshes[1::2], strict=True):
         try:
-            _refuse_non_finite(file)
+            _refuse_nonsense(file)
             _USES[Use(use)](file)
             message = ""
         except (pybullet.error, MemoryError) as error:
@@ -47,8 +45,16 @@ def main() -> None:
         os.write(int(report), " ".join(message.split()).encode() + b"\n")
 
 
-def _refuse_non_finite(file: str) -> None:
-    """Refuses an STL file with a number that is none: with it, PyBullet crashes now and then."""
+def _refuse_nonsense(file: str) -> None:
+    """Refuses an STL file with a number that is none, and an OBJ file that makes no sense.
+
+    With those, PyBullet crashes now and then, and so not always here.
+    """
+    if file.lower().endswith(".obj"):
+        try:
+            check_obj(io.BytesIO(read_file(file)))
+        except ValueError as error:
+            raise pybullet.error(str(error)) from None
     if file.lower().endswith(".stl"):
         triangles = struct.iter_unpack("<12fH", read_file(file)[84:])
         if not all(math.isfinite(sum(numbers)) for numbers in triangles):

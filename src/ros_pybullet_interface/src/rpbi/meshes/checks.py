@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from pathlib import Path
 
@@ -31,6 +31,29 @@ def mesh_file_problem(path: str) -> str:
     if path.lower().endswith(".stl") and not _is_binary_stl(path):
         return "expected a whole binary STL file, got another kind or a part"
     return ""
+
+
+def check_obj(lines: Iterable[bytes]) -> None:
+    """Checks that the faces of an OBJ file name corners that it has; PyBullet reads whatever is in memory there.
+
+    Raises:
+        ValueError: If one does not, or a corner is not at three finite numbers.
+    """
+    counts = {b"v": 0, b"vt": 0, b"vn": 0}
+    furthest = [0, 0, 0]
+    for line in lines:
+        key, *words = line.split() or [b""]
+        if key in counts:
+            counts[key] += 1
+            if key == b"v" and not (len(words) >= 3 and all(math.isfinite(float(word)) for word in words[:3])):
+                raise ValueError(f"corner {counts[key]} is not at three finite numbers")
+        elif key == b"f":
+            for word in words:
+                for index, number in enumerate(word.split(b"/")[:3]):
+                    furthest[index] = max(furthest[index], abs(int(number or 0)))
+    for name, count, most in zip(("v", "vt", "vn"), counts.values(), furthest):
+        if most > count:
+            raise ValueError(f"a face names '{name}' {most} of {count}")
 
 
 def _is_binary_stl(path: str) -> bool:

@@ -7,6 +7,7 @@ well is remembered by its content, in the user's cache folder, so that every mes
 import enum
 import logging
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -15,17 +16,17 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from custom_ros_tools.child_process import start_child
+from custom_ros_tools.processes.child import start_child
 
 from .copies import cache_folder, content_hash
 
-TRIAL = 2
+TRIAL = 3
 """Number of the present kind of trial; meshes that went well in another are tried again."""
-MOST_BYTES = 4 * 2**30
+MOST_BYTES = 2 * 2**30
 """Memory that a trial may take."""
 MOST_CPU_S = 20
 """Time that a trial may take [s] of the processor."""
-LONGEST_TRIAL_S = 60.0
+LONGEST_TRIAL_S = 45.0
 """Time that a trial may take [s] of wall time."""
 MOST_TOGETHER = 100
 """Meshes that one process tries, as long as it lives."""
@@ -53,6 +54,14 @@ class Mesh(NamedTuple):
 
 _tried: set[tuple[Mesh, int, int]] = set()
 """Meshes that went well, by size and time of the last change [ns]: files that are the same need not be read again."""
+
+
+def limit_resources(cpu_s: int) -> None:
+    """Limits what this process may take: memory, time of the processor [s], and no core dump."""
+    for limit, most in ((resource.RLIMIT_AS, MOST_BYTES), (resource.RLIMIT_CPU, cpu_s), (resource.RLIMIT_CORE, 0)):
+        already = resource.getrlimit(limit)[0]
+        most = most if already == resource.RLIM_INFINITY else min(already, most)
+        resource.setrlimit(limit, (most, most))
 
 
 def faults_in(meshes: Iterable[Mesh]) -> dict[Mesh, str]:

@@ -5,7 +5,7 @@ import logging
 import os
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import pybullet
@@ -27,6 +27,7 @@ from rpbi.ros.services.node_services import NODE_SERVICES, NodeContext
 from rpbi.ros.window.topics import WindowTopics
 from rpbi.urdf.files import write_description
 from rpbi.world import World
+from rpbi.world_warnings import world_warnings
 
 from .endpoints import serve
 from .headers import use_own_frames, use_prefix
@@ -80,6 +81,17 @@ LONGEST_END_S = 10.0
 sys.setswitchinterval(0.0005)
 
 
+MAX_WARNINGS = 20
+"""Warnings of a world that are logged at its start; of more, the rest is counted."""
+
+
+def _log_warnings(warnings: Sequence[Problem]) -> None:
+    for warning in warnings[:MAX_WARNINGS]:
+        log.warning("%s", warning)
+    if len(warnings) > MAX_WARNINGS:
+        log.warning("%d more warnings: ./rpbi check WORLD.yaml lists all", len(warnings) - MAX_WARNINGS)
+
+
 class SimulatorNode:
     """Builds the configured world and connects everything in it to ROS.
 
@@ -102,6 +114,7 @@ class SimulatorNode:
             )
         self._world = World(loaded, simulated)
         endpoints(self._world)  # refuses what `./rpbi check` refuses
+        _log_warnings(world_warnings(self._world))
         use_own_frames(self._world.frames())
         self._frames = StaticFrames(config.poses)
         trust_only({"rpbi", *config.trusted_packages}, "name its package in trusted_packages of the main file")

@@ -2,7 +2,7 @@
 
 import copy
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from custom_ros_tools.errors import ConfigError, Problem, shortened
 from rpbi.geometry import scaled
@@ -72,13 +72,20 @@ def description_for_ros(path: str) -> str:
     return text_of(robot)
 
 
+WORLD_LINK = "world"
+"""The link that PyBullet takes for the world: without inertia it weighs nothing, and as a root it is fixed."""
+LEAST_KG = "1e-06"
+"""Mass of a floating root that is a mere frame [kg]: PyBullet would fix one without mass to the world."""
+
+
 def without_shapes(document: UrdfDocument, links: Sequence[str] | None = None) -> str:
     """Returns a URDF without shapes, of all or some links and the joints between them.
 
     It loads in half a millisecond where meshes take up to some hundred. Every link has unit mass at its own frame, so
     that PyBullet's frames of mass centres are the links' frames.
     """
-    kept = [name for name in document.links if links is None or name in links]
+    root = document.root_link()
+    kept = sorted((name for name in document.links if links is None or name in links), key=lambda name: name != root)
     ends = {*kept}
     every = document.joint_elements
     tied = (one for one in every if links is None or {end_of(one, "parent"), end_of(one, "child")} <= ends)
@@ -126,6 +133,77 @@ def mounted_on(robot: Element, root_link: str, joints: Sequence[UrdfJoint]) -> N
     links = [new_element("link", inertial("0"), name=joint.parent) for joint in joints]
     robot[:0] = [*links, root]  # in order, in case of URDF_MAINTAIN_LINK_ORDER
     robot.extend(map(joint_element, joints))
+
+
+def frame_masses(document: UrdfDocument, is_fixed: bool) -> dict[str, str]:
+    """Returns the masses [kg] of links that are mere frames, which PyBullet would give 1 kg each.
+
+    A frame is a link without inertia and shape. It weighs nothing, but PyBullet needs some mass where something moves
+    freely: a root that is not fixed weighs `LEAST_KG`, if mass is fixed to it. Left out are frames on a moving joint
+    that moves no mass, and a root that is neither fixed nor has mass fixed to it.
+
+    Args:
+        is_fixed: Whether the base is fixed to the world.
+    """
+    frames = document.frames - {WORLD_LINK}
+    if not frames:
+        return {}
+    above = {edge.child: edge for edge in document.edges}
+    # Mass that moves with a link, and that is fixed to it
+    carries, holds = (set(document.links) - document.frames - document.massless for _ in range(2))
+    for link in reversed(_from_the_root(document)):
+        edge = above.get(link)
+        if edge is not None and link in carries:
+            carries.add(edge.parent)
+        if edge is not None and link in holds and document.joint_types[edge.joint] == "fixed":
+            holds.add(edge.parent)
+    masses: dict[str, str] = {}
+    for link in frames:
+        if (edge := above.get(link)) is None:
+            masses |= {link: LEAST_KG} if link in holds and not is_fixed else {}
+        elif link in carries or document.joint_types[edge.joint] == "fixed":
+            masses[link] = "0"
+    return masses
+
+
+def _from_the_root(document: UrdfDocument) -> list[str]:
+    """Returns all links, each one after that on which it hangs."""
+    below: dict[str, list[str]] = {}
+    for edge in document.edges:
+        below.setdefault(edge.parent, []).append(edge.child)
+    ordered = [document.root_link()]
+    for link in ordered:
+        ordered += below.get(link, [])
+    return ordered
+
+
+def weigh_frames(robot: Element, masses: Mapping[str, str]) -> None:
+    """Gives links of a robot, by name, masses [kg] such as `frame_masses` returns."""
+    for link in robot.findall("link"):
+        if (mass := masses.get(link.get("name", ""))) is not None:
+            link.append(inertial(mass))
+
+
+def weighed_by_pybullet(document: UrdfDocument, is_fixed: bool) -> list[str]:
+    """Returns the links that can move and weigh 1 kg because the URDF says nothing of their mass."""
+    above = {edge.child: edge for edge in document.edges}
+    moving: set[str] = set()
+    for link in _from_the_root(document):
+        edge = above.get(link)
+        is_free = not (is_fixed or link == WORLD_LINK) if edge is None else edge.parent in moving
+        if is_free or (edge is not None and document.joint_types[edge.joint] != "fixed"):
+            moving.add(link)
+    silent = {link.get("name", "") for link in document.root.findall("link") if link.find("inertial") is None}
+    missing = moving & silent - frame_masses(document, is_fixed).keys()
+    return [link for link in document.links if link in missing]
+
+
+def put_root_first(robot: Element) -> None:
+    """Puts the root link of a robot before all others: PyBullet dies of others with URDF_MAINTAIN_LINK_ORDER."""
+    children = {end_of(joint, "child") for joint in robot.findall("joint")}
+    for root in [link for link in robot.findall("link") if link.get("name") not in children]:
+        robot.remove(root)
+        robot.insert(0, root)
 
 
 def put_first_visuals_last(robot: Element) -> None:

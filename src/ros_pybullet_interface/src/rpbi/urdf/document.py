@@ -127,6 +127,19 @@ class UrdfDocument:
                 for key, text in element.attrib.items():
                     yield Attribute(name, element.tag, key, text, is_read and element.tag in READ)
 
+    @cached_property
+    def frames(self) -> set[str]:
+        """Names of the links that have neither inertia nor shape."""
+        parts = ("inertial", "visual", "collision")
+        links = (link for link in self.root.findall("link") if all(link.find(part) is None for part in parts))
+        return {link.get("name", "") for link in links}
+
+    @cached_property
+    def massless(self) -> set[str]:
+        """Names of the links whose mass is 0."""
+        masses = ((link.get("name", ""), link.find("inertial/mass")) for link in self.root.findall("link"))
+        return {name for name, mass in masses if mass is not None and not float(mass.get("value") or 0.0)}
+
     @property
     def is_soft(self) -> bool:
         """Whether it describes a soft body."""

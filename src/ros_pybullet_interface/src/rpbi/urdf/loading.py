@@ -15,7 +15,7 @@ from rpbi.engine.client import MAXIMAL_COORDINATES, Client
 from rpbi.meshes.checks import mesh_file_problem
 from rpbi.meshes.trial import Mesh, Use, faults_in
 
-from .copies import for_pybullet, put_first_visuals_last
+from .copies import for_pybullet, frame_masses, put_first_visuals_last, put_root_first, weigh_frames
 from .document import UrdfDocument
 from .elements import Element, text_of
 from .files import found_mesh
@@ -49,14 +49,25 @@ def urdf_problems(path: str) -> list[str]:
         return [f"{path}: expected <robot> at the top, got <{shortened(document.tag)}>"]
     if not document.links and not document.is_soft:
         return [f"{path}: the robot has no <link>"]
-    problems = [*structure_problems(document), *_count_problems(document)] or _mesh_problems(document)
-    return [f"{path}: {problem}" for problem in problems]
+    if problems := structure_problems(document):
+        return [f"{path}: {problem}" for problem in problems]
+    try:
+        check_joints(path, document.root)
+    except ConfigError as error:
+        return [str(error)]
+    return [f"{path}: {problem}" for problem in _mesh_problems(document)]
 
 
-def _count_problems(document: UrdfDocument) -> list[str]:
-    """Returns a sentence if there are too many joints for PyBullet even when it merges the fixed ones."""
-    moving = sum(kind != "fixed" for kind in document.joint_types.values())
-    return [f"expected at most {MOST_JOINTS} joints that are not fixed, got {moving}"] if moving > MOST_JOINTS else []
+def check_joints(file: str, robot: Element) -> None:
+    """Checks that PyBullet can load all joints of a robot, when it merges the fixed ones if need be.
+
+    Raises:
+        ConfigError: If there are too many.
+    """
+    moving = sum(joint.get("type") != "fixed" for joint in robot.findall("joint"))
+    if moving > MOST_JOINTS:
+        message = f"expected at most {MOST_JOINTS} joints that are not fixed, got {moving}"
+        raise ConfigError([Problem(file, "", message)])
 
 
 def _mesh_problems(document: UrdfDocument) -> list[str]:
@@ -109,6 +120,9 @@ def load_urdf(
         document = UrdfDocument(file)
         check_structure(document)
         robot = prepare(document)
+        weigh_frames(robot, frame_masses(document, bool(arguments.get("useFixedBase"))))
+        check_joints(file, robot)
+        put_root_first(robot)
         if pb.has_window:
             put_first_visuals_last(robot)
         flags = arguments.get("flags") or 0

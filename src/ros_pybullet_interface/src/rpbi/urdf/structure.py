@@ -19,13 +19,14 @@ LONGEST_TEXT = 1000
 """Bytes of any other text; for names of files, the same holds."""
 MOST_LINKS = 2000
 """Links of a robot, those on fixed joints too."""
-MOST_SHAPES = 2000
+MOST_SHAPES = 1000
 """Shapes of all links, to see or to touch."""
 MOST_ATTRIBUTES = 100_000
 """Texts in a file."""
 MOST_PROBLEMS = 20
 """Faults of one file that are reported."""
 _NAMES = {("robot", "name"), ("link", "name"), ("joint", "name"), ("material", "name"), ("joint", "type")}
+_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "spherical")
 _UNSAFE = re.compile(r"[%\x00-\x1f\x7f-\x9f]")
 """Characters that PyBullet's log, which takes texts of a URDF for printf formats, must not get."""
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*(e[-+]?\d+)?|\.\d+(e[-+]?\d+)?|nan|inf(inity)?)", re.IGNORECASE)
@@ -75,6 +76,7 @@ def _problems(document: UrdfDocument) -> Iterator[str]:
     if (shapes := sum(1 for _ in document.root.iter("geometry"))) > MOST_SHAPES:
         yield f"expected at most {MOST_SHAPES} shapes, got {shapes}"
     yield from _name_problems(document)
+    yield from _type_problems(document)
     yield from _tree_problems(document)
     yield from _mimic_problems(document)
     yield from _text_problems(document)
@@ -87,6 +89,14 @@ def _name_problems(document: UrdfDocument) -> Iterator[str]:
                 yield f"a {kind} has no name"
             elif count > 1:
                 yield f"{count} {kind}s are called '{shortened(name)}'; names are unique"
+
+
+def _type_problems(document: UrdfDocument) -> Iterator[str]:
+    """Yields a sentence for each joint of no type: PyBullet's message of that is a format without arguments."""
+    for joint in document.joint_elements:
+        if (kind := joint.get("type", "")) not in _TYPES:
+            name = shortened(joint.get("name", ""))
+            yield f"joint '{name}': type: expected one of {', '.join(_TYPES)}, got {shortened(ascii(kind))}"
 
 
 def _tree_problems(document: UrdfDocument) -> Iterator[str]:

@@ -1,7 +1,11 @@
 """Starts arm and haptic device, shows what happens, and reports one press and release."""
 
+import contextlib
+import os
+import signal
 import threading
 import time
+import xmlrpc.client
 from collections import deque
 from pathlib import Path
 
@@ -27,10 +31,12 @@ KEPT = 1000
 """So many forces and poses wait on a busy machine until all that belongs to a moment is there."""
 SHOWN_S = 20.0
 """So much of the past is in the window [s]."""
+LONGEST_FAREWELL_S = 15.0
+"""So long is waited for an interrupt by roslaunch [s]."""
 LEFT_S = 2.0
 """So long after the scripted hand has gone, its press is over in any case [s]."""
 LARGEST_ERROR = 0.05
-"""How far the steady force may be from what stiffness and depth predict."""
+"""How far the mean force of a press may be from what stiffness and depth predict, as a share."""
 
 
 class Watch:
@@ -38,6 +44,11 @@ class Watch:
 
     def __init__(self) -> None:
         self._folder = Path(rospy.get_param("~working_directory", "."), rospy.get_param("~output", "."))
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            message = f"output: expected a folder that can be made, got '{self._folder}': {error.strerror}"
+            raise InterfaceError(message) from error
         self._is_scripted = rospy.get_param("~device", "") == "scripted"
         self._press = self._new_press()
         self._measured: deque[tuple[rospy.Time, float]] = deque(maxlen=KEPT)
@@ -74,6 +85,10 @@ class Watch:
             pass
         if self._failure:
             raise InterfaceError(self._failure)
+        if not rospy.is_shutdown() and interrupt_roslaunch():
+            left = threading.Event()
+            rospy.on_shutdown(left.set)
+            left.wait(LONGEST_FAREWELL_S)
         rospy.signal_shutdown("the press is over")
 
     def _new_press(self) -> Press:
@@ -125,7 +140,9 @@ class Watch:
         press.write_table(self._folder / "human_interaction.csv")
         press.write_figure(self._folder / "human_interaction.png")
         report = press.report()
-        told = "pressed too shortly or unsteadily to tell how strongly" if report is None else str(report)
+        told = (
+            "pressed too shortly to tell how strongly, or the simulator stood still" if report is None else str(report)
+        )
         rospy.loginfo("%s; see human_interaction.png and .csv in %s", told, self._folder.resolve())
         if report is not None and report.felt_error > LARGEST_ERROR:
             rospy.logwarn(
@@ -152,6 +169,22 @@ class Watch:
 def _value_at(values: deque[tuple[float, float]], time_s: float) -> float:
     """Returns the value that was the newest one at a time; 0 if there was none."""
     return next((value for stamp_s, value in reversed(values.copy()) if stamp_s <= time_s), 0.0)
+
+
+def interrupt_roslaunch() -> bool:
+    """Interrupts the roslaunch that started this process, which then ends all of its nodes, without an error.
+
+    Returns:
+        Whether there is one.
+    """
+    parent = os.getppid()
+    for uri in rospy.get_param("/roslaunch/uris", {}).values():
+        with contextlib.suppress(OSError, xmlrpc.client.Error):  # it has gone
+            *_, pid = xmlrpc.client.ServerProxy(uri).get_pid()
+            if pid == parent:
+                os.kill(parent, signal.SIGINT)
+                return True
+    return False
 
 
 def main() -> None:

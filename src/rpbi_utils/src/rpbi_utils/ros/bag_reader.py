@@ -9,7 +9,7 @@ from typing import NamedTuple
 from custom_ros_tools.errors import shortened
 from rpbi_utils.bag_file import BagFile, NotABagError
 from rpbi_utils.errors import BagError
-from rpbi_utils.limits import MAX_ALL_DEFINITIONS_BYTES, Budget, LimitError
+from rpbi_utils.limits import MAX_ALL_DEFINITIONS_BYTES, MAX_TOPICS, Budget, LimitError
 from rpbi_utils.message_type import MessageType
 
 _ACTIVE_SUFFIX = ".active"
@@ -57,7 +57,7 @@ class BagReader:
             self._bag = self._open()
             if not any_size:
                 self._refuse_bombs()
-            self.budget = Budget(self.path, self._bag.unfolded_bytes, any_size)
+            self.budget = Budget(self.path, self.path.stat().st_size, any_size)
             self._read_connections()
         except BaseException:
             self._file.close()
@@ -113,6 +113,9 @@ class BagReader:
         self.counts: dict[str, int] = {}
         self._types: dict[int, tuple[str, MessageType]] = {}
         known: dict[tuple[str, str], MessageType] = {}
+        topics = len({each.topic for number, each in self._bag.connections.items() if self._bag.counts[number]})
+        if topics > MAX_TOPICS:
+            raise BagError(self.path, str(LimitError.over(f"{MAX_TOPICS:,} topics", f"{topics:,}")))
         left = MAX_ALL_DEFINITIONS_BYTES
         for number, each in sorted(self._bag.connections.items(), key=lambda item: item[1].topic):
             if not self._bag.counts[number]:

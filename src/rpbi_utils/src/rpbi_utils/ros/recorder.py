@@ -20,8 +20,8 @@ import rosgraph
 import roslib.packages
 from rosgraph.names import get_ros_namespace, resolve_name
 
-from custom_ros_tools.child_process import start_child
 from custom_ros_tools.errors import MissingDependency
+from custom_ros_tools.processes.child import start_child
 from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, TimedTransport
 from rpbi_utils.errors import RecordingError
 

@@ -1,5 +1,6 @@
 """Distances to bodies of the environment."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -60,18 +61,19 @@ class Environment(Check):
         Raises:
             ValueError: If an obstacle has no shape.
         """
-        unit, margin_m = "m of distance", self.config.margin_m
+        margin_m = self.config.margin_m
         if not np.isfinite(motion.position).all():  # PyBullet would find nothing near it
-            return Violation(self.name, "the robot", float("nan"), margin_m, unit)
+            return Violation(self.name, "the robot", math.nan, margin_m, "m", quantity="distance")
         if situation.obstacles is None and self.config.world is None:
-            return Violation(self.name, "nobody tells what is around the robot", float("nan"), float("nan"), "")
+            return Violation(self.name, "nobody tells what is around the robot", math.nan, math.nan, "")
         live = situation.obstacles or ()
         if live is not self._live:
             self._take(live)
         found = self.proximity.first(motion)
         if found is None:
             return None
-        return Violation(self.name, self._subject(found.pair), found.distance, margin_m, unit, found.is_while_braking)
+        subject = self._subject(found.pair)
+        return Violation(self.name, subject, found.distance, margin_m, "m", found.is_while_braking, "distance")
 
     def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
         """See `Check`."""

@@ -16,4 +16,4 @@ class JointAcceleration(Check):
 
     def check(self, motion: Motion, situation: Situation) -> Violation | None:
         """See `Check`."""
-        return self.first_above(np.abs(motion.acceleration), self.limits.acceleration, UNIT)
+        return self.first_above(np.abs(motion.acceleration), self.limits.acceleration, "acceleration", UNIT)

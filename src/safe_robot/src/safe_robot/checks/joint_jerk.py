@@ -16,4 +16,4 @@ class JointJerk(Check):
 
     def check(self, motion: Motion, situation: Situation) -> Violation | None:
         """See `Check`."""
-        return self.first_above(np.abs(motion.jerk), self.limits.jerk, UNIT)
+        return self.first_above(np.abs(motion.jerk), self.limits.jerk, "jerk", UNIT)

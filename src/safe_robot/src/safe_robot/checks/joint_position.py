@@ -23,4 +23,4 @@ class JointPosition(Check):
             return None
         row, i = divmod(int(np.argmin(is_inside)), q.shape[1])
         limit = self.limits.lower[i] if q[row, i] < low[i] else self.limits.upper[i]
-        return self.of_joint(i, float(q[row, i]), float(limit), UNIT, row > 0)
+        return self.of_joint(i, float(q[row, i]), float(limit), "position", UNIT, row > 0)

@@ -16,4 +16,4 @@ class JointVelocity(Check):
 
     def check(self, motion: Motion, situation: Situation) -> Violation | None:
         """See `Check`."""
-        return self.first_above(np.abs(motion.velocity), self.limits.velocity, UNIT)
+        return self.first_above(np.abs(motion.velocity), self.limits.velocity, "velocity", UNIT)

@@ -46,5 +46,5 @@ class LinkVelocity(Check):
             is_slow = speed <= limit
             if not is_slow.all():
                 row = int(np.argmin(is_slow))
-                return Violation(self.name, f"link '{link}'", float(speed[row]), limit, "m/s", row > 0)
+                return Violation(self.name, f"link '{link}'", float(speed[row]), limit, "m/s", row > 0, "speed")
         return None

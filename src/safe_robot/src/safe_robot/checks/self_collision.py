@@ -1,6 +1,7 @@
 """Distances between the links of the robot."""
 
 import math
+import os
 import random
 from pathlib import Path
 from typing import Any
@@ -53,12 +54,12 @@ class SelfCollision(Check):
     def check(self, motion: Motion, situation: Situation) -> Violation | None:
         """See `Check`."""
         if not np.isfinite(motion.position).all():  # PyBullet would find nothing near it
-            return Violation(self.name, "the robot", float("nan"), self.config.margin_m, "m of distance")
+            return Violation(self.name, "the robot", math.nan, self.config.margin_m, "m", quantity="distance")
         found = self.proximity.first(motion)
         if found is None:
             return None
         subject, margin_m = self._subject(found.pair), self.config.margin_m
-        return Violation(self.name, subject, found.distance, margin_m, "m of distance", found.is_while_braking)
+        return Violation(self.name, subject, found.distance, margin_m, "m", found.is_while_braking, "distance")
 
     def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
         """See `Check`."""
@@ -73,7 +74,7 @@ class SelfCollision(Check):
 
     def _pairs(self) -> list[tuple[str, str]]:
         path = self.config.pairs_file
-        if path is not None and Path(path).exists():
+        if path is not None and os.path.exists(path):
             return self._read(path)
         if self.config.srdf is None:
             pairs = pairs_that_may_meet(self.robot, self.distances, self.config.margin_m)
@@ -86,7 +87,7 @@ class SelfCollision(Check):
     def _write(self, path: str, pairs: list[tuple[str, str]]) -> None:
         try:
             Path(path).write_text(yaml.safe_dump({"pairs": [list(pair) for pair in pairs]}, default_flow_style=None))
-        except OSError as error:
+        except (OSError, ValueError) as error:
             message = f"expected a file that can be written, got {error}"
             raise ConfigError([Problem(self.file, "checks.self_collision.pairs_file", message)]) from None
 

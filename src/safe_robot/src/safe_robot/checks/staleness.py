@@ -25,11 +25,40 @@ class Staleness(Check):
         """See `Check`."""
         timeout_s = self.config.timeout_s
         if not abs(situation.age_s) <= timeout_s:
-            return Violation(self.name, "the age of the target", situation.age_s, timeout_s, "s")
+            return too_old(situation.age_s, timeout_s, "checks.staleness.timeout_s")
         step_s = situation.stamp_step_s
         if step_s is not None and not step_s > 0.0:
-            return Violation(self.name, "the stamp, after that of the target before,", step_s, 0.0, "s")
+            return Violation(
+                self.name, "the stamp, after that of the target before,", step_s, 0.0, "s", words=_order(step_s)
+            )
         if not motion.start.is_at_rest and not situation.since_command_s <= timeout_s:
             since_s = situation.since_command_s
-            return Violation(self.name, "the time without a target while the robot moves", since_s, timeout_s, "s")
+            words = (
+                f"no target for {since_s:.3g} s while the robot moves, limit {timeout_s:.6g} s; publish until it"
+                " rests, or raise checks.staleness.timeout_s"
+            )
+            return Violation(self.name, "the time without a target", since_s, timeout_s, "s", words=words)
         return None
+
+
+def too_old(age_s: float, limit_s: float, key: str) -> Violation:
+    """Returns the violation of a target of an age [s] beyond a limit [s], which a parameter sets."""
+    if age_s < 0.0:
+        words = (
+            f"the stamp of the target is {-age_s:.3g} s in the future, limit {limit_s:.6g} s; synchronise the clocks"
+        )
+    else:
+        words = (
+            f"the target is {age_s:.3g} s old, limit {limit_s:.6g} s; synchronise the clocks, publish targets sooner,"
+            f" or raise {key}"
+        )
+    return Violation(Staleness.name, "the age of the target", age_s, limit_s, "s", words=words)
+
+
+def _order(step_s: float) -> str:
+    """Returns what is wrong with a stamp that comes some time [s] after that of the target before."""
+    if step_s == 0.0:
+        found = "two targets have the same stamp"
+    else:
+        found = f"the stamp of the target is {-step_s:.3g} s before that of the target before"
+    return f"{found}; give each target a later stamp, or none, and let one source publish"

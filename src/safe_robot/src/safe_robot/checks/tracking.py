@@ -33,4 +33,4 @@ class Tracking(Check):
         measured = np.array([situation.measured.get(name, np.nan) for name in self.robot.joint_names])
         expected = motion.start.position - self.config.lag_s * motion.start.velocity
         error = np.abs(measured - expected)[None]
-        return self.first_above(error, np.full(error.shape[1], self.config.tolerance), ("rad of error", "m of error"))
+        return self.first_above(error, np.full(error.shape[1], self.config.tolerance), "error", ("rad", "m"))

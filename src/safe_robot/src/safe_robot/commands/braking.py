@@ -5,7 +5,7 @@ command a period: v_k = (q_k - q_{k-1}) / T, a_k = (v_k - v_{k-1}) / T, j_k = (a
 """
 
 import math
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,8 @@ GROWTH = 1.15
 INSIDE = 1.0 - 1e-6
 """Braking keeps this share of the limits, so that rounding does not bring it over them."""
 TINY = 1e-300
+MAX_PERIODS = 10_000
+"""No braking may take more periods: those of all lengths are prepared."""
 FASTEST = 10.0
 """Speed from which braking is prepared where none is the limit [rad/s or m/s]."""
 
@@ -38,8 +40,8 @@ class Brake(NamedTuple):
         rows = max(len(self.velocity), len(other.velocity))
         return Brake(
             *(
-                np.where(joints, _padded(theirs, rows, mode), _padded(own, rows, mode))
-                for own, theirs, mode in zip(self, other, ("edge", "constant", "constant", "constant"))
+                np.where(joints, _padded(theirs, rows, i == 0), _padded(own, rows, i == 0))
+                for i, (own, theirs) in enumerate(zip(self, other))
             )
         )
 
@@ -85,6 +87,9 @@ class Braking:
         max_acceleration: n largest accelerations [rad/s^2 or m/s^2].
         max_jerk: n largest jerks [rad/s^3 or m/s^3].
         period_s: T [s].
+
+    Raises:
+        ValueError: If a braking may take more than `MAX_PERIODS` periods.
     """
 
     def __init__(
@@ -93,6 +98,11 @@ class Braking:
         self._period_s = period_s
         self._max_acceleration, self._max_jerk = INSIDE * max_acceleration, INSIDE * max_jerk
         longest_s = max(map(_longest_s, max_velocity.tolist(), max_acceleration.tolist(), max_jerk.tolist()))
+        if not longest_s <= MAX_PERIODS * period_s:
+            raise ValueError(
+                f"expected limits with which braking takes at most {MAX_PERIODS} periods of period_s, {period_s:g} s;"
+                f" got {longest_s:.3g} s"
+            )
         lengths = [2]
         while lengths[-1] * period_s < longest_s:
             lengths.append(max(lengths[-1] + 1, round(lengths[-1] * GROWTH)))
@@ -177,9 +187,9 @@ class Braking:
         return is_within
 
 
-def _padded(values: np.ndarray, rows: int, mode: Literal["edge", "constant"]) -> np.ndarray:
-    """Returns k x n values with rows after them, which repeat the last one or are 0; 0 where there is no row."""
-    return np.pad(values, ((0, rows - len(values)), (0, 0)), mode if len(values) else "constant")
+def _padded(values: np.ndarray, rows: int, repeats: bool) -> np.ndarray:
+    """Returns k x n values with rows after them, which repeat the last one, if there is one, or are 0."""
+    return np.pad(values, ((0, rows - len(values)), (0, 0)), "edge" if repeats and len(values) else "constant")
 
 
 def _jerk_line(length: int) -> np.ndarray:
@@ -205,5 +215,5 @@ def _longest_s(velocity: float, acceleration: float, jerk: float) -> float:
     velocity = min(velocity, FASTEST)
     acceleration = min(acceleration, 2.0 * math.sqrt(velocity * jerk))
     by_acceleration = 2.25 * velocity / acceleration
-    by_jerk = (2.0 * acceleration + math.sqrt(4.0 * acceleration**2 + 6.0 * velocity * jerk)) / jerk
+    by_jerk = (2.0 * acceleration + math.sqrt(4.0 * acceleration * acceleration + 6.0 * velocity * jerk)) / jerk
     return 1.3 * max(by_acceleration, by_jerk if jerk < math.inf else 0.0)

@@ -21,7 +21,9 @@ OVERSHOOT = 0.01
 class ShapingConfig(ConfigModel):
     """How targets are smoothed that joints cannot follow."""
 
-    time_s: Seconds = Field(0.03, description="Time constant: smoothed commands are about twice as far behind.")
+    time_s: Annotated[Seconds, Field(ge=1e-4)] = Field(
+        0.03, description="Time constant: smoothed commands are about twice as far behind."
+    )
     reach: Annotated[Positive, Unit("rad or m")] = Field(
         0.25, description="How far from the last command a target may be; one further away is a jump, and not smoothed."
     )

@@ -17,6 +17,7 @@ from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
 from custom_ros_tools.ros.rospy_internals import DirectSending
 from safe_robot.check import Violation
+from safe_robot.checks.staleness import too_old
 from safe_robot.guard import Decision
 
 from .guard_markers import GuardMarkers
@@ -105,7 +106,7 @@ class GuardNode:
 
     def _end_wait(self, age_s: float) -> None:
         if not self._guard.is_halted:
-            self._halt(Violation("staleness", "the newest target", age_s, self._silence_s, "s of age"))
+            self._halt(too_old(age_s, self._silence_s, "silence_s"))
 
     def _lose_master(self) -> None:
         reason = f"the ROS master at {self._master.uri} has gone, and nobody could find stop_subscriber"
@@ -149,7 +150,7 @@ class GuardNode:
                     return self._guard.refuse(f"stamps jump by {step_s:g} s")
             self._last_stamp = stamp, now_s
             if self._guard.last_command is None and age_s > self._silence_s:  # it waited for a connection
-                return Decision(None, Violation("staleness", "the first target", age_s, self._silence_s, "s of age"))
+                return Decision(None, too_old(age_s, self._silence_s, "silence_s"))
         return self._guard.decide(values.position, self._measurements.situation(self._sent_s, age_s, step_s))
 
     def _checked(self, message: JointState) -> JointValues:

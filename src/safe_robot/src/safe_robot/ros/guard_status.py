@@ -13,6 +13,8 @@ from safe_robot.msg import Status
 from safe_robot.msg import Violation as ViolationMessage
 
 QUEUE_SIZE = 100
+WARNING_PERIOD_S = 60.0
+"""Shortest time between two warnings of one check while the guard goes on [s]; the status topic has each violation."""
 
 
 def violation_of(check: str, reason: str) -> Violation:
@@ -32,7 +34,7 @@ class GuardStatus:
         self._guard, self._subject = guard, subject
         self._status = rospy.Publisher("robot_safety/status", Status, queue_size=QUEUE_SIZE, latch=True)
         self._violation = rospy.Publisher("robot_safety/violation", ViolationMessage, queue_size=QUEUE_SIZE, latch=True)
-        self._warn = ThrottledWarning()
+        self._warn = ThrottledWarning(WARNING_PERIOD_S)
         self._way_out_from: object = None
         self._way_out_words = ""
 
@@ -66,7 +68,8 @@ class GuardStatus:
             then = "braking to rest, and halted" if self._guard.is_braking else "halted"
             rospy.logwarn("%s: %s; %s until robot_safety/start_subscriber is called", self._subject, message, then)
         else:
-            self._warn(self._subject, message)
+            check = f"{violation.check}: "
+            self._warn(f"{self._subject}: {violation.check}", message.removeprefix(check))
 
     def warn_of_halt(self) -> None:
         """Says that a target has come in vain."""

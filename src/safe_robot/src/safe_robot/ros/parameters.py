@@ -1,11 +1,13 @@
 """What the guard's node is told by parameters."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import rospy
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
+from custom_ros_tools.schema.type_names import shown
 from rpbi.urdf.files import write_description
 from safe_robot import legacy
 from safe_robot.config import GuardConfig, NodeConfig
@@ -13,6 +15,11 @@ from safe_robot.guard import Guard
 from safe_robot.robot import GuardedRobot
 
 DESCRIPTION = "robot_description"
+START_FROM_TARGET = (
+    "start_from is 'target': while nothing publishes joint_states/measured, the robot is assumed to stand at the first"
+    " target after each start; if it stands elsewhere, it goes there at a speed that nothing limits, and the way is not"
+    " checked"
+)
 
 
 def guard_of_parameters() -> tuple[Guard, NodeConfig]:
@@ -21,11 +28,27 @@ def guard_of_parameters() -> tuple[Guard, NodeConfig]:
     Raises:
         ConfigError: If a parameter, or the robot, is wrong.
     """
-    node = rospy.get_name()
     given: dict[str, Any] = dict(rospy.get_param("~", {}))
     given.pop(DESCRIPTION, None)
+    guard, output = guard_of(given, _description_file(given), rospy.get_name())
+    if guard.config.start_from == "target":
+        rospy.logwarn(START_FROM_TARGET)
+    return guard, output
+
+
+def guard_of(given: Mapping[str, Any], path: str, node: str) -> tuple[Guard, NodeConfig]:
+    """Returns the guard of a robot that parameters describe, and what its node does beside.
+
+    Args:
+        given: The parameters.
+        path: File of the robot's description.
+        node: Name of the node, for messages.
+
+    Raises:
+        ConfigError: If a parameter, or the robot, is wrong; it names the parameter, what it expected and what it got.
+    """
+    given = dict(given)
     output = NodeConfig.parse({key: given.pop(key) for key in NodeConfig.model_fields if key in given}, node)
-    path = _description_file()
     config = GuardConfig.parse(legacy.translated(given, list(GuardedRobot(path).joint_names), node), node)
     try:
         robot = GuardedRobot(path, config.joint_names)
@@ -34,8 +57,11 @@ def guard_of_parameters() -> tuple[Guard, NodeConfig]:
     return Guard(config, robot, node), output
 
 
-def _description_file() -> str:
+def _description_file(given: Mapping[str, Any]) -> str:
     """Returns a file of the robot's description.
+
+    Args:
+        given: The other parameters.
 
     Raises:
         ConfigError: If there is none.
@@ -43,6 +69,9 @@ def _description_file() -> str:
     key = rospy.search_param(DESCRIPTION)
     text = None if key is None else rospy.get_param(key)
     if not isinstance(text, str):
-        message = f"expected the robot's URDF in the parameter '{DESCRIPTION}', got nothing"
+        got = "nothing" if text is None else shown(text)
+        message = f"expected the robot's URDF, or its file, as parameter '{DESCRIPTION}', got {got}"
+        if "exotica_xml_filename" in given:
+            message += "; 'exotica_xml_filename', which names it in the authors' release, is not read"
         raise ConfigError([Problem(rospy.get_name(), DESCRIPTION, message)])
     return write_description(text.replace("file://", "")) if "<" in text else str(Path(text))

@@ -1,4 +1,4 @@
-"""The ROS master: asked without waiting for ever, whether its side reaches this node, and where another one has room."""
+"""The ROS master: asked without waiting for ever, whether its side reaches this node, and a port for another one."""
 
 import http.client
 import os
@@ -42,7 +42,7 @@ def timed_master(uri: str | None = None) -> Any:
 
 
 def address_fault() -> str | None:
-    """Returns in one line why others cannot, or may not, reach this node by the address that it gives; None if they can.
+    """Returns in one line why others cannot, or may not, reach this node by the address that it gives, else None.
 
     The address is that of ROS_HOSTNAME, ROS_IP or this computer's name. It has to be one of this computer; where the
     master is reached by a network, none that only this computer reaches, and if the master is on another computer, the

@@ -23,6 +23,7 @@ from rpbi.config.pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity, S
 from rpbi.config.sensors import ContactsConfig, ForceTorqueEntry
 from rpbi.control.controllers.entry import ControllerEntry
 from rpbi.control.controllers.impedance import JointSprings
+from rpbi.control.jitter_buffer import BUFFER_S
 from rpbi.control.planar_base import PlanarBaseConfig
 from rpbi.control.trajectories.config import JointTrajectoryControllerConfig
 from rpbi.urdf.elements import Mimic
@@ -95,9 +96,9 @@ class RobotConfig(BodyConfig):
         "with rounded corners.",
     )
     target_buffer_s: NonNegative = Field(
-        0.01,
-        description="Longest delay of position targets of a stream, which evens out how late they come by their "
-        "stamps; 0 is none.",
+        BUFFER_S,
+        description="Delay of position targets of a stream, in which late ones are still in time; 0 plays targets as "
+        "they come.",
         json_schema_extra={"unit": "s"},
     )
     enforce_effort_limits: Switch = Field(True, description="Whether motors are held to the efforts of the URDF.")

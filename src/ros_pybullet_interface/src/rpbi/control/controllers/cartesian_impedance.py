@@ -9,13 +9,13 @@ import numpy as np
 from pydantic import Field, WithJsonSchema
 
 from custom_ros_tools.schema import NonNegative, Text, Unit
-from rpbi.control.target_stream import Arrivals, TargetStream
+from rpbi.control.jitter_buffer import BUFFER_S, JitterBuffer
+from rpbi.control.target_stream import TargetStream
 from rpbi.engine.inputs import check_pose
 from rpbi.geometry import Pose, minus, plus, rotated
 
 from .controller import Arm, Array, Controller, ControllerConfig, RobotState
 from .impedance import DampingRatio, Disturbance, force_for, implicit, implicit_wrench, inverse, turn_between
-from .joint_impedance import BUFFER_S
 
 LEAST_MOBILITY = 0.01
 """Of a direction in which the arm can hardly move, for damping [1/kg, 1/(kg m^2)]."""
@@ -85,7 +85,7 @@ class CartesianImpedanceController(Controller):
     def start(self, state: RobotState, tick: int) -> None:
         """Holds the pose and the posture that are measured."""
         self._goal = self._pose()
-        self._stream = TargetStream(Arrivals(self.arm.dt_s, BUFFER_S), _components(self._goal), smooth=True)
+        self._stream = TargetStream(JitterBuffer(self.arm.dt_s, BUFFER_S), _components(self._goal), smooth=True)
         self._posture = np.array(state.position)[self.arm.chosen]
         self._disturbance = Disturbance(len(self._posture), self.arm.dt_s)
         self._taken: Any = None
@@ -155,7 +155,7 @@ class CartesianImpedanceController(Controller):
         if sum(a * b for a, b in zip(quat, self._goal.quat_xyzw)) < 0.0:  # the same orientation, and near in numbers
             quat = (-quat[0], -quat[1], -quat[2], -quat[3])
         self._goal = Pose(position, quat)
-        self._stream.take(tick, _components(self._goal), {}, target.stamp_ns)
+        self._stream.push(tick, _components(self._goal), {}, target.stamp_ns)
 
 
 def _components(pose: Pose) -> dict[int, float]:

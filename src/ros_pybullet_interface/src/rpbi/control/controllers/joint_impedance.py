@@ -9,14 +9,12 @@ import numpy as np
 from pydantic import Field, WithJsonSchema
 
 from custom_ros_tools.schema import Text
-from rpbi.control.target_stream import Arrivals, TargetStream
+from rpbi.control.jitter_buffer import BUFFER_S, JitterBuffer
+from rpbi.control.target_stream import TargetStream
 from rpbi.urdf.joints import JointTarget
 
 from .controller import Arm, Array, Controller, ControllerConfig, RobotState
 from .impedance import JointImpedance, JointSprings
-
-BUFFER_S = 0.01
-"""Longest delay of targets to even out how late they come [s]."""
 
 
 class JointImpedanceConfig(JointSprings, ControllerConfig):
@@ -61,7 +59,7 @@ class JointImpedanceController(Controller):
     def start(self, state: RobotState, tick: int) -> None:
         """Holds what is measured."""
         held = {place: state.position[chosen] for place, chosen in enumerate(self.arm.chosen)}
-        self._stream = TargetStream(Arrivals(self.arm.dt_s, BUFFER_S), held, smooth=True)
+        self._stream = TargetStream(JitterBuffer(self.arm.dt_s, BUFFER_S), held, smooth=True)
         self._push = np.zeros(len(held))
         self._springs.restart()
         self._taken: Any = None
@@ -90,7 +88,7 @@ class JointImpedanceController(Controller):
         self._taken = target
         places = [self._places[name] for name in target.names]
         self._goal = self._goal | dict(zip(places, map(float, target.position)))
-        self._stream.take(tick, self._goal, {}, target.stamp_ns)
+        self._stream.push(tick, self._goal, {}, target.stamp_ns)
         if target.effort:
             self._push[places] = target.effort
 

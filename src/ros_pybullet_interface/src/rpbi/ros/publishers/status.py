@@ -13,7 +13,7 @@ from std_msgs.msg import Int64
 from custom_ros_tools.ros.lifecycle.wall_time import WallRate
 from ros_pybullet_interface.msg import SimulationState
 from rpbi.engine.clock import Schedule
-from rpbi.engine.pacer import Pacer
+from rpbi.engine.pacer import Load, Pacer
 from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import to_ros_time
 from rpbi.world import World
@@ -43,6 +43,8 @@ MAX_CLOCK_HZ = 1000.0
 FREE_RUNNING_CLOCK_HZ = 250.0
 FALLING_BEHIND = 0.98
 """Share of the asked real-time factor below which the diagnostics warn."""
+SLOW_PERIODS = 3
+"""Messages of the diagnostics in a row after which a warning says why a world is slow; at its start it may be."""
 SLOW_CALL_S = 0.0005
 """From so long a call of PyBullet on, its window is what slows a world down [s]; without one it takes 10 µs."""
 
@@ -104,9 +106,10 @@ class StatusPublisher:
     """
 
     def __init__(self, world: World, pacer: Pacer, facts: Callable[[], Mapping[str, str]]) -> None:
-        self._clock, self._pacer, self._facts = world.clock, pacer, facts
-        self._window = world.window
-        """Until it has been named as slow."""
+        self._world, self._clock, self._pacer, self._facts = world, world.clock, pacer, facts
+        self._load: Load | None = Load.now(world.physics_s, world.clock.tick)
+        """At the last message of the diagnostics; None once it was said why the world is slow."""
+        self._slow_periods = 0
         self._rate = WallRate(world.config.status_hz)
         self._diagnostics_rate = WallRate(1.0, delay_s=1.0)
         self._status = rospy.Publisher(STATUS.name, Int64, queue_size=10)
@@ -139,7 +142,10 @@ class StatusPublisher:
         if running and factor < FALLING_BEHIND * asked:
             status.level = DiagnosticStatus.WARN
             status.message = f"too slow: real-time factor {factor:.3f} instead of {asked:g}"
-            self._blame_window(status.message)
+            self._slow_periods += 1
+        else:
+            self._slow_periods = 0
+        self._say_why(status.message)
         values = {
             "real_time_factor": f"{factor if running else 0.0:.4f}",
             "overruns_total": str(self._pacer.overruns),
@@ -154,12 +160,19 @@ class StatusPublisher:
         message.header.stamp = to_ros_time(self._clock.stamp_ns)
         self._diagnostics.publish(message)
 
-    def _blame_window(self, message: str) -> None:
-        """Says once if it is the window that makes the world slow."""
-        if self._window is not None and (call_s := self._window.seconds_per_call()) > SLOW_CALL_S:
-            self._window = None
-            advice = "without a graphics card use RViz and connection_mode DIRECT"
-            log.warning("%s: with its window, PyBullet takes %.1f ms a call; %s", message, 1e3 * call_s, advice)
+    def _say_why(self, message: str) -> None:
+        """Warns once, when the world has been too slow for a while, of what slows it down."""
+        if self._load is None:
+            return
+        before, self._load = self._load, Load.now(self._world.physics_s, self._clock.tick)
+        if self._slow_periods < SLOW_PERIODS:
+            return
+        reason, window = self._load.since(before).reason(self._clock.dt_s), self._world.window
+        if window is not None and (call_s := window.seconds_per_call()) > SLOW_CALL_S:
+            reason = f"with its window, PyBullet takes {1e3 * call_s:.1f} ms a call; without a graphics card use RViz"
+            reason += " and connection_mode DIRECT"
+        self._load = None
+        log.warning("%s: %s (docs/slow.md)", message, reason)
 
 
 class StatePublisher:

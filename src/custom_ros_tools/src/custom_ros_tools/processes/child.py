@@ -11,7 +11,7 @@ from typing import Any
 def start_child(command: Sequence[str], at_end: signal.Signals, **options: Any) -> subprocess.Popen[bytes]:
     """Starts a process that gets a signal when this one ends, in whichever way.
 
-    Its standard input is a pipe that this process holds open: when its other end is closed, by the end of the process
+    Its standard input is a pipe that this process holds open. When its other end is closed, by the end of the process
     or of `stdin` of what is returned, the kernel sends the signal (`F_SETSIG` of fcntl(2)). `PR_SET_PDEATHSIG` would
     send it at the end of the thread that starts the child. It also needs code between fork and exec, which is not safe
     where there are threads.

@@ -1,0 +1,104 @@
+"""Triangles of mesh files, and how much larger their convex hulls are."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from custom_ros_tools.config import read_file
+
+from .copies import content_hash, kept
+
+MAX_BYTES = 64_000_000
+"""Longest file that is read; a longer one is an error."""
+Triangles = npt.NDArray[np.float64]
+"""Corners of triangles [m], shape (n, 3, 3)."""
+
+
+def read_triangles(path: str) -> list[Triangles]:
+    """Returns the triangles of each part of an OBJ or STL file; PyBullet makes a convex hull of each part.
+
+    Raises:
+        ValueError: If it is of another format, has no triangles, or is broken.
+        OSError: If it cannot be read, or is too long.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".obj", ".stl"):
+        raise ValueError(f"expected an OBJ or STL file, got {path}")
+    data = read_file(path, MAX_BYTES)
+    try:
+        parts = [_read_stl(data)] if suffix == ".stl" else _read_obj(data.decode(errors="replace"))
+    except (ValueError, IndexError) as error:
+        raise ValueError(f"{path} is no mesh: {error}") from None
+    parts = [part for part in parts if len(part)]
+    if not parts or not all(np.isfinite(part).all() for part in parts):
+        raise ValueError(f"{path} is no mesh: expected triangles with finite corners")
+    return parts
+
+
+def _read_stl(data: bytes) -> Triangles:
+    rows = np.frombuffer(data[84:], np.dtype([("numbers", "<f4", 12), ("attribute", "<u2")]))
+    return rows["numbers"].reshape(-1, 4, 3)[:, 1:].astype(float)
+
+
+def _read_obj(text: str) -> list[Triangles]:
+    corners: list[list[float]] = []
+    parts: list[list[list[int]]] = [[]]
+    for line in text.splitlines():
+        kind, *words = line.split() or [""]
+        if kind == "v":
+            corners.append([float(word) for word in words[:3]])
+        elif kind in ("o", "g"):
+            parts.append([])
+        elif kind == "f":
+            given = [int(word.split("/")[0]) for word in words]
+            if any(number == 0 or abs(number) > len(corners) for number in given):
+                raise ValueError(f"a face names a corner of {len(corners)} that there is not")
+            face = [number - 1 if number > 0 else number + len(corners) for number in given]
+            parts[-1] += [[face[0], second, third] for second, third in zip(face[1:], face[2:])]
+    points = np.array(corners, float).reshape(-1, 3)
+    return [points[np.array(part, int).reshape(-1, 3)] for part in parts]
+
+
+def volumes(path: str) -> tuple[float, float] | None:
+    """Returns the volume that a mesh encloses, and that of the convex hulls of its parts [m^3].
+
+    It is remembered by the file's content. None if the surface is not closed, or the mesh cannot be read.
+    """
+    found = "volumes.json"
+    try:
+        folder = kept(f"volumes-{content_hash(path)}", lambda made: _write(made / found, _volumes(path)))
+        return tuple(json.loads((folder / found).read_text())) or None
+    except (OSError, ValueError):
+        return _volumes(path)
+
+
+def _write(path: Path, value: tuple[float, float] | None) -> None:
+    path.write_text(json.dumps(value or []))
+
+
+def _volumes(path: str) -> tuple[float, float] | None:
+    from scipy.spatial import ConvexHull, QhullError  # takes a while to import, and most worlds have no meshes
+
+    try:
+        parts = read_triangles(path)
+        if not all(map(_is_closed, parts)):
+            return None
+        hulls = sum(float(ConvexHull(part.reshape(-1, 3)).volume) for part in parts)
+    except (OSError, ValueError, QhullError):
+        return None
+    # Tetrahedra between the origin and each triangle
+    enclosed = sum(abs(float(np.linalg.det(part - part[0, 0]).sum())) / 6.0 for part in parts)
+    return enclosed, hulls
+
+
+def _is_closed(triangles: Triangles) -> bool:
+    """Returns whether each edge has a triangle on either side, both turning the same way."""
+    _, corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    faces = corners.reshape(-1, 3)
+    count = int(corners.max()) + 1
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    edges = edges[edges[:, 0] != edges[:, 1]]
+    there, back = (np.sort(edges[:, one] * count + edges[:, other]) for one, other in ((0, 1), (1, 0)))
+    return bool(np.array_equal(there, back))
