@@ -117,6 +117,7 @@ def plot_forces(push: pd.Series, friction: pd.Series, wrist: pd.DataFrame, start
     above.plot(friction.index - start_s, friction, color="#22333f", lw=2.2, alpha=0.35, label="mu N of the floor")
     above.plot(push.index - start_s, push, color="#e8731a", lw=1.2, label="arm on box")
     above.set_ylabel("force [N]")
+    above.margins(y=0.3)  # for the legend
     above.legend(fontsize=8, ncols=2, loc="upper right")
     for axis, colour in zip("xyz", ("#c0392b", "#27864a", "#2c5f8a")):
         below.plot(wrist.index - start_s, wrist[f"wrench/force/{axis}"], color=colour, lw=1.0, label=axis)
