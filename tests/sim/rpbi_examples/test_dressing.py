@@ -164,8 +164,7 @@ def dress_pressed(
             furthest_m = max(furthest_m, drawn_m)
             back_m = furthest_m - drawn_m
             force_n = push_n(since_s, drawn_m - CAUGHT_M)
-            points = world.contacts.of(world.bodies["human"])
-            nets_n.append(np.linalg.norm(np.sum([(0.0, 0.0, 0.0), *(point.force for point in points)], axis=0)))
+            nets_n.append(math.hypot(*world.contacts.sample(world.bodies["human"], world.clock.tick).force))
         for number in range(len(plates)):
             world.put(f"plate_{number}/target", {"push": force_n})
     world.close()
