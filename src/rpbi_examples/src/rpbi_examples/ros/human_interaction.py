@@ -8,6 +8,7 @@ import time
 import xmlrpc.client
 from collections import deque
 from pathlib import Path
+from typing import Any
 
 import rospy
 import tf2_ros
@@ -180,8 +181,8 @@ def interrupt_roslaunch() -> bool:
     parent = os.getppid()
     for uri in rospy.get_param("/roslaunch/uris", {}).values():
         with contextlib.suppress(OSError, xmlrpc.client.Error):  # it has gone
-            *_, pid = xmlrpc.client.ServerProxy(uri).get_pid()
-            if pid == parent:
+            roslaunch: Any = xmlrpc.client.ServerProxy(uri)
+            if roslaunch.get_pid()[2] == parent:
                 os.kill(parent, signal.SIGINT)
                 return True
     return False
