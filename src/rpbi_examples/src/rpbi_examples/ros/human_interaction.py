@@ -181,9 +181,8 @@ def interrupt_roslaunch() -> bool:
     parent = os.getppid()
     for uri in rospy.get_param("/roslaunch/uris", {}).values():
         with contextlib.suppress(OSError, xmlrpc.client.Error):  # it has gone
-            answer: Any = xmlrpc.client.ServerProxy(uri).get_pid()
-            pid = answer[2]
-            if pid == parent:
+            roslaunch: Any = xmlrpc.client.ServerProxy(uri)
+            if roslaunch.get_pid()[2] == parent:
                 os.kill(parent, signal.SIGINT)
                 return True
     return False
