@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Sequence
 
@@ -26,9 +27,14 @@ def play(
     smooth: bool = True,
     buffer_s: float = 0.0,
     velocities: Sequence[float] | None = None,
+    limit: float = math.inf,
 ) -> list[float]:
     """Returns the set point after each tick of a joint at 0 that gets targets: tick, position, stamp."""
-    stream = TargetStream(JitterBuffer(DT_S, buffer_s), {0: 0.0}, smooth)
+
+    def limited(index: int, value: float) -> float:
+        return min(max(value, -limit), limit)
+
+    stream = TargetStream(JitterBuffer(DT_S, buffer_s), {0: 0.0}, smooth, limited)
     waiting = list(enumerate(targets))
     positions = []
     for tick in range(ticks):
@@ -193,3 +199,11 @@ def test_velocities_make_it_a_cubic_that_lags_by_one_period():
 def test_velocities_that_do_not_fit_do_not_count():
     targets = [(number * PERIOD, 0.03 * number, 0) for number in range(20)]
     assert play(targets, 250, velocities=[0.0] * 20) == play(targets, 250)
+
+
+def test_hostile_velocities_pass_no_limit():
+    rng = random.Random(1)
+    targets = [(number * PERIOD, rng.choice((-0.5, 0.4, 0.5)), 0) for number in range(100)]
+    velocities = [rng.uniform(-10.0, 10.0) for _ in targets]
+    assert max(map(abs, play(targets, 1100, velocities=velocities, buffer_s=0.02))) > 0.51
+    assert max(map(abs, play(targets, 1100, velocities=velocities, buffer_s=0.02, limit=0.5))) <= 0.5

@@ -114,6 +114,8 @@ class TargetStream:
             basis = segment.basis(tick, self._window)
             for index in positions:
                 positions[index] += segment.covered(index, basis)
+        if any(segment.slopes is not None for segment in segments):  # cubics may leave the hull of their targets
+            positions = {index: self._limited(index, value) for index, value in positions.items()}
         self.set_points = positions
         return positions
 
