@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from ros_system import find_executable
 from tries import tries
-from worlds import FLOOR, box, iiwa, write_world
+from worlds import BOX_FLOOR, box, iiwa, write_world
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs/commands.md").read_text()
@@ -113,7 +113,7 @@ def test_check_says_nothing_but_its_own(tmp_path):
     """PyBullet tells of its build when it is imported; a world's folder may have spaces."""
     folder = tmp_path / "my worlds"
     folder.mkdir()
-    world = write_world(folder, collision=(FLOOR,), dynamic=(box(basePosition=[1.0, 0.0, 0.2]),), robots=(iiwa(),))
+    world = write_world(folder, collision=(BOX_FLOOR,), dynamic=(box(basePosition=[1.0, 0.0, 0.2]),), robots=(iiwa(),))
     done = run([ROOT / "rpbi", "check", world])
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith(f"{world}: fine; ")

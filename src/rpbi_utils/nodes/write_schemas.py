@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Writes the JSON Schemas of what stands in for a robot anew."""
+"""Writes the JSON Schemas of this package anew."""
 
 from custom_ros_tools.ros.node import run_command
 

@@ -35,7 +35,7 @@ DIFFERENT = 12
 """From so much on, of 255, a pixel has another colour."""
 COMPLAINING = {"warning": (192, 128, 0), "error": (192, 32, 32)}
 """Colours in which RViz writes the name of a display that has something to complain of."""
-HARMLESS = re.compile(r"arrived closer .* than the lower bound you provided|has had no processor time")
+HARMLESS = re.compile(r"arrived closer .* than the lower bound you provided|has had no processor time|too slow: ")
 """RViz's coloured depth believes that images come twice a second at most; and the machine may be busy."""
 SLOW_S = 300.0
 

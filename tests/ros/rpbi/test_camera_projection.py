@@ -23,7 +23,7 @@ TOPICS = {
     "depth/camera_info": CameraInfo,
 }
 ROOT_FRAME = "rpbi/kuka_lwr/base"
-DT_NS = 2_000_000
+DT_NS = 1_000_000
 CAMERA_HZ = 15
 FRAMES = 6
 MOVES = 0.05

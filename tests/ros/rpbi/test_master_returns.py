@@ -106,7 +106,7 @@ def test_a_world_that_stands_still_is_found_again_and_again_while_somebody_waits
     simulator = _start(ros, master, tmp_path, start_pybullet_after_initialization=False)
     before = master.registrations(NODE)
     description = master.api.getParam(DESCRIPTION)
-    waiting = _command(ros, master, "rosservice", "call", "/rpbi/step_n", "4000000000")
+    waiting = _command(ros, master, "rosservice", "call", "/rpbi/step_n", "1000000")
     wait_until(lambda: "the simulation is stepping" in _call(ros, master, "step"), "it steps")
     master.kill()
     _wait_for(ros, simulator, GONE)

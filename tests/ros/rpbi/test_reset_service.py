@@ -17,7 +17,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty, Trigger
 from tf2_msgs.msg import TFMessage
-from worlds import FLOOR, ball, box, iiwa
+from worlds import BOX_FLOOR, ball, box, iiwa
 
 from ros_pybullet_interface.msg import PybulletObject, SimulationState
 from ros_pybullet_interface.srv import GetStateHash, ResetJointState, StepN
@@ -48,7 +48,7 @@ def start(ros, tmp_path):
             ball(basePosition=[1.0, 0.0, 0.5], broadcast_hz=100),
             box(basePosition=[1.0, 1.0, 0.5], broadcast_hz=50),
         )
-        config = main_config(tmp_path, collision=(FLOOR,), dynamic=dynamic, robots=(arm,), **main)
+        config = main_config(tmp_path, collision=(BOX_FLOOR,), dynamic=dynamic, robots=(arm,), **main)
         return ros.simulator(config, use_sim_time=use_sim_time)
 
     return open_world
@@ -259,7 +259,8 @@ def test_a_hundred_resets_leave_no_trace(ros, start, tmp_path):
     wait_until(lambda: len(ros.output(listener)) > heard, "TF is still known")
     assert rosout.logs("refused") == []
     warned = [log.msg for log in rosout.logs() if log.level > 2 and log.name == "/ros_pybullet_interface"]
-    assert [message for message in warned if "the ROS master" not in message] == []  # which may be slow to answer
+    harmless = ("the ROS master", "too slow")  # which may be slow to answer, as a busy machine may be
+    assert [message for message in warned if not any(words in message for words in harmless)] == []
     assert "TF_" not in ros.output(listener), "TF_OLD_DATA and the like"
     last: dict[str, int] = {}
     with rosbag.Bag(str(bag)) as recorded:

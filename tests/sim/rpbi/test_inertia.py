@@ -89,21 +89,26 @@ def test_what_no_body_can_have_is_guessed_and_told(moments_of, caplog, impossibl
     assert "bell: no body has the moments of inertia of lump: guessed from the shape" in caplog.messages
 
 
+def own_messages(caplog):
+    """Returns messages but for those that PyBullet prints."""
+    return [record.getMessage() for record in caplog.records if record.name != "pybullet"]
+
+
 def test_they_grow_with_the_lengths(moments_of, caplog):
     assert moments_of(inertial(0.01, 0.02, 0.025), scaling=2.0) == pytest.approx((0.04, 0.08, 0.1))
-    assert not caplog.messages
+    assert not own_messages(caplog)
 
 
 def test_placeholders_are_told_with_the_key_that_guesses(moments_of, caplog):
     assert moments_of(inertial(1, 1, 1)) == pytest.approx((1.0, 1.0, 1.0))
-    assert caplog.messages == [
+    assert own_messages(caplog) == [
         "bell: moments of inertia of lump are far too large for their size; inertia_from_urdf: false guesses them"
     ]
 
 
 def test_a_key_has_pybullet_guess_all(moments_of, caplog):
     assert moments_of(inertial(1, 1, 1), inertia_from_urdf=False) == pytest.approx(BOX_MOMENTS)
-    assert not caplog.messages
+    assert not own_messages(caplog)
 
 
 def test_what_is_not_finite_is_refused(moments_of):

@@ -118,7 +118,7 @@ def test_contact_forces_are_those_of_the_whole_step(make, sub_steps):
         MOON,
         SetPhysicsEngineParameter(numSolverIterations=5),
         SetPhysicsEngineParameter(numSubSteps=3),
-        SetPhysicsEngineParameter(contactBreakingThreshold=0.05),
+        SetPhysicsEngineParameter(contactBreakingThreshold=0.0005),
         SetPhysicsEngineParameter(contactERP=0.4, enableConeFriction=False),
         SetPhysicsEngineParameter(constraintSolverType="CONSTRAINT_SOLVER_LCP_DANTZIG"),
         SetPhysicsEngineParameter(deterministicOverlappingPairs=False, contactSlop=0.02),
@@ -127,12 +127,12 @@ def test_contact_forces_are_those_of_the_whole_step(make, sub_steps):
 )
 def test_a_change_has_an_effect_and_a_reset_takes_it_back(change):
     world = build()
-    untouched = run(world, 150)
+    untouched = run(world, 250)
     world.reset()
     world.change_physics(change)
-    assert run(world, 150) != untouched
+    assert run(world, 250) != untouched
     world.reset()
-    assert run(world, 150) == untouched
+    assert run(world, 250) == untouched
     world.close()
 
 

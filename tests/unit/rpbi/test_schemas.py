@@ -93,7 +93,8 @@ def test_shipped_file_with_a_wrong_key_anywhere_does_not_hold_its_schema(path: P
     named = MODELINE.match(path.read_text())
     assert named
     data = yaml.safe_load(path.read_text())
-    of_sensors = {id(one) for sensor in data.get("sensors", ()) for one in mappings(sensor)}
+    sensors = [sensor for each in mappings(data) for sensor in each.get("sensors", ())]
+    of_sensors = {id(one) for sensor in sensors for one in mappings(sensor)}
     count = 0
     for mapping in mappings(data):
         if id(mapping) in of_sensors:  # any class may have a sensor's keys

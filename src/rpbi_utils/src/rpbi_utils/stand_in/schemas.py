@@ -1,13 +1,18 @@
-"""JSON Schemas of the YAML files of what stands in for a robot."""
+"""JSON Schemas of the YAML files of this package."""
 
 from pathlib import Path
 
 from custom_ros_tools.schema import ConfigModel
 from custom_ros_tools.schema.json_schema import explained, json_schema, schema_text, write_schemas
+from rpbi_utils.tracking.config import TrackingNodeConfig
 
 from .config import RobotLimits, StandInConfig
 
-FILES: dict[str, type[ConfigModel]] = {"robot_limits": RobotLimits, "stand_in": StandInConfig}
+FILES: dict[str, type[ConfigModel]] = {
+    "robot_limits": RobotLimits,
+    "stand_in": StandInConfig,
+    "tracked_objects": TrackingNodeConfig,
+}
 
 
 def schema_files(root: Path) -> dict[Path, str]:
