@@ -1,4 +1,4 @@
-"""What the contacts of many boxes cost, beside a bare step of the same world; both in one process, by turns."""
+"""Cost of the contacts of many boxes, beside a bare step of the same world; both in one process, by turns."""
 
 from __future__ import annotations
 

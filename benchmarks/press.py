@@ -11,7 +11,7 @@ from session import Session
 
 SEEDS, QUICK_SEEDS = 20, 2
 LARGEST_ERROR = 0.05
-"""How far the mean force on the tool may be from the predicted one, as a share of that."""
+"""Largest error of the mean force on the tool, as a share of the predicted force."""
 LONGEST_S = 180.0
 MEANS = re.compile(
     r"at a depth of ([\d.]+) mm: ([\d.]+) N on the tool, by stiffness ([\d.]+) N .* scattered by ([\d.]+) N; "

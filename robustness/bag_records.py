@@ -56,7 +56,7 @@ class Topic:
 
 @dataclass
 class Bag:
-    """What a bag has; `chunks` are lists of a topic's number, a time [ns] and a serialised message.
+    """Content of a bag; `chunks` are lists of a topic's number, a time [ns] and a serialised message.
 
     Attributes:
         topics: The connections.

@@ -26,7 +26,7 @@ _ENDS_AT = 10 * 2**30
 
 
 class Trial(NamedTuple):
-    """What became of a reader.
+    """Outcome of a reader.
 
     Attributes:
         verdict: `taken`, `refused`, or what must not be: `signal N`, `traceback`, `silent` or `code`.
@@ -58,7 +58,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "bag_to_table, CSV": lambda path: _to_files(path, "csv"),
     "replay": lambda path: sys.exit(replay.main([str(path), "--quiet"])),
 }
-"""Who reads bags, by name; a refusal is an InterfaceError, or an exit with 1 and words on stderr or stdout."""
+"""Readers of bags by name; a refusal is an InterfaceError, or an exit with 1 and words on stderr or stdout."""
 
 
 def tried(read: Callable[[Path], object], path: Path) -> Trial:

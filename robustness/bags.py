@@ -414,7 +414,7 @@ MAKERS: dict[str, Callable[[random.Random, Path], None]] = {
     "world descriptions": _description,
     "commands and states": _commands,
 }
-"""What is done to a bag, by name."""
+"""Changes of a bag by name."""
 
 
 def main() -> None:

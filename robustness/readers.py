@@ -1,4 +1,4 @@
-"""What reads a hostile file: each returns if it takes the file, and raises an InterfaceError or ValueError if not."""
+"""Readers of hostile files: each returns if it takes the file, and raises an InterfaceError or ValueError if not."""
 
 from __future__ import annotations
 
@@ -161,4 +161,4 @@ def _replay(path: Path, folder: Path) -> None:
 
 
 REFUSALS = (InterfaceError, ValueError)
-"""What readers raise for a file that they refuse; whoever calls them says so in a line."""
+"""Errors that readers raise for a file that they refuse; the caller reports them in a line."""

@@ -31,7 +31,7 @@ MOST_TOGETHER = 100
 
 
 class Outcome(NamedTuple):
-    """What became of a reader of a file.
+    """Outcome of a reader of a file.
 
     Attributes:
         seed: The file's seed.

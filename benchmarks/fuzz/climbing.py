@@ -21,7 +21,7 @@ CHANGED = 0.3
 AROUND_M = 0.023
 """A course begins no further from something than this [m]."""
 SAMPLES, NEAR_M = 3, 0.03
-"""Of a braking this many rows are judged, and all of them if one is nearer to something than this [m]."""
+"""Number of rows of a braking that are judged, and the distance [m] below which all of them are."""
 TOLERANCE_M = 1e-6
 """Distances below the margin by no more than this count as the margin [m]."""
 

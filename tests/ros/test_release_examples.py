@@ -186,7 +186,7 @@ WORLDS: dict[str, Callable[[Path], dict[str, Any]]] = {
         "visual_object": ["{ik_ros_examples}/configs/kuka_lwr_trac_ik_example/sphere.yaml"],
     },
 }
-"""What the worlds of launch files have beside a window and a floor."""
+"""Content of the worlds of launch files beside a window and a floor."""
 
 
 @pytest.mark.parametrize("launch_files", WORLDS)

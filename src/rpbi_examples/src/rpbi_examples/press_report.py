@@ -43,7 +43,7 @@ class Sample(NamedTuple):
 
 
 class PressReport(NamedTuple):
-    """How a whole press went, from the first touch to the last.
+    """Result of a whole press, from the first touch to the last.
 
     Means are over time. Those of force and stiffness times depth are the same for any motion: what damping and inertia
     of box and arm add while it goes in is taken back while it comes out.
@@ -70,12 +70,12 @@ class PressReport(NamedTuple):
 
     @property
     def error(self) -> float:
-        """How far the mean force on the tool is from what stiffness and depth predict, as a share of that."""
+        """Error of the mean force on the tool, as a share of the force that stiffness and depth predict."""
         return abs(self.measured_n - self.predicted_n) / self.predicted_n
 
     @property
     def felt_error(self) -> float:
-        """How far the mean force on the handle is from what force on the tool and scale predict, as a share of that."""
+        """Error of the mean force on the handle, as a share of the force that tool and scale predict."""
         return abs(self.felt_n - self.expected_n) / self.expected_n
 
     def __str__(self) -> str:

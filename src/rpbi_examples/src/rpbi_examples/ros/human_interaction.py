@@ -33,11 +33,11 @@ KEPT = 1000
 SHOWN_S = 20.0
 """So much of the past is in the window [s]."""
 LONGEST_FAREWELL_S = 15.0
-"""So long is waited for an interrupt by roslaunch [s]."""
+"""Time-out of an interrupt by roslaunch [s]."""
 LEFT_S = 2.0
 """So long after the scripted hand has gone, its press is over in any case [s]."""
 LARGEST_ERROR = 0.05
-"""How far the mean force of a press may be from what stiffness and depth predict, as a share."""
+"""Largest error of the mean force of a press, as a share of the force that stiffness and depth predict."""
 
 
 class Watch:
