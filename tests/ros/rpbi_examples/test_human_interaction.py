@@ -1,7 +1,4 @@
-"""`human_interaction.launch`: an arm presses on a box by itself, and the force is what stiffness and depth predict.
-
-A real robot follows the arm meanwhile.
-"""
+"""`human_interaction.launch`: an arm presses on a box by itself, and the force is what stiffness and depth predict."""
 
 from __future__ import annotations
 
@@ -10,7 +7,6 @@ import re
 
 import pytest
 from PIL import Image
-from real_robot import RealRobot
 from ros_system import wait_until
 
 MEAN = re.compile(r"at a depth of ([\d.]+) mm: ([\d.]+) N on the tool, by stiffness ([\d.]+) N")
@@ -21,10 +17,8 @@ TOUCH_HEIGHT_M = 0.135
 def test_one_press_and_release(ros, tmp_path):
     """The folder of the output is not there before, and roslaunch ends as if it were interrupted."""
     folder = tmp_path / "new" / "folder"
-    arguments = ["device:=scripted", "headless:=true", f"output:={folder}", "seed:=1", "real_robot:=true"]
-    real = RealRobot(ros)
+    arguments = ["device:=scripted", "headless:=true", f"output:={folder}", "seed:=1"]
     process = ros.start(["roslaunch", "rpbi_examples", "human_interaction.launch", *arguments])
-    real.wait_until_moved()
     wait_until(lambda: process.poll() is not None, "it ends by itself")
     output = ros.output(process)
     found = MEAN.search(output)

@@ -86,8 +86,9 @@ def test_the_twin_has_the_box_where_its_tag_is_found_in_images(ros):
 
     def compared():
         """Returns the detections that Vicon has poses before and after, each with the box's place at its stamp."""
-        times_s = [each.header.stamp.to_sec() for each in vicon.messages]
-        places = np.array([[getattr(each.transform.translation, axis) for axis in "xyz"] for each in vicon.messages])
+        truth = list(vicon.messages)
+        times_s = [each.header.stamp.to_sec() for each in truth]
+        places = np.array([[getattr(each.transform.translation, axis) for axis in "xyz"] for each in truth])
         found = [one for each in seen.messages for one in each.detections]
         for one in found:
             stamp_s = one.pose.header.stamp.to_sec()
@@ -95,7 +96,7 @@ def test_the_twin_has_the_box_where_its_tag_is_found_in_images(ros):
             if 0 < after < len(times_s) and times_s[after] - times_s[after - 1] < 0.05:
                 yield one, [np.interp(stamp_s, times_s, axis) for axis in places.T]
 
-    pairs = wait_until(lambda: len(pairs := list(compared())) >= 10 and pairs, "the tag is found", SLOW_S, every_s=0.5)
+    pairs = wait_until(lambda: len(pairs := list(compared())) >= 5 and pairs, "the tag is found", SLOW_S, every_s=0.5)
     for one, (x, y, z) in pairs:
         assert (one.id, one.size, one.pose.header.frame_id) == ((7,), (0.1,), "lab/rpbi/eye")
         position, quat = one.pose.pose.pose.position, one.pose.pose.pose.orientation
