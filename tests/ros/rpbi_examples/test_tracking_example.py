@@ -100,8 +100,8 @@ def test_the_twin_has_the_box_where_its_tag_is_found_in_images(ros):
     for one, (x, y, z) in pairs:
         assert (one.id, one.size, one.pose.header.frame_id) == ((7,), (0.1,), "lab/rpbi/eye")
         position, quat = one.pose.pose.pose.position, one.pose.pose.pose.orientation
-        assert math.dist((position.x, position.y), (x, -y)) < 0.005, "the camera is above the origin"
-        assert abs(position.z - (1.5 - z - 0.05)) < 0.025, "along the line of sight"
+        assert math.dist((position.x, position.y), (x, -y)) < 0.007, "the camera is above the origin"
+        assert abs(position.z - (0.9 - z - 0.05)) < 0.01, "along the line of sight"
         assert abs(quat.x) > math.cos(0.05), "the tag faces the camera, turned as it is"
         assert set(one.pose.pose.covariance) == {0.0}
     assert frames(tf, "lab/rpbi/eye", "lab/tag"), "on TF too"
