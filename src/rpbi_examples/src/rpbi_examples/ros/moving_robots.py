@@ -2,6 +2,7 @@
 
 import math
 import sys
+import threading
 
 import rospy
 from geometry_msgs.msg import Point, PoseStamped, Twist
@@ -112,9 +113,17 @@ def _problem(time_s: float, side: float) -> CalculateInverseKinematicsProblem:
 
 
 def _wipe() -> None:
-    touched: list[str] = []
-    while "table" not in touched:
-        touched = [point.other_body for point in rospy.wait_for_message("rpbi/kuka_lwr/contacts", Contacts).points]
+    touched = threading.Event()
+
+    def look(message: Contacts) -> None:
+        if any(point.other_body == "table" for point in message.points):
+            touched.set()
+
+    contacts = rospy.Subscriber("rpbi/kuka_lwr/contacts", Contacts, look, queue_size=1)
+    while not touched.wait(0.1):  # wait_for_message in a loop may stay without a connection
+        if rospy.is_shutdown():
+            return
+    contacts.unregister()
     rospy.sleep(SETTLING_S)
     start_pose = TfInterface().wait_for_tf_msg("rpbi/world", "rpbi/kuka_lwr/end_effector_ball")
     if start_pose is None:
