@@ -135,6 +135,19 @@ def test_a_target_late_at_the_turning_point_of_a_swing_stops_nothing():
     assert largest_change_of_velocity(positions) < 1.05 * 0.8 * math.pi**2
 
 
+def test_the_first_stall_of_a_regular_stream_is_none_of_the_samples():
+    """Its stamps are those of sending, and until then nothing says so."""
+    turn = 2.0 * math.pi * PERIOD * DT_S
+    positions = [0.3 * math.cos(turn * n) for n in range(120)]
+    velocities = [-0.3 * 2.0 * math.pi * math.sin(turn * n) for n in range(120)]
+    for stalled in range(70, 100):
+        sent = [n * PERIOD for n in range(120)]
+        sent[stalled] = sent[stalled + 1] = sent[stalled] + 15
+        targets = [(tick, position, stamp_ns(tick)) for tick, position in zip(sent, positions)]
+        swing = play(targets, 1150, buffer_s=0.02, velocities=velocities)[300:]
+        assert largest_change_of_velocity(swing) < 1.5 * 0.3 * (2.0 * math.pi) ** 2
+
+
 @pytest.mark.parametrize("stamps", ["of sending", "none"])
 def test_jitter_adds_little_delay(stamps):
     for seed in range(16):

@@ -24,7 +24,9 @@ REPLACED = 0.25
 DRIFT = 0.1
 """Stamps are used while they run as fast as the world's time within this share."""
 MIN_MISFIT_RATIO = 2.0
-"""Ratio of squared misfits above which stamps give way to a regular period, or the other way round."""
+"""Ratio of excess squared misfits above which stamps give way to a regular period, or the other way round."""
+MIN_MISFIT = 1e-10
+"""Squared misfit that decides nothing [rad^2 or m^2]."""
 MIN_LOSS_RATIO = 16.0
 """Ratio of squared misfits above which a gap counts as lost targets rather than as a late one."""
 MAX_LOST = 4
@@ -243,11 +245,12 @@ class JitterBuffer:
         new = _misfit(times[-4:], last), _misfit(steps[-4:], last)
         if not all(map(math.isfinite, new)):
             return
-        irregular, regular = ((1.0 - 1.0 / WINDOW) * a + b for a, b in zip(self._misfits, new))
-        self._misfits = irregular, regular
-        if irregular > MIN_MISFIT_RATIO * regular:
+        change = new[0] - new[1]
+        irregular, regular = ((1.0 - 1.0 / WINDOW) * sum_ for sum_ in self._misfits)
+        self._misfits = irregular, regular = irregular + max(change, 0.0), regular + max(-change, 0.0)
+        if irregular > MIN_MISFIT_RATIO * regular + MIN_MISFIT:
             self._is_regular = True
-        elif regular > MIN_MISFIT_RATIO * irregular:
+        elif regular > MIN_MISFIT_RATIO * irregular + MIN_MISFIT:
             self._is_regular = False
 
 
