@@ -23,7 +23,7 @@ MOST_BYTES = 16_000_000
 MOST_VALUES = 1_000_000
 """And have so many values, with those that aliases (`*NAME`) repeat counted each time."""
 LONGEST_NUMBER = 1000
-"""Characters of a number."""
+"""Characters of a number; a longer one without a tag is a text."""
 _INT, _FLOAT = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
 _PACKAGE = re.compile(r"package://(?P<uri>[^/{}]+)|\{(?P<braces>[^{}]*)\}")
 
@@ -174,6 +174,12 @@ class _StrictLoader(yaml.SafeLoader):
             return self.construct_document(node)
         finally:
             _dismantle(node)
+
+    def resolve(self, kind: type[yaml.Node], value: Any, implicit: Any) -> Any:
+        """Takes a longer scalar than any number for a text: to match it with those of numbers would stop all threads."""
+        if kind is yaml.ScalarNode and len(value) > LONGEST_NUMBER:
+            implicit = (False, True)
+        return super().resolve(kind, value, implicit)
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
         is_number = isinstance(node, yaml.ScalarNode) and node.tag in (_INT, _FLOAT)
