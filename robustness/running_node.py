@@ -38,7 +38,7 @@ class Pauses(NamedTuple):
     Attributes:
         wall: As it was.
         own: Less what its thread waited for a processor; at most the processor time of the process.
-        python: Less what of that was inside PyBullet's loading.
+        python: Less what PyBullet's functions that load, remove and step took of that.
     """
 
     wall: float
@@ -79,10 +79,10 @@ class WatchedNode:
         lines = self.pauses.read_text().splitlines()[-2000:]
         rows = [json.loads(line) for line in lines if line.endswith("]")]
         found = [Pauses(0.0, 0.0, 0.0)]
-        for now_s, gap_s, waited_s, cpu_s, loading_s in rows:
+        for now_s, gap_s, waited_s, cpu_s, inside_s in rows:
             if now_s >= since_s:
                 own_s = min(gap_s - waited_s, cpu_s)
-                found.append(Pauses(gap_s, own_s, own_s - loading_s))
+                found.append(Pauses(gap_s, own_s, own_s - inside_s))
         return Pauses(*map(max, zip(*found, strict=True)))
 
 
@@ -118,9 +118,9 @@ def outcomes_in_node(workplace: Any, kind: str, seeds: range, folder: Path) -> I
         stop_group(master)
         for name in ("pauses", "world.yaml", "floor.yaml", "ball.yaml", "iiwa.yaml", *(f"{n}.log" for n in range(99))):
             (folder / name).unlink(missing_ok=True)
-    for name, pause in (("wall time", "wall"), ("own processor time", "own"), ("without PyBullet's loading", "python")):
+    for name, pause in (("wall time", "wall"), ("own processor time", "own"), ("outside PyBullet", "python")):
         for wanted in ("refused", "taken"):
-            rows = sorted(((getattr(pauses, pause), seed) for pauses, seed, got in worst if got == wanted), reverse=True)
+            rows = sorted(((getattr(each, pause), seed) for each, seed, got in worst if got == wanted), reverse=True)
             print(f"{kind}: longest pauses [ms], {wanted}, {name}:", *(f"{1e3 * s:.1f} ({n})" for s, n in rows[:5]))
 
 

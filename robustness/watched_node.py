@@ -1,7 +1,8 @@
 """The simulator node, with a file of its pauses: `watched_node.py FILE ARGUMENTS ...`.
 
 Each line has, as JSON, in seconds: the time at which a tick began, how long after the one before, for how much of that
-its thread waited for a processor, the processor time of the whole process, and that inside PyBullet's loading.
+its thread waited for a processor, the processor time of the whole process, and that inside PyBullet's functions that
+load and step.
 """
 
 from __future__ import annotations
@@ -22,15 +23,18 @@ SHORTEST_S = 0.005
 """Pauses that are shorter are not written."""
 PRIORITY = -15
 """Beside other work; whoever may not have it runs without."""
-LOADING = ("loadURDF", "loadSoftBody", "createVisualShape", "createCollisionShape", "createMultiBody", "removeBody")
-"""PyBullet's functions that add and remove objects; each is one call that cannot be divided."""
-loading_s = 0.0
+INDIVISIBLE = (
+    *("loadURDF", "loadSoftBody", "createVisualShape", "createCollisionShape", "createMultiBody", "removeBody"),
+    "stepSimulation",
+)
+"""PyBullet's functions that add and remove objects, and its step: each call lasts as long as PyBullet wants."""
+inside_s = 0.0
 """Processor time that they have taken."""
 
 
 def main() -> None:
     """Runs the node."""
-    for name in LOADING:
+    for name in INDIVISIBLE:
         setattr(pybullet, name, _timed(getattr(pybullet, name)))
 
     from rpbi.ros import node  # after that, so that it gets the timed functions
@@ -55,18 +59,18 @@ def main() -> None:
 
 def _clocks() -> tuple[float, float, float, float]:
     waited_s = int(Path("/proc/thread-self/schedstat").read_text().split()[1]) * 1e-9
-    return time.monotonic(), waited_s, time.process_time(), loading_s
+    return time.monotonic(), waited_s, time.process_time(), inside_s
 
 
 def _timed(call: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(call)
     def timed(*arguments: Any, **more: Any) -> Any:
-        global loading_s
+        global inside_s
         began_s = time.thread_time()
         try:
             return call(*arguments, **more)
         finally:
-            loading_s += time.thread_time() - began_s
+            inside_s += time.thread_time() - began_s
 
     return timed
 

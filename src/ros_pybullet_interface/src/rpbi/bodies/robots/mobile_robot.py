@@ -20,6 +20,7 @@ class MobileRobot(Robot):
     """
 
     base_joints = len(PLANAR_JOINTS)
+    fixes_base = True
     prepare_urdf = staticmethod(with_planar_joints)
     example = {key: value for key, value in Robot.example.items() if key != "object_tf"} | {"planar_base": {}}
 
