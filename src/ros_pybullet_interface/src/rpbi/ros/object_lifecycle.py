@@ -112,7 +112,7 @@ class ObjectLifecycle:
             raise ConfigError([Problem(file, each.key, each.message) for each in error.problems]) from None
         body_type = body_class(kind)
         with blaming(body_type, f"preparing '{config.name}'"), suppress(ConfigError):  # which making it reports
-            body_type.prepare(config, self._world.pb.has_window)
+            body_type.prepare(config, self._world.window is not None)
 
     def _take_in(self, kind: str, config: Any, file: str) -> None:
         """Does the simulation thread's part of adding."""
