@@ -94,6 +94,7 @@ LONG = f"1{':59' * 60}"[:57]
         ("a: [!!timestamp x]\n", "w.yaml: line 1, column 5: expected a value of the type timestamp, got 'x'"),
         ("a: !!set [b]\n", "w.yaml: line 1, column 4: expected a mapping node, but found sequence"),
         ("a: !!set b\n", "w.yaml: line 1, column 4: expected a mapping node, but found scalar"),
+        ("!!seq a: 1\n", "w.yaml: line 1, column 1: found unhashable key"),
         ("a: 2001-14-01\n", "w.yaml: line 1, column 4: expected a value of the type timestamp, got '2001-14-01'"),
         pytest.param(
             f"a: 1{':59' * 300}.0\n",
