@@ -186,5 +186,6 @@ def test_many_shapes_are_looked_at_in_several_polls(ros, tmp_path, monkeypatch):
         markers.poll()
         polls += markers._look is not None
     (message,) = listener.messages
-    assert polls == len(message.markers) == 8, "each poll had time for one"
+    markers._publisher.unregister()
     world.close()
+    assert polls == len(message.markers) == 8, "each poll had time for one"
