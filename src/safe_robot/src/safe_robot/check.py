@@ -102,7 +102,7 @@ class Situation(NamedTuple):
 
 
 class Check(ABC):
-    """A check of motions. It keeps no state: equal motions have equal answers, whatever was asked before.
+    """A check of motions: equal motions are equally safe, whatever was asked before.
 
     Args:
         config: Its options.
