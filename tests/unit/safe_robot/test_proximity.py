@@ -17,7 +17,7 @@ from safe_robot.robot import GuardedRobot
 MARGIN_M = 0.02
 ROWS = 40
 TABLE = Obstacle("table", "box", (0.7, 1.2, 0.1), Pose((-0.7, 0.0, 0.05)))
-DOWN = np.array((0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+DOWN = np.array((0.0, 1.3, 0.0, 0.0, 0.0, 0.0, 0.0))
 """To the table from home [rad]."""
 PAIRS = [(link, 0) for link in ("lwr_arm_5_link", "lwr_arm_6_link", "end_effector", "end_effector_ball")]
 
@@ -61,8 +61,8 @@ def test_a_motion_is_safe_if_and_only_if_each_row_is(distances):
     proximity = Proximity(distances, PAIRS, MARGIN_M)
     generator = np.random.default_rng(3)
     for _ in range(6):
-        start = np.array(HOME) + generator.normal(0.0, 0.2, 7)
-        way = DOWN + generator.normal(0.0, 0.2, 7)
+        start = np.array(HOME) + generator.normal(0.0, 0.1, 7)
+        way = DOWN + generator.normal(0.0, 0.1, 7)
         outside, inside = grazing(distances, start, way)
         for _ in range(2):
             assert proximity.first(outside) is None
