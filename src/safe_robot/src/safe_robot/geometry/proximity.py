@@ -253,7 +253,7 @@ class Proximity:
 
 
 def _spread(bounds: np.ndarray, rows: np.ndarray, ways: np.ndarray) -> None:
-    """Raises lower bounds in all of k rows by those in some rows: between two rows a pair moves by no more than its way.
+    """Raises lower bounds in k rows by those in some of them: between two rows a pair moves by no more than its way.
 
     Args:
         bounds: k x s [m]; inf of a row bounds no other one.
