@@ -64,7 +64,8 @@ def test_a_motion_is_safe_if_and_only_if_each_row_is(distances):
         start = np.array(HOME) + generator.normal(0.0, 0.1, 7)
         way = DOWN + generator.normal(0.0, 0.1, 7)
         outside, inside = grazing(distances, start, way)
-        for _ in range(2):
+        for is_trial in (False, True):
+            outside.is_trial = inside.is_trial = is_trial
             assert proximity.first(outside) is None
             found = proximity.first(inside)
             assert found is not None and found.distance < MARGIN_M and found.is_while_braking

@@ -79,7 +79,7 @@ class Proximity:
         if not len(near):
             return None
         i, row = self._last[0], min(self._last[1], len(motion.position) - 1)
-        if i in near:
+        if motion.is_trial and i in near:
             self._distances.place(motion.position[row])
             if found := self._too_near(motion, i, row, self._contact(i)):
                 return found
@@ -127,7 +127,8 @@ class Proximity:
     ) -> TooNear | None:
         """Returns one of s pairs that comes too near in some chosen ones of k rows, by measuring if need be.
 
-        The row with the least bound is measured next, since it most likely is too near.
+        Of a trial the row with the least bound is measured next, since it most likely is too near; else the first one,
+        so that equal motions have equal answers.
 
         Args:
             motion: The motion.
@@ -142,7 +143,7 @@ class Proximity:
         spare[chosen] = np.fmax(spare[chosen], self._separation.lower_bounds(frames, suspects) - least_m)
         placed = -1
         while (bounds := spare[chosen]).min() <= 0.0:
-            at, k = divmod(int(bounds.argmin()), len(suspects))
+            at, k = divmod(int(bounds.argmin() if motion.is_trial else (bounds <= 0.0).argmax()), len(suspects))
             i, row = int(suspects[k]), int(rows[chosen[at]])
             if placed != row:
                 self._distances.place(motion.position[row])
