@@ -10,7 +10,7 @@ from rpbi.geometry import Pose
 from safe_robot.commands.braking import Brake
 from safe_robot.geometry.distances import LinkDistances
 from safe_robot.geometry.obstacles import Obstacle
-from safe_robot.geometry.proximity import Proximity
+from safe_robot.geometry.proximity import Proximity, _spread
 from safe_robot.motion import Motion, State
 from safe_robot.robot import GuardedRobot
 
@@ -69,3 +69,9 @@ def test_a_motion_is_safe_if_and_only_if_each_row_is(distances):
             assert proximity.first(outside) is None
             found = proximity.first(inside)
             assert found is not None and found.distance < MARGIN_M and found.is_while_braking
+
+
+def test_a_row_without_a_bound_of_its_own_has_that_of_a_row_beside_it_less_the_way_between():
+    bounds = np.array(((np.inf,), (-np.inf,), (0.5,)))
+    _spread(bounds, np.array((0, 2)), np.array(((0.0,), (0.2,), (0.3,))))
+    assert bounds[:, 0] == pytest.approx((np.inf, 0.4, 0.5)), "inf says that a row may be, and nothing of other rows"
