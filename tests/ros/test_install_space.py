@@ -12,18 +12,34 @@ from ros_system import wait_until
 from sensor_msgs.msg import Image, JointState, Range
 
 ROOT = Path(__file__).resolve().parents[2]
+MESSAGES = "devel/lib/python3/dist-packages"
 
 
 def _install(workspace: Path, packages: Path, onto: Path | None = None) -> Path:
-    """Builds and installs a copy of some packages over an installed workspace; returns where. All else is removed."""
+    """Installs a copy of some packages over an installed workspace; returns where. All else is removed.
+
+    The messages are those of the devel space: the same generator would make the same files again.
+    """
     shutil.copytree(packages, workspace / "src", ignore=shutil.ignore_patterns("__pycache__"))
-    build = "ROS_LANG_DISABLE=gencpp:genlisp catkin_make --no-color install -DPYTHON_EXECUTABLE=/usr/bin/python3"
-    line = f"cd {workspace}; {build}"  # headers for C++ would take as long as everything else
-    done = subprocess.run(in_clean_shell(line, onto and onto / "setup.bash"), capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
+    (workspace / "src/CMakeLists.txt").unlink(missing_ok=True)
+    prefixes = f"-DCATKIN_DEVEL_PREFIX={workspace}/devel -DCMAKE_INSTALL_PREFIX={workspace}/install"
+    options = f"{prefixes} -DPYTHON_EXECUTABLE=/usr/bin/python3 -DCATKIN_ENABLE_TESTING=OFF"
+    configure = f"ROS_LANG_DISABLE=gencpp:genlisp cmake -S . -B ../build {options}"
+    _run(f"cd {workspace}/src; catkin_init_workspace; {configure}", onto and onto / "setup.bash")
+    for folder in (workspace / MESSAGES).iterdir():
+        for kind in ("msg", "srv"):
+            if (folder / kind).exists():
+                shutil.copytree(ROOT / MESSAGES / folder.name / kind, folder / kind, dirs_exist_ok=True)
+    _run(f"make -C {workspace}/build install/fast")
     for folder in ("src", "build", "devel"):
         shutil.rmtree(workspace / folder)
     return workspace / "install"
+
+
+def _run(line: str, setup: Path | None = None) -> str:
+    done = subprocess.run(in_clean_shell(line, setup), capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
 
 
 @pytest.fixture(scope="module")
@@ -39,9 +55,7 @@ def installed_lab(tmp_path_factory, installed):
 
 
 def _do(installed: Path, line: str) -> str:
-    done = subprocess.run(in_clean_shell(line, installed / "setup.bash"), capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+    return _run(line, installed / "setup.bash")
 
 
 FOLDERS = ("configs", "launch", "robots", "rviz", "schema", "msg", "srv")

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import pytest
 
-SLOWEST = 10
+SLOWEST = 15
+Row = tuple[int, float, float]
+"""Number of tests, wall time and processor time [s]."""
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -18,7 +20,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 class RunReport:
-    """Measures each phase of a test, and lists the times of folders and of the slowest tests at the end."""
+    """Measures each phase of a test, and lists the times of folders, of the slowest files and tests at the end."""
 
     def __init__(self) -> None:
         self._used_s = processor_s()
@@ -42,23 +44,36 @@ class RunReport:
         times[1] += getattr(report, "processor_s", 0.0)
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
-        """Lists what there is to tell."""
+        """Prints the tables."""
         if not self._tests:
             return
-        folders: dict[str, list[float]] = defaultdict(lambda: [0, 0.0, 0.0])
-        for name, times in self._tests.items():
-            row = folders[os.path.dirname(name.split("::")[0])]
-            for column, value in enumerate((1, *times)):
-                row[column] += value
-        folders["all"] = [sum(column) for column in zip(*folders.values())]
-        write = terminalreporter.write_line
-        terminalreporter.section("time by folder")
-        write(f"{'tests':>6} {'seconds':>9} {'processor':>10}  folder")
-        for folder, (count, wall_s, used_s) in sorted(folders.items(), key=lambda item: (item[0] == "all", item[0])):
-            write(f"{count:6} {wall_s:9.1f} {used_s:10.1f}  {folder}")
-        terminalreporter.section(f"slowest {SLOWEST}")
-        for name, (wall_s, used_s) in sorted(self._tests.items(), key=lambda item: -item[1][0])[:SLOWEST]:
-            write(f"{'':6} {wall_s:9.1f} {used_s:10.1f}  {name}")
+        tests = {name: (1, times[0], times[1]) for name, times in self._tests.items()}
+        files = _summed(tests, lambda name: name.split("::")[0])
+        folders = _summed(files, os.path.dirname)
+        tables = {
+            "time by folder": [*sorted(folders.items()), *_summed(folders, lambda _: "all").items()],
+            f"slowest {SLOWEST} files": _slowest(files),
+            f"slowest {SLOWEST} tests": _slowest(tests),
+        }
+        for title, rows in tables.items():
+            terminalreporter.section(title)
+            terminalreporter.write_line(f"{'tests':>6} {'seconds':>9} {'processor':>10}")
+            for name, (count, wall_s, used_s) in rows:
+                terminalreporter.write_line(f"{count:6} {wall_s:9.1f} {used_s:10.1f}  {name}")
+
+
+def _summed(rows: Mapping[str, Row], group: Callable[[str], str]) -> dict[str, Row]:
+    """Returns the sum of the rows of each group."""
+    sums: defaultdict[str, Row] = defaultdict(lambda: (0, 0.0, 0.0))
+    for name, row in rows.items():
+        count, wall_s, used_s = sums[group(name)]
+        sums[group(name)] = (count + row[0], wall_s + row[1], used_s + row[2])
+    return sums
+
+
+def _slowest(rows: Mapping[str, Row]) -> list[tuple[str, Row]]:
+    """Returns the rows with the most wall time, longest first."""
+    return sorted(rows.items(), key=lambda item: -item[1][1])[:SLOWEST]
 
 
 def processor_s() -> float:

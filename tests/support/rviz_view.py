@@ -6,6 +6,7 @@ import math
 import re
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,8 @@ CRASH_CODES = (-6, -11)
 """The same of RViz alone."""
 FIELD_OF_VIEW = math.radians(45.0)
 """Vertical opening of RViz's view."""
+
+FRAMES_HZ = 5
 
 Array = npt.NDArray[np.float64]
 
@@ -65,6 +68,12 @@ def find_view(screen: Screen) -> Window | None:
 def launch_with_rviz(system: RosSystem, screen: Screen, *arguments: str) -> subprocess.Popen:
     """Launches an example as a user with a screen does, and waits until RViz is open; see `start_with_rviz`."""
     return start_with_rviz(system, screen, "roslaunch", "rpbi_examples", *arguments, "headless:=false")
+
+
+def start_rviz(system: RosSystem, screen: Screen, config: dict[str, Any], name: str = "view.rviz") -> subprocess.Popen:
+    """Starts RViz with a config that draws few frames a second, since software draws them; see `start_with_rviz`."""
+    config["Visualization Manager"]["Global Options"]["Frame Rate"] = FRAMES_HZ
+    return start_with_rviz(system, screen, "rviz", "-d", system.write_yaml(name, config), "-f", "rpbi/world")
 
 
 def start_with_rviz(system: RosSystem, screen: Screen, *command: str) -> subprocess.Popen:

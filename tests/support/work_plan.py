@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 TESTS = Path(__file__).resolve().parents[1]
-FIRST = ("ros/ik_ros", "ros/rpbi_examples", "gui", "ros")
+FIRST = ("ros/ik_ros", "ros/rpbi_examples", "gui", "ros", "unit/safe_robot", "sim")
 """Folders whose files take long: they are begun first, so that no worker is left alone with one at the end."""
 
 

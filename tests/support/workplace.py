@@ -69,6 +69,8 @@ class Workplace:
             HOME=str(home),
             XDG_RUNTIME_DIR=str(run),
         )
+        if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):  # else each of a thousand nodes would compile its modules
+            os.environ["PYTHONPYCACHEPREFIX"] = str(Path(__file__).resolve().parents[2] / ".rpbi/pycache")
         if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # so it is behind the `&` of a script
             signal.signal(signal.SIGINT, signal.default_int_handler)
 

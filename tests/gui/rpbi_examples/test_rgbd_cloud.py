@@ -1,12 +1,16 @@
-"""RViz, as the example with the orbiting camera opens it, shows the coloured point cloud."""
+"""RViz with the config of the example with the orbiting camera shows the coloured point cloud."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
+import yaml
 from ros_system import RosSystem, wait_until
-from rviz_view import launch_with_rviz
+from rviz_view import start_rviz
 from sensor_msgs.msg import PointCloud2
 
+CONFIG_FILE = Path(__file__).resolve().parents[3] / "src/rpbi_examples/rviz/pybullet_rgbd_example.rviz"
 SLOW_S = 300.0
 
 
@@ -14,7 +18,9 @@ SLOW_S = 300.0
 def example(ros_master, screen, tmp_path):
     system = RosSystem(tmp_path)
     try:
-        launch_with_rviz(system, screen, "pybullet_rgbd_example.launch")
+        system.start(["roslaunch", "rpbi_examples", "pybullet_rgbd_example.launch", "headless:=true"])
+        system.listen("/rpbi/camera/pointcloud", PointCloud2).wait_for(3, SLOW_S)
+        start_rviz(system, screen, yaml.safe_load(CONFIG_FILE.read_text()))
         yield system
     finally:
         system.close()
@@ -29,5 +35,4 @@ def cyan_pixels(screen):
 
 
 def test_ball_is_in_the_cloud_in_its_own_colour(example, screen):
-    example.listen("/rpbi/camera/pointcloud", PointCloud2).wait_for(3, SLOW_S)
     wait_until(lambda: cyan_pixels(screen) > 500, "RViz shows the cyan ball, which only the cloud has", SLOW_S)

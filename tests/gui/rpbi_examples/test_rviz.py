@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw
 from rendering import back_project
 from robot_shape import link_triangles, moved, pose_matrix
 from ros_system import RosSystem, stop_group, wait_until
-from rviz_view import RvizView, find_view, launch_with_rviz, start_with_rviz
+from rviz_view import RvizView, find_view, launch_with_rviz, start_rviz
 from sensor_msgs.msg import CameraInfo
 from sensor_msgs.msg import Image as ImageMessage
 from tf2_msgs.msg import TFMessage
@@ -156,8 +156,7 @@ def show(example, screen, shipped):
         shown = [display for display in manager["Displays"] if display["Class"] in classes]
         manager["Displays"] = [display for display in shown if display["Name"] != FORCES]
         manager["Global Options"]["Background Color"] = "; ".join(map(str, DARK_GREEN))
-        path = example.write_yaml("_".join(sorted(classes)).replace("/", "-") + ".rviz", config)
-        rviz = start_with_rviz(example, screen, "rviz", "-d", str(path))
+        rviz = start_rviz(example, screen, config, "_".join(sorted(classes)).replace("/", "-") + ".rviz")
         try:
             picture, window = settled(
                 screen,

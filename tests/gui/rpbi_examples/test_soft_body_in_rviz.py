@@ -1,13 +1,17 @@
-"""RViz, as the example opens it, shows the soft torus, the forces on the cube and the camera's image."""
+"""RViz with the example's config shows the soft torus, the forces on the cube and the camera's image."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+import yaml
 from ros_system import RosSystem, wait_until
-from rviz_view import launch_with_rviz
+from rviz_view import start_rviz
 from scipy import ndimage
 
+CONFIG_FILE = Path(__file__).resolve().parents[3] / "src/rpbi_examples/rviz/soft_body.rviz"
 TORUS = (242, 115, 92)
 ARROW = (217, 26, 26)
 SLOW_S = 300.0
@@ -18,9 +22,10 @@ def picture(ros_master, tmp_path_factory, screen):
     """What is to be seen in the window's right part, where the world is, when called."""
     system = RosSystem(tmp_path_factory.mktemp("soft_body_in_rviz"))
     try:
-        example = launch_with_rviz(system, screen, "soft_body.launch")
+        example = system.start(["roslaunch", "rpbi_examples", "soft_body.launch", "headless:=true"])
+        rviz = start_rviz(system, screen, yaml.safe_load(CONFIG_FILE.read_text()))
         yield lambda: screen.grab()[:, 420:]
-        print(system.output(example))  # pytest shows it if a test failed
+        print(system.output(example), system.output(rviz))  # pytest shows it if a test failed
     finally:
         system.close()
 

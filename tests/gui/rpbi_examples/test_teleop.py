@@ -10,16 +10,19 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+import rosnode
 import rospy
 from ros_system import RosSystem, stop_group, wait_until
 from sensor_msgs.msg import JointState, Joy
 from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import Trigger
 
 from operator_node.emulators.spacenavd import SpacenavDaemon
 from operator_node.parser import reconstruct_interface_log_msg
 
 SLOW_S = 120.0
 REAL = "rpbi/real/joint_states/target"
+REAL_NODES = ("stand_in/driver", "real_robot/guard", "real_robot/to_driver", "real_robot/states/from_driver")
 TARGET, TIP = "rpbi/teleop_tip", "rpbi/kuka_lwr/end_effector_ball"
 AWAY, RIGHT, UP = np.array([-1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 """Directions of a person who stands behind the arm, in the world."""
@@ -107,6 +110,8 @@ def test_what_stands_in_for_a_real_robot_has_followed(example):
         return all(abs(there[name] - here[name]) < 0.02 for name in there)
 
     wait_until(follows, "it stands where the arm does", SLOW_S)
+    assert example.call("/stand_in/rpbi/stop", Trigger).success  # a computer has enough to do with the arm alone
+    rosnode.kill_nodes([f"/{name}" for name in REAL_NODES])
 
 
 def test_the_logger_has_the_signals_of_the_last_second(example, screen):

@@ -1,4 +1,4 @@
-"""`kuka_lwr_ik_example.launch`: the arm tracks a figure eight by each solver, headless."""
+"""`kuka_lwr_ik_example.launch`: the arm tracks a figure eight by each solver, and leads a real robot by one of them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import os
 import numpy as np
 import pytest
 import rosgraph
+from real_robot import RealRobot
 from robot_shape import moved, pose_matrix
 from ros_system import wait_until
 from tf2_msgs.msg import TFMessage
@@ -15,6 +16,8 @@ TIP, TARGET, FIGURE = "rpbi/kuka_lwr/end_effector_ball", "rpbi/figure_eight", "r
 SOLVERS = ("kdl", "trac_ik", "tasks", "trajectory")  # the last one plans the figure as a whole
 if os.environ.get("IK_EXAMPLE_SOLVERS") == "all":
     SOLVERS += ("pybullet", "global")  # some 15 s each; they differ from kdl in nothing that the launch file does
+LEADING = "kdl"
+"""The one with `real_robot:=true`."""
 SPAN_M = 0.35
 """The figure is 0.4 m from end to end."""
 NEAR_M = 0.01
@@ -32,7 +35,9 @@ def poses(listener, frame):
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_arm_tracks_the_figure(ros, solver):
     moving, still = ros.listen("/tf", TFMessage), ros.listen("/tf_static", TFMessage)
-    process = ros.start(["roslaunch", "rpbi_examples", "kuka_lwr_ik_example.launch", f"ik:={solver}", "headless:=true"])
+    real = RealRobot(ros) if solver == LEADING else None
+    arguments = (f"ik:={solver}", "headless:=true", f"real_robot:={real is not None}")
+    process = ros.start(["roslaunch", "rpbi_examples", "kuka_lwr_ik_example.launch", *arguments])
 
     def places():
         """Returns where target and tip have been in the world since the target moves [m]; shapes (n, 3)."""
@@ -49,6 +54,8 @@ def test_arm_tracks_the_figure(ros, solver):
         found = places()
         return found and min(np.ptp(each[:, 1]) if len(each) else 0.0 for each in found) > SPAN_M and found
 
+    if real is not None:
+        real.wait_until_moved()
     target, tip = wait_until(drawn, "target and tip move from end to end", 300.0, every_s=1.0)
     off_m = np.linalg.norm(tip[:, None] - target[None], axis=-1).min(axis=1)
     assert np.median(off_m) < NEAR_M

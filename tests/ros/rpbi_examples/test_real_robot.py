@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import rospy
 from node_world import publishing
+from real_robot import RealRobot
 from ros_system import RosSystem, wait_until
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -20,25 +21,24 @@ from safe_robot.msg import Status
 
 JOINT = "lwr_arm_0_joint"
 SLOW_S = 120.0
-MOVED_RAD = 0.05
 
 
-@pytest.mark.parametrize(
-    "example", ("basic_example_panda", "kuka_lwr_ik_example", "human_interaction"), ids=lambda example: example
-)
-def test_every_example_leads_a_real_robot(ros: RosSystem, example: str, tmp_path) -> None:
-    """From its launch file to the joints of what stands in for the robot; teleop is in tests/gui."""
-    arguments = ("device:=scripted", f"output:={tmp_path}") if example == "human_interaction" else ()
-    ros.start(["roslaunch", "rpbi_examples", f"{example}.launch", "real_robot:=true", "headless:=true", *arguments])
-    state = ros.listen("/stand_in/driver_state", DriverState)
-    real = ros.listen("/rpbi/real/joint_states/target", JointState)
+def test_the_panda_swings_and_leads_a_real_robot(ros: RosSystem) -> None:
+    """IK and teleop lead one where they are tested."""
+    real = RealRobot(ros)
+    states = ros.listen("/rpbi/panda/joint_states", JointState)
+    ros.start(["roslaunch", "rpbi_examples", "basic_example_panda.launch", "real_robot:=true", "headless:=true"])
+    first = states.wait_for(1, SLOW_S)[0]
+    index = first.name.index("panda_joint4")
+    real.wait_until_moved()
+    wait_until(lambda: abs(states.messages[-1].position[index] - first.position[index]) > 0.3, "it moves", SLOW_S)
 
-    def has_moved() -> bool:
-        ways = np.ptp([message.position for message in real.messages], axis=0) if real.messages else np.zeros(1)
-        return ways.max() > MOVED_RAD
 
-    wait_until(has_moved, "the real robot has moved", SLOW_S)
-    assert state.messages[-1].mode == DriverState.MOVE and state.messages[-1].reflexes == 0, state.messages[-1].message
+def test_human_interaction_leads_a_real_robot(ros: RosSystem, tmp_path) -> None:
+    real = RealRobot(ros)
+    arguments = ("human_interaction.launch", "device:=scripted", "real_robot:=true", "headless:=true")
+    ros.start(["roslaunch", "rpbi_examples", *arguments, f"output:={tmp_path}"])
+    real.wait_until_moved()
 
 
 def test_the_real_robot_follows_the_simulated_one_and_a_jump_stops_it_until_it_is_recovered(ros: RosSystem) -> None:

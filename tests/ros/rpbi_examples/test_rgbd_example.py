@@ -14,13 +14,14 @@ from tf2_msgs.msg import TFMessage
 from rpbi.geometry import Pose
 
 SLOW_S = 120.0
+FASTER = "real_time_factor:=3"
 
 
 @pytest.fixture(params=["pybullet_rgbd_example", "pybullet_objects_example"])
 def example(request, ros_master, tmp_path):
     system = RosSystem(tmp_path)
     try:
-        system.start(["roslaunch", "rpbi_examples", f"{request.param}.launch", "headless:=true"])
+        system.start(["roslaunch", "rpbi_examples", f"{request.param}.launch", "headless:=true", FASTER])
         yield request.param, system
     finally:
         system.close()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from apriltag_ros.msg import AprilTagDetectionArray
 from geometry_msgs.msg import TransformStamped
@@ -73,3 +74,40 @@ def test_the_twin_has_the_box_where_a_camera_detects_its_tag(ros):
     wait_until(lambda: len(lifted()) > 20, "the twin lifts the box", SLOW_S)
     path = frames(tf, "lab/figure_eight_base", "lab/figure_eight")
     assert all(min(math.dist((p.x, p.y), (q.x, q.y)) for q in path) < 0.03 for p in lifted()[10::5])
+
+
+def test_the_twin_has_the_box_where_its_tag_is_found_in_images(ros):
+    """Beside the camera there is Vicon, whose poses are the simulator's but for 0.5 mm and 3 mrad."""
+    arguments = ("headless:=true", "tracker:=april_tags", "images:=true")
+    tf = ros.listen("/tf", TFMessage)
+    seen = ros.listen("/lab/tag_detections", AprilTagDetectionArray)
+    vicon = ros.listen("/lab/vicon/box/box", TransformStamped)
+    ros.start(["roslaunch", "rpbi_examples", "tracking_example.launch", *arguments])
+
+    def compared():
+        """Returns the detections that Vicon has poses before and after, each with the box's place at its stamp."""
+        truth = list(vicon.messages)
+        times_s = [each.header.stamp.to_sec() for each in truth]
+        places = np.array([[getattr(each.transform.translation, axis) for axis in "xyz"] for each in truth])
+        found = [one for each in seen.messages for one in each.detections]
+        for one in found:
+            stamp_s = one.pose.header.stamp.to_sec()
+            after = int(np.searchsorted(times_s, stamp_s))
+            if 0 < after < len(times_s) and times_s[after] - times_s[after - 1] < 0.05:
+                yield one, [np.interp(stamp_s, times_s, axis) for axis in places.T]
+
+    pairs = wait_until(lambda: len(pairs := list(compared())) >= 5 and pairs, "the tag is found", SLOW_S, every_s=0.5)
+    for one, (x, y, z) in pairs:
+        assert (one.id, one.size, one.pose.header.frame_id) == ((7,), (0.1,), "lab/rpbi/eye")
+        position, quat = one.pose.pose.pose.position, one.pose.pose.pose.orientation
+        assert math.dist((position.x, position.y), (x, -y)) < 0.007, "the camera is above the origin"
+        assert abs(position.z - (0.9 - z - 0.05)) < 0.01, "along the line of sight"
+        assert abs(quat.x) > math.cos(0.05), "the tag faces the camera, turned as it is"
+        assert set(one.pose.pose.covariance) == {0.0}
+    assert frames(tf, "lab/rpbi/eye", "lab/tag"), "on TF too"
+
+    def follows():
+        newest = frames(tf, "twin/rpbi/world", "twin/rpbi/box")[-1]
+        return abs(newest.z - CARRIED_Z) < 0.03 and abs(newest.x) < 0.13 and abs(newest.y) < 0.23
+
+    wait_until(follows, "the twin has the box", SLOW_S)

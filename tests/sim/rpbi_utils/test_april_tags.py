@@ -18,7 +18,7 @@ from rpbi.images import CameraImages
 from rpbi.world import World
 from rpbi_utils.tracking import tag_files
 from rpbi_utils.tracking.tag_files import write_tag
-from rpbi_utils.tracking.tags import TagDetector, tag_image, tag_poses
+from rpbi_utils.tracking.tags import DetectedTag, TagDetector, tag_image, tag_pose, tag_poses
 
 POSES = int(os.environ.get("APRIL_TAG_POSES", "12"))
 """How many poses are tried; docs/tracking.md has the figures of 500."""
@@ -68,6 +68,15 @@ def seen(lab: tuple[World, CameraImages], *poses: Pose) -> dict[int, Pose]:
 def errors(found: Pose, truth: Pose) -> tuple[float, float]:
     """Returns how far and how much turned a pose is from another [m, rad]."""
     return math.dist(found.position, truth.position), math.hypot(*rotation_between(found.quat_xyzw, truth.quat_xyzw))
+
+
+@pytest.mark.parametrize("position", [(0.0, 0.0, 0.55), (0.07, 0.19, 0.55), (-0.09, 0.1, 0.55)])
+def test_a_tag_that_is_parallel_to_the_image_is_found_as_it_is(position):
+    truth, half = Pose(position, (1.0, 0.0, 0.0, 0.0)), SIZE / 2.0
+    corners = np.array(position) + [[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]]
+    pixels = corners @ CAMERA_MATRIX.T
+    found = tag_pose(DetectedTag(7, pixels[:, :2] / pixels[:, 2:]), SIZE, CAMERA_MATRIX)
+    assert found is not None and max(errors(found, truth)) < 1e-4
 
 
 def facing(draw: random.Random) -> Pose:

@@ -28,6 +28,7 @@ from custom_ros_tools.ros.lifecycle.timed_master import unused_port
 from custom_ros_tools.ros.transform_messages import position_in, quat_in
 from rpbi.config.loading import LoadedWorld, load_world
 from rpbi.geometry import Pose
+from rpbi.ros.publishers.status import MAX_CLOCK_HZ
 from rpbi_examples import demo_report
 from rpbi_examples.draw_rate import draw_rate_hz
 from rpbi_examples.process_tree import kill_with_children
@@ -178,7 +179,7 @@ def _expected_rates() -> dict[str, float]:
         WRIST: robot.joint_state_publisher_hz,
         CONTACTS: configs["box"].contacts.hz,
         "/tf": robot.broadcast_link_states_hz,
-        "/clock": min(1.0 / world.config.timeStep, 1000.0),
+        "/clock": min(1.0 / world.config.timeStep, world.config.clock_hz or MAX_CLOCK_HZ),
     }
     return {**rates, **dict.fromkeys(CAMERA_TOPICS, camera.hz)}
 

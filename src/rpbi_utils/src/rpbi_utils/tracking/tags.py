@@ -103,9 +103,18 @@ def tag_pose(tag: DetectedTag, size: float, camera_matrix: npt.NDArray[np.float6
     # In the order that SOLVEPNP_IPPE_SQUARE wants: top left, top right, bottom right, bottom left
     square = np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
     pixels = tag.corners[[3, 2, 1, 0]]
-    found, rotation, translation = cv2.solvePnP(square, pixels, camera_matrix, None, flags=cv2.SOLVEPNP_IPPE_SQUARE)
-    if not found or not np.isfinite(translation).all() or translation[2, 0] <= 0.0:
+    # The first finds both poses that a tag may look to have, but fails for tags that are parallel to the image
+    solutions = [
+        (float(error), rotation, translation)
+        for method in (cv2.SOLVEPNP_IPPE_SQUARE, cv2.SOLVEPNP_ITERATIVE)
+        for rotation, translation, (error,) in zip(
+            *cv2.solvePnPGeneric(square, pixels, camera_matrix, None, flags=method)[1:]
+        )
+        if np.isfinite(error) and translation[2, 0] > 0.0
+    ]
+    if not solutions:
         return None
+    _, rotation, translation = min(solutions, key=lambda solution: solution[0])
     x, y, z = translation.ravel().tolist()
     qx, qy, qz, qw = Rotation.from_rotvec(rotation.ravel()).as_quat().tolist()
     return Pose((x, y, z), (qx, qy, qz, qw))

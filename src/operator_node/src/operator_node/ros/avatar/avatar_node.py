@@ -84,6 +84,7 @@ class AvatarNode:
             return
         if self._begins or self._retargeting is None:
             self._begin(frame)
+            self._last_stamp = now  # the first target is where the avatar is
         assert self._retargeting is not None
         target = self._retargeting.pose(frame)
         if self._holds:

@@ -1,0 +1,36 @@
+"""The stand-in for a real robot that examples with `real_robot:=true` lead."""
+
+from __future__ import annotations
+
+import numpy as np
+from ros_system import RosSystem, wait_until
+from sensor_msgs.msg import JointState
+
+from rpbi_utils.msg import DriverState
+
+MOVED_RAD = 0.05
+SLOW_S = 120.0
+
+
+class RealRobot:
+    """Listens to the stand-in; made before the example is launched.
+
+    Args:
+        ros: Who listens.
+    """
+
+    def __init__(self, ros: RosSystem) -> None:
+        self._states = ros.listen("/stand_in/driver_state", DriverState)
+        self._joints = ros.listen("/rpbi/real/joint_states/target", JointState)
+
+    @property
+    def has_moved(self) -> bool:
+        """Whether a joint has gone some way."""
+        messages = list(self._joints.messages)
+        return bool(messages) and np.ptp([each.position for each in messages], axis=0).max() > MOVED_RAD
+
+    def wait_until_moved(self) -> None:
+        """Waits until a joint has gone some way; its driver must be in motion then, without a reflex."""
+        wait_until(lambda: self.has_moved, "the real robot has moved", SLOW_S)
+        state = self._states.messages[-1]
+        assert state.mode == DriverState.MOVE and state.reflexes == 0, state.message
