@@ -23,21 +23,12 @@ JOINT = "lwr_arm_0_joint"
 SLOW_S = 120.0
 
 
-def test_the_panda_swings_and_leads_a_real_robot(ros: RosSystem) -> None:
-    """IK and teleop lead one where they are tested."""
+@pytest.mark.parametrize("example", ["basic_example_panda", "human_interaction"])
+def test_every_example_leads_a_real_robot(ros: RosSystem, example: str, tmp_path) -> None:
+    """From its launch file to the joints of the stand-in; IK and teleop lead one where they are tested."""
     real = RealRobot(ros)
-    states = ros.listen("/rpbi/panda/joint_states", JointState)
-    ros.start(["roslaunch", "rpbi_examples", "basic_example_panda.launch", "real_robot:=true", "headless:=true"])
-    first = states.wait_for(1, SLOW_S)[0]
-    index = first.name.index("panda_joint4")
-    real.wait_until_moved()
-    wait_until(lambda: abs(states.messages[-1].position[index] - first.position[index]) > 0.3, "it moves", SLOW_S)
-
-
-def test_human_interaction_leads_a_real_robot(ros: RosSystem, tmp_path) -> None:
-    real = RealRobot(ros)
-    arguments = ("human_interaction.launch", "device:=scripted", "real_robot:=true", "headless:=true")
-    ros.start(["roslaunch", "rpbi_examples", *arguments, f"output:={tmp_path}"])
+    arguments = ("device:=scripted", f"output:={tmp_path}") if example == "human_interaction" else ()
+    ros.start(["roslaunch", "rpbi_examples", f"{example}.launch", "real_robot:=true", "headless:=true", *arguments])
     real.wait_until_moved()
 
 
