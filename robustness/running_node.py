@@ -9,7 +9,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import rosgraph
 import rospy
@@ -30,6 +30,20 @@ TYPES = {"urdfs": "URDF", "robots": "ROBOT", "dynamic": "DYNAMIC", "soft": "SOFT
 """Name of the number in PybulletObject by argument of `write_world`."""
 LONGEST_MESSAGE = 250_000
 """Characters of an answer."""
+
+
+class Pauses(NamedTuple):
+    """Time between two ticks [s].
+
+    Attributes:
+        wall: As it was.
+        own: Less what its thread waited for a processor; at most the processor time of the process.
+        python: Less what PyBullet's functions that load, remove and step took of that.
+    """
+
+    wall: float
+    own: float
+    python: float
 
 
 class WatchedNode:
@@ -60,20 +74,23 @@ class WatchedNode:
         new, self._seen = said[self._seen :], len(said)
         return new
 
-    def longest_pauses(self, since_s: float) -> tuple[float, float, float]:
-        """Returns its longest pause since a time [s]: as it was, less its waiting for a processor, and less loading."""
-        rows = [json.loads(line) for line in self.pauses.read_text().splitlines()[-2000:] if line.endswith("]")]
-        rows = [row for row in rows if row[0] >= since_s]
-        own = [gap - waited for _, gap, waited, _ in rows]
-        idle = [gap - waited - loading for _, gap, waited, loading in rows]
-        return max((row[1] for row in rows), default=0.0), max(own, default=0.0), max(idle, default=0.0)
+    def longest_pauses(self, since_s: float) -> Pauses:
+        """Returns its longest pauses since a time [s]."""
+        lines = self.pauses.read_text().splitlines()[-2000:]
+        rows = [json.loads(line) for line in lines if line.endswith("]")]
+        found = [Pauses(0.0, 0.0, 0.0)]
+        for now_s, gap_s, waited_s, cpu_s, inside_s in rows:
+            if now_s >= since_s:
+                own_s = min(gap_s - waited_s, cpu_s)
+                found.append(Pauses(gap_s, own_s, own_s - inside_s))
+        return Pauses(*map(max, zip(*found, strict=True)))
 
 
 def outcomes_in_node(workplace: Any, kind: str, seeds: range, folder: Path) -> Iterator[Outcome]:
     """Yields what became of each file; prints the longest pauses and the largest size at the end."""
     command = ["rosmaster", "--core", "-p", str(workplace.port.number)]
     master = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
-    worst: list[tuple[float, float, float, int, str]] = []
+    worst: list[tuple[Pauses, int, str]] = []
     try:
         wait_until(rosgraph.is_master_online, "the ROS master answers")
         ros = RosSystem(folder)
@@ -88,7 +105,7 @@ def outcomes_in_node(workplace: Any, kind: str, seeds: range, folder: Path) -> I
             verdict, text = _ask(ros, node, what)
             seconds = time.monotonic() - began_s
             time.sleep(0.003)
-            worst.append((*node.longest_pauses(began_s), seed, verdict))
+            worst.append((node.longest_pauses(began_s), seed, verdict))
             outcome = Outcome(seed, "node", verdict, seconds, text)
             if outcome.is_fine:
                 shutil.rmtree(place)
@@ -101,12 +118,10 @@ def outcomes_in_node(workplace: Any, kind: str, seeds: range, folder: Path) -> I
         stop_group(master)
         for name in ("pauses", "world.yaml", "floor.yaml", "ball.yaml", "iiwa.yaml", *(f"{n}.log" for n in range(99))):
             (folder / name).unlink(missing_ok=True)
-    for column, name in enumerate(("all", "without waiting for a processor", "without that and PyBullet's loading")):
-        for verdict in ("refused", "taken"):
-            rows = sorted((row for row in worst if row[4] == verdict), key=lambda row: -row[column])[:5]
-            print(
-                f"{kind}: longest pauses [ms], {verdict}, {name}:", *(f"{1e3 * r[column]:.1f} ({r[3]})" for r in rows)
-            )
+    for name, pause in (("wall time", "wall"), ("own processor time", "own"), ("outside PyBullet", "python")):
+        for wanted in ("refused", "taken"):
+            rows = sorted(((getattr(each, pause), seed) for each, seed, got in worst if got == wanted), reverse=True)
+            print(f"{kind}: longest pauses [ms], {wanted}, {name}:", *(f"{1e3 * s:.1f} ({n})" for s, n in rows[:5]))
 
 
 def _ask(ros: RosSystem, node: WatchedNode, what: Any) -> tuple[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import faulthandler
 import json
 import logging
 import os
@@ -100,6 +101,7 @@ def _of_batch(kind: str, seeds: list[int], folder: Path) -> Iterator[Outcome]:
 
 def _read_all(kind: str, seeds: list[int], folder: Path, report: int) -> None:
     """Reads files, writes a line before each reader and one with its outcome, and ends the process."""
+    faulthandler.disable()  # which pytest has enabled: a signal is a result here, not a fault of the test
     try:
         for limit, most in ((resource.RLIMIT_AS, MOST_BYTES), (resource.RLIMIT_CORE, 0)):
             resource.setrlimit(limit, (most, most))

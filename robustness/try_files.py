@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import resource
 import shutil
 import sys
 import tempfile
@@ -60,7 +61,8 @@ def main() -> None:
             found = list(shown(kind, outcomes(kind, seeds, folder)))
         rows.append(_row(kind, len(seeds), found))
         print("\n".join([_line(HEAD), "|---" * len(HEAD) + "|", *map(_line, rows)]), flush=True)
-    print("load:", *(f"{load:.1f}" for load in os.getloadavg()))
+    largest_mb = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e3
+    print(f"largest process: {largest_mb:.0f} MB; load:", *(f"{load:.1f}" for load in os.getloadavg()))
     shutil.rmtree(folder / "cache", ignore_errors=True)
     if not any(folder.iterdir()):
         folder.rmdir()

@@ -1,7 +1,8 @@
 """The simulator node, with a file of its pauses: `watched_node.py FILE ARGUMENTS ...`.
 
-Each line has, as JSON: the time at which a tick began [s, monotonic], how long after the one before [s], how much of
-that its thread waited for a processor, and how much it spent on adding and removing objects, most of it in PyBullet.
+Each line has, as JSON, in seconds: the time at which a tick began, how long after the one before, for how much of that
+its thread waited for a processor, the processor time of the whole process, and that inside PyBullet's functions that
+load and step.
 """
 
 from __future__ import annotations
@@ -16,50 +17,62 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from rpbi.engine import contents
-from rpbi.ros import node
-from rpbi.world import World
+import pybullet
 
 SHORTEST_S = 0.005
 """Pauses that are shorter are not written."""
 PRIORITY = -15
 """Beside other work; whoever may not have it runs without."""
+INDIVISIBLE = (
+    *("loadURDF", "loadSoftBody", "createVisualShape", "createCollisionShape", "createMultiBody", "removeBody"),
+    "stepSimulation",
+)
+"""PyBullet's functions that add and remove objects, and its step: each call lasts as long as PyBullet wants."""
+inside_s = 0.0
+"""Processor time that they have taken."""
 
 
 def main() -> None:
     """Runs the node."""
+    for name in INDIVISIBLE:
+        setattr(pybullet, name, _timed(getattr(pybullet, name)))
+
+    from rpbi.ros import node  # after that, so that it gets the timed functions
+    from rpbi.world import World
+
     with contextlib.suppress(PermissionError):
         os.setpriority(os.PRIO_PROCESS, 0, PRIORITY)
     file = open(sys.argv.pop(1), "a", buffering=1)
-    spent = [0.0]
-    contents.apply = _timed(contents.apply, spent)
-    step, last = World.step, [time.monotonic(), 0.0, 0.0]
+    step, last = World.step, _clocks()
 
     def watched(world: World) -> Any:
-        now, waited = time.monotonic(), _waited_s()
-        if now - last[0] > SHORTEST_S:
-            file.write(json.dumps([now, now - last[0], waited - last[1], spent[0] - last[2]]) + "\n")
-        last[:] = now, waited, spent[0]
+        nonlocal last
+        now = _clocks()
+        if now[0] - last[0] > SHORTEST_S:
+            file.write(json.dumps([now[0], *(after - before for after, before in zip(now, last, strict=True))]) + "\n")
+        last = now
         return step(world)
 
     World.step = watched  # type: ignore[method-assign, assignment]
     node.main()
 
 
-def _timed(call: Callable[..., Any], spent: list[float]) -> Callable[..., Any]:
+def _clocks() -> tuple[float, float, float, float]:
+    waited_s = int(Path("/proc/thread-self/schedstat").read_text().split()[1]) * 1e-9
+    return time.monotonic(), waited_s, time.process_time(), inside_s
+
+
+def _timed(call: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(call)
     def timed(*arguments: Any, **more: Any) -> Any:
-        began_s = time.monotonic()
+        global inside_s
+        began_s = time.thread_time()
         try:
             return call(*arguments, **more)
         finally:
-            spent[0] += time.monotonic() - began_s
+            inside_s += time.thread_time() - began_s
 
     return timed
-
-
-def _waited_s() -> float:
-    return int(Path("/proc/thread-self/schedstat").read_text().split()[1]) * 1e-9
 
 
 if __name__ == "__main__":

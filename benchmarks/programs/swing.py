@@ -6,10 +6,10 @@ import argparse
 import json
 import math
 
-AMPLITUDE, FREQUENCY_HZ = 0.8, 0.5  # [rad], [Hz]
+AMPLITUDE, FREQUENCY_HZ = 0.49, 0.5  # [rad], [Hz]
 RAMP_S = 1.0
 HZ = 50
-JOINT = "lbr_iiwa_joint_1"
+JOINT = "lbr_iiwa_joint_2"
 
 
 def position(time_s: float) -> float:

@@ -6,6 +6,7 @@ As a program it replays a recording from its standard input, as JSON, and prints
 from __future__ import annotations
 
 import json
+import math
 import random
 import sys
 import tempfile
@@ -85,6 +86,7 @@ class Script:
 
     def __init__(self, seed: int) -> None:
         self._random = random.Random(seed)
+        self._stream_random = random.Random(seed)
         self._visitors: list[str] = []
         self._count = 0
 
@@ -99,6 +101,8 @@ class Script:
             world.put("follower/pose", Pose(place, (0.0, 0.0, draw.uniform(-1, 1), 1.0)))
         if draw.random() < 0.05:
             self._target(world)
+        if world.clock.tick % 10 == self._stream_random.randrange(4):
+            self._stream(world)
         if draw.random() < 0.01:
             self._something(world)
         if draw.random() < 0.012:
@@ -125,6 +129,14 @@ class Script:
             world.put("iiwa/target", JointTarget(joints, values, values, [20.0 * value for value in values]))
         with suppress(ValueError):
             world.put("iiwa/springs/target", JointTarget(tuple(joints), tuple(values), (), (), world.clock.stamp_ns))
+
+    def _stream(self, world: World) -> None:
+        """Sends a target of a swing; some are lost, some come twice, and stamps jitter."""
+        time_s = world.clock.tick * 0.002
+        stamp_ns = world.clock.stamp_ns - self._stream_random.randrange(4_000_000)
+        with suppress(ValueError):
+            swing = [0.3 * math.sin(time_s)], [0.3 * math.cos(time_s)]
+            world.put("iiwa/target", JointTarget(JOINTS[:1], *swing, stamp_ns=stamp_ns))
 
     def _something(self, world: World) -> None:
         draw = self._random

@@ -29,10 +29,10 @@ def arm_keys(mode: str) -> dict[str, Any]:
     return {"setJointMotorControlArray": {"controlMode": mode}}
 
 
-def late_targets(real_time_factor: float) -> Callable[[], float]:
-    """Returns delays of targets that are up to 15 ms late by the wall clock, in simulated time [s]; always the same."""
+def late_targets(latest_s: float, real_time_factor: float = 1.0) -> Callable[[], float]:
+    """Returns delays of targets in simulated time, always the same [s]; the latest is given by the wall clock [s]."""
     chance = random.Random(1)
-    return lambda: real_time_factor * chance.uniform(0.0, 0.015)
+    return lambda: real_time_factor * chance.uniform(0.0, latest_s)
 
 
 def floor_picture(path: Path) -> None:
@@ -89,14 +89,20 @@ def impedance_picture(path: Path) -> None:
 
 
 def targets_picture(path: Path) -> None:
-    """Draws a push by targets that come late, and by targets that are made in the tick."""
-    forces = {"50 Hz, up to 15 ms late": pushed(late_s=late_targets(1.0)), "at every tick": pushed(target_hz=1000.0)}
+    """Draws pushes by targets that come late, without and with a buffer, and by targets that are made in the tick."""
+    no_buffer = {"kuka_lwr": {"target_buffer_s": 0.0}}
+    forces = {
+        "up to 15 ms late, no buffer": pushed(objects=no_buffer, late_s=late_targets(0.015)),
+        "up to 15 ms late, buffer of 20 ms": pushed(late_s=late_targets(0.015)),
+        "at every tick": pushed(target_hz=1000.0),
+    }
     _pushes(path, forces)
 
 
 def real_time_picture(path: Path) -> None:
-    """Draws pushes by targets that are late by the wall clock, at real time and slower."""
-    _pushes(path, {f"real_time_factor {factor:g}": pushed(late_s=late_targets(factor)) for factor in (1.0, 0.5, 0.1)})
+    """Draws pushes by targets that are later by the wall clock than the buffer is long, at real time and slower."""
+    factors = (1.0, 0.5, 0.1)
+    _pushes(path, {f"real_time_factor {each:g}": pushed(late_s=late_targets(0.06, each)) for each in factors})
 
 
 def _touch_and_push(path: Path, forces: Mapping[str, Force]) -> None:

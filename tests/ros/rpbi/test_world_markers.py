@@ -12,10 +12,12 @@ from node_world import add, main_config, remove
 from ros_system import wait_until
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
-from worlds import FLOOR, ball, box, iiwa
+from worlds import FLOOR, ball, box, iiwa, write_world
 
 from ros_pybullet_interface.msg import PybulletObject
 from ros_pybullet_interface.srv import StepN
+from rpbi.ros.publishers import world_markers
+from rpbi.world import World
 
 TOPIC = "/rpbi/markers"
 MARK = {
@@ -172,3 +174,18 @@ def test_rate_of_0_switches_markers_off(ros, tmp_path):
     ros.simulator(main_config(tmp_path, collision=(FLOOR,), markers_hz=0))
     published = rosgraph.Master("/tests").getSystemState()[0]
     assert TOPIC not in [topic for topic, _ in published]
+
+
+def test_many_shapes_are_looked_at_in_several_polls(ros, tmp_path, monkeypatch):
+    monkeypatch.setattr(world_markers, "LONGEST_LOOK_S", 0.0)
+    world = World.from_file(write_world(tmp_path, robots=(iiwa(),)))
+    markers = world_markers.WorldMarkers(world, 1000.0)
+    listener = ros.listen(TOPIC, MarkerArray)
+    polls = 0
+    while not listener.messages:
+        markers.poll()
+        polls += markers._look is not None
+    (message,) = listener.messages
+    markers._publisher.unregister()
+    world.close()
+    assert polls == len(message.markers) == 8, "each poll had time for one"

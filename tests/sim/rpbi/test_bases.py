@@ -93,6 +93,11 @@ def test_a_base_that_follows_tf_has_its_link_frame_there_not_its_centre_of_mass(
     assert frames["rpbi/mobile/arm"].position == pytest.approx((1.5, 2.0, 0.5), abs=1e-6)
 
 
+def test_a_mobile_robot_by_its_type_needs_a_planar_base(build, tmp_path):
+    with pytest.raises(ConfigError, match="planar_base: missing: a mobile_robot needs it"):
+        build({**mobile_base(tmp_path, **STILL), "type": "mobile_robot"})
+
+
 @pytest.mark.parametrize("planar_base", [None, {}])
 def test_a_base_that_physics_moves_does_not_follow_tf_and_says_so(build, tmp_path, caplog, planar_base):
     world = build(mobile_base(tmp_path, object_tf={"tf_id": "carrier"}, planar_base=planar_base))

@@ -18,13 +18,16 @@ from ros_system import SUPPORT, support_on_path
 from worlds import ball, write_world
 
 from custom_ros_tools.errors import ConfigError
+from ik_ros.formulation.robot import Robot
 from rpbi.bodies.urdf_object import UrdfObject
 from rpbi.config.loading import load_world
+from rpbi.kinematics import Kinematics
 from rpbi.meshes import trial
 from rpbi.meshes.trial import Mesh, Use
 from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.loading import urdf_problems
 from rpbi.world import World
+from safe_robot.robot import GuardedRobot
 
 FIRST_SEED, EACH = 1000, 8
 
@@ -158,6 +161,16 @@ def test_a_urdf_of_which_nothing_is_wrong_is_left_alone(tmp_path):
     path = tmp_path / "robot.urdf"
     path.write_text(_urdf(MASSES.format("a", "1e0 "), LINK.format("b"), JOINT.format("a", "fixed", "a", "b")))
     assert urdf_problems(str(path)) == [] and UrdfDocument(str(path)).root_link() == "a"
+
+
+@pytest.mark.parametrize("reader", [GuardedRobot, Robot, Kinematics])
+def test_no_reader_takes_joints_by_the_hundred(tmp_path, reader):
+    links = "".join(f"<link name='l{number}'/>" for number in range(502))
+    ends = (f"<parent link='l{number}'/><child link='l{number + 1}'/>" for number in range(501))
+    joints = "".join(f"<joint name='j{number}' type='continuous'>{each}</joint>" for number, each in enumerate(ends))
+    (tmp_path / "robot.urdf").write_text(f"<robot name='r'>{links}{joints}</robot>")
+    with pytest.raises(ConfigError, match="joints that are not fixed, got 501"):
+        reader(str(tmp_path / "robot.urdf"))
 
 
 class LoadsByItself(UrdfObject):

@@ -15,7 +15,10 @@ import pytest
 from worlds import iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError
+from rpbi.bodies import body_class
+from rpbi.config.loading import load_object
 from rpbi.kinematics import Kinematics
+from rpbi.urdf import loading
 from rpbi.urdf.copies import description_for_ros
 from rpbi.world import World
 
@@ -97,6 +100,36 @@ def test_package_with_three_slashes_is_package_with_two(build, tmp_path, monkeyp
     (tmp_path / "x.urdf").write_text("<robot name='x'>" + link("l0", mesh.replace("cube", "none")) + "</robot>")
     with pytest.raises(ConfigError, match="unknown ROS package"):
         build(tmp_path / "x.urdf")
+
+
+@pytest.mark.parametrize(
+    ("kind", "entry"),
+    [
+        ("urdf", {"name": "it", "loadURDF": {"fileName": "kuka_iiwa/model.urdf"}}),
+        ("robot", iiwa("it")),
+        ("visual_robot", iiwa("it", is_visual_robot=True)),
+        ("mobile_robot", iiwa("it", planar_base={})),
+    ],
+)
+def test_a_prepared_urdf_is_neither_copied_nor_written_again(build, tmp_path, kind, entry):
+    (tmp_path / "x.urdf").write_text("<robot name='x'>" + link("l0") + "</robot>")
+    world = build(tmp_path / "x.urdf")
+    made_ready = loading._prepared.cache_info
+    loading._prepared.cache_clear()
+    config = load_object(kind, entry, "it.yaml")
+    body_class(kind).prepare(config, has_window=False)
+    assert made_ready().misses == 1
+    world.add(kind, config)
+    assert made_ready().misses == 1 and world.bodies["it"].link_indices
+
+
+def test_of_many_lines_of_pybullet_some_are_logged_and_the_rest_is_counted(build, tmp_path, caplog):
+    bare = "".join(f"<link name='l{number}'>{BOX}</link>" for number in range(41))
+    (tmp_path / "x.urdf").write_text(f"<robot name='x'>{bare}{''.join(joint(n, 'fixed') for n in range(40))}</robot>")
+    caplog.set_level("INFO", "pybullet")
+    build(tmp_path / "x.urdf")
+    lines = [record.message for record in caplog.records if record.name == "pybullet"]
+    assert len(lines) == 21 and lines[-1] == "and 63 more lines", lines
 
 
 def test_of_more_joints_than_pybullet_tells_of_the_fixed_ones_are_left_out(build, tmp_path, caplog):

@@ -92,6 +92,9 @@ LONG = f"1{':59' * 60}"[:57]
         ("a: !!bool 3\n", "w.yaml: line 1, column 4: expected a value of the type bool, got '3'"),
         ('a: !!int ""\n', "w.yaml: line 1, column 4: expected a value of the type int, got ''"),
         ("a: [!!timestamp x]\n", "w.yaml: line 1, column 5: expected a value of the type timestamp, got 'x'"),
+        ("a: !!set [b]\n", "w.yaml: line 1, column 4: expected a mapping node, but found sequence"),
+        ("a: !!set b\n", "w.yaml: line 1, column 4: expected a mapping node, but found scalar"),
+        ("!!seq a: 1\n", "w.yaml: line 1, column 1: found unhashable key"),
         ("a: 2001-14-01\n", "w.yaml: line 1, column 4: expected a value of the type timestamp, got '2001-14-01'"),
         pytest.param(
             f"a: 1{':59' * 300}.0\n",
@@ -99,7 +102,7 @@ LONG = f"1{':59' * 60}"[:57]
             id="a float of many minutes",
         ),
         pytest.param(
-            f"a: 1{':59' * 1000}\n",
+            f"a: !!int 1{':59' * 1000}\n",
             f"w.yaml: line 1, column 4: expected a value of the type int, got '{LONG}...'",
             id="an integer of many minutes",
         ),
@@ -110,6 +113,11 @@ def test_faulty_yaml_is_told_with_line_and_column(text: str, told: str) -> None:
     with pytest.raises(ConfigError) as caught:
         load_configs(text, "w.yaml")
     assert str(caught.value).replace("\\t", "\\\\t") == told
+
+
+@pytest.mark.parametrize("text", [f"1{':59' * 1000}", "1" * 1001, f"2001-01-01 {' ' * 1000}01:01:01"])
+def test_longer_values_than_any_number_are_texts(text: str) -> None:
+    assert load_configs(f"a: {text}\n") == {"a": text}
 
 
 def test_yaml_cannot_run_code(tmp_path: Path) -> None:

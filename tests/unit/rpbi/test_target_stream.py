@@ -123,6 +123,43 @@ def test_one_late_target_does_not_change_a_constant_velocity(late, has_stamps):
     assert largest_change_of_velocity(positions) < 1.0
 
 
+def test_a_target_late_at_the_turning_point_of_a_swing_stops_nothing():
+    def position(tick: float) -> float:
+        return 0.8 * math.cos(math.pi * tick * DT_S)
+
+    targets = [(n * PERIOD, position(n * PERIOD), 0) for n in range(120)]
+    targets[101] = (targets[101][0] + 15, *targets[101][1:])
+    targets[102] = (targets[101][0], *targets[102][1:])
+    velocities = [(position(tick + 0.01) - position(tick - 0.01)) / (0.02 * DT_S) for tick in range(0, 1200, PERIOD)]
+    positions = play(targets, 1150, buffer_s=0.02, velocities=velocities)[300:]
+    assert largest_change_of_velocity(positions) < 1.05 * 0.8 * math.pi**2
+
+
+def test_the_first_stall_of_a_regular_stream_is_none_of_the_samples():
+    """Its stamps are those of sending, and until then nothing says so."""
+    turn = 2.0 * math.pi * PERIOD * DT_S
+    positions = [0.3 * math.cos(turn * n) for n in range(120)]
+    velocities = [-0.3 * 2.0 * math.pi * math.sin(turn * n) for n in range(120)]
+    for stalled in range(70, 100):
+        sent = [n * PERIOD for n in range(120)]
+        sent[stalled] = sent[stalled + 1] = sent[stalled] + 15
+        targets = [(tick, position, stamp_ns(tick)) for tick, position in zip(sent, positions)]
+        swing = play(targets, 1150, buffer_s=0.02, velocities=velocities)[300:]
+        assert largest_change_of_velocity(swing) < 1.5 * 0.3 * (2.0 * math.pi) ** 2
+
+
+@pytest.mark.parametrize("stamps", ["of sending", "none"])
+def test_jitter_adds_little_delay(stamps):
+    for seed in range(16):
+        rng, sent, targets = random.Random(seed), 0.0, []
+        for number in range(250):
+            sent = max(sent, number * PERIOD + rng.uniform(0.0, 6.0))
+            targets.append((math.ceil(sent), 0.03 * number, stamp_ns(sent) if stamps == "of sending" else 0))
+        positions = play(targets, 2480, buffer_s=0.02)
+        lags = [tick + 1 - position * PERIOD / 0.03 for tick, position in enumerate(positions)][500:]
+        assert sum(lags) / len(lags) * DT_S < 0.05
+
+
 def test_the_delay_is_constant_from_the_first_target_on():
     """It is the buffer without the tick before which targets come, beside one and a half periods."""
     positions = play([(n * PERIOD, 0.03 * n, 0) for n in range(40)], 40 * PERIOD, buffer_s=0.02)

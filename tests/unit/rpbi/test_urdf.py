@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.urdf.copies import description_for_ros, for_pybullet
+from rpbi.urdf.copies import description_for_ros, files_of, for_pybullet
 from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.elements import text_of
 
@@ -29,7 +29,8 @@ def meshes(text: str) -> list[str | None]:
 
 
 def resolved(path: str) -> str:
-    return text_of(for_pybullet(UrdfDocument(path)))
+    document = UrdfDocument(path)
+    return text_of(for_pybullet(document, files_of(document)))
 
 
 def test_a_folder_beside_or_above_stands_in_for_a_package_as_for_pybullet(tmp_path):

@@ -52,14 +52,13 @@ def test_from_inside_the_margin_the_robot_gets_away():
 @pytest.mark.parametrize("is_mended", [True, False])
 def test_hill_climbing_finds_no_braking_inside_the_margin_unless_rows_are_left_out(monkeypatch, is_mended):
     """A wrist that swings its flange through the lowest point is nearest to the table between two sparse rows."""
-    every = Proximity._coarse_to_fine
+    every = Proximity._judged
 
-    def sparse(self, travelled):
-        rows = every(self, travelled)
-        return rows[: rows.tolist().index(len(rows) - 1) + 1]
+    def sparse(self, motion, suspects, rows):
+        return every(self, motion, suspects, rows[self._sparse(motion.travelled[rows] @ self._furthest)])
 
     if not is_mended:
-        monkeypatch.setattr(Proximity, "_coarse_to_fine", sparse)
+        monkeypatch.setattr(Proximity, "_judged", sparse)
     climber = Climber(LWR, LWR.guard("limit"), np.random.default_rng(SEED))
     least_m, course = climber.climb(STEPS)
     assert (least_m >= MARGIN_M - TOLERANCE_M) == is_mended, course

@@ -23,7 +23,7 @@ MOST_BYTES = 16_000_000
 MOST_VALUES = 1_000_000
 """And have so many values, with those that aliases (`*NAME`) repeat counted each time."""
 LONGEST_NUMBER = 1000
-"""Characters of a number."""
+"""Characters of a number; a longer one without a tag is a text."""
 _INT, _FLOAT = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
 _PACKAGE = re.compile(r"package://(?P<uri>[^/{}]+)|\{(?P<braces>[^{}]*)\}")
 
@@ -175,6 +175,12 @@ class _StrictLoader(yaml.SafeLoader):
         finally:
             _dismantle(node)
 
+    def resolve(self, kind: type[yaml.Node], value: Any, implicit: Any) -> Any:
+        """Takes a longer scalar than any number for a text: matching it with numbers would stop all threads."""
+        if kind is yaml.ScalarNode and len(value) > LONGEST_NUMBER:
+            implicit = (False, True)
+        return super().resolve(kind, value, implicit)
+
     def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
         is_number = isinstance(node, yaml.ScalarNode) and node.tag in (_INT, _FLOAT)
         try:
@@ -190,10 +196,12 @@ class _StrictLoader(yaml.SafeLoader):
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         seen: dict[Any, yaml.Node] = {}
-        for key_node, _ in node.value:
+        for key_node, _ in node.value if isinstance(node, yaml.MappingNode) else ():
             if key_node.tag == "tag:yaml.org,2002:merge" or not isinstance(key_node, yaml.ScalarNode):
                 continue
             key = self.construct_object(key_node)
+            if not isinstance(key, Hashable):  # which making the mapping reports
+                continue
             if key in seen:
                 first = seen[key].start_mark.line + 1
                 raise yaml.constructor.ConstructorError(

@@ -272,14 +272,16 @@ class Guard:
         self._state, self._stop, self._is_first = found, BrakingCommands.none(len(target)), False
         return None
 
-    def _judged(self, command: Sequence[float], situation: Situation, checks: Sequence[Check]) -> _Safe | Violation:
+    def _judged(
+        self, command: Sequence[float], situation: Situation, checks: Sequence[Check], is_trial: bool = False
+    ) -> _Safe | Violation:
         """Returns the command if it is safe, else what the first of some checks says that is not."""
         assert self._state is not None
         period_s = self.config.period_s
         position = np.array(command)
         state = self._state.then(position, period_s)
         brake = self._brake(state)
-        motion = Motion(self.robot, self._state, position, period_s, brake)
+        motion = Motion(self.robot, self._state, position, period_s, brake, is_trial)
         for check in checks:
             if violation := check.check(motion, situation):
                 return violation
@@ -317,7 +319,7 @@ class Guard:
             np.array(target),
             self._state,
             self._way_to_rest,
-            lambda wanted, checks: self._judged(tuple(wanted.tolist()), situation, checks),
+            lambda wanted, checks: self._judged(tuple(wanted.tolist()), situation, checks, is_trial=True),
         )
         return Decision(self._brake_on() if safe is None else self._sent(safe), violation)
 

@@ -48,6 +48,7 @@ class Motion:
         robot: The robot.
         period_s: The period [s].
         start: The state before the command.
+        is_trial: Whether it only counts whether the motion is safe: any violation will do.
         position: k x n [rad or m].
         velocity: k x n [rad/s or m/s].
         acceleration: k x n [rad/s^2 or m/s^2].
@@ -55,9 +56,15 @@ class Motion:
     """
 
     def __init__(
-        self, robot: GuardedRobot, start: State, command: np.ndarray, period_s: float, brake: Brake | None = None
+        self,
+        robot: GuardedRobot,
+        start: State,
+        command: np.ndarray,
+        period_s: float,
+        brake: Brake | None = None,
+        is_trial: bool = False,
     ) -> None:
-        self.robot, self.start, self.period_s = robot, start, period_s
+        self.robot, self.start, self.period_s, self.is_trial = robot, start, period_s, is_trial
         state = start.then(command, period_s)
         jerk = (state.acceleration - start.acceleration) / period_s
         self.position, self.velocity = command[None], state.velocity[None]

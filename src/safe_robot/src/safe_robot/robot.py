@@ -11,6 +11,8 @@ from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.elements import UrdfJoint
 from rpbi.urdf.structure import check_structure
 
+MOST_JOINTS = 500
+"""Joints that are not fixed; the time that finding out how they move takes grows with their square."""
 MOST_OUTSIDE = 0.1
 """A telescopic joint starts at most so far outside its limits [rad or m]."""
 
@@ -43,6 +45,9 @@ class GuardedRobot:
         self.urdf_path = urdf_path
         self.document = document = UrdfDocument(urdf_path, not_xml="expected well-formed XML")
         check_structure(document)
+        if (moving := sum(kind != "fixed" for kind in document.joint_types.values())) > MOST_JOINTS:
+            message = f"expected at most {MOST_JOINTS} joints that are not fixed, got {moving}"
+            raise ConfigError([Problem(urdf_path, "", message)])
         try:
             self._all = document.joints
         except ValueError as error:

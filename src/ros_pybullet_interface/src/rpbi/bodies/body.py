@@ -49,6 +49,14 @@ class Body:
     object_tf: ObjectTf | None = None
     """The TF frame that its base follows, if it follows one."""
 
+    @classmethod
+    def prepare(cls, config: Any, has_window: bool) -> None:
+        """Does and remembers what takes long of making a body, but for PyBullet's part; any thread may call it.
+
+        Raises:
+            ConfigError: If the configuration does not fit.
+        """
+
     def __init__(self, pb: Client, name: str, body_id: int) -> None:
         if body_id < 0:
             raise PhysicsError(f"{name}: PyBullet did not create the body")

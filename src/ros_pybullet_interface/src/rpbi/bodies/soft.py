@@ -21,7 +21,7 @@ from rpbi.sensors.contacts.arrows import contact_sensors
 from rpbi.sensors.sensor import Sensor
 from rpbi.sensors.surface import SurfaceSensor
 from rpbi.urdf.document import UrdfDocument
-from rpbi.urdf.loading import load_urdf
+from rpbi.urdf.loading import load_urdf, prepared_urdf
 
 from .body import Body
 from .body_config import BodyConfig
@@ -64,6 +64,12 @@ class SoftObject(Body):
     section = "soft_objects"
     is_soft = True
     example = {"loadSoftBody": {"fileName": "cloth_z_up.obj", "useMassSpring": True}, "contacts": {}}
+
+    @classmethod
+    def prepare(cls, config: SoftObjectConfig, has_window: bool) -> None:
+        """Prepares what PyBullet gets in the place of the URDF, if there is one."""
+        if config.loadURDF is not None:
+            prepared_urdf(config.loadURDF.kwargs(), has_window=has_window)
 
     def __init__(self, pb: Client, config: SoftObjectConfig) -> None:
         if not pb.is_deformable:

@@ -15,7 +15,7 @@ from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
 from rpbi.urdf.document import UrdfDocument, mimics_of
 from rpbi.urdf.joints import Joint, JointModel
-from rpbi.urdf.loading import load_urdf
+from rpbi.urdf.loading import load_urdf, prepared_urdf
 
 from .body import Body
 from .body_config import BodyConfig
@@ -56,6 +56,11 @@ class UrdfObject(Body):
         "contacts": {},
         "object_tf": {"tf_id": "FRAME"},
     }
+
+    @classmethod
+    def prepare(cls, config: UrdfObjectConfig, has_window: bool) -> None:
+        """Prepares what PyBullet gets in the place of the URDF."""
+        prepared_urdf(config.loadURDF.kwargs(), has_window=has_window)
 
     def __init__(self, pb: Client, config: UrdfObjectConfig) -> None:
         _refuse_soft(config)

@@ -13,12 +13,10 @@ LONGEST_PERIOD_S = 0.2
 """Targets that are farther apart than this [s] are no stream: each acts at once."""
 EVERY_TICK = 1.5
 """Targets that are no farther apart than this many ticks act at once, too."""
-WINDOW = 32
+WINDOW = 64
 """Number of arrivals from which period, rate and delay are estimated."""
 SETTLING_S = 0.8
-"""Time constant of changes of the delay [s]."""
-FIRST = 10
-"""Number of targets during which the delay settles faster."""
+"""Time constant of changes of the delay [s], shorter for the first targets."""
 SHORTEST = 0.8
 """A target is played no sooner after the one before than this share of the time between them."""
 REPLACED = 0.25
@@ -26,7 +24,9 @@ REPLACED = 0.25
 DRIFT = 0.1
 """Stamps are used while they run as fast as the world's time within this share."""
 MIN_MISFIT_RATIO = 2.0
-"""Ratio of squared misfits above which stamps give way to a regular period, or the other way round."""
+"""Ratio of excess squared misfits above which stamps give way to a regular period, or the other way round."""
+MIN_MISFIT = 1e-10
+"""Squared misfit that decides nothing [rad^2 or m^2]."""
 MIN_LOSS_RATIO = 16.0
 """Ratio of squared misfits above which a gap counts as lost targets rather than as a late one."""
 MAX_LOST = 4
@@ -35,10 +35,8 @@ PERSISTENT = 4
 """Number of targets out of step in a row after which only these count."""
 SAME_PERIOD = (0.6, 1.6)
 """Range of the mean of the last `PERSISTENT` intervals within which the period has not changed [periods]."""
-FAR = 3.0
-"""Multiple of the mean error at which a time counts by half."""
-LEAST_ERROR = 0.25
-"""Error of times that is not far in any case [ticks]."""
+LEAST_AHEAD = 0.25
+"""A target is played at least so much after it came [ticks]."""
 
 
 class Arrival(NamedTuple):
@@ -107,6 +105,7 @@ class JitterBuffer:
 
     def _restart(self) -> None:
         self._seen.clear()
+        self._count = 0
         self._interval = 0.0
         self._rate = 1.0
         self._is_regular: bool | None = None
@@ -123,6 +122,7 @@ class JitterBuffer:
         if self._seen and tick - self._seen[-1].tick > self._longest:
             self._restart()
         self._seen.append(Arrival(tick, stamp_ns, goal))
+        self._count += 1
         times, is_stamped = self._times()
         count = len(times)
         intervals = sorted(after - before for before, after in zip(times, times[1:])) or [0.0]
@@ -149,18 +149,18 @@ class JitterBuffer:
 
     def _schedule(self, tick: int, planned: float, interval: float, period: float) -> Playout:
         """Returns when to play the newest target, which is as near to the planned time as the delay may change."""
-        count, before = len(self._seen), self._end
-        if count == 2:
+        before = self._end
+        if self._count == 2:
             self._end = max(planned, tick + SHORTEST * period)
             self._start = self._end - interval
             return Playout(self._start, self._end, period)
-        gain = max(min(interval / self._settling, 1.0), 1.0 / count if count < FIRST else 0.0)
+        gain = max(min(interval / self._settling, 1.0), 2.0 / (self._count + 2.0))
         regular = before + interval
         end = max(regular + gain * (planned - regular), before + SHORTEST * interval)
         if (late := tick - before) > 0.0:
             beyond = min(late / self.extrapolation - 1.0, 1.0) if self.extrapolation else 1.0
             end = max(end, tick + SHORTEST * period * beyond)
-        self._end = end = max(end, tick + LEAST_ERROR)
+        self._end = end = max(end, tick + LEAST_AHEAD)
         if interval <= REPLACED * period:
             return Playout(self._start, end, period)
         self._start = before
@@ -226,6 +226,7 @@ class JitterBuffer:
         newest = list(self._seen)[-PERSISTENT:]
         self._seen.clear()
         self._seen.extend(each._replace(step=1) for each in newest)
+        self._count = PERSISTENT
         self._out_of_step = 0
 
     def _count_lost(self, times: Sequence[float]) -> None:
@@ -244,28 +245,33 @@ class JitterBuffer:
         new = _misfit(times[-4:], last), _misfit(steps[-4:], last)
         if not all(map(math.isfinite, new)):
             return
-        irregular, regular = ((1.0 - 1.0 / WINDOW) * a + b for a, b in zip(self._misfits, new))
-        self._misfits = irregular, regular
-        if irregular > MIN_MISFIT_RATIO * regular:
+        change = new[0] - new[1]
+        irregular, regular = ((1.0 - 1.0 / WINDOW) * sum_ for sum_ in self._misfits)
+        self._misfits = irregular, regular = irregular + max(change, 0.0), regular + max(-change, 0.0)
+        if irregular > MIN_MISFIT_RATIO * regular + MIN_MISFIT:
             self._is_regular = True
-        elif regular > MIN_MISFIT_RATIO * irregular:
+        elif regular > MIN_MISFIT_RATIO * irregular + MIN_MISFIT:
             self._is_regular = False
 
 
 def _slope(x: Sequence[float], y: Sequence[float]) -> float:
-    """Returns the slope of a line through points, few of which are far from it: least squares, weighted (Cauchy)."""
-    weights = [1.0] * len(x)
-    slope = 0.0
-    for _ in range(3):
-        whole = sum(weights)
-        mean_x = sum(w * a for w, a in zip(weights, x)) / whole
-        mean_y = sum(w * b for w, b in zip(weights, y)) / whole
-        spread = sum(w * (a - mean_x) ** 2 for w, a in zip(weights, x))
-        slope = sum(w * (a - mean_x) * (b - mean_y) for w, a, b in zip(weights, x, y)) / spread if spread else 0.0
-        errors = [abs(b - mean_y - slope * (a - mean_x)) for a, b in zip(x, y)]
-        far = FAR * sum(errors) / len(x) + LEAST_ERROR
-        weights = [1.0 / (1.0 + (error / far) ** 2) for error in errors]
-    return slope
+    """Returns the slope of the line that lies under all points and nearest to them on average.
+
+    That is the best estimate if delays are one-sided (Moon, Skelly, Towsley: Estimation and removal of clock skew from
+    network delay measurements, INFOCOM 1999). The line runs along the lower convex hull, below the mean of x.
+    """
+    hull: list[tuple[float, float]] = []
+    for point in zip(x, y):
+        while len(hull) > 1 and _rise(hull[-2], hull[-1]) >= _rise(hull[-2], point):
+            hull.pop()
+        hull.append(point)
+    mean = sum(x) / len(x)
+    return next((_rise(*edge) for edge in zip(hull, hull[1:]) if edge[1][0] >= mean), 0.0)
+
+
+def _rise(first: tuple[float, float], last: tuple[float, float]) -> float:
+    """Returns the slope between two points."""
+    return (last[1] - first[1]) / (last[0] - first[0])
 
 
 def _misfit(times: Sequence[float], arrivals: Sequence[Arrival]) -> float:

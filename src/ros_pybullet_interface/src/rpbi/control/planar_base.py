@@ -14,7 +14,7 @@ from custom_ros_tools.schema import ConfigModel, Positive, Seconds, Unit
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose, Twist
 from rpbi.plain_values import as_tuple
-from rpbi.urdf.copies import for_pybullet, mounted_on
+from rpbi.urdf.copies import Files, for_pybullet, mounted_on
 from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.elements import Element, UrdfJoint
 
@@ -104,16 +104,16 @@ CATCH_UP_SPEED = (0.5, 0.5, 1.0)
 """How fast the base may make up for its lag [m/s, m/s, rad/s]; a greater lag is given up: something is in the way."""
 
 
-def with_planar_joints(document: UrdfDocument) -> Element:
+def with_planar_joints(document: UrdfDocument, files: Files) -> Element:
     """Puts a massless chain of joints along x, along y and about z between the world and the root link of a URDF.
 
     Returns:
         What PyBullet reads of it, with the chain; its root is the fixed end of the chain.
 
     Raises:
-        ConfigError: If the file is not a tree of links, or a mesh of it does not exist.
+        ConfigError: If the file is not a tree of links.
     """
-    robot = for_pybullet(document)
+    robot = for_pybullet(document, files)
     world, x, y, yaw = (f"planar_base/{name}" for name in ("world", "x", "y", "yaw"))
     chain = (
         UrdfJoint(x, "prismatic", world, x, axis=(1.0, 0.0, 0.0)),

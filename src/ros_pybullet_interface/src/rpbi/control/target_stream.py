@@ -133,9 +133,10 @@ class TargetStream:
         if last.slopes is None:
             first = then = {index: self._next_velocity(index) for index in last.way}
         else:
-            first, bend = dict(last.slopes[1]), last.acceleration_at_end()
-            then = {index: _lesser(value + length * bend[index], 2.0 * value) for index, value in first.items()}
-        if length <= 0.0 or not any(first.values()):
+            first, bends = dict(last.slopes[1]), last.acceleration_at_end()
+            means = {index: (value - last.slopes[0][index]) / last.length for index, value in first.items()}
+            then = {index: value + length * _lesser(bends[index], means[index]) for index, value in first.items()}
+        if length <= 0.0 or not any((*first.values(), *then.values())):
             return
         rest = dict.fromkeys(first, 0.0)
         self._extend(

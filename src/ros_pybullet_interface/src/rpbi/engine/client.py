@@ -25,6 +25,8 @@ PRINTING = frozenset(
     "createCollisionShape createMultiBody createSoftBodyAnchor startStateLogging stopStateLogging vhacd".split()
 )
 """Functions in which PyBullet may print something; the others are called often, and print nothing."""
+MAX_LINES = 20
+"""Lines of one call that are logged; of more, the rest is counted. PyBullet prints several for each link of a robot."""
 log = logging.getLogger("pybullet")
 
 
@@ -63,8 +65,10 @@ class _Printed:
                 if not self._depth:
                     self._name(self._originals)
                 lines = self._take()
-            for line in lines:
+            for line in lines[:MAX_LINES]:
                 log.info("%s", line)
+            if len(lines) > MAX_LINES:
+                log.info("and %d more lines", len(lines) - MAX_LINES)
 
     def _name(self, streams: Iterable[int | None]) -> None:
         for variable, stream in zip(self._streams, streams):

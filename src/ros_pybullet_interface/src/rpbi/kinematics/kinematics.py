@@ -140,7 +140,7 @@ class Kinematics:
             write_description(without_shapes(self._document)),
             useFixedBase=True,
             globalScaling=self._scaling,
-            flags=flags_for(self._document.root, flags),
+            flags=flags_for(len(self._document.edges), flags),
         )
         joints = Joint.all_of(pb, body_id)
         self._root_link = pb.getBodyInfo(body_id)[0].decode()

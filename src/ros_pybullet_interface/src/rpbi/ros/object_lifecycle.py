@@ -2,11 +2,14 @@
 
 import threading
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem, UnknownNameError
+from rpbi.bodies import body_class
 from rpbi.bodies.file_checks import check_files
 from rpbi.config.sensors import RgbdSensorConfig
+from rpbi.plugins import blaming
 from rpbi.ros.publishers.sample_publishers import SamplePublishers
 from rpbi.ros.publishers.topics import FastTopic
 from rpbi.ros.services.body_endpoints import BodyEndpoints
@@ -44,7 +47,7 @@ class ObjectLifecycle:
         """
         with self._lock:
             config = with_initial_state(config, file)
-            self._check_files(config, file)  # in this thread, since the simulation's has no time for new meshes
+            self._prepare(kind, config, file)  # in this thread, since the simulation's has no time for large files
             self._ask(lambda: self._take_in(kind, config, file))
             try:
                 self._open(config.name)
@@ -102,11 +105,14 @@ class ObjectLifecycle:
         """Waits until nobody is coming or going, and lets nobody from then on."""
         self._lock.acquire(timeout=timeout_s)
 
-    def _check_files(self, config: Any, file: str) -> None:
+    def _prepare(self, kind: str, config: Any, file: str) -> None:
         try:
             check_files(config)
         except ConfigError as error:
             raise ConfigError([Problem(file, each.key, each.message) for each in error.problems]) from None
+        body_type = body_class(kind)
+        with blaming(body_type, f"preparing '{config.name}'"), suppress(ConfigError):  # which making it reports
+            body_type.prepare(config, self._world.window is not None)
 
     def _take_in(self, kind: str, config: Any, file: str) -> None:
         """Does the simulation thread's part of adding."""

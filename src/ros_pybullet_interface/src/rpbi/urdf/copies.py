@@ -3,12 +3,14 @@
 import copy
 import logging
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 from custom_ros_tools.errors import ConfigError, Problem, shortened
 from rpbi.geometry import scaled
 
 from .document import UrdfDocument
 from .elements import (
+    READ,
     Element,
     UrdfJoint,
     as_read,
@@ -24,34 +26,55 @@ from .files import address_for_ros, beside_or_above, found_mesh
 
 log = logging.getLogger(__name__)
 
+Files = tuple[tuple[tuple[str, str], str], ...]
+"""Absolute names of files by the tag and the `filename` of the elements that name them."""
 
-def for_pybullet(document: UrdfDocument) -> Element:
-    """Returns what PyBullet reads of a URDF, with absolute names of files.
 
-    PyBullet knows nothing of ROS packages. Textures that are no ordinary files, or are not there, are left out.
+def files_of(document: UrdfDocument) -> Files:
+    """Returns the files that PyBullet reads beside a URDF; textures that are no ordinary files are left out.
 
     Raises:
         ConfigError: If a mesh belongs to an unknown package or does not exist.
     """
-    robot = as_read(document.root)
+    files: list[tuple[tuple[str, str], str]] = []
     problems: list[Problem] = []
-    for parent in list(robot.iter()):
-        for element in parent.findall("*[@filename]"):
-            name = element.get("filename", "")
-            try:
-                if element.tag != "texture":
-                    element.set("filename", str(found_mesh(name, document.source)))
-                elif (file := beside_or_above(name, document.source)) is not None:
-                    element.set("filename", str(file))
-                else:
-                    log.info("%s: no such texture: %s", document.path, shortened(name))
-                    parent.remove(element)
-            except ConfigError as error:
-                problems += error.problems
-            except OSError as error:
-                problems.append(Problem(document.path, "", str(error)))
+    for tag, name in _named_files(document):
+        try:
+            texture = beside_or_above(name, document.source) if tag == "texture" else None
+            if tag != "texture":
+                files.append(((tag, name), str(found_mesh(name, document.source))))
+            elif texture is not None:
+                files.append(((tag, name), str(texture)))
+            else:
+                log.info("%s: no such texture: %s", document.path, shortened(name))
+        except ConfigError as error:
+            problems += error.problems
+        except OSError as error:
+            problems.append(Problem(document.path, "", str(error)))
     if problems:
         raise ConfigError(problems)
+    return tuple(files)
+
+
+@lru_cache(maxsize=32)
+def _named_files(document: UrdfDocument) -> tuple[tuple[str, str], ...]:
+    parts = [part for child in document.root if child.tag in READ for part in as_read(child).iter()]
+    return tuple(dict.fromkeys((part.tag, part.get("filename", "")) for part in parts if "filename" in part.attrib))
+
+
+def for_pybullet(document: UrdfDocument, files: Files) -> Element:
+    """Returns what PyBullet, which knows nothing of ROS packages, reads of a URDF: with the names that `files_of` has.
+
+    It depends on nothing else.
+    """
+    robot, known = as_read(document.root), dict(files)
+    for parent in list(robot.iter()):
+        for element in [child for child in parent if "filename" in child.attrib]:
+            file = known.get((element.tag, element.get("filename", "")))
+            if file is None:
+                parent.remove(element)
+            else:
+                element.set("filename", file)
     return robot
 
 

@@ -56,7 +56,7 @@ class UrdfDocument:
 
     Attributes:
         tag: The element at the top, `robot` in a URDF.
-        links: Names of all links.
+        links: Names of all links; as all of these, not to be changed.
         joint_types: Type of each joint by name, such as `revolute` or `fixed`.
         edges: All joints, with the links that they tie, in the file's order.
         meshes: The meshes of links, as the file names them.
@@ -77,14 +77,7 @@ class UrdfDocument:
         except (expat.ExpatError, RecursionError) as error:
             raise ConfigError([Problem(path, "", f"{not_xml}: {error}")]) from None
         self.tag = self.root.tag
-        self.joint_elements = self.root.findall("joint")
-        self.links = [link.get("name", "") for link in self.root.findall("link")]
-        self.joint_types = {joint.get("name", ""): joint.get("type", "") for joint in self.joint_elements}
-        self.meshes = list(dict.fromkeys(mesh.get("filename", "") for mesh in self.root.iter("mesh")))
-        self.edges = [
-            Edge(joint.get("name", ""), end_of(joint, "parent"), end_of(joint, "child"))
-            for joint in self.joint_elements
-        ]
+        self.joint_elements, self.links, self.joint_types, self.meshes, self.edges = _parts_of(self.root)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, UrdfDocument) and self.root is other.root
@@ -179,6 +172,26 @@ class UrdfDocument:
 def _robot_in(data: bytes) -> Element:
     """Returns the robot in a file's content; that of files that were read lately is there already."""
     return parse(data.decode(errors="replace"))
+
+
+class _Parts(NamedTuple):
+    joint_elements: list[Element]
+    links: list[str]
+    joint_types: dict[str, str]
+    meshes: list[str]
+    edges: list[Edge]
+
+
+@lru_cache(maxsize=32)
+def _parts_of(root: Element) -> _Parts:
+    joints = root.findall("joint")
+    return _Parts(
+        joints,
+        [link.get("name", "") for link in root.findall("link")],
+        {joint.get("name", ""): joint.get("type", "") for joint in joints},
+        list(dict.fromkeys(mesh.get("filename", "") for mesh in root.iter("mesh"))),
+        [Edge(joint.get("name", ""), end_of(joint, "parent"), end_of(joint, "child")) for joint in joints],
+    )
 
 
 def mimics_of(path: str) -> dict[str, Mimic]:

@@ -4,8 +4,9 @@ import logging
 import math
 import tempfile
 from collections.abc import Callable, Collection, Mapping
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pybullet
 
@@ -15,7 +16,7 @@ from rpbi.engine.client import MAXIMAL_COORDINATES, Client
 from rpbi.meshes.checks import mesh_file_problem
 from rpbi.meshes.trial import Mesh, Use, faults_in
 
-from .copies import for_pybullet, frame_masses, put_first_visuals_last, put_root_first, weigh_frames
+from .copies import Files, files_of, for_pybullet, frame_masses, put_first_visuals_last, put_root_first, weigh_frames
 from .document import UrdfDocument
 from .elements import Element, text_of
 from .files import found_mesh
@@ -94,22 +95,70 @@ def _mesh_problems(document: UrdfDocument) -> list[str]:
     return list(problems)
 
 
+class ForPybullet(NamedTuple):
+    """Text that PyBullet gets in the place of a URDF.
+
+    Attributes:
+        text: It has what PyBullet reads, and nothing else, so that both understand the same: PyBullet's own reader
+            stops at null characters, cuts long lines and ignores errors.
+        joints: Number of joints.
+        without_inertial: Names of the links without inertial.
+    """
+
+    text: str
+    joints: int
+    without_inertial: frozenset[str]
+
+
+Prepare = Callable[[UrdfDocument, Files], Element]
+"""Returns what PyBullet shall read of a URDF; it depends on the arguments alone."""
+
+
+def prepared_urdf(
+    arguments: Mapping[str, Any], prepare: Prepare = for_pybullet, has_window: bool = False
+) -> ForPybullet:
+    """Returns what PyBullet gets in the place of a URDF file.
+
+    It is remembered: a thread that has time for a large file may call this before the simulation's loads it.
+
+    Args:
+        arguments: Those of `loadURDF`.
+        prepare: Makes the robot that PyBullet shall read.
+        has_window: Whether PyBullet draws it.
+
+    Raises:
+        ConfigError: If it cannot be loaded; it names what is wrong with the file.
+    """
+    document = UrdfDocument(arguments["fileName"])
+    check_structure(document)
+    return _prepared(document, files_of(document), prepare, bool(arguments.get("useFixedBase")), has_window)
+
+
+@lru_cache(maxsize=32)
+def _prepared(document: UrdfDocument, files: Files, prepare: Prepare, is_fixed: bool, has_window: bool) -> ForPybullet:
+    robot = prepare(document, files)
+    weigh_frames(robot, frame_masses(document, is_fixed))
+    check_joints(document.path, robot)
+    put_root_first(robot)
+    if has_window:
+        put_first_visuals_last(robot)
+    without = {link.get("name", "") for link in robot.findall("link") if link.find("inertial") is None}
+    return ForPybullet(text_of(robot), len(robot.findall("joint")), frozenset(without))
+
+
 def load_urdf(
     pb: Client,
     name: str,
     arguments: Mapping[str, Any],
-    prepare: Callable[[UrdfDocument], Element] = for_pybullet,
+    prepare: Prepare = for_pybullet,
     inertia_from_urdf: bool = False,
 ) -> int:
     """Loads a URDF file in which `urdf_problems` finds nothing, and returns PyBullet's id of the body.
 
-    PyBullet gets a file with what it reads, and nothing else, so that both understand the same: its own reader stops at
-    null characters, cuts long lines and ignores errors.
-
     Args:
         name: Name of the body, for messages.
         arguments: Those of `loadURDF`.
-        prepare: Returns what PyBullet shall read of the URDF.
+        prepare: Makes the robot that PyBullet shall read.
         inertia_from_urdf: Whether moments of inertia are the URDF's, else PyBullet guesses them unless `flags` say.
 
     Raises:
@@ -117,27 +166,21 @@ def load_urdf(
     """
     file: str = arguments["fileName"]
     try:
-        document = UrdfDocument(file)
-        check_structure(document)
-        robot = prepare(document)
-        weigh_frames(robot, frame_masses(document, bool(arguments.get("useFixedBase"))))
-        check_joints(file, robot)
-        put_root_first(robot)
-        if pb.has_window:
-            put_first_visuals_last(robot)
-        flags = arguments.get("flags") or 0
-        flags = flags_for(robot, flags)
-        _warn_of_merging(name, robot, flags & ~(arguments.get("flags") or 0))
+        robot = prepared_urdf(arguments, prepare, pb.has_window)
+        asked = arguments.get("flags") or 0
+        flags = flags_for(robot.joints, asked)
+        if flags != asked:
+            message = "%d joints are more than the %d that PyBullet takes: fixed ones are left out, with their links"
+            log.warning(f"%s: {message}", name, robot.joints, MOST_JOINTS)
         if inertia_from_urdf:
             flags |= pybullet.URDF_USE_INERTIA_FROM_FILE
         with tempfile.NamedTemporaryFile("w", suffix=".urdf", encoding="utf-8") as written:
-            written.write(text_of(robot))
+            written.write(robot.text)
             written.flush()
             body_id = int(pb.loadURDF(**{**arguments, "fileName": written.name, "flags": flags}))
         if not inertia_from_urdf:
             return body_id
-        without = {link.get("name", "") for link in robot.findall("link") if link.find("inertial") is None}
-        _complete_inertias(pb, name, body_id, without, arguments.get("globalScaling") or 1.0)
+        _complete_inertias(pb, name, body_id, robot.without_inertial, arguments.get("globalScaling") or 1.0)
         return body_id
     except ConfigError as error:
         messages = [f"{problem.key or file}: {problem.message}" for problem in error.problems]
@@ -146,18 +189,12 @@ def load_urdf(
     raise ConfigError([Problem(name, "loadURDF.fileName", message) for message in messages])
 
 
-def flags_for(robot: Element, flags: int) -> int:
-    """Returns the flags by which PyBullet takes a URDF: of one with too many joints it merges the fixed ones.
+def flags_for(joints: int, flags: int) -> int:
+    """Returns the flags by which PyBullet takes a URDF of so many joints: of too many it merges the fixed ones.
 
     PyBullet loads more than 127, but then tells neither of joints nor of links where they are.
     """
-    return flags | (pybullet.URDF_MERGE_FIXED_LINKS if len(robot.findall("joint")) > MOST_JOINTS else 0)
-
-
-def _warn_of_merging(name: str, robot: Element, added_flags: int) -> None:
-    if added_flags & pybullet.URDF_MERGE_FIXED_LINKS:
-        message = "%s: %d joints are more than the %d that PyBullet takes: fixed ones are left out, with their links"
-        log.warning(message, name, len(robot.findall("joint")), MOST_JOINTS)
+    return flags | (pybullet.URDF_MERGE_FIXED_LINKS if joints > MOST_JOINTS else 0)
 
 
 def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[str], scaling: float) -> None:

@@ -18,7 +18,7 @@ ROUNDING_M = 1e-9
 """Distances that differ by less are equal [m]."""
 KEPT_M = 3e-4
 """So much more than the margin is kept where a command is chosen, since distances are taken to be linear there [m]."""
-LOOSE_M = 0.01
+LOOSE_M = 0.003
 """A bound that is that much below the distance is made anew [m]."""
 FAR_M = 10.0
 """Distances are not looked at beyond this [m]."""
@@ -55,6 +55,7 @@ class Proximity:
         self._reach = np.array([distances.reach(pair) for pair in pairs])
         self._furthest = self._reach.max(axis=0, initial=0.0)
         self._separation = Separation([(distances.solids(a), distances.solids(b)) for a, b in pairs])
+        self._last = -1, 0  # the pair and the row that were too near last: in a similar motion they likely are again
         self._known_at = np.zeros((2, *self._reach.shape))  # for each pair the ends of a motion
         self._known_m = np.full((2, len(pairs)), -np.inf)  # it is no nearer there
 
@@ -65,10 +66,10 @@ class Proximity:
             self._separation.replace(i, self._distances.solids(self._pairs[i][1]))
 
     def first(self, motion: Motion) -> TooNear | None:
-        """Returns the first pair that comes too near in a motion.
+        """Returns a pair that comes too near in a motion; None if none does in any row.
 
         A pair that is d and e away at two rows, between which it moves by m, is (d + e - m) / 2 away between them.
-        Where that is not enough, rows are tried one by one.
+        Where that is not enough, every row is judged.
         """
         if not len(self._pairs):
             return None
@@ -77,6 +78,11 @@ class Proximity:
         near = np.flatnonzero(~(known[0] + known[1] - reach @ motion.path > 2.0 * least_m))
         if not len(near):
             return None
+        i, row = self._last[0], min(self._last[1], len(motion.position) - 1)
+        if motion.is_trial and i in near:
+            self._distances.place(motion.position[row])
+            if found := self._too_near(motion, i, row, self._contact(i)):
+                return found
         rows = motion.waypoints
         bounds = self._separation.lower_bounds(motion.waypoint_frames, near)
         self._known_m[:, near], self._known_at[:, near] = bounds[[0, -1]], motion.position[[0, -1], None]
@@ -88,36 +94,70 @@ class Proximity:
             return None
         all_rows = np.arange(len(motion.position))
         section = np.clip(np.searchsorted(rows, all_rows, side="right") - 1, 0, len(is_unsure) - 1)
-        return self._measured(motion, near[suspects], all_rows[is_unsure.any(axis=1)[section]])
+        return self._judged(motion, near[suspects], all_rows[is_unsure.any(axis=1)[section]])
 
-    def _measured(self, motion: Motion, suspects: np.ndarray, rows: np.ndarray) -> TooNear | None:
-        """Returns the first of some pairs that comes too near in some rows of a motion, by measuring if need be.
+    def _judged(self, motion: Motion, suspects: np.ndarray, rows: np.ndarray) -> TooNear | None:
+        """Returns one of s pairs that comes too near in some of k rows of a motion; None if none does in any of them.
 
-        Rows far from each other are tried first, since a motion that is not safe shows there soonest.
+        Rows far from each other are judged first: a motion that is not safe shows there soonest, and what is found
+        there is enough for most rows between them.
+
+        Args:
+            motion: The motion.
+            suspects: Numbers of the pairs.
+            rows: Numbers of the rows.
         """
-        frames = self._distances.frames(motion.position[rows])
-        bounds = self._separation.lower_bounds(frames, suspects)
-        travelled = motion.travelled[rows] @ self._reach[suspects].T
-        order = self._coarse_to_fine(motion.travelled[rows] @ self._furthest)
-        placed, least_m = -1, self._margin_m + ROUNDING_M
-        for at, k in ((order[i], k) for i, k in np.argwhere(~(bounds[order] > least_m)).tolist()):
-            if bounds[at, k] > least_m:
-                continue
-            i, row = int(suspects[k]), int(rows[at])
+        ways = motion.travelled[rows] @ self._reach[suspects].T
+        spare = np.full(ways.shape, -np.inf)
+        sparse = self._sparse(motion.travelled[rows] @ self._furthest)
+        if found := self._measured(motion, suspects, rows, sparse, ways, spare):
+            return found
+        _spread(spare, sparse, ways)
+        unsure = np.flatnonzero(~(spare > 0.0).all(axis=1))
+        return self._measured(motion, suspects, rows, unsure, ways, spare) if len(unsure) else None
+
+    def _measured(
+        self,
+        motion: Motion,
+        suspects: np.ndarray,
+        rows: np.ndarray,
+        chosen: np.ndarray,
+        ways: np.ndarray,
+        spare: np.ndarray,
+    ) -> TooNear | None:
+        """Returns one of s pairs that comes too near in some chosen ones of k rows, by measuring if need be.
+
+        Of a trial the row with the least bound is measured next, since it most likely is too near; else the first one,
+        so that equal motions have equal answers.
+
+        Args:
+            motion: The motion.
+            suspects: Numbers of the pairs.
+            rows: Numbers of the k rows.
+            chosen: Which of these are judged.
+            ways: How far each pair has moved in each row, k x s [m].
+            spare: Lower bounds of distances less the margin, k x s [m], which are raised; inf where the pair may be.
+        """
+        least_m = self._margin_m + ROUNDING_M
+        frames = self._distances.frames(motion.position[rows[chosen]])
+        spare[chosen] = np.fmax(spare[chosen], self._separation.lower_bounds(frames, suspects) - least_m)
+        placed = -1
+        while (bounds := spare[chosen]).min() <= 0.0:
+            at, k = divmod(int(bounds.argmin() if motion.is_trial else (bounds <= 0.0).argmax()), len(suspects))
+            i, row = int(suspects[k]), int(rows[chosen[at]])
             if placed != row:
                 self._distances.place(motion.position[row])
                 placed = row
-            contact = self._distances.contact(self._pairs[i], FAR_M, self._margin_m + ROUNDING_M)
-            if contact is None:
-                continue
-            distance = contact.distance
-            if not distance >= self._margin_m and not self._is_further(motion, i, distance, row):
-                return TooNear(self._pairs[i], distance, row > 0)
-            if not distance < bounds[at, k] + LOOSE_M:
+            contact = self._contact(i)
+            if found := self._too_near(motion, i, row, contact):
+                return found
+            distance = FAR_M if contact is None else contact.distance
+            if contact is not None and not distance - least_m < bounds[at, k] + LOOSE_M:
                 self._separation.learn(i, contact.directions, frames[at])
-                bounds[:, k] = self._separation.lower_bounds(frames, suspects[k : k + 1])[:, 0]
-            way = np.abs(travelled[:, k] - travelled[at, k])
-            bounds[:, k] = np.maximum(bounds[:, k], distance - way)
+                more = self._separation.lower_bounds(frames, suspects[k : k + 1])[:, 0] - least_m
+                spare[chosen, k] = np.fmax(spare[chosen, k], more)
+            spare[:, k] = np.maximum(spare[:, k], distance - least_m - np.abs(ways[:, k] - ways[chosen[at], k]))
+            spare[chosen[at], k] = np.inf
         return None
 
     def _known_near(self, q: np.ndarray) -> np.ndarray:
@@ -129,19 +169,27 @@ class Proximity:
         known: np.ndarray = self._known_m - np.einsum("...n,...n->...", np.abs(q - self._known_at), self._reach)
         return known
 
-    def _coarse_to_fine(self, travelled: np.ndarray) -> np.ndarray:
-        """Returns all of k rows: the first, those between which something moves by a spacing, the last, all others."""
+    def _sparse(self, travelled: np.ndarray) -> np.ndarray:
+        """Returns some of k rows in order, the first and the last among them, a spacing apart."""
         spacing_m = max(2.0 * self._margin_m, LEAST_SPACING_M)
         marks = np.arange(travelled[0] + spacing_m, travelled[-1], spacing_m)
-        coarse = np.searchsorted(travelled, marks, side="right").tolist()
-        return np.array(list(dict.fromkeys((0, *coarse, len(travelled) - 1, *range(len(travelled))))))
+        between = np.searchsorted(travelled, marks, side="right").tolist()
+        return np.array(list(dict.fromkeys((0, *between, len(travelled) - 1))))
 
-    def _is_further(self, motion: Motion, i: int, distance: float, row: int) -> bool:
-        """Returns whether a pair that is too near was no further apart before the motion."""
+    def _contact(self, i: int) -> Contact | None:
+        return self._distances.contact(self._pairs[i], FAR_M, self._margin_m + ROUNDING_M)
+
+    def _too_near(self, motion: Motion, i: int, row: int, contact: Contact | None) -> TooNear | None:
+        """Returns a pair by its contact in a row, where the robot is put: if it is too near, and nearer than before."""
+        if contact is None or contact.distance >= self._margin_m:
+            return None
         self._distances.place(motion.start.position)
         before = self._distances.distance(self._pairs[i], FAR_M, self._margin_m)
-        self._distances.place(motion.position[row])
-        return distance >= before - ROUNDING_M
+        if contact.distance >= before - ROUNDING_M:
+            self._distances.place(motion.position[row])
+            return None
+        self._last = i, row
+        return TooNear(self._pairs[i], contact.distance, row > 0)
 
     def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
         """Returns what keeps pairs apart near some configurations, see `Check.bounds`."""
@@ -203,3 +251,17 @@ class Proximity:
             contact = self._distances.contact(pair, within_m, within_m)
             if contact is not None and contact.distance < within_m:
                 yield pair, contact
+
+
+def _spread(bounds: np.ndarray, rows: np.ndarray, ways: np.ndarray) -> None:
+    """Raises lower bounds in k rows by those in some of them: between two rows a pair moves by no more than its way.
+
+    Args:
+        bounds: k x s [m]; inf of a row bounds no other one.
+        rows: Numbers of the rows, in ascending order.
+        ways: How far each pair has moved in each row, k x s [m].
+    """
+    known = np.where(bounds[rows] < np.inf, bounds[rows], -np.inf)
+    after = np.clip(np.searchsorted(rows, np.arange(len(bounds))), 0, len(rows) - 1)
+    for side in (after, np.maximum(after - 1, 0)):
+        np.maximum(bounds, known[side] - np.abs(ways[rows[side]] - ways), out=bounds)

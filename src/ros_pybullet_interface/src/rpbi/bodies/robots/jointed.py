@@ -4,7 +4,7 @@ import logging
 import math
 from collections.abc import Mapping
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from rpbi.bodies.body import Body
@@ -17,7 +17,7 @@ from rpbi.sensors.sensor import Sensor
 from rpbi.urdf.copies import for_pybullet
 from rpbi.urdf.document import mimics_of
 from rpbi.urdf.joints import Joint, JointModel, JointTarget
-from rpbi.urdf.loading import load_urdf
+from rpbi.urdf.loading import load_urdf, prepared_urdf
 
 from .robot_config import RobotConfig
 
@@ -32,9 +32,6 @@ DEFAULT_BASE_STATE_HZ = 50.0
 class JointedBody(Body):
     """A body that comes from a URDF and stands at its start position.
 
-    Args:
-        fixed_base: Whether its base is fixed, whatever the configuration says.
-
     Raises:
         ConfigError: If the configuration does not fit the robot.
         PhysicsError: If PyBullet cannot load it.
@@ -47,11 +44,21 @@ class JointedBody(Body):
     """How many joints `prepare_urdf` puts between the world and the root link."""
     prepare_urdf = staticmethod(for_pybullet)
     """Returns what PyBullet reads of the configured URDF."""
+    fixes_base: ClassVar[bool] = False
+    """Whether PyBullet fixes the base, whatever the configuration says."""
 
-    def __init__(self, pb: Client, config: RobotConfig, fixed_base: bool = False) -> None:
+    @classmethod
+    def prepare(cls, config: RobotConfig, has_window: bool) -> None:
+        """Prepares what PyBullet gets in the place of the URDF."""
+        prepared_urdf(cls._load_arguments(config), cls.prepare_urdf, has_window)
+
+    @classmethod
+    def _load_arguments(cls, config: RobotConfig) -> dict[str, Any]:
         arguments = config.loadURDF.kwargs()
-        if fixed_base or self.base_joints:
-            arguments["useFixedBase"] = True
+        return {**arguments, "useFixedBase": True} if cls.fixes_base else arguments
+
+    def __init__(self, pb: Client, config: RobotConfig) -> None:
+        arguments = self._load_arguments(config)
         self.has_fixed_base = bool(arguments.get("useFixedBase", False)) and not self.base_joints
         inertia_from_urdf = config.inertia_from_urdf and not config.is_visual_robot  # which has no mass
         body_id = load_urdf(pb, config.name, arguments, self.prepare_urdf, inertia_from_urdf)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from custom_ros_tools.errors import ConfigError, Problem
 from rpbi.control.planar_base import PLANAR_JOINTS, PlanarBase, PlanarVelocity, with_planar_joints
 from rpbi.engine.client import Client
 from rpbi.engine.inputs import Input
@@ -20,12 +21,14 @@ class MobileRobot(Robot):
     """
 
     base_joints = len(PLANAR_JOINTS)
+    fixes_base = True
     prepare_urdf = staticmethod(with_planar_joints)
     example = {key: value for key, value in Robot.example.items() if key != "object_tf"} | {"planar_base": {}}
 
     def __init__(self, pb: Client, config: RobotConfig) -> None:
+        if config.planar_base is None:  # its type is named
+            raise ConfigError([Problem(config.name, "planar_base", "missing: a mobile_robot needs it")])
         super().__init__(pb, config)
-        assert config.planar_base is not None  # `claims` has seen it
         self.planar_base = PlanarBase(pb, self.body_id, config.planar_base, self.drive.dt_s)
 
     @classmethod

@@ -16,6 +16,7 @@ class VisualRobot(JointedBody):
     """A robot without physics: it is put where it shall be, pushes nothing and is pushed by nothing."""
 
     has_physics = False
+    fixes_base = True
     example = {
         "is_visual_robot": True,
         "loadURDF": {"fileName": "kuka_iiwa/model.urdf", "useFixedBase": True},
@@ -25,7 +26,7 @@ class VisualRobot(JointedBody):
     }
 
     def __init__(self, pb: Client, config: RobotConfig) -> None:
-        super().__init__(pb, config, fixed_base=True)
+        super().__init__(pb, config)
         self.object_tf = config.object_tf
         self._limit_reports = LimitReports(self.name)
         for link in (-1, *self.joint_indices):

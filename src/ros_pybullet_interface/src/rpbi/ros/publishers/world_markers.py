@@ -1,6 +1,8 @@
 """The whole world as markers for RViz, which otherwise knows robots only."""
 
 import math
+import time
+from collections.abc import Iterator
 from urllib.parse import quote
 
 import rospy
@@ -76,6 +78,9 @@ MARKERS = Topic(
 STILL = 1e-4
 """What moves and turns less than that [m, and parts of a quaternion] is not sent again."""
 
+LONGEST_LOOK_S = 0.002
+"""Time after which a poll leaves the rest of a look at all shapes to the next one [s]."""
+
 _Key = tuple[str, int]
 
 
@@ -84,14 +89,17 @@ class WorldMarkers:
 
     Each is given in the frame of its link, which TF moves. Shapes of links that are not on TF are given in the world;
     they are looked at while somebody listens, and all is sent again when one of them has moved. It looks at a rate
-    [Hz] of wall time; only the simulation thread may make and poll it.
+    [Hz] of wall time, at many shapes in several polls; only the simulation thread may make and poll it.
     """
 
     def __init__(self, world: World, hz: float) -> None:
         self._world = world
         self._rate = WallRate(hz)
         self._seen: tuple[object, ...] = ()
+        self._look: Iterator[None] | None = None
+        """The look at all shapes that is under way."""
         self._markers: dict[_Key, Marker] = {}
+        self._sent: dict[_Key, Marker] = {}
         self._loose: list[tuple[_Key, Body, BodyShape]] = []
         """Shapes that no frame of TF carries along."""
         self._shown: dict[_Key, Pose] = {}
@@ -100,24 +108,34 @@ class WorldMarkers:
 
     def poll(self) -> None:
         """Publishes what has changed, if it is time to look."""
-        if not self._rate.is_due():
+        if self._look is None and not self._rate.is_due():
             return
         present = (len(self._world.log), *self._world.bodies.values())
         if present != self._seen:
-            self._seen = present
-            self._look_at_all()
+            self._seen, self._look = present, self._look_at_all()
+        if self._look is not None:
+            self._go_on(self._look)
         elif self._loose and self._publisher.get_num_connections():
             self._look_at_loose()
 
-    def _look_at_all(self) -> None:
-        before, self._markers = self._markers, {}
-        self._loose, self._shown = [], {}
+    def _go_on(self, look: Iterator[None]) -> None:
+        end_s = time.monotonic() + LONGEST_LOOK_S
+        for _ in look:
+            if time.monotonic() > end_s:
+                return
+        self._look = None
+
+    def _look_at_all(self) -> Iterator[None]:
+        """Yields after each shape, and publishes all at the end."""
+        self._markers, self._loose, self._shown = {}, [], {}
         for body in self._world.bodies.values():
             for number, shape in enumerate(body_shapes(body)):
                 self._add((body.name, number), body, shape)
-        gone = [deletion(marker) for key, marker in before.items() if key not in self._markers]
-        if gone or self._markers != before:
+                yield
+        gone = [deletion(marker) for key, marker in self._sent.items() if key not in self._markers]
+        if gone or self._markers != self._sent:
             self._publisher.publish([*gone, *self._markers.values()])
+        self._sent = self._markers
 
     def _add(self, key: _Key, body: Body, shape: BodyShape) -> None:
         own = link_frame(body, self._world.sensors_of(body.name), shape.link)

@@ -115,11 +115,11 @@ class Bag:
             data += header(MESSAGE, conn=uint32(number), time=when) + text(raw)
         packed = _packed(bytes(data), self.compression)
         size = uint32(self.claims.get("size", len(data)))
-        chunk = header(CHUNK, compression=self.compression.encode(), size=size) + text(packed)
+        chunk = bytearray(header(CHUNK, compression=self.compression.encode(), size=size) + text(packed))
         for number, each in entries.items():
             count = uint32(self.claims.get("count", len(each)))
             chunk += header(INDEX, ver=uint32(1), conn=uint32(number), count=count) + text(b"".join(each))
-        return chunk, entries
+        return bytes(chunk), entries
 
 
 def _packed(data: bytes, compression: str) -> bytes:

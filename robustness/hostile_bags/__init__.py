@@ -1,0 +1,1 @@
+"""Hostile bags by a seed: their makers by subject, and the trial of a reader."""
