@@ -9,8 +9,10 @@ import json
 import sys
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
+import pybullet_data
 import pytest
 from computers import TwoComputers, why_not
 from ros_system import SUPPORT, RosSystem, wait_until
@@ -19,6 +21,7 @@ from worlds import iiwa, write_world
 pytestmark = pytest.mark.skipif(bool(why_not()), reason=why_not())
 
 JOINT = "lbr_iiwa_joint_6"
+IIWA = str(Path(pybullet_data.getDataPath()) / "kuka_iiwa/model.urdf")
 STATES, TARGETS = "/rpbi/iiwa/joint_states", "/rpbi/iiwa/joint_states/target"
 OUT_S = 5.0
 
@@ -53,10 +56,11 @@ def both(ros_of_module: RosSystem, tmp_path_factory: pytest.TempPathFactory) -> 
 Reports = Callable[[], list[dict[str, Any]]]
 
 
-def _operator(ros: RosSystem, both: TwoComputers, ip: str) -> Reports:
-    """Starts an operator on the first computer; returns what gives the lines that it has printed."""
-    program = (sys.executable, str(SUPPORT / "far_operator.py"), STATES, TARGETS, JOINT, "50", "0.4")
-    process = both.first.start(*program, "__name:=operator_" + ip.replace(".", "_"), master=both.master, ROS_IP=ip)
+def _operator(ros: RosSystem, both: TwoComputers, ip: str, targets: str = TARGETS) -> Reports:
+    """Starts an operator on the first computer, in place of the one before; returns what gives its lines."""
+    both.on(both.first, "rosnode", "kill", "/operator")
+    program = (sys.executable, str(SUPPORT / "far_operator.py"), STATES, targets, JOINT, "50", "0.4")
+    process = both.first.start(*program, "__name:=operator", master=both.master, ROS_IP=ip)
     lines: Reports = lambda: [json.loads(line) for line in ros.output(process).splitlines() if line[:1] == "{"]  # noqa: E731
     wait_until(lambda: lines() and lines()[-1]["position"] > 0.1, "the robot of the second computer swings")
     return lines
@@ -94,10 +98,37 @@ def test_targets_with_20_ms_of_jitter_move_the_robot(
     ros_of_module: RosSystem, both: TwoComputers, reports: Reports
 ) -> None:
     both.switch_radio_on(0.0, 0.02)
-    both.on(both.first, "rosnode", "kill", "/operator_10_77_0_1")
     lines = _operator(ros_of_module, both, both.first.radio_ip)
     wait_until(lambda: len(lines()) > 20, "some seconds have gone")
     assert lines()[-1]["lag_s"] < 0.5
+
+
+@pytest.mark.parametrize("side", ["first", "second"])
+def test_a_guard_on_either_side_lets_a_swing_through(ros_of_module: RosSystem, both: TwoComputers, side: str) -> None:
+    targets = f"/{side}/targets"
+    parameters = {
+        "robot_description": IIWA,
+        "policy": "limit",
+        "period_s": 0.02,
+        "shape": {"time_s": 0.06},
+        "silence_s": 0.2,
+        "limits": {"acceleration": 10.0, "jerk": 1000.0},
+        "checks": {"staleness": {"timeout_s": 1.0}},
+    }
+    given = [f"_{name}:={json.dumps(value)}" for name, value in parameters.items()]
+    names = (f"joint_states/target:={targets}", f"joint_states/command:={TARGETS}", f"joint_states/measured:={STATES}")
+    computer = both.first if side == "first" else both.second
+    guard = computer.start(
+        "rosrun", "safe_robot", "safe_robot_node.py", f"__name:=guard_{side}", *names, *given, master=both.master
+    )
+    wait_until(lambda: both.registered(f"/guard_{side}"), "the guard is known")
+    lines = _operator(ros_of_module, both, both.first.cable_ip, targets)
+    swings = len(lines())
+    wait_until(lambda: len(lines()) > swings + 20, "the arm has swung for five seconds")
+    both.on(both.first, "rosnode", "kill", f"/guard_{side}")
+    positions = [line["position"] for line in lines()[swings:]]
+    assert max(positions) - min(positions) > 0.35
+    assert "halted" not in ros_of_module.output(guard)
 
 
 FAULTS = {

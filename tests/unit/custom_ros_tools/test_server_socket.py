@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable, Iterator
 
 import pytest
+from ros_system import wait_until
 from rospy.impl.tcpros_base import TCPROSServer, TCPServer
 
 from custom_ros_tools.ros import server_socket
@@ -103,7 +104,7 @@ def test_who_says_nothing_for_long_is_sent_away(monkeypatch, caplog):
     node = Node()
     with socket.create_connection(node.address, SOON_S) as silent:
         assert is_closed(silent)
-    assert "closed: no header came within 0.1 s" in caplog.text
+    wait_until(lambda: "closed: no header came within 0.1 s" in caplog.text, "the log has the reason")
 
 
 def test_who_goes_without_a_word_is_forgotten(node, connect):
