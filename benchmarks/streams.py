@@ -32,7 +32,7 @@ PERIOD_S = 0.02
 SECONDS = 5.0
 SETTLING_S = 1.0
 """Time at the start that does not count [s]."""
-FIRST_SEED = 7000
+FIRST_SEED = 9000
 JITTER_S, STALL_S = 0.012, 0.03
 MAX_LAG_MS = 50.0
 STATES = "/rpbi/iiwa/joint_states"

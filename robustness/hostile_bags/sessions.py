@@ -48,8 +48,8 @@ def world_descriptions(rng: random.Random, path: Path) -> None:
     def change(topic: str, raw: bytes) -> list[bytes]:
         if topic != "/rpbi/world_description":
             return [raw]
-        told = raw[4:].decode()
-        return [text(told.replace(old, new) if old else spoil_text(rng, told))] * rng.choice((1, 1, 1, 2, 0))
+        original = raw[4:].decode()
+        return [text(original.replace(old, new) if old else spoil_text(rng, original))] * rng.choice((1, 1, 1, 2, 0))
 
     _session_with(path, change)
 

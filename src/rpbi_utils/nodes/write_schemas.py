@@ -3,4 +3,4 @@
 
 from custom_ros_tools.ros.node import run_command
 
-run_command("rpbi_utils.stand_in.schemas:main")
+run_command("rpbi_utils.schemas:main")

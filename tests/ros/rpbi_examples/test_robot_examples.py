@@ -110,6 +110,14 @@ def test_panda_works_the_ros_way(ros, position):
         )
 
 
+def test_panda_swings(ros):
+    launch(ros, "basic_example_panda")
+    states = ros.listen("/rpbi/panda/joint_states", JointState)
+    first = states.wait_for(1)[0]
+    index = first.name.index("panda_joint4")
+    wait_until(lambda: abs(states.messages[-1].position[index] - first.position[index]) > 0.3, "it moves")
+
+
 @pytest.mark.quick
 def test_kuka_holds_still_until_it_is_told_to_move(ros):
     launch(ros, "run_kuka")

@@ -21,7 +21,7 @@ from rpbi.ros.reference.reference_world import FOLLOWED, reference_world
 from rpbi.ros.reference.write import reference_files
 from rpbi.samples import LinkPoseSample
 from rpbi.world import World
-from rpbi_utils.stand_in import schemas as stand_in_schemas
+from rpbi_utils import schemas as utils_schemas
 from safe_robot import schemas as guard_schemas
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -38,7 +38,7 @@ def world() -> Iterator[World]:
 
 def test_schemas_and_pages_are_fresh() -> None:
     written = reference_files(ROOT)
-    for each in (solver_schemas, stand_in_schemas, guard_schemas):
+    for each in (solver_schemas, utils_schemas, guard_schemas):
         written |= each.schema_files(ROOT)
     stale = [path for path, text in written.items() if not path.exists() or path.read_text() != text]
     assert [str(path.relative_to(ROOT)) for path in stale] == [], "not what the code says: run ./rpbi docs"

@@ -176,7 +176,7 @@ class _StrictLoader(yaml.SafeLoader):
             _dismantle(node)
 
     def resolve(self, kind: type[yaml.Node], value: Any, implicit: Any) -> Any:
-        """Takes a longer scalar than any number for a text: matching it with numbers would stop all threads."""
+        """Resolves a scalar that is longer than any number as a text: to match it would stop all threads."""
         if kind is yaml.ScalarNode and len(value) > LONGEST_NUMBER:
             implicit = (False, True)
         return super().resolve(kind, value, implicit)

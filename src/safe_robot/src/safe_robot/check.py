@@ -102,8 +102,8 @@ class Situation(NamedTuple):
 
 
 class Check(ABC):
-    """A check of motions. It keeps no state: equal motions have equal answers, whatever was asked before. Of trials
-    only whether they are safe has to be equal.
+    """A check of motions. It keeps no state: equal motions have equal answers, whatever was asked before. For
+    trials, only the verdict has to be equal.
 
     Args:
         config: Its options.

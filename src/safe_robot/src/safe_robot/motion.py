@@ -48,7 +48,7 @@ class Motion:
         robot: The robot.
         period_s: The period [s].
         start: The state before the command.
-        is_trial: Whether it only counts whether the motion is safe: any violation will do.
+        is_trial: Whether only the verdict counts, so that any violation may be reported.
         position: k x n [rad or m].
         velocity: k x n [rad/s or m/s].
         acceleration: k x n [rad/s^2 or m/s^2].

@@ -51,7 +51,7 @@ class Body:
 
     @classmethod
     def prepare(cls, config: Any, has_window: bool) -> None:
-        """Does and remembers what takes long of making a body, but for PyBullet's part; any thread may call it.
+        """Prepares and caches what is slow to make for a body, except PyBullet's own part; any thread may call it.
 
         Raises:
             ConfigError: If the configuration does not fit.

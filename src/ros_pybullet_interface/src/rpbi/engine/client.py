@@ -26,7 +26,7 @@ PRINTING = frozenset(
 )
 """Functions in which PyBullet may print something; the others are called often, and print nothing."""
 MAX_LINES = 20
-"""Lines of one call that are logged; of more, the rest is counted. PyBullet prints several for each link of a robot."""
+"""Largest number of lines logged for one call; further ones are counted. PyBullet prints several for each link."""
 log = logging.getLogger("pybullet")
 
 

@@ -63,9 +63,9 @@ def _named_files(document: UrdfDocument) -> tuple[tuple[str, str], ...]:
 
 
 def for_pybullet(document: UrdfDocument, files: Files) -> Element:
-    """Returns what PyBullet, which knows nothing of ROS packages, reads of a URDF: with the names that `files_of` has.
+    """Returns what PyBullet, which does not resolve ROS packages, reads of a URDF, with the file names of `files_of`.
 
-    It depends on nothing else.
+    The result depends on the arguments alone.
     """
     robot, known = as_read(document.root), dict(files)
     for parent in list(robot.iter()):

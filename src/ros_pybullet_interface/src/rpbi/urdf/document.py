@@ -56,7 +56,7 @@ class UrdfDocument:
 
     Attributes:
         tag: The element at the top, `robot` in a URDF.
-        links: Names of all links; as all of these, not to be changed.
+        links: Names of all links. Callers must not change this or any other attribute.
         joint_types: Type of each joint by name, such as `revolute` or `fixed`.
         edges: All joints, with the links that they tie, in the file's order.
         meshes: The meshes of links, as the file names them.

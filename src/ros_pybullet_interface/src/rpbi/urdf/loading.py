@@ -190,9 +190,9 @@ def load_urdf(
 
 
 def flags_for(joints: int, flags: int) -> int:
-    """Returns the flags by which PyBullet takes a URDF of so many joints: of too many it merges the fixed ones.
+    """Returns flags with which PyBullet can use a URDF: with too many joints, fixed ones are merged.
 
-    PyBullet loads more than 127, but then tells neither of joints nor of links where they are.
+    PyBullet loads more than 127, but then does not report where joints and links are.
     """
     return flags | (pybullet.URDF_MERGE_FIXED_LINKS if joints > MOST_JOINTS else 0)
 

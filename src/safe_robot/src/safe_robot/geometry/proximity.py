@@ -127,15 +127,15 @@ class Proximity:
     ) -> TooNear | None:
         """Returns one of s pairs that comes too near in some chosen ones of k rows, by measuring if need be.
 
-        Of a trial the row with the least bound is measured next, since it most likely is too near; else the first one,
-        so that equal motions have equal answers.
+        In a trial, the row with the smallest bound is measured next, since it is most likely too near. Otherwise rows
+        are measured in order, so that equal motions have equal answers.
 
         Args:
             motion: The motion.
             suspects: Numbers of the pairs.
             rows: Numbers of the k rows.
-            chosen: Which of these are judged.
-            ways: How far each pair has moved in each row, k x s [m].
+            chosen: Indices of the rows to judge.
+            ways: Distance that each pair has moved by each row, k x s [m].
             spare: Lower bounds of distances less the margin, k x s [m], which are raised; inf where the pair may be.
         """
         least_m = self._margin_m + ROUNDING_M
@@ -180,7 +180,7 @@ class Proximity:
         return self._distances.contact(self._pairs[i], FAR_M, self._margin_m + ROUNDING_M)
 
     def _too_near(self, motion: Motion, i: int, row: int, contact: Contact | None) -> TooNear | None:
-        """Returns a pair by its contact in a row, where the robot is put: if it is too near, and nearer than before."""
+        """Returns a pair if its contact is too near and nearer than at the start; the robot has to stand at the row."""
         if contact is None or contact.distance >= self._margin_m:
             return None
         self._distances.place(motion.start.position)
@@ -259,7 +259,7 @@ def _spread(bounds: np.ndarray, rows: np.ndarray, ways: np.ndarray) -> None:
     Args:
         bounds: k x s [m]; inf of a row bounds no other one.
         rows: Numbers of the rows, in ascending order.
-        ways: How far each pair has moved in each row, k x s [m].
+        ways: Distance that each pair has moved by each row, k x s [m].
     """
     known = np.where(bounds[rows] < np.inf, bounds[rows], -np.inf)
     after = np.clip(np.searchsorted(rows, np.arange(len(bounds))), 0, len(rows) - 1)

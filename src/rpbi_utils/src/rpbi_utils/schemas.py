@@ -4,9 +4,8 @@ from pathlib import Path
 
 from custom_ros_tools.schema import ConfigModel
 from custom_ros_tools.schema.json_schema import explained, json_schema, schema_text, write_schemas
+from rpbi_utils.stand_in.config import RobotLimits, StandInConfig
 from rpbi_utils.tracking.config import TrackingNodeConfig
-
-from .config import RobotLimits, StandInConfig
 
 FILES: dict[str, type[ConfigModel]] = {
     "robot_limits": RobotLimits,
