@@ -1,5 +1,5 @@
 """Runs the benchmarks, as `./rpbi bench` does."""
 
-from custom_ros_tools.ros.node import run_command
+from custom_ros_tools.ros.console import run_console
 
-run_command("run:main")
+run_console("rpbi_examples.ros.console.bench")

@@ -8,11 +8,11 @@ import random
 from result import Result, Target
 from worlds import CONFIGS
 
-from rpbi.engine.actions import TimedGoal
+from rpbi.control.joint_command import JointCommand
 from rpbi.geometry import Pose
 from rpbi.kinematics import IKProblem
-from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
+from rpbi.world.actions import TimedGoal
 from rpbi_examples.motions import CARRY_HEIGHT, FINGERS_CLOSED, GraspStep, PlanarPose, pick_and_place
 
 HOLD_S, QUICK_HOLD_S = 60.0, 5.0
@@ -42,7 +42,7 @@ class Grasp:
         (x, y, _), quat = self.world.bodies["box"].base_pose()
         return PlanarPose(x, y, 2.0 * math.atan2(quat[2], quat[3]))
 
-    def take(self, step: GraspStep) -> None:
+    def observe(self, step: GraspStep) -> None:
         """Does a step: the hand moves there, then the fingers."""
         robot = self.world.bodies["panda"]
         positions = tuple(robot.joint_positions().values())
@@ -62,7 +62,7 @@ class Grasp:
             self.world.step()
         if not motion.result.result().success:
             raise RuntimeError(motion.result.result().message)
-        self.world.put("panda/target", JointTarget(["panda_finger_joint1"], [step.finger]))
+        self.world.put("panda/target", JointCommand(["panda_finger_joint1"], [step.finger]))
         self.wait(FINGERS_S)
 
 
@@ -70,7 +70,7 @@ def drift_mm_s(hold_s: float) -> tuple[float, float]:
     """Returns how fast a lifted box moves in the world, from begin to end and in its worst second [mm/s]."""
     grasp = Grasp(PlanarPose(0.5, -0.2, 0.35))
     for step in pick_and_place(grasp.box(), PlanarPose(0.5, 0.2, 0.0)):
-        grasp.take(step)
+        grasp.observe(step)
         if step.height == CARRY_HEIGHT and step.finger == FINGERS_CLOSED:
             break
     places = []
@@ -88,7 +88,7 @@ def placed_mm(seed: int) -> float:
     grasp = Grasp(PlanarPose(draw.uniform(0.4, 0.6), draw.uniform(-0.3, -0.1), draw.uniform(-math.pi, math.pi)))
     goal = PlanarPose(draw.uniform(0.4, 0.6), draw.uniform(0.1, 0.3), draw.uniform(-0.7, 0.7))
     for step in pick_and_place(grasp.box(), goal):
-        grasp.take(step)
+        grasp.observe(step)
     placed = grasp.world.bodies["box"].base_pose().position
     grasp.world.close()
     return math.dist(placed, (goal.x, goal.y, 0.025)) * 1e3

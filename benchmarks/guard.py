@@ -17,7 +17,7 @@ import numpy as np
 from result import Result, Target
 from session import Session
 
-from safe_robot.check import Situation
+from safe_robot.check import CheckContext
 from safe_robot.config import GuardConfig
 from safe_robot.guard import Guard
 from safe_robot.robot import GuardedRobot
@@ -115,7 +115,7 @@ def _durations_ms(policy: str, count: int, amplitude: float, checks: dict[str, A
         ramp = (1.0 - math.cos(math.pi * min(t / 2.0, 1.0))) / 2.0
         target = tuple((HOME + amplitude * ramp * ramp * np.sin(SPEEDS * t)).tolist())
         start_s = time.perf_counter()
-        decision = guard.decide(target, Situation())
+        decision = guard.decide(target, CheckContext())
         durations.append(1e3 * (time.perf_counter() - start_s))
         assert policy == "limit" or decision.command == target, decision.violation
     return durations

@@ -14,7 +14,7 @@ from session import Session
 HZ = 240
 PEOPLE = (1, 3)
 TOPICS = ("/tf", "/mvn/segments")
-MOST_PERCENT = 25.0
+MAX_PERCENT = 25.0
 """Share of a core that one person may take."""
 
 
@@ -36,7 +36,7 @@ def run(quick: bool) -> list[Result]:
             arrivals = watcher.arrivals()
             passed_s = time.monotonic() - begin_s
             node_s, floor_s = (_processor_s(each) - was for each, was in zip((node, floor), before))
-        target = Target(MOST_PERCENT) if people == 1 else None
+        target = Target(MAX_PERCENT) if people == 1 else None
         share, floor_share = (100.0 * used_s / passed_s for used_s in (node_s, floor_s))
         what = f"{people} at {HZ} Hz"
         results.append(Result("mvn", f"{what}: share of a core", share, "%", floor_share or None, target))

@@ -21,7 +21,7 @@ from operator_node.haptics.controller import ForceFeedbackConfig, HapticControll
 from operator_node.haptics.coupling import Mode
 from operator_node.haptics.device import HapticConfig, HapticReading
 from operator_node.haptics.hand import Hand
-from rpbi.geometry import Vector
+from robot_model.geometry import Vector
 
 SET_UPS = "PASSIVITY_SET_UPS"
 """Environment variable: how many random set-ups to try in place of 1,000."""
@@ -186,9 +186,9 @@ def run_set_up(case: SetUp, ticks: int = TICKS, passivity: bool = True, is_resol
         felt = back.received(now_s)
         if felt is not None:
             if case.mode == "coupling":
-                controller.take_tool((0.0, 0.0, felt), now_s)
+                controller.observe_tool((0.0, 0.0, felt), now_s)
             else:
-                controller.take_wrench((0.0, 0.0, felt), now_s)
+                controller.observe_wrench((0.0, 0.0, felt), now_s)
         # what the haptic node does
         force = controller.tick(now_s, HapticReading(measured(hand.position, case.resolution_m)))
         there.send(controller.snapshot.way[2], now_s)

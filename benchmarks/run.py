@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import json
 import os
@@ -12,6 +11,7 @@ import subprocess
 import sys
 import time
 import traceback
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -32,36 +32,37 @@ print("renderer:", open_renderer([Camera("camera", "camera", Intrinsics())]).nam
 """
 
 
-def main() -> None:
-    """Runs the benchmarks named on the command line, all without names; exits with 1 if one could not run."""
-    parser = argparse.ArgumentParser(prog="benchmarks", description=__doc__)
-    default, named = ", ".join(BENCHMARKS), ", ".join(WHEN_NAMED)
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"by default all of {default}; also {named}")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="where to write the figures")
-    parser.add_argument("--quick", action="store_true", help="measure for a shorter time, less exactly")
-    arguments = parser.parse_args()
-    for name in arguments.names:
-        if name not in BENCHMARKS + WHEN_NAMED:
-            parser.error(f"there is no benchmark '{name}'; there are {', '.join(BENCHMARKS + WHEN_NAMED)}")
+def run(names: Sequence[str], quick: bool = False, json_file: Path | None = None) -> int:
+    """Runs benchmarks.
+
+    Args:
+        names: Their names, of BENCHMARKS or WHEN_NAMED; without any, those of BENCHMARKS.
+        quick: Whether to measure for a shorter time, less exactly.
+        json_file: File for the figures.
+
+    Returns:
+        The exit code: 1 if one could not run.
+    """
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that what was started ends too
     facts = machine()
     results: list[Result] = []
     failed = []
-    for name in arguments.names or BENCHMARKS:
+    for name in names or BENCHMARKS:
         print(f"==> {name}", file=sys.stderr, flush=True)
         start_s = time.monotonic()
         try:
-            results += importlib.import_module(name).run(arguments.quick)
+            results += importlib.import_module(name).run(quick)
         except Exception:
             traceback.print_exc()
             failed.append(name)
         print(f"    {time.monotonic() - start_s:.0f} s", file=sys.stderr, flush=True)
     print("\n".join(f"{key}: {value}" for key, value in facts.items()), table(results), sep="\n\n")
-    if arguments.json:
-        report = {"machine": facts, "quick": arguments.quick, "results": [one.as_dict() for one in results]}
-        arguments.json.write_text(json.dumps(report, indent=2) + "\n")
+    if json_file:
+        report = {"machine": facts, "quick": quick, "results": [one.as_dict() for one in results]}
+        json_file.write_text(json.dumps(report, indent=2) + "\n")
     if failed:
-        sys.exit(f"could not run: {', '.join(failed)}")
+        print(f"could not run: {', '.join(failed)}", file=sys.stderr)
+    return 1 if failed else 0
 
 
 def machine() -> dict[str, Any]:

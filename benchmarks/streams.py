@@ -24,7 +24,7 @@ from result import Result, Target
 from session import Session
 from worlds import write_main
 
-from rpbi.urdf.joints import JointTarget
+from rpbi.control.joint_command import JointCommand
 from rpbi.world import World
 
 DT_S = 0.002
@@ -117,7 +117,7 @@ def _follow(folder: Path, sent: Sequence[Sent], velocities: bool) -> tuple[float
                 one = waiting.popleft()
                 given = [velocity(one.sample_s)] if velocities else []
                 stamp_ns = round(1e9 * (1.0 + one.stamp_s))
-                world.put("iiwa/target", JointTarget([JOINT], [position(one.sample_s)], given, stamp_ns=stamp_ns))
+                world.put("iiwa/target", JointCommand([JOINT], [position(one.sample_s)], given, stamp_ns=stamp_ns))
             world.step()
             found, _, _, effort = arm.pb.getJointState(arm.body_id, arm.model[JOINT].index)
             time_s = (tick + 1) * DT_S

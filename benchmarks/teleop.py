@@ -16,7 +16,7 @@ import numpy as np
 from result import Result, Target
 from session import Session
 
-from safe_robot.check import Situation
+from safe_robot.check import CheckContext
 from safe_robot.config import GuardConfig
 from safe_robot.guard import Guard
 from safe_robot.robot import GuardedRobot
@@ -108,5 +108,5 @@ def stops_at(targets: np.ndarray, **options: Any) -> int:
     for target in targets.tolist():
         if guard.is_halted:
             guard.start()
-        stops += guard.decide(target, Situation()).is_halted
+        stops += guard.decide(target, CheckContext()).is_halted
     return stops

@@ -16,7 +16,7 @@ from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
+sys.path[:0] = [str(ROOT), *map(str, (ROOT / "tests/support").iterdir())]
 
 from robustness.hostile_bags.makers import hostile_bags  # noqa: E402
 from robustness.hostile_bags.trial import READERS, Trial, tried  # noqa: E402

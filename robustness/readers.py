@@ -14,18 +14,18 @@ from worlds import ball, write_world
 
 from custom_ros_tools.config import load_config
 from custom_ros_tools.errors import InterfaceError
-from ik_ros.chain.description import ChainDescription
-from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.robot import PinocchioRobot
 from operator_node.avatar.urdf_offsets import urdf_offsets
-from rpbi.config.loading import load_world
+from robot_model.chain import Chain
+from robot_model.urdf.document import UrdfDocument, mimics_of
+from robot_model.urdf.files import write_description
 from rpbi.engine.client import Client
 from rpbi.kinematics import Kinematics
 from rpbi.render.mirror import Mirror
 from rpbi.replay.world_description import WorldDescription, describe
 from rpbi.urdf.copies import description_for_ros
-from rpbi.urdf.document import UrdfDocument, mimics_of
-from rpbi.urdf.files import write_description
 from rpbi.world import World
+from rpbi.world.loading import load_world
 from safe_robot.robot import GuardedRobot
 
 from .meshes import write_mesh
@@ -143,9 +143,9 @@ def _solve(file: str) -> None:
 
 
 def _ik(file: str) -> None:
-    Robot(file)
+    PinocchioRobot(file)
     links = UrdfDocument(file).links
-    ChainDescription(file, links[0], links[-1])
+    Chain(file, links[0], links[-1])
 
 
 def _replay(path: Path, folder: Path) -> None:

@@ -25,9 +25,9 @@ from .readers import REFUSALS, hostile
 
 LONGEST_S = 60.0
 """Time that all readers of a file may take together [s]."""
-MOST_BYTES = 4 * 2**30
+MAX_BYTES = 4 * 2**30
 """Memory that a process may take."""
-MOST_TOGETHER = 100
+MAX_BATCH = 100
 """Files that one process reads, as long as it lives."""
 
 
@@ -59,7 +59,7 @@ def outcomes(kind: str, seeds: range, folder: Path) -> Iterator[Outcome]:
     waiting = list(seeds)
     while waiting:
         done = 0
-        for outcome in _of_batch(kind, waiting[:MOST_TOGETHER], folder):
+        for outcome in _of_batch(kind, waiting[:MAX_BATCH], folder):
             if outcome.reader == "all":
                 done += 1
                 continue
@@ -103,7 +103,7 @@ def _read_all(kind: str, seeds: list[int], folder: Path, report: int) -> None:
     """Reads files, writes a line before each reader and one with its outcome, and ends the process."""
     faulthandler.disable()  # which pytest has enabled: a signal is a result here, not a fault of the test
     try:
-        for limit, most in ((resource.RLIMIT_AS, MOST_BYTES), (resource.RLIMIT_CORE, 0)):
+        for limit, most in ((resource.RLIMIT_AS, MAX_BYTES), (resource.RLIMIT_CORE, 0)):
             resource.setrlimit(limit, (most, most))
         nowhere = os.open(os.devnull, os.O_RDWR)
         for stream in (0, 1, 2):

@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from rpbi.config.schemas import file_schemas
+from rpbi.world.schemas import file_schemas
 
 from .texts import NAMES, NUMBERS, spoil
 

@@ -18,6 +18,7 @@ WORKPLACE = Workplace()
 import rosgraph  # noqa: E402
 import rospy  # noqa: E402
 from careful_master import path_with  # noqa: E402
+from forked_node import close_server  # noqa: E402
 from ros_system import RosSystem, stop_group, wait_until  # noqa: E402
 from second_master import SecondMaster  # noqa: E402
 
@@ -36,6 +37,7 @@ def pytest_terminal_summary() -> None:
 def no_process_is_left() -> Iterator[None]:
     """Fails the last test of a worker if any of its tests left a process behind, and ends that process."""
     yield
+    close_server()
     with contextlib.suppress(TimeoutError):  # whoever was told to end may need a moment
         wait_until(lambda: not WORKPLACE.processes(), "all processes have ended", 15.0)
     left = WORKPLACE.processes()

@@ -19,24 +19,28 @@ ROOT = Path(__file__).resolve().parent.parent
 SRC = ROOT / "src"
 MODULES = {
     "custom_ros_tools": "custom_ros_tools",
+    "robot_model": "robot_model",
     "ros_pybullet_interface": "rpbi",
     "ik_ros": "ik_ros",
     "operator_node": "operator_node",
     "safe_robot": "safe_robot",
     "rpbi_utils": "rpbi_utils",
+    "episodes": "episodes",
+    "motion_primitives": "motion_primitives",
     "rpbi_examples": "rpbi_examples",
 }
 """Python module of each package."""
 ALLOWED = {
     "custom_ros_tools": set(),
-    "ros_pybullet_interface": {"custom_ros_tools"},
-    "ik_ros": {"custom_ros_tools", "ros_pybullet_interface"},
-    "operator_node": {"custom_ros_tools", "ros_pybullet_interface"},
-    "safe_robot": {"custom_ros_tools", "ros_pybullet_interface"},
-    "rpbi_utils": {"custom_ros_tools", "ros_pybullet_interface"},
-    "rpbi_examples": {
-        *("custom_ros_tools", "ros_pybullet_interface", "ik_ros", "operator_node", "safe_robot", "rpbi_utils"),
-    },
+    "robot_model": {"custom_ros_tools"},
+    "ros_pybullet_interface": {"custom_ros_tools", "robot_model"},
+    "ik_ros": {"custom_ros_tools", "robot_model", "ros_pybullet_interface"},
+    "operator_node": {"custom_ros_tools", "robot_model", "ros_pybullet_interface"},
+    "safe_robot": {"custom_ros_tools", "robot_model", "ros_pybullet_interface"},
+    "rpbi_utils": {"custom_ros_tools", "robot_model", "ros_pybullet_interface"},
+    "motion_primitives": {"custom_ros_tools", "robot_model", "rpbi_utils"},
+    "episodes": {"custom_ros_tools", "robot_model", "ros_pybullet_interface", "rpbi_utils"},
+    "rpbi_examples": MODULES.keys() - {"rpbi_examples"},
 }
 """What each package may depend on."""
 FORMER_NODES = {"ik_ros": {"operator_node"}}
@@ -65,9 +69,13 @@ def test_every_package_is_known_here():
 
 
 def test_packages_for_compatibility_have_no_code():
-    """They are names of the release's: definitions, and nodes that call what is elsewhere."""
-    python = [path for path in COMPATIBILITY.rglob("*.py") if path.parent.name != "nodes"]
-    assert python == []
+    """They are names of the release's: definitions, nodes that call what is elsewhere, and modules that import it."""
+    modules = [path for path in COMPATIBILITY.rglob("src/**/*.py")]
+    others = [path for path in COMPATIBILITY.rglob("*.py") if path.name != "setup.py" and path.parent.name != "nodes"]
+    assert others == modules
+    for path in modules:
+        docstring, *rest = ast.parse(path.read_text()).body
+        assert isinstance(docstring, ast.Expr) and all(isinstance(node, ast.ImportFrom) for node in rest), path
     assert not {path.parent.name for path in COMPATIBILITY.glob("*/package.xml")} & set(MODULES)
 
 
@@ -109,6 +117,55 @@ def test_imports_between_packages_are_those_of_package_xml(package):
     assert declared <= ALLOWED[package] | FORMER_NODES.get(package, set())
 
 
+ROBOTS_IN_THE_SIMULATOR = ("rpbi.geometry", "rpbi.urdf", "rpbi.kinematics")
+"""Robots and their geometry as PyBullet has them; everything else uses `robot_model`."""
+ADAPTERS = {
+    "ik_ros.solvers.pybullet_solver": "solves by the simulator's inverse kinematics",
+    "safe_robot.geometry.bullet": "measures distances by PyBullet",
+    "rpbi_examples.dressing.hand": "shows the simulator's inverse kinematics",
+    "rpbi_examples.pushing": "shows the simulator's inverse kinematics",
+    "rpbi_examples.ros.push_example": "shows the simulator's inverse kinematics",
+    "rpbi_examples.ros.telepresence": "shows the simulator's inverse kinematics",
+}
+"""Modules outside of the simulator that use its robots, and what for."""
+
+
+def _users_of_the_simulators_robots(imports: dict[str, set[str]]) -> list[str]:
+    return [
+        f"{module} imports {name}"
+        for module, names in imports.items()
+        for name in sorted(names)
+        if _is_of_the_simulators_robots(name) and not module.startswith("rpbi.") and module not in ADAPTERS
+    ]
+
+
+def _is_of_the_simulators_robots(name: str) -> bool:
+    return f"{name}.".startswith(tuple(f"{module}." for module in ROBOTS_IN_THE_SIMULATOR))
+
+
+def _modules() -> dict[str, set[str]]:
+    """Returns the full names of all that each module of the packages imports."""
+    files = [(path, path.relative_to(SRC / package / "src")) for package in MODULES for path in _python_files(package)]
+    return {".".join(name.with_suffix("").parts).removesuffix(".__init__"): _imports(path) for path, name in files}
+
+
+def test_robots_geometry_and_urdfs_are_those_of_robot_model():
+    imports = _modules()
+    assert _users_of_the_simulators_robots(imports) == []
+    used = {module for module, names in imports.items() if any(map(_is_of_the_simulators_robots, names))}
+    assert set(ADAPTERS) <= used, "an adapter that is none any more"
+
+
+def test_a_module_that_uses_the_simulators_robots_is_named():
+    imports = {"safe_robot.guard": {"rpbi.geometry.Pose", "rpbi.world.World"}, "rpbi.world": {"rpbi.geometry.Pose"}}
+    assert _users_of_the_simulators_robots(imports) == ["safe_robot.guard imports rpbi.geometry.Pose"]
+
+
+def test_robot_model_needs_neither_ros_nor_pybullet():
+    names = {name.split(".")[0] for path in _python_files("robot_model") for name in _imports(path)}
+    assert not names & {"rospy", "rospkg", "pybullet", "pybullet_data", "rpbi", "ros_pybullet_interface"}
+
+
 @pytest.mark.parametrize("package", MODULES)
 def test_nodes_only_call_main(package):
     for path in (*(SRC / package / "nodes").glob("*"), *COMPATIBILITY.glob("*/nodes/*")):
@@ -126,8 +183,8 @@ def test_only_the_world_and_its_parts_call_pybullet_from_the_simulator_node():
 
 
 FAMILIES = {
-    "body": ("rpbi.bodies:BODY_TYPES", "rpbi.bodies.body:Body", "concepts.md"),
-    "sensor": ("rpbi.sensors:SENSOR_TYPES", "rpbi.sensors.sensor:Sensor", "concepts.md"),
+    "body": ("rpbi.bodies:BODY_TYPES", "rpbi.bodies.body:Body", "plugins.md"),
+    "sensor": ("rpbi.sensors:SENSOR_TYPES", "rpbi.sensors.sensor:Sensor", "plugins.md"),
     "solver": ("ik_ros.solvers:SOLVERS", "ik_ros.solver:Solver", "ik_solvers.md"),
     "controller": (
         "rpbi.control.controllers:CONTROLLERS",
@@ -138,6 +195,7 @@ FAMILIES = {
     "device": ("operator_node.devices:DEVICES", "operator_node.device:Device", "devices.md"),
     "mapping": ("operator_node.mappings:MAPPINGS", "operator_node.mappings.mapping:Mapping", "teleoperation.md"),
     "check": ("safe_robot.checks:CHECKS", "safe_robot.check:Check", "safety.md"),
+    "primitive": ("motion_primitives.primitives:PRIMITIVES", "motion_primitives.primitive:Primitive", "learning.md"),
 }
 """Table, base class and page of each family of plug-ins; their files are where the table is."""
 
@@ -175,8 +233,9 @@ def test_solvers_and_tasks_are_imported_when_they_are_asked_for():
     program = """
 import pkgutil, sys
 import ik_ros.lookup, ik_ros.solvers, ik_ros.tasks
-paths = [*ik_ros.solvers.SOLVERS.values(), *ik_ros.tasks.TASKS.values()]
-assert not sys.modules.keys() & {path.split(":")[0] for path in paths}
+modules = [each.name for table in (ik_ros.solvers, ik_ros.tasks)
+           for each in pkgutil.iter_modules(table.__path__, f"{table.__name__}.")]
+assert len(modules) > 15 and not sys.modules.keys() & set(modules)
 assert not sys.modules.keys() & {"PyKDL", "pytracik", "pinocchio", "daqp", "casadi"}
 """
     environment = {"PYTHONPATH": ":".join(sys.path)}
@@ -196,8 +255,8 @@ def test_every_solver_is_shown_in_the_example_and_held_to_the_conformance_suite(
 def test_devices_are_imported_when_they_are_asked_for():
     program = """
 import sys
-import operator_node.devices, operator_node.device_feed, operator_node.lookup
-assert not sys.modules.keys() & {path.split(":")[0] for path in operator_node.devices.DEVICES.values()}
+import operator_node.devices, operator_node.device_feed
+assert not sys.modules.keys() & {f"operator_node.devices.{name}" for name in operator_node.devices.DEVICES}
 assert not sys.modules.keys() & {"pygame", "tkinter"}
 """
     environment = {"PYTHONPATH": ":".join(sys.path)}
@@ -215,7 +274,7 @@ def test_every_device_is_held_to_the_conformance_suite():
 
 def test_every_body_type_is_shown_in_an_example():
     from rpbi.bodies import BODY_TYPES
-    from rpbi.config.loading import load_world
+    from rpbi.world.loading import load_world
 
     worlds = (SRC / "rpbi_examples/configs").glob("*/config.yaml")
     shown = {each.type for world in worlds for each in load_world(str(world)).objects}

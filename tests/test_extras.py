@@ -53,7 +53,7 @@ def test_an_unknown_extra_is_refused_with_the_known_ones():
 )
 def test_extras_are_wanted_unless_tests_are_chosen(arguments, chosen):
     script = (ROOT / "rpbi").read_text()
-    function = script[script.index("names_tests()") : script.index("run_tests()")]
+    function = script[script.index("names_tests()") : script.index("refuse_spaces()")]
     done = subprocess.run(["bash", "-c", f"{function}\nnames_tests {arguments}"], cwd=ROOT)
     assert (done.returncode == 0) == chosen
 

@@ -11,11 +11,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from import_graph import ImportGraph
+from import_graph import ImportGraph, circles_of
 
 ROOT = Path(__file__).resolve().parent.parent
-MOST_MODULES = 12
-MOST_SMALL = 25
+MAX_MODULES = 12
+MAX_SMALL = 25
 SMALL_LINES = 80
 TABLES = (
     "rpbi.bodies",
@@ -25,8 +25,27 @@ TABLES = (
     "operator_node.devices",
     "operator_node.mappings",
     "safe_robot.checks",
+    "rpbi_utils.ros.controls.panels",
+    "motion_primitives.primitives",
 )
 """Packages whose classes have a file each, whoever imports them."""
+FLOORS = {
+    "rpbi": (
+        {"geometry", "plain_values", "plugins"},
+        {"config", "samples"},
+        {"engine", "meshes", "window"},
+        {"urdf"},
+        {"kinematics"},
+        {"control"},
+        {"sensors"},
+        {"bodies"},
+        {"world"},
+        {"world_warnings", "render", "replay", "reference"},
+        {"images", "ros"},
+        {"ros_node"},
+    )
+}
+"""The rooms of packages from below; each imports only from floors under its own, or from rooms beside it."""
 ONE_PLACE = {
     "rospy's private parts": r"\.impl\b",
     "the XML of URDFs": r"ElementTree|\betree\b|\blxml\b",
@@ -46,20 +65,43 @@ def circles(src: Path) -> list[str]:
     return [f"circle of imports: {', '.join(circle)}" for circle in graph_of(src).circles()]
 
 
+def circles_of_rooms(src: Path) -> list[str]:
+    return [
+        f"circle of rooms in {package}: {', '.join(circle)}"
+        for package, rooms in graph_of(src).rooms().items()
+        for circle in circles_of(rooms)
+    ]
+
+
+def rooms_above(src: Path) -> list[str]:
+    """Rooms that import from a floor above their own; a room has one line in `FLOORS`."""
+    found = []
+    for package, floors in FLOORS.items():
+        level = {room: i for i, rooms in enumerate(floors) for room in rooms} | {"__init__": -1}
+        for room, targets in graph_of(src).rooms()[package].items():
+            found += [f"{package}.{each}: on no floor" for each in {room, *targets} - level.keys()]
+            found += [
+                f"{package}.{room} imports {each}, a floor above"
+                for each in targets
+                if level.get(each, -1) > level.get(room, len(floors))
+            ]
+    return sorted(set(found))
+
+
 def crowded_folders(src: Path) -> list[str]:
     return [
-        f"{package}: at most {MOST_MODULES} modules a folder, there are {len(paths)}: "
+        f"{package}: at most {MAX_MODULES} modules a folder, there are {len(paths)}: "
         + ", ".join(str(path.relative_to(src)) for path in paths)
-        for package, paths in graph_of(src).crowded_folders(MOST_MODULES).items()
+        for package, paths in graph_of(src).crowded_folders(MAX_MODULES).items()
     ]
 
 
 def small_modules(src: Path) -> list[str]:
     small = graph_of(src).small_with_one_importer(SMALL_LINES)
     small = [name for name in small if not name.startswith(tuple(f"{table}." for table in TABLES))]
-    if len(small) <= MOST_SMALL:
+    if len(small) <= MAX_SMALL:
         return []
-    rule = f"at most {MOST_SMALL} modules of {SMALL_LINES} lines or less may have a single importer"
+    rule = f"at most {MAX_SMALL} modules of {SMALL_LINES} lines or less may have a single importer"
     return [f"{rule}, there are {len(small)}: {', '.join(small)}"]
 
 
@@ -82,6 +124,7 @@ DOCUMENTED = {
     "operator_node.node",
     "rpbi.ros_node",
     "rpbi_utils",
+    "episodes",
 }
 """Import paths of the release's Python API, which lead into `ros` folders."""
 
@@ -97,6 +140,8 @@ def repeated(src: Path) -> list[str]:
 
 RULES: tuple[Callable[[Path], list[str]], ...] = (
     circles,
+    circles_of_rooms,
+    rooms_above,
     crowded_folders,
     small_modules,
     ros_in_the_core,
@@ -115,6 +160,11 @@ BREAKS = {
         {"engine/clock.py": "from .mailbox import Mailbox", "engine/mailbox.py": "from .clock import Clock"},
         "engine.clock",
     ),
+    circles_of_rooms: (
+        {"engine/clock.py": "import rpbi.meshes.checks", "meshes/checks.py": "import rpbi.engine.mailbox"},
+        "rpbi: engine, meshes",
+    ),
+    rooms_above: ({"sensors/more.py": "import rpbi.world.loading"}, "rpbi.sensors imports world"),
     crowded_folders: ({f"sensors/more_{i}.py": "" for i in range(13)}, "rpbi/sensors/more_12.py"),
     small_modules: (
         {f"replay/part_{i}.py": "" for i in range(26)}
@@ -130,7 +180,7 @@ BREAKS = {
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
 def test_a_broken_rule_is_told_with_its_file(rule, tmp_path):
     src = tmp_path / "src"
-    for package in ("custom_ros_tools", "ros_pybullet_interface", "ik_ros"):
+    for package in ("custom_ros_tools", "robot_model", "ros_pybullet_interface", "ik_ros"):
         others = shutil.ignore_patterns("__pycache__")  # whose files come and go while other tests run
         shutil.copytree(ROOT / "src" / package / "src", src / package / "src", ignore=others)
     additions, named = BREAKS[rule]

@@ -22,7 +22,12 @@ NOT_IN_DEBIAN = {
     "depth_image_proc", "nodelet",  # optional: off unless the user asks
 }  # fmt: skip
 
-REPLACEABLE = {"ik_ros_examples": {"rpbi_examples"}, "keyboard": {"operator_node"}, "teleop": {"operator_node"}}
+REPLACEABLE = {
+    "dmp": {"motion_primitives"},
+    "ik_ros_examples": {"rpbi_examples"},
+    "keyboard": {"operator_node"},
+    "teleop": {"operator_node"},
+}
 """Packages that stand-ins use undeclared: those of a workspace over this one, of the same names, need the stand-ins."""
 RELEASE = {"operator_node": "keyboard teleop", "rpbi_examples": "ik_ros_examples"}
 """Packages of the release that are built over ours, with the packages of ours that they are built with."""

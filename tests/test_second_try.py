@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-SUPPORT = Path(__file__).parent / "support"
+SUPPORT = Path(__file__).parent / "support/runs"
 SUITE = """
 import pathlib, pytest
 

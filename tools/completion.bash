@@ -7,52 +7,58 @@ _rpbi_root() {
   command=$(readlink -f "$(type -P -- "$command")") && dirname "$command"
 }
 
-# Prints the arguments of a launch file, an example's or one that runs a world, as NAME:=.
-_rpbi_arguments() {
+# What arguments may be: functions of these names print words. Arguments: the checkout, the words after the command.
+
+_rpbi_examples() { (cd "$1/src/rpbi_examples/launch" && printf '%s\n' *.launch | sed 's/\.launch$//'); }
+_rpbi_extras() { (cd "$1" && printf '%s\n' requirements-*.txt) | sed 's/requirements-\(.*\)\.txt/\1/'; }
+_rpbi_benchmarks() { sed -n "/^BENCHMARKS/,/^)/p; /^WHEN_NAMED/p" "$1/benchmarks/run.py" | grep -oE '"[a-z_]+"' | tr -d '"'; }
+
+# Prints the arguments, as NAME:=, of a launch file, an example's or one that runs a world.
+_rpbi_launch_arguments() {
   local file=$2
   [[ -e $file && $file == *.launch ]] || file=$1/src/rpbi_examples/launch/${2%.launch}.launch
   [[ $2 != *.yaml ]] || file=$1/src/rpbi_examples/launch/world.launch
   sed -n 's/^ *<arg name="\([^"]*\)" default=.*/\1:=/p' "$file" 2>/dev/null
 }
 
-# Prints what is in the running world; sets nothing up, unlike ./rpbi list.
+# Prints what is in the running world; sets nothing up, unlike ./rpbi list. An attachment has the name of what it holds.
 _rpbi_objects() (
   # shellcheck disable=SC1091 # catkin writes it
   { source "$1/devel/setup.bash" && timeout 5 "$1/.venv/bin/python3" "$1/src/rpbi_utils/nodes/world" list; } 2>/dev/null |
     sed 's/ .*//'
 )
 
-# Prints what may stand where the cursor is, a word a line. Arguments: the checkout, the word, the words before it.
-_rpbi_words() {
-  local root=$1 word=$2 command=${4-} first=${5-} last=${!#} page=$1/docs/commands.md
-  local section='/^## '$command'$/,/^## /'
-  (($# > 3)) || { sed -n 's/^## \([a-z]*\)$/\1/p' "$page" && return; }
-  [[ $word != -* ]] || { { echo --help && sed -n "$section p" "$page" | grep -oE -- '--[a-z-]+'; } | sort -u && return; }
-  case $command in
-    help) sed -n 's/^## \([a-z]*\)$/\1/p' "$page" ;;
-    launch)
-      [[ $first ]] || { cd "$root/src/rpbi_examples/launch" && printf '%s\n' *.launch | sed 's/\.launch$//'; }
-      [[ ! $first ]] || _rpbi_arguments "$root" "$first"
-      ;;
-    setup) (cd "$root" && printf '%s\n' requirements-*.txt) | sed 's/requirements-\(.*\)\.txt/\1/' ;;
-    bench) sed -n "/^BENCHMARKS/,/^)/p; /^WHEN_NAMED/p" "$root/benchmarks/run.py" | grep -oE '"[a-z_]+"' | tr -d '"' ;;
-    spawn) [[ $last != --type ]] || printf '%s\n' visual collision dynamic robot urdf soft camera ;;
-    remove | detach) _rpbi_objects "$root" ;; # an attachment is called as what it holds
-    attach) [[ ${6-} ]] || _rpbi_objects "$root" ;;
-    move | send) [[ $first ]] || _rpbi_objects "$root" ;;
-  esac
+# Prints what the argument under the cursor may be, as lines of tools/completion.txt without command and place.
+# Arguments: the checkout, the words before the cursor.
+_rpbi_sources() {
+  local root=$1 command=$3 last=${!#} place=$(($# - 2))
+  [[ $last == --* ]] || last=none
+  awk -v command="$command" -v place="$place" -v option="$last" '
+    $1 != command { next }
+    { where = $2; sub(/^[^ ]+ [^ ]+ /, "") }
+    where == option { of_option = of_option $0 "\n" }
+    where == place || where == "*" { of_place = of_place $0 "\n" }
+    END { printf "%s", of_option ? of_option : of_place }
+  ' "$root/tools/completion.txt"
 }
 
-# Prints the pattern of the files that may stand there, nothing if none may. Arguments: the words before it.
-_rpbi_files() {
-  case ${2-} in
-    check) echo '*.yaml' ;;
-    launch) [[ ${3-} ]] || echo '*.@(launch|yaml)' ;;
-    spawn) echo '*.@(yaml|urdf)' ;;
-    replay) echo '*.bag' ;;
-    test | demo | bench) echo '*' ;;
-  esac
+# Prints the words that may stand there, one a line. Arguments: the checkout, the word, the words before it.
+_rpbi_words() {
+  local root=$1 word=$2 command=${4-} page=$1/docs/commands.md kind words section
+  (($# > 3)) && [[ $command != help ]] || { sed -n 's/^## \([a-z_]*\)$/\1/p' "$page" && return; }
+  section='/^## '$command'$/,/^## /'
+  [[ $word != -* ]] || { { echo --help && sed -n "$section p" "$page" | grep -oE -- '--[a-z-]+'; } | sort -u && return; }
+  while read -r kind words; do
+    case $kind in
+      files) ;;
+      words) tr ' ' '\n' <<<"$words" ;;
+      *) "_rpbi_$kind" "$root" "${@:5}" ;;
+    esac
+  done < <(_rpbi_sources "$root" "${@:3}")
 }
+
+# Prints the pattern of the files that may stand there, nothing if none may. Arguments: the checkout, the words before it.
+_rpbi_files() { _rpbi_sources "$@" | sed -n 's/^files //p' | head -n 1; }
 
 _rpbi() {
   local root words word=$2 file pattern line=${COMP_LINE:0:COMP_POINT}
@@ -67,7 +73,7 @@ _rpbi() {
   mapfile -t COMPREPLY < <(compgen -W "$(_rpbi_words "$root" "$whole" "${words[@]}")" -- "$whole")
   COMPREPLY=("${COMPREPLY[@]#"$kept"}")
   [[ ${COMPREPLY[*]} != *:= ]] || compopt -o nospace
-  pattern=$(_rpbi_files "${words[@]}")
+  pattern=$(_rpbi_files "$root" "${words[@]}")
   [[ $pattern && $whole != -* ]] || return
   compopt -o filenames
   while IFS= read -r file; do

@@ -14,7 +14,7 @@ import pybullet
 import yaml
 
 from rpbi.world import World
-from safe_robot.check import Situation
+from safe_robot.check import CheckContext
 from safe_robot.checks.environment import Environment
 from safe_robot.checks.self_collision import SelfCollision
 from safe_robot.config import GuardConfig
@@ -97,7 +97,7 @@ def drive(world: World, guard: Guard | None, goal: np.ndarray, names: tuple[str,
         if guard is None:
             command = target
         else:
-            decision = guard.decide(tuple(target.tolist()), Situation())
+            decision = guard.decide(tuple(target.tolist()), CheckContext())
             if decision.violation is not None:
                 print(decision.violation)
             command = command if decision.command is None else np.array(decision.command)

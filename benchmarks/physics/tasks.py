@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from rpbi.control.joint_command import JointCommand
 from rpbi.samples import ContactsSample
-from rpbi.urdf.joints import JointTarget
 from rpbi.world import World
 
 from .friction import FRICTION, KINDS
@@ -73,7 +73,7 @@ def _move(world: World, robot: str, seconds: float, target: Callable[[float], di
     ticks = round(seconds / world.config.timeStep)
     for tick in range(ticks):
         positions = target((tick + 1) / ticks)
-        world.put(f"{robot}/target", JointTarget(list(positions), list(positions.values())))
+        world.put(f"{robot}/target", JointCommand(list(positions), list(positions.values())))
         samples += world.step()
     return samples
 

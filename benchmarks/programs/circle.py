@@ -66,12 +66,12 @@ def main() -> None:
     arrivals_ns: dict[int, int] = {}
     to_wall_ns = time.time_ns() - time.monotonic_ns()
 
-    def take(message: JointState) -> None:
+    def on_message(message: JointState) -> None:
         arrivals_ns[message.header.stamp.to_nsec() - to_wall_ns] = time.monotonic_ns()
 
     message_type = JointState if arguments.joint_states else IKProblem
     publisher = rospy.Publisher(arguments.topic, message_type, queue_size=1000, tcp_nodelay=True)  # none is lost
-    subscriber = rospy.Subscriber(arguments.target, JointState, take, tcp_nodelay=True)
+    subscriber = rospy.Subscriber(arguments.target, JointState, on_message, tcp_nodelay=True)
     while not (publisher.get_num_connections() and subscriber.get_num_connections()):
         time.sleep(0.05)
     period_ns = round(1e9 / arguments.hz)

@@ -30,9 +30,9 @@ class Client:
     def __init__(self, topic: str) -> None:
         self._expected, self._arrived = 0.0, threading.Event()
         self._arrival_s = 0.0
-        kind, take = (Joy, lambda message: message.axes) if "signal" not in topic else (Float64MultiArray, _data)
+        kind, values_of = (Joy, lambda message: message.axes) if "signal" not in topic else (Float64MultiArray, _data)
         self.subscriber = rospy.Subscriber(
-            topic, kind, lambda message: self._take(take(message)), queue_size=100, tcp_nodelay=True
+            topic, kind, lambda message: self._on_values(values_of(message)), queue_size=100, tcp_nodelay=True
         )
 
     def latency_s(self, send: Callable[[int], None], value: int) -> float:
@@ -43,7 +43,7 @@ class Client:
         send(value)
         return self._arrival_s - start_s if self._arrived.wait(ANSWER_S) else ANSWER_S
 
-    def _take(self, values: tuple[float, ...]) -> None:
+    def _on_values(self, values: tuple[float, ...]) -> None:
         if values and abs(values[0] - self._expected) < 0.1 / FULL:
             self._arrival_s = time.monotonic()
             self._arrived.set()

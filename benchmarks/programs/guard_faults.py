@@ -110,7 +110,7 @@ class Experiment:
         rospy.init_node("judge", disable_signals=True)
         self._clock = SimulatedClock() if is_simulated else None
         self._commands: list[tuple[float, tuple[float, ...]]] = []
-        rospy.Subscriber(COMMAND, JointState, self._take, tcp_nodelay=True)
+        rospy.Subscriber(COMMAND, JointState, self._on_message, tcp_nodelay=True)
         if parameters is None:
             commands = rospy.Publisher(COMMAND, JointState, queue_size=100, tcp_nodelay=True)
             rospy.Subscriber(TARGET, JointState, commands.publish, tcp_nodelay=True)
@@ -160,7 +160,7 @@ class Experiment:
             self._clock.go_on()
         return outcome
 
-    def _take(self, message: JointState) -> None:
+    def _on_message(self, message: JointState) -> None:
         self._commands.append((time.monotonic(), message.position))
 
     def _call(self, verb: str) -> bool:

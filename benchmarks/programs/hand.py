@@ -20,7 +20,7 @@ from rpbi_utils.msg import DriverState
 from safe_robot.msg import Status
 
 START_S = 180.0
-"""How long it may take until the arm is at its target."""
+"""Longest time until the arm is at its target [s]."""
 RESTS, TURNS = 0.2, 0.3
 """How often the hand rests, and how often it turns the cap, too."""
 RISES_S, HOLDS_S = (0.02, 0.1, 0.3, 0.6), (0.1, 1.5)
@@ -114,7 +114,7 @@ class Witness:
         self.driver = DriverState()
         self._subscribe(targets, JointState, lambda message: self.targets.append(message.position))
         for topic, guard in GUARDS.items():
-            self._subscribe(topic, Status, partial(self._take_status, guard))
+            self._subscribe(topic, Status, partial(self._on_status, guard))
         self._subscribe("/stand_in/driver_state", DriverState, lambda message: setattr(self, "driver", message))
 
     @property
@@ -122,10 +122,10 @@ class Witness:
         """Whether a guard has refused something, or the driver has stopped."""
         return bool(self.unsafe or self.driver.reflexes)
 
-    def _subscribe(self, topic: str, kind: type, take: object) -> None:
-        rospy.Subscriber(topic, kind, take, queue_size=QUEUE_SIZE, tcp_nodelay=True)
+    def _subscribe(self, topic: str, kind: type, on_message: object) -> None:
+        rospy.Subscriber(topic, kind, on_message, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
-    def _take_status(self, guard: str, message: Status) -> None:
+    def _on_status(self, guard: str, message: Status) -> None:
         self.decisions += 1
         if not message.is_safe:
             self.unsafe.append(f"{message.message} ({guard})")

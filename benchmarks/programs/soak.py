@@ -29,9 +29,9 @@ class Count:
     def __init__(self, topic: str, message_type: type) -> None:
         self.number, self.longest_gap_s = 0, 0.0
         self._last_s = math.inf
-        rospy.Subscriber(topic, message_type, self._take, tcp_nodelay=True)
+        rospy.Subscriber(topic, message_type, self._on_message, tcp_nodelay=True)
 
-    def _take(self, _: object) -> None:
+    def _on_message(self, _: object) -> None:
         now_s = time.monotonic()
         self.longest_gap_s = max(self.longest_gap_s, now_s - self._last_s)
         self._last_s = now_s

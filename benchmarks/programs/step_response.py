@@ -33,7 +33,7 @@ class Client:
         self._from = float("nan")
         self._arrival_s = 0.0
         self._publisher = rospy.Publisher(target, JointState, queue_size=10, tcp_nodelay=True)
-        self._subscriber = rospy.Subscriber(state, JointState, self._take, tcp_nodelay=True)
+        self._subscriber = rospy.Subscriber(state, JointState, self._on_message, tcp_nodelay=True)
 
     @property
     def is_connected(self) -> bool:
@@ -61,7 +61,7 @@ class Client:
             before = self.position
             time.sleep(REST_S)
 
-    def _take(self, message: JointState) -> None:
+    def _on_message(self, message: JointState) -> None:
         arrival_s = time.monotonic()
         self.position = message.position[message.name.index(self._joint)]
         if abs(self.position - self._from) > MOVED and not self.moved.is_set():

@@ -9,7 +9,7 @@ from pydantic import Field
 from operator_node.haptics.device import HapticReading
 from operator_node.haptics.devices.emulated import EmulatedDevice
 from operator_node.haptics.devices.scripted import ScriptedConfig, ScriptedDevice
-from rpbi.geometry import Vector
+from robot_model.geometry import Vector
 
 
 class TimedConfig(ScriptedConfig):

@@ -6,7 +6,7 @@ import random
 import struct
 from pathlib import Path
 
-from hostile_files import WORDS
+from robustness.hostile_files.files import WORDS
 
 from .messages import DIAGNOSTICS, HEADER, JOINT_STATE, LINE, joint_state, write_one_topic
 from .records import Bag, Topic, text, uint32

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from pathlib import Path
 
-from hostile_files import spoil_text
+from robustness.hostile_files.files import spoil_text
 
 from .messages import JOINT_STATE, KNOWN, LINE, joint_state, write_one_topic
 from .records import Topic, uint32

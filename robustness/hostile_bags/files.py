@@ -6,7 +6,7 @@ import random
 import struct
 from pathlib import Path
 
-from hostile_files import spoil_bytes
+from robustness.hostile_files.files import spoil_bytes
 
 from .messages import DIAGNOSTICS, JOINT_STATE, KNOWN, STEP_NS, joint_state
 from .records import Bag, Topic, text, uint32

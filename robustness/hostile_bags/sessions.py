@@ -10,10 +10,9 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
-from hostile_files import REPLACED, spoil_text, write_session
-
+from robustness.hostile_files.files import REPLACED, spoil_text, write_session
 from ros_pybullet_interface.msg import SimulationState, WorldCommand, WorldCommands
-from rpbi_utils.bag_file import BagFile
+from rpbi_utils.bags.bag_file import BagFile
 
 from .records import Bag, Topic, text
 

@@ -15,13 +15,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+from custom_ros_tools.console.modules import command_of
 from custom_ros_tools.errors import InterfaceError
 from rpbi_utils import bag_to_dataframes, topic_report
-from rpbi_utils.ros import bag_to_table, replay
+from rpbi_utils.ros.bags import bag_to_table
 
 LONGEST_S = 60.0
 """Processor time; a process that takes more, or ten times this on the clock, is ended by signal 9."""
-MOST_MEMORY = 4 * 2**30
+MAX_MEMORY = 4 * 2**30
 _ENDS_AT = 10 * 2**30
 
 
@@ -42,7 +43,7 @@ class Trial(NamedTuple):
 
     @property
     def is_fine(self) -> bool:
-        is_small = self.cpu_s <= LONGEST_S and self.memory_mb * 1e6 <= MOST_MEMORY
+        is_small = self.cpu_s <= LONGEST_S and self.memory_mb * 1e6 <= MAX_MEMORY
         return self.verdict in ("taken", "refused") and is_small
 
 
@@ -56,7 +57,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "bag_to_dataframes": lambda path: bag_to_dataframes(path, images=True),
     "bag_to_table, Parquet": lambda path: _to_files(path, "parquet"),
     "bag_to_table, CSV": lambda path: _to_files(path, "csv"),
-    "replay": lambda path: sys.exit(replay.main([str(path), "--quiet"])),
+    "replay": lambda path: sys.exit(command_of("rpbi_utils.ros.console.replay").run([str(path), "--quiet"])),
 }
 """Readers of bags by name; a refusal is an InterfaceError, or an exit with 1 and words on stderr or stdout."""
 

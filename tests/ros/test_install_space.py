@@ -82,6 +82,7 @@ MODULES = (
     "rpbi.world",
     "rpbi_examples",
     "rpbi_utils",
+    "episodes",
 )
 
 

@@ -21,7 +21,7 @@ CMAKE = f"""cmake_minimum_required(VERSION 3.16)
 project(release_client)
 find_package(catkin REQUIRED COMPONENTS {" ".join(PACKAGES)})
 include_directories(${{CMAKE_CURRENT_SOURCE_DIR}} ${{catkin_INCLUDE_DIRS}})
-add_executable(release_client {SUPPORT}/release_client.cpp)
+add_executable(release_client {SUPPORT}/release/release_client.cpp)
 target_link_libraries(release_client ${{catkin_LIBRARIES}})
 """
 

@@ -3,4 +3,4 @@
 
 from custom_ros_tools.ros.node import run
 
-run("operator_node.ros.mvn.node:main")
+run("operator_node.ros.devices.device_node:mvn")

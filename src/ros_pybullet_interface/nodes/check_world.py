@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Checks a world without a ROS master."""
+"""Finds all problems of a world; see `check_world.py --help`."""
 
-from custom_ros_tools.ros.node import run_command
+from custom_ros_tools.ros.console import run_console
 
-run_command("rpbi.ros.reference.check:main")
+run_console("rpbi.ros.console.check")

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Runs the demo."""
 
-from custom_ros_tools.ros.node import run_command
+from custom_ros_tools.ros.console import run_console
 
-run_command("rpbi_examples.ros.demo:main")
+run_console("rpbi_examples.ros.console.demo")

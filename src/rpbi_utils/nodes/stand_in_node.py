@@ -3,4 +3,4 @@
 
 from custom_ros_tools.ros.node import run
 
-run("rpbi_utils.ros.stand_in:main")
+run("rpbi_utils.ros.fake_driver.node:main")

@@ -14,10 +14,10 @@ from sensor_msgs.msg import Joy
 KEEPS_AN_ERROR = """
 import gc, sys, threading
 from operator_node.device import DeviceError
-from operator_node.devices.window import Window
+from operator_node.devices.window import DeviceWindow
 
 def use():
-    window = Window("mouse", "mouse", 100, 100)
+    window = DeviceWindow("mouse", "mouse", 100, 100)
     window._note_closed()
     try:
         window.wait(0.01)

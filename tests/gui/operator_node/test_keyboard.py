@@ -13,10 +13,10 @@ from tries import tries
 
 from custom_ros_tools.errors import ConfigError
 from operator_node.conformance import DeviceConformance, Reader
+from operator_node.devices import DEVICES
 from operator_node.devices.held_keys import KeyEvent
 from operator_node.devices.key_terminal import codes_in
 from operator_node.devices.key_window import code_of
-from operator_node.lookup import make_device
 
 KEYS = {"LEFT": "Left", "RIGHT": "Right", "DOWN": "Down", "UP": "Up"}
 """Names that xdotool has for keys; those of characters are their own."""
@@ -73,7 +73,7 @@ def keyboard(screen):
     readers = []
 
     def start(**options):
-        reader = KeyReader("keyboard", make_device("keyboard", options))
+        reader = KeyReader("keyboard", DEVICES.make("keyboard", options))
         readers.append(reader)
         reader.until(lambda: bool(reader.readings), "it is open")
         if not options.get("terminal"):
@@ -128,7 +128,7 @@ def test_who_types_elsewhere_holds_nothing_here(screen, keyboard):
     reader = keyboard(axes=[["a", "b"]])
     screen.run("xdotool", "keydown", "b")
     reader.until(lambda: reader.last.axes == (1.0,), "it is held")
-    other = make_device("mouse", {})
+    other = DEVICES.make("mouse", {})
     other.open()
     for _ in tries("the other window is open"):
         other.read(0.01)
@@ -195,11 +195,19 @@ def test_a_key_of_a_terminal_is_held_for_a_time(terminal, keyboard):
     assert reader.is_at_rest
 
 
+def test_a_key_that_is_typed_as_soon_as_the_terminal_is_open_counts(terminal, keyboard):
+    reader = keyboard(terminal=True, terminal_hold_s=60.0, axes=[["LEFT", "RIGHT"]])
+    os.write(terminal, b"\x1b[C")
+    reader.until(lambda: bool(reader.events), "it has come")
+    assert reader.readings[-1].axes == (1.0,)
+    assert not reader.feed.held
+
+
 def test_a_terminal_that_is_none_is_refused_at_the_start(monkeypatch):
     with open(os.devnull) as nothing, monkeypatch.context() as patch:
         patch.setattr(sys, "stdin", nothing)
         with pytest.raises(ConfigError, match="terminal.*rosrun"):
-            make_device("keyboard", {"terminal": True})
+            DEVICES.make("keyboard", {"terminal": True})
 
 
 @pytest.mark.parametrize(

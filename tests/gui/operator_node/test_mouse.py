@@ -10,7 +10,7 @@ from tries import tries
 
 from operator_node.conformance import DeviceConformance, Reader
 from operator_node.device import DeviceClosedError, DeviceError
-from operator_node.lookup import make_device
+from operator_node.devices import DEVICES
 
 NUMBERS = {"left": "1", "middle": "2", "right": "3"}
 WHEEL = {True: "4", False: "5"}
@@ -67,7 +67,7 @@ def open_mouse():
     with contextlib.ExitStack() as opened:
 
         def open_mouse(**options):
-            reader = Reader("mouse", make_device("mouse", options))
+            reader = Reader("mouse", DEVICES.make("mouse", options))
             opened.callback(reader.feed.close)
             reader.until(lambda: len(reader.feed.free_axes) == 3, "it is open")
             return reader
@@ -103,7 +103,7 @@ def test_notches_of_the_wheel_add_up(screen, open_mouse):
 
 def test_the_wheel_returns_by_itself_once_it_was_told(screen):
     """Though the time is over before anybody asks."""
-    device = make_device("mouse", {"wheel_return_s": 1e-6})
+    device = DEVICES.make("mouse", {"wheel_return_s": 1e-6})
     device.open()
     with contextlib.closing(device):
         wait_until(lambda: device.read(0.01), "its window is open")
@@ -137,4 +137,4 @@ def test_closing_the_window_is_the_end(screen, reader):
 def test_without_a_screen_it_says_what_to_set(monkeypatch):
     monkeypatch.delenv("DISPLAY")
     with pytest.raises(DeviceError, match="DISPLAY"):
-        make_device("mouse", {}).open()
+        DEVICES.make("mouse", {}).open()

@@ -154,7 +154,8 @@ def test_joystick_moves_the_arm(example, screen, follows):
 def test_6d_mouse_moves_the_arm(example, screen, follows, tmp_path):
     cap = SpacenavDaemon(tmp_path / "spnav.sock")
     with device(example, screen, "spacenav", SPNAV_SOCKET=str(cap.path)):
-        wait_until(lambda: cap.clients, "it is connected")
+        joy = example.listen("spacenav/joy", Joy)
+        wait_until(lambda: cap.move(0, 30, 0) or (joy.messages and joy.messages[-1].axes[2]), "it has been at rest")
         follows(UP, lambda: cap.move(0, 300, 0), lambda: cap.move(0, 0, 0))
     cap.close()
 

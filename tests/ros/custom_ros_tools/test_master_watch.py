@@ -66,7 +66,7 @@ def test_a_publisher_that_comes_while_its_subscriber_registers_is_connected(ros,
     threading.Thread(target=server.serve_forever, daemon=True).start()
     uri = f"http://127.0.0.1:{server.server_address[1]}/"
     master, topic = rosgraph.Master("/late"), "/comes_meanwhile"
-    take = Registrations._take
+    take = Registrations._on_answer
 
     def take_late(self, kind, name, answer):
         assert (kind, name, answer[2]) == ("sub", topic, [])
@@ -77,7 +77,7 @@ def test_a_publisher_that_comes_while_its_subscriber_registers_is_connected(ros,
         wait_until(lambda: (topic, [uri]) in rospys.updates, "the master has told of the publisher")
         take(self, kind, name, answer)
 
-    monkeypatch.setattr(Registrations, "_take", take_late)
+    monkeypatch.setattr(Registrations, "_on_answer", take_late)
     subscriber = rospy.Subscriber(topic, Empty)
     monkeypatch.undo()
     try:

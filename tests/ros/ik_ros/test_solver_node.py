@@ -163,6 +163,22 @@ def test_continuity_holds_the_velocities_of_the_joints_and_the_target_when_it_is
     assert any("of the way there" in solution.message for solution in solutions.messages)
 
 
+def test_targets_start_where_the_robot_is_though_nobody_listened_to_the_first_ones(ros):
+    """A guard that starts late would halt at a target that is away from the robot."""
+    start_solver(ros, continuity={"max_velocity": 0.5, "hold": True})
+    asked = problem_at(np.add(HOME, 0.4))
+    with publishing("ik", IKProblem) as ik:
+        for number in range(50):
+            asked.header.stamp = rospy.Time(100) + rospy.Duration.from_sec(0.01 * number)
+            ik.publish(asked)
+        ros.call("ik/solver/kdl/solve_ik", SolveIK, asked)  # it is served after some of them, if not all
+        targets = ros.listen("joint_states/target", JointState)
+        wait_until(lambda: targets.is_connected, "targets would be received")
+        asked.header.stamp = rospy.Time(101)
+        first = send_until(ik, asked, targets)
+    assert first.position == pytest.approx(HOME)
+
+
 _POSES = {}
 
 

@@ -127,7 +127,7 @@ def test_silence_is_told_and_the_pose_is_held_until_it_goes_on(avatar):
     log = Rosout(avatar)
     targets = avatar.listen("rpbi/human/joint_states/target", JointState)
     follow(avatar, {HINGE: 1.2}, (0.3, 0.2, 0.93), lambda: targets.messages, "it follows")
-    log.wait_for(["/mvn/segments: nothing has come for 0.5 s; the avatar holds its last pose"])
+    log.wait_for(["/mvn/segments: no message for 0.5 s; the avatar holds its last pose"])
     count = len(targets.messages)
     follow(avatar, {HINGE: 1.2}, (0.3, 0.2, 0.93), lambda: len(targets.messages) > count, "it goes on")
     assert avatar.call("avatar/engage", Trigger).success

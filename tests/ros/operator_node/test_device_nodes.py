@@ -81,7 +81,7 @@ def test_daemon_that_dies_in_the_middle_of_a_motion_leaves_it_at_rest(ros, tmp_p
     wait_until(lambda: not any(joy.messages[-1].axes), "it is at rest")
     wait_until(lambda: LOOK in ros.output(node) or "has gone" in ros.output(node), "it says why")
     ros.start(command)
-    wait_until(lambda: "it is there now" in ros.output(node), "it is taken up again")
+    wait_until(lambda: "it is available now" in ros.output(node), "it is taken up again")
     wait_until(lambda: any(joy.messages[-1].axes), "it moves again")
 
 

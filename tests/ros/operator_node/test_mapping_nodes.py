@@ -79,7 +79,7 @@ class TestScaleNode:
             assert zeros(signals) == round_number, "exactly one for each time that input ceases"
         assert data(signals).count((0.5, -0.5)) > 3, "what is not zero is repeated while it is in force"
         assert set(data(signals)) == {(0.5, -0.5), (0.0, 0.0)}
-        rosout.wait_for(["/joy: nothing has come for 0.3 s: the signal is zero"])
+        rosout.wait_for(["/joy: no message for 0.3 s: the signal is zero"])
 
     def test_switched_off_it_says_zero_once_and_then_nothing(self, ros, joy, signals):
         assert switch(ros, True) == (False, "operator node is already on")

@@ -111,7 +111,7 @@ def test_frames_become_tf_poses_and_joy_until_the_stream_falls_silent(module_ros
 
     wait_until(lambda: not any(joy.messages[-1].axes), "the hands are let go")
     count = len(poses.messages)
-    wait_until(lambda: "no frame has come for 0.3 s" in module_ros.output(module_ros.processes[-1]), "a warning")
+    wait_until(lambda: "no frame for 0.3 s" in module_ros.output(module_ros.processes[-1]), "a warning")
     status = wait_until(lambda: _status(topics, "no frames", frames=str(count)), "diagnostics tell")
     assert status["datagrams used"] == status["datagrams received"] == str(count)
     wait_until(lambda: topics["/mvn/markers"].messages[-1].markers[0].action == 2, "nobody is drawn any more")

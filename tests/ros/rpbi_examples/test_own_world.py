@@ -45,7 +45,7 @@ def folder(tmp_path):
 
 
 RPBI = f"'{ROOT}/rpbi' launch world.yaml"
-LAUNCH = f"{sys.executable} '{ROOT}/src/rpbi_examples/nodes/launch.py' '{ROOT}/src/rpbi_examples/launch'"
+LAUNCH = f"{sys.executable} '{ROOT}/src/custom_ros_tools/nodes/console' launch"
 """The program of `./rpbi launch`, which is quicker without setting up the workspace."""
 WORLD = f"{LAUNCH} world.yaml"
 ROSLAUNCH = "roslaunch rpbi_examples world.launch config:=world.yaml"

@@ -11,7 +11,7 @@ from ros_system import RosSystem, wait_until
 from sensor_msgs.msg import Image, PointCloud2
 from tf2_msgs.msg import TFMessage
 
-from rpbi.geometry import Pose
+from robot_model.geometry import Pose
 
 SLOW_S = 120.0
 FACTOR = {"pybullet_rgbd_example": 1, "pybullet_objects_example": 3}

@@ -111,7 +111,7 @@ def test_panda_works_the_ros_way(ros, position):
 
 
 def test_panda_swings(ros):
-    launch(ros, "basic_example_panda")
+    launch(ros, "basic_example_panda", real_time_factor=4)
     states = ros.listen("/rpbi/panda/joint_states", JointState)
     first = states.wait_for(1)[0]
     index = first.name.index("panda_joint4")

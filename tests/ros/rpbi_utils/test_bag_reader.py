@@ -13,8 +13,8 @@ import rosbag
 from std_msgs.msg import Float64, String
 
 from rpbi_utils import bag_to_dataframes, topic_report
-from rpbi_utils.errors import BagError
-from rpbi_utils.ros import bag_reader, bag_to_table
+from rpbi_utils.bags.errors import BagError
+from rpbi_utils.ros.bags import bag_reader, bag_to_table
 
 WriteBag = Callable[..., Path]
 
@@ -92,14 +92,14 @@ def test_a_bag_that_is_damaged_inside(write_bag: WriteBag, compression: str) -> 
 @pytest.fixture
 def bomb(write_bag: WriteBag, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A bag of 5 MB in a few kB, where 1 MB counts as much."""
-    monkeypatch.setattr(bag_reader, "MOST_UNFOLDED", 1_000_000)
+    monkeypatch.setattr(bag_reader, "MAX_UNPACKED_BYTES", 1_000_000)
     return write_bag([("/a", String("x" * 1_000_000))] * 5, compression="bz2")
 
 
 def test_a_bag_that_unfolds_to_far_more_than_its_size_is_refused_unless_it_is_asked_for(
     bomb: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert bomb.stat().st_size * bag_reader.MOST_TIMES < 5_000_000
+    assert bomb.stat().st_size * bag_reader.MAX_COMPRESSION < 5_000_000
     assert "MB unfold to 0.005 GB: more than 255 times as much; --any-size, if you know who made it" in _refused(bomb)
     assert len(bag_to_dataframes(bomb, any_size=True)["/a"]) == 5
     assert topic_report(bomb, any_size=True).loc["/a", "bytes"] == 5 * 1_000_004
@@ -109,7 +109,7 @@ def test_a_bag_that_unfolds_to_far_more_than_its_size_is_refused_unless_it_is_as
 
 
 def test_lz4_never_unfolds_too_far(write_bag: WriteBag, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bag_reader, "MOST_UNFOLDED", 0)
+    monkeypatch.setattr(bag_reader, "MAX_UNPACKED_BYTES", 0)
     path = write_bag([("/a", String("x" * 1_000_000))] * 5, compression="lz4")
     assert len(bag_to_dataframes(path)["/a"]) == 5
 

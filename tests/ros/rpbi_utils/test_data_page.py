@@ -34,9 +34,11 @@ def recording(write_bag: Callable[..., Path]) -> Path:
         target = JointState(header, ["lwr_arm_0_joint"], [angle + 0.01], [], [])
         state = JointState(header, ["lwr_arm_0_joint", "lwr_arm_1_joint"], [angle, 0.0], [0.1, 0.0], [1.0, 2.0])
         box = TransformStamped(header=header, child_frame_id="rpbi/box")
+        box.transform.rotation.w = 1.0
         loop = DiagnosticStatus(name="loop", values=[KeyValue("overruns", str(index))])
         pixels = np.full((2, 3), 1.5, np.float32)
         image = Image(header=header, height=2, width=3, encoding="32FC1", step=12, data=pixels.tobytes())
+        colour = Image(header=header, height=2, width=3, encoding="rgb8", step=9, data=bytes(18))
         arm = ContactPoint(link="link0", other_body="kuka_lwr", normal_force=index / 10)
         floor = ContactPoint(link="link0", other_body="floor", normal_force=8.0)
         contacts = Contacts(header=header, points=[floor, arm] if index % 2 else [floor])
@@ -47,6 +49,7 @@ def recording(write_bag: Callable[..., Path]) -> Path:
             ("/rpbi/box/contacts", contacts),
             ("/diagnostics", DiagnosticArray(header, [loop])),
             ("/rpbi/camera/depth/image", image),
+            ("/rpbi/camera/colour/image", colour),
         ]
     return write_bag(messages, name="recording.bag", compression="lz4")
 
@@ -56,7 +59,7 @@ def test_the_examples_run_one_after_the_other(
 ) -> None:
     monkeypatch.chdir(recording.parent)
     blocks = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
-    assert len(blocks) == 8
+    assert len(blocks) == 11
     names: dict[str, Any] = {}
     for block in blocks:
         exec(compile(block, "docs/data.md", "exec"), names)
@@ -65,7 +68,15 @@ def test_the_examples_run_one_after_the_other(
     assert (recording.parent / "positions.png").stat().st_size > 1000
     assert len(names["path"]) == 100
     assert names["values"]["values/overruns"].max() == 99
-    assert (names["metres"] == 1.5).all() and names["metres"].shape == (2, 3)
+    together, errors = names["together"]
+    assert len(together) == 50
+    assert (together["target/position/lwr_arm_0_joint"] - together["arm/position/lwr_arm_0_joint"]).max() < 0.0101
+    assert errors.max() < 0.0051
+    assert len(names["box"]) == 100
+    assert len(list((recording.parent / "depth").iterdir())) == 101
+    assert (recording.parent / "camera.mp4").stat().st_size > 1000
+    assert names["pixels"].shape == (2, 3, 3)
+    assert len(names["farthest"]) == 100 and {depth for _, depth in names["farthest"]} == {1.5}
     printed = capsys.readouterr().out
     assert "largest error: 0.0100 rad" in printed
     assert "pushed with up to 9.9 N, for 50% of the time" in printed
@@ -76,3 +87,12 @@ def test_the_command_has_the_options_of_the_page(recording: Path) -> None:
     text = subprocess.run([*command, "--help"], capture_output=True, text=True).stdout
     documented = set(re.findall(r"^\| `(--\w+)", PAGE, flags=re.MULTILINE))
     assert documented == set(re.findall(r"(--\w+)", text)) - {"--help"}
+
+
+def test_plots_are_written_beside_the_bag(recording: Path) -> None:
+    ended = subprocess.run([str(ROOT / "rpbi"), "plot", str(recording)], capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    written = [Path(line) for line in ended.stdout.splitlines()]
+    assert {path.name for path in written} >= {"rpbi.kuka_lwr.joint_states.png", "rpbi.box.contacts.png", "rates.png"}
+    assert all(path.parent == recording.with_name("recording_plots") for path in written)
+    assert all(path.stat().st_size > 1000 for path in written)

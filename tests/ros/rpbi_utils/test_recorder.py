@@ -21,7 +21,7 @@ from second_master import SecondMaster
 from std_msgs.msg import Float64
 
 from rpbi_utils import Recorder, bag_to_dataframes
-from rpbi_utils.errors import RecordingError
+from rpbi_utils.bags.errors import RecordingError
 
 TALKER = """
 import rospy, sys

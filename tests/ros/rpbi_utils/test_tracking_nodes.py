@@ -13,7 +13,7 @@ from node_world import Rosout, main_config, publishing
 from ros_system import wait_until
 from tf2_msgs.msg import TFMessage
 
-from rpbi.geometry import Pose, rotation_between
+from robot_model.geometry import Pose, rotation_between
 from rpbi_utils.tracking.tag_files import write_tag
 
 CAMERA = Pose((0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0))

@@ -16,9 +16,10 @@ from terminal import Terminal
 from worlds import FLOOR, box, iiwa
 
 from custom_ros_tools.config import load_config
+from custom_ros_tools.console.modules import command_of
 from rpbi.bodies import BODY_TYPES
-from rpbi.config.loading import load_world
-from rpbi_utils.ros.world_commands import kind_in, main
+from rpbi.world.loading import load_world
+from rpbi_utils.ros.console.spawn import kind_in
 
 CONFIGS = Path(__file__).resolve().parents[3] / "src/rpbi_examples/configs"
 
@@ -41,7 +42,9 @@ def say(ros, capsys):
     """Runs a command in the namespace; returns its exit code and what it printed on both streams."""
 
     def run(line: str, *more: str) -> tuple[int, str]:
-        code = main([*line.split(), *more, "--ns", "lab"])
+        name, *words = line.split()
+        command = command_of(f"rpbi_utils.ros.console.{name}")
+        code = command.run([*words, *more, "--ns", "lab"])
         printed = capsys.readouterr()
         return code, (printed.out + printed.err).strip()
 

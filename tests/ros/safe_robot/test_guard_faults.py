@@ -68,7 +68,7 @@ def test_what_runs_instead_of_targets_does_so_a_period_apart():
     times_s: list[float] = []
     done = threading.Event()
 
-    def take(item: int) -> bool:
+    def accept(item: int) -> bool:
         taken.append(item)
         times_s.append(time.monotonic())
         return True
@@ -80,13 +80,13 @@ def test_what_runs_instead_of_targets_does_so_a_period_apart():
             done.set()
         return len(times_s) < 8
 
-    queue = TargetQueue(period_s, 60.0, 100, take, lambda age_s: None)
+    queue = TargetQueue(period_s, 60.0, 100, accept, lambda age_s: None)
     with queue.lock:
         for item in range(4):
             queue.put(item, 0.0)
         queue.run_instead(step)
     assert done.wait(60.0) and taken == [0]
-    assert np.diff(times_s).min() >= period_s - 1e-3, "but for what lies between the begin of a period and the take"
+    assert np.diff(times_s).min() >= period_s - 1e-3, "but for what lies between the begin of a period and the call"
 
 
 @pytest.mark.parametrize("silence_s, is_dropped", [(0.12, True), (60.0, False)])
@@ -95,13 +95,13 @@ def test_what_a_dead_source_left_behind_is_not_sent(silence_s, is_dropped):
     given_up = threading.Event()
     done = threading.Event()
 
-    def take(item: int) -> bool:
+    def accept(item: int) -> bool:
         taken.append(item)
         if item == 9:
             done.set()
         return True
 
-    queue = TargetQueue(0.05, silence_s, 100, take, lambda age_s: given_up.set())
+    queue = TargetQueue(0.05, silence_s, 100, accept, lambda age_s: given_up.set())
     for item in range(10):
         queue.put(item, 0.0)
     assert (given_up if is_dropped else done).wait(60.0)

@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from custom_ros_tools.errors import ConfigError
-from safe_robot.check import Situation
+from safe_robot.check import CheckContext
 from safe_robot.ros.guard_status import GuardStatus
 from safe_robot.ros.parameters import guard_of_parameters
 
@@ -187,8 +187,8 @@ def test_parameters_of_the_release_are_taken(parameters):
     guard, output = guard_of_parameters()
     assert guard.joint_names == tuple(NAMES) and output.publish_as_joint_state
     guard.start()
-    assert guard.decide((0.0, 0.0), Situation()).command
-    violation = guard.decide((0.0021, 0.0), Situation()).violation
+    assert guard.decide((0.0, 0.0), CheckContext()).command
+    violation = guard.decide((0.0021, 0.0), CheckContext()).violation
     assert "velocity is 0.21 m/s, limit 0.2 m/s" in str(violation)
 
 
@@ -216,11 +216,11 @@ def test_launch_files_of_the_release_are_answered_with_what_they_lack(parameters
     rospy.set_param("~robot_description", SLIDER)
     guard, _ = guard_of_parameters()
     guard.start()
-    assert "set start_from to target" in str(guard.decide((0.0, 0.0), Situation()).violation)
+    assert "set start_from to target" in str(guard.decide((0.0, 0.0), CheckContext()).violation)
     rospy.set_param("~start_from", "target")
     guard, _ = guard_of_parameters()
     guard.start()
-    assert guard.decide((0.0, 0.0), Situation()).command
+    assert guard.decide((0.0, 0.0), CheckContext()).command
     heard.wait_for(["the robot is assumed to stand at the first target"])
 
 
@@ -229,12 +229,12 @@ def test_targets_with_one_stamp_are_warned_of_in_one_line_a_minute(parameters, r
     parameters(policy="limit", start_from="target")
     guard, _ = guard_of_parameters()
     guard.start()
-    guard.decide((0.0, 0.0), Situation())
+    guard.decide((0.0, 0.0), CheckContext())
     heard = Rosout(ros, own=True)
     heard.wait_to_hear(rospy.get_name())
     status = GuardStatus(guard, "/joint_states/target")
     for _ in range(20):
-        status.publish(Header(), guard.decide((0.0, 0.0), Situation(stamp_step_s=0.0)).violation)
+        status.publish(Header(), guard.decide((0.0, 0.0), CheckContext(stamp_step_s=0.0)).violation)
     rospy.logwarn("all have been published")
     heard.wait_for(["all have been published"])
     assert [log.msg for log in heard.logs("stamp")] == [

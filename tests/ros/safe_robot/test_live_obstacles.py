@@ -12,10 +12,10 @@ from node_world import publishing
 from ros_system import wait_until
 from visualization_msgs.msg import Marker, MarkerArray
 
+from robot_model.geometry import Pose
 from rpbi.bodies.visual_shapes import BodyShape, ShapeKind
-from rpbi.geometry import Pose
 from rpbi.ros.publishers.world_markers import deletion, shape_marker
-from safe_robot.check import Situation
+from safe_robot.check import CheckContext
 from safe_robot.ros.live_obstacles import LiveObstacles
 
 BASE = "rpbi/arm/base"
@@ -62,15 +62,15 @@ def test_bodies_are_where_tf_has_them_until_they_go(around):
 def test_an_arm_keeps_away_from_them_and_stands_while_nobody_knows_where_they_are(around, tmp_path):
     around, publish = around
     guard = guard_of(folding(tmp_path), policy="reject", checks={"environment": {"margin_m": 0.05}})
-    assert guard.decide((0.0, 0.0), Situation(obstacles=None)).command is None
+    assert guard.decide((0.0, 0.0), CheckContext(obstacles=None)).command is None
     publish([marker("box", 1.0, 0.9, 0.12)])  # above the lower arm, 0.04 m off
     wait_until(lambda: around.obstacles, "the body is known")
-    guard.decide((0.1, 0.0), Situation(obstacles=around.obstacles))
+    guard.decide((0.1, 0.0), CheckContext(obstacles=around.obstacles))
     assert not guard.is_halted
     for k in range(1, 201):
         t = k / 200.0
         upwards = 0.1 - 0.2 * t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
-        if (decision := guard.decide((upwards, 0.0), Situation(obstacles=around.obstacles))).is_halted:
+        if (decision := guard.decide((upwards, 0.0), CheckContext(obstacles=around.obstacles))).is_halted:
             break
     assert guard.is_halted and decision.violation.check == "environment"
     assert "'box'" in str(decision.violation)

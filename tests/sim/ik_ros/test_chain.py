@@ -10,10 +10,10 @@ import pybullet_data
 import pytest
 
 from custom_ros_tools.errors import ConfigError, UnknownNameError
-from ik_ros.chain.description import ChainDescription
 from ik_ros.chain.kdl import KdlChain
 from ik_ros.conformance import distances
-from rpbi.geometry import Pose
+from robot_model.chain import Chain
+from robot_model.geometry import Pose
 from rpbi.kinematics import Kinematics
 
 DATA = Path(pybullet_data.getDataPath())
@@ -65,7 +65,7 @@ def rig(tmp_path):
 def test_the_tip_is_where_pybullet_has_it_and_moves_as_its_jacobian_says(name, rig):
     path, base, tip = CHAINS[name]
     path = rig if path == "rig.urdf" else str(path)
-    description = ChainDescription(path, base, tip)
+    description = Chain(path, base, tip)
     chain = KdlChain(description)
     limits = description.limits
     robot = Kinematics(path)
@@ -99,7 +99,7 @@ def _check_jacobian(chain, q):
 
 def test_joints_limits_and_velocities_are_those_of_the_urdf(rig):
     inf = float("inf")
-    description = ChainDescription(rig, "wall", "tool")
+    description = Chain(rig, "wall", "tool")
     assert description.joint_names == ("slide", "spin", "bend")
     assert (description.limits.lower, description.limits.upper) == ((-0.5, -inf, -1.0), (0.5, inf, 2.0))
     assert description.velocity_limits == (1.5, 3.0, inf)
@@ -109,13 +109,13 @@ def test_joints_limits_and_velocities_are_those_of_the_urdf(rig):
 
 def test_nothing_is_farther_than_the_reach(rig):
     for path, base, tip in CHAINS.values():
-        description = ChainDescription(rig if path == "rig.urdf" else str(path), base, tip)
+        description = Chain(rig if path == "rig.urdf" else str(path), base, tip)
         chain, limits = KdlChain(description), description.limits
         generator = random.Random(2)
         poses = [chain.pose(limits.random(generator, limits.middle)) for _ in range(300)]
-        assert all(chain.reach.covers(pose.position) for pose in poses)
-        assert not chain.reach.covers((5.0, 0.0, 0.0))
-        assert chain.reach.covers((5.0, 0.0, 0.0), 5.0)
+        assert all(description.reach.covers(pose.position) for pose in poses)
+        assert not description.reach.covers((5.0, 0.0, 0.0))
+        assert description.reach.covers((5.0, 0.0, 0.0), 5.0)
 
 
 @pytest.mark.parametrize(
@@ -130,7 +130,7 @@ def test_nothing_is_farther_than_the_reach(rig):
 )
 def test_a_chain_that_is_not_there_is_told_with_what_is(rig, base, tip, error, message):
     with pytest.raises(error, match=message):
-        ChainDescription(rig, base, tip)
+        Chain(rig, base, tip)
 
 
 @pytest.mark.parametrize(
@@ -146,12 +146,12 @@ def test_numbers_that_make_no_sense_are_named_by_joint(tmp_path, old, new, messa
     path = tmp_path / "rig.urdf"
     path.write_text(RIG.replace(old, new))
     with pytest.raises((ValueError, ConfigError), match=message):
-        ChainDescription(str(path), "wall", "tool")
+        Chain(str(path), "wall", "tool")
 
 
 def test_the_length_of_an_axis_does_not_matter(tmp_path):
     """PyBullet would let a joint slide twice as far."""
     path = tmp_path / "rig.urdf"
     path.write_text(RIG.replace('<axis xyz="1 0 0"/>', '<axis xyz="2 0 0"/>'))
-    chain = KdlChain(ChainDescription(str(path), "rail", "carriage"))
+    chain = KdlChain(Chain(str(path), "rail", "carriage"))
     assert chain.pose([0.4]).position == pytest.approx((0.4, 0.0, 0.2))

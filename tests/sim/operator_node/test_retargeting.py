@@ -13,7 +13,7 @@ from operator_node.avatar.anthropometry import segment_offsets
 from operator_node.avatar.forward import segment_frame
 from operator_node.avatar.human_urdf import human_urdf
 from operator_node.avatar.joints import HINGES, LOWER, UPPER
-from operator_node.avatar.retargeting import AvatarPose, Place, Retargeting
+from operator_node.avatar.retargeting import AvatarPlace, AvatarPose, Retargeting
 from operator_node.mvn.segments import SEGMENTS
 
 HEIGHT_M = 1.75
@@ -127,7 +127,7 @@ def test_a_taller_person_stands_on_the_avatars_feet():
 def test_the_avatar_begins_at_its_place_and_goes_on_with_the_person():
     turn = Rotation.from_euler("z", 50.0, degrees=True).as_quat()
     first = segment_frame(OFFSETS, np.array((7.0, -4.0, 0.9)), turn, {})
-    retargeting = Retargeting(OFFSETS, Place(1.0, 2.0, np.pi / 2))
+    retargeting = Retargeting(OFFSETS, AvatarPlace(1.0, 2.0, np.pi / 2))
     pose = retargeting.pose(first)
     assert pose.position == pytest.approx((1.0, 2.0, 0.9))
     assert Rotation.from_quat(pose.quat_xyzw).as_euler("xyz") == pytest.approx((0.0, 0.0, np.pi / 2))

@@ -16,11 +16,11 @@ from operator_node.avatar.segment_forces import SegmentForce, forces_by_segment
 from operator_node.emulators.arm_held_out import RAISING_S, ArmHeldOut
 from operator_node.mvn.segments import SEGMENTS
 from rpbi.world import World
-from rpbi_examples.dressing.controller import LARGEST_LEAD_M, Dressing
+from rpbi_examples.dressing.controller import MAX_LEAD_M, Dressing
 from rpbi_examples.dressing.force import ARM_SEGMENTS, ArmForce, forces_on_arm
 from rpbi_examples.dressing.hand import RADIUS_M, ROBOT_BASE
 from rpbi_examples.dressing.outcome import AROUND, RINGS, outcome, rings_of
-from rpbi_examples.dressing.trial import FORCE_LIMIT_N, LONGEST_S, WORLD, Trial, run_trial
+from rpbi_examples.dressing.trial import FORCE_LIMIT_N, MAX_DURATION_S, WORLD, Trial, run_trial
 from rpbi_examples.dressing.way import CUFF, ArmPosition, is_held_out
 
 SHOULDER, ELBOW, WRIST = np.array((0.0, -0.23, 1.43)), np.array((0.32, -0.28, 1.43)), np.array((0.57, -0.27, 1.43))
@@ -76,7 +76,7 @@ def test_the_sleeve_waits_for_a_hand_that_does_not_follow():
     for _ in range(500):
         target = dressing.target(ARM, cuff, 0.0, DT)
     assert not dressing.is_done
-    assert math.dist(held_cuff(target), cuff) <= LARGEST_LEAD_M + 1e-9, "the hand has never far to go"
+    assert math.dist(held_cuff(target), cuff) <= MAX_LEAD_M + 1e-9, "the hand has never far to go"
     for _ in range(1000):
         cuff = held_cuff(dressing.target(ARM, cuff, 0.0, DT))
     assert dressing.is_done, "when it follows, all goes on"
@@ -122,7 +122,7 @@ def dress_pressed(
     force_limit_n: float,
     plates: Sequence[tuple[Sequence[float], float]],
     push_n: Callable[[float, float], float],
-    longest_s: float = LONGEST_S,
+    longest_s: float = MAX_DURATION_S,
 ) -> Pressed:
     """Dresses somebody on whose arm plates press, from when the cuff has been drawn 0.3 m and for 2 s.
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from custom_ros_tools.config import replace_package
-from rpbi.config.loading import load_world
 from rpbi.kinematics import Kinematics
 from rpbi.samples import ContactsSample
 from rpbi.world import World
+from rpbi.world.loading import load_world
 from rpbi_examples.motions import PlanarPose
 from rpbi_examples.pushing import NEAR_M, PLACES, Pusher, next_push
 

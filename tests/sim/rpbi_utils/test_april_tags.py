@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from worlds import write_world
 
-from rpbi.geometry import Pose, rotation_between
+from robot_model.geometry import Pose, rotation_between
 from rpbi.images import CameraImages
 from rpbi.world import World
 from rpbi_utils.tracking import tag_files

@@ -9,7 +9,7 @@ from planar_arm import planar_arm
 
 from ik_ros.chain.solver import ChainConfig, ChainSolver
 from ik_ros.problem import IKProblem
-from rpbi.kinematics.limits import TURN
+from robot_model.limits import TURN
 
 TRUTH = (0.2, 1.0, -0.9)
 

@@ -15,7 +15,7 @@ from ik_ros.chain.kdl import Goal
 from ik_ros.conformance import distances, random_quat
 from ik_ros.lookup import make_solver
 from ik_ros.problem import IKProblem
-from rpbi.geometry import Pose
+from robot_model.geometry import Pose
 
 LWR = Path(__file__).resolve().parents[3] / "src/rpbi_examples/robots/kuka_lwr.urdf"
 ELBOW = [0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0]

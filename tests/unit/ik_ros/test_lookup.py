@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from custom_ros_tools.errors import ConfigError, UnknownNameError
-from ik_ros.lookup import make_solver, solver_class
+from ik_ros.lookup import make_solver
+from ik_ros.solvers import SOLVERS
 
 LWR = Path(__file__).resolve().parents[3] / "src/rpbi_examples/robots/kuka_lwr.urdf"
 OPTIONS = {"urdf_filename": str(LWR), "base_link": "lwr_arm_0_link", "tip_link": "end_effector_ball"}
@@ -35,7 +36,7 @@ def test_a_class_of_another_package_serves_where_a_name_does():
 )
 def test_a_class_that_is_not_there_or_no_solver_is_named(name, message):
     with pytest.raises(ConfigError, match=message):
-        solver_class(name)
+        SOLVERS.configured(name)
 
 
 @pytest.mark.parametrize(

@@ -95,6 +95,16 @@ def test_without_any_start_continuity_begins_at_the_first_solution(smooth):
     assert smooth.solve(at(0.5, -0.5), 1.0).positions == (0.5, -0.5)
 
 
+def test_a_restarted_stream_begins_at_the_next_start(smooth):
+    for stamp_s in (1.0, 1.1, 1.2):
+        smooth.solve(at(0.5, 0.0, shoulder=0.0, elbow=0.0), stamp_s)
+    smooth.restart()
+    assert smooth.target is None
+    assert smooth.solve(at(0.5, 0.0, shoulder=0.1, elbow=-0.3), 1.3).positions == (0.1, -0.3)
+    smooth.restart()
+    assert smooth.solve(at(0.5, -0.5), 1.4).positions == (0.5, -0.5), "without a start"
+
+
 @pytest.mark.parametrize("hold", [True, False])
 def test_without_a_solution_targets_go_on_to_the_last_one_if_asked_to(solver, hold):
     config = JointRateLimiterConfig(hold=hold)

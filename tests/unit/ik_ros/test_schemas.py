@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from jsonschema import Draft7Validator
 
-from ik_ros.lookup import solver_class
 from ik_ros.schemas import schema_files, schemas
 from ik_ros.solvers import SOLVERS
 
@@ -17,7 +16,7 @@ CHAIN = {"urdf_filename": "arm.urdf", "base_link": "base", "tip_link": "tip"}
 
 def test_every_solver_has_one() -> None:
     for name in SOLVERS:
-        solver_class(name)  # tells which extra is missing
+        SOLVERS.configured(name)  # tells which extra is missing
     assert list(schemas()) == list(SOLVERS)
 
 

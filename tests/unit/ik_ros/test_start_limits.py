@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 
 from ik_ros.solver import StartLimits
-from rpbi.kinematics.limits import Limits
+from robot_model.limits import Limits
 
 
 def test_each_joint_is_told_of_once_however_often_it_comes_back(caplog):

@@ -11,8 +11,7 @@ import pinocchio as pin
 import pytest
 from tree_robot import TREE
 
-from ik_ros.formulation.formulation import task_class
-from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.robot import PinocchioRobot
 from ik_ros.formulation.task import Task
 from ik_ros.problem import IKProblem
 from ik_ros.shape import ShapeConfig
@@ -47,22 +46,22 @@ EXAMPLES: dict[str, dict[str, Any]] = {
 }
 
 
-def robot_with_shapes(tmp_path: Path, floating: bool = True, **options: Any) -> Robot:
+def robot_with_shapes(tmp_path: Path, floating: bool = True, **options: Any) -> PinocchioRobot:
     path = tmp_path / "tree.urdf"
     path.write_text(TREE)
-    robot = Robot(str(path), floating, **options)
+    robot = PinocchioRobot(str(path), floating, **options)
     for shape in SHAPES:
         robot.add_shape(ShapeConfig.parse(shape, "test"))
     return robot
 
 
-def make_task(robot: Robot, kind: str, **changes: Any) -> Task:
-    found = task_class(kind)
+def make_task(robot: PinocchioRobot, kind: str, **changes: Any) -> Task:
+    found = TASKS.find(kind)
     data = {"name": "it", "type": kind, **EXAMPLES[kind], **changes}
     return found(found.Config.parse(data, "test"), robot)
 
 
-def random_configuration(robot: Robot, seed: int) -> np.ndarray:
+def random_configuration(robot: PinocchioRobot, seed: int) -> np.ndarray:
     generator = np.random.default_rng(seed)
     q = robot.with_positions(pin.neutral(robot.model), generator.uniform(-1.2, 1.2, len(robot.joint_names)))
     if robot.is_floating:

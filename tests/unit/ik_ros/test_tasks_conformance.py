@@ -8,7 +8,7 @@ from pathlib import Path
 import pybullet_data
 
 from ik_ros.conformance import SolverConformance
-from rpbi.geometry import Pose
+from robot_model.geometry import Pose
 
 IIWA = str(Path(pybullet_data.getDataPath()) / "kuka_iiwa/model.urdf")
 PANDA = str(Path(pybullet_data.getDataPath()) / "franka_panda/panda.urdf")
@@ -26,7 +26,7 @@ class TestTasksWithIiwa(SolverConformance):
 
     def forward(self, positions: Sequence[float]) -> Pose:
         at = dict(zip(self.solver.joint_names, positions))
-        return self.robot.forward([at.get(name, 0.0) for name in self.robot.joint_names], self.tip_link)
+        return self.robot.pose([at.get(name, 0.0) for name in self.robot.joint_names], self.tip_link)
 
 
 class TestTasksWithConstraintOnPanda(TestTasksWithIiwa):

@@ -17,7 +17,7 @@ from custom_ros_tools.errors import ConfigError, MissingDependency, UnknownNameE
 from ik_ros.lookup import make_solver
 from ik_ros.problem import IKProblem
 from ik_ros.solvers.tasks import TasksSolver
-from rpbi.geometry import Pose
+from robot_model.geometry import Pose
 
 TALOS = Path(__file__).resolve().parents[3] / "src/rpbi_examples/configs/ik_talos/ik.yaml"
 IIWA_TIP = "lbr_iiwa_link_7"

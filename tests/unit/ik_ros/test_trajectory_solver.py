@@ -23,7 +23,7 @@ from ik_ros.solvers.trajectory import KEPT_PROGRAMS, TrajectorySolver
 from ik_ros.trajectory.program import Program
 from ik_ros.trajectory.spline import Spline
 from ik_ros.trajectory.symbolic import link_frames, rotation_vector
-from rpbi.geometry import Pose
+from robot_model.geometry import Pose
 from rpbi.kinematics import Kinematics
 
 DATA = Path(pybullet_data.getDataPath())

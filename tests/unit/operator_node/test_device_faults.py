@@ -13,7 +13,7 @@ import pytest
 
 from custom_ros_tools.schema import ConfigModel
 from operator_node.device import Device, DeviceError, Reading
-from operator_node.device_feed import AT_REST, HELD_S, MOST_REASONS, DeviceFeed, FeedConfig, problem_of
+from operator_node.device_feed import AT_REST, HELD_S, MAX_REASONS, DeviceFeed, FeedConfig, problem_of
 from operator_node.devices import spacenav
 
 READINGS = 40
@@ -102,7 +102,7 @@ FAULTS: dict[str, tuple[Callable[[Reading, int], Any], str]] = {
     "a button half pressed": (one_button(0.5), NO_BUTTON),
     "a button that is NaN": (one_button(math.nan), NO_BUTTON),
     "a button as text": (one_button("1"), NO_BUTTON),
-    "no reading": (lambda reading, which: (0.1, which), "no reading"),
+    "no reading": (lambda reading, which: (0.1, which), "other than a reading"),
     "an error": (lambda reading, which: ZeroDivisionError("division by zero"), "it failed: ZeroDivisionError"),
 }
 
@@ -166,7 +166,7 @@ def test_what_is_never_at_rest_moves_nothing_and_is_told(stuck, held, caplog):
         for _ in range(3):
             feed.step(0.0)
     assert caplog.messages == [
-        f"gamepad: {held} not at rest since it was opened; let go: until then it counts as if it were"
+        f"gamepad: {held} not at rest since it was opened; release it: until then it counts as at rest"
     ]
     feed._device.says = [feed._device.at_rest()]
     feed.step(0.0)
@@ -183,7 +183,7 @@ def test_a_device_that_repeats_itself_is_heard_once():
 def test_reasons_without_end_are_counted_in_bounded_memory():
     rest = Reading((0.0, 0.0, 1.0), (0, 0))
     feed, _ = played(Gamepad([rest._replace(refused=(f"packet {number} is odd",)) for number in range(1000)]))
-    assert len(feed.refused) == MOST_REASONS + 1 and sum(feed.refused.values()) == 1000
+    assert len(feed.refused) == MAX_REASONS + 1 and sum(feed.refused.values()) == 1000
 
 
 def test_actions_without_end_wait_in_bounded_memory():
@@ -200,7 +200,7 @@ def test_actions_without_end_wait_in_bounded_memory():
 
 def test_a_full_scale_that_is_too_small_is_named():
     device = spacenav.Spacenav(spacenav.SpacenavConfig(full_scale=300.0))
-    device._take((spacenav.MOTION, 350, 0, 0, 0, 0, 0, 0))
+    device._process((spacenav.MOTION, 350, 0, 0, 0, 0, 0, 0))
     assert device._refused == ["a motion beyond full_scale, which is cut off there"] and device._motion[1] == -1.0
 
 

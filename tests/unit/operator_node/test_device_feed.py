@@ -14,7 +14,7 @@ from custom_ros_tools.errors import ConfigError, MissingDependency, UnknownNameE
 from custom_ros_tools.schema import ConfigModel
 from operator_node.device import Device, DeviceClosedError, DeviceError, Reading
 from operator_node.device_feed import AT_REST, DeviceFeed, FeedConfig, problem_of
-from operator_node.lookup import make_device
+from operator_node.devices import DEVICES
 
 STEP_S = 0.001
 
@@ -87,8 +87,8 @@ def test_what_changes_is_handed_on_and_what_does_not_is_not():
         (at(1.0001), "axis 'x' is outside [-1, 1]"),
         (at(0, -300), "axis 'y' is outside [-1, 1]"),
         (at(0, 0, 2), "button 'a' is neither 0 nor 1"),
-        (Reading((0.0,), (0,)), "a reading of another number of axes than the 2 of the device"),
-        (Reading((0.0, 0.0), ()), "a reading of another number of buttons than the 1 of the device"),
+        (Reading((0.0,), (0,)), "a reading whose number of axes differs from the 2 of the device"),
+        (Reading((0.0, 0.0), ()), "a reading whose number of buttons differs from the 1 of the device"),
     ],
 )
 def test_a_reading_that_makes_no_sense_is_counted_and_the_last_good_one_counts_on(bad, reason, caplog):
@@ -154,7 +154,7 @@ def test_whatever_it_raises_it_comes_to_rest_and_is_opened_again(failure, caplog
             feed.step(0.05)
             if published[-1] == at(0.2):
                 break
-    assert len([line for line in caplog.messages if "it is there now" in line]) == 1
+    assert len([line for line in caplog.messages if "it is available now" in line]) == 1
 
 
 def test_a_device_that_is_not_there_is_warned_of_once(caplog):
@@ -169,7 +169,7 @@ def test_a_device_that_is_not_there_is_warned_of_once(caplog):
         device.absent = None
         feed._open_at_s = -math.inf
         feed.step(0.0)
-    assert caplog.messages[1:] == ["tape: it is there now"] and published == [at(0)]
+    assert caplog.messages[1:] == ["tape: it is available now"] and published == [at(0)]
 
 
 def test_a_missing_library_is_an_error():
@@ -226,8 +226,8 @@ def test_no_reading_that_makes_sense_has_a_problem():
 
 def test_names_of_devices():
     with pytest.raises(UnknownNameError, match="unknown device 'joystik'.*joystick"):
-        make_device("joystik", {})
+        DEVICES.make("joystik", {})
     with pytest.raises(ConfigError, match="nowhere"):
-        make_device("nowhere.at_all:Device", {})
+        DEVICES.make("nowhere.at_all:Device", {})
     with pytest.raises(ConfigError, match="deadzone.*got 2"):
-        make_device("joystick", {"deadzone": 2.0}, "pad.yaml")
+        DEVICES.make("joystick", {"deadzone": 2.0}, "pad.yaml")

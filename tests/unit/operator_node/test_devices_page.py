@@ -9,12 +9,11 @@ import pytest
 from custom_ros_tools.schema.json_schema import yaml_text
 from operator_node.device_feed import FeedConfig
 from operator_node.devices import DEVICES
-from operator_node.lookup import device_class
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 PAGES = {"mvn": "mvn.md"}
 """Of devices that have a page of their own."""
-MODELS = {"feed": FeedConfig, **{name: device_class(name).Config for name in DEVICES}}
+MODELS = {"feed": FeedConfig, **{name: DEVICES.find(name).Config for name in DEVICES}}
 
 
 @pytest.mark.parametrize("model", MODELS)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from operator_node.avatar.engagement import LONGEST_STEP_S, Engagement
+from operator_node.avatar.engagement import MAX_STEP_S, Engagement
 from operator_node.avatar.joints import LOWER, UPPER
 from operator_node.avatar.retargeting import AvatarPose
 
@@ -33,7 +33,7 @@ def test_no_step_is_larger_than_speed_times_time_at_start_and_reconnect():
         for _ in range(4):  # after each pause the person is elsewhere
             target, dt = random_pose(random), random.choice((1e-3, 1 / 60, 5.0))
             now = engagement.step(target, dt)
-            time_s = min(dt, LONGEST_STEP_S)
+            time_s = min(dt, MAX_STEP_S)
             assert np.abs(now.hinges - before.hinges).max() <= JOINT_SPEED * time_s + ROUNDING
             assert np.linalg.norm(now.position - before.position) <= SPEED * time_s + ROUNDING
             assert angle(before, now) <= ANGULAR_SPEED * time_s + 1e-6

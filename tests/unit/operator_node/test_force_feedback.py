@@ -116,7 +116,7 @@ def test_the_clutch_moves_the_tool_only_while_its_button_is_held():
 def test_coupling_pulls_towards_a_tool_that_stays_behind():
     rig = Rig(mode="coupling", stiffness=200.0, damping=1.0)
     for _ in range(600):
-        rig.controller.take_tool((0.0, 0.0, max(rig.hand.position[2], -0.005)), rig.now_s + DT_S)
+        rig.controller.observe_tool((0.0, 0.0, max(rig.hand.position[2], -0.005)), rig.now_s + DT_S)
         rig.tick((0.0, 0.0, -0.03))
     depth_m = -0.005 - rig.hand.position[2]
     assert depth_m > 0.005

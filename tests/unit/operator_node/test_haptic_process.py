@@ -14,15 +14,15 @@ import pytest
 from ros_system import SUPPORT, is_running, support_on_path, wait_until
 from writing_hand import forces_in, setup_of
 
+from operator_node.haptics.link import Link
+from operator_node.haptics.messages import LoopReport
 from operator_node.haptics.process import client as client_module
 from operator_node.haptics.process.client import LoopClient
-from operator_node.haptics.process.link import Link
-from operator_node.haptics.process.messages import Report
 
 SILENCE_S = 0.02
 
 
-def way(report: Report) -> float:
+def way(report: LoopReport) -> float:
     """Returns how far the target has gone [m], along x."""
     return report.snapshot.way[0] if report.snapshot else math.nan
 
@@ -30,7 +30,7 @@ def way(report: Report) -> float:
 def test_no_force_20_ms_after_the_node_is_stopped_or_killed(tmp_path):
     """By the times of the ticks themselves, so that the load of the machine does not matter."""
     file = tmp_path / "forces"
-    command = [sys.executable, str(SUPPORT / "writing_hand.py"), str(file)]
+    command = [sys.executable, str(SUPPORT / "plugins/writing_hand.py"), str(file)]
     node = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, **support_on_path()})
     loop = int(node.stdout.readline())
     try:
@@ -54,7 +54,7 @@ def test_no_force_20_ms_after_the_node_is_stopped_or_killed(tmp_path):
 
 
 def test_a_loop_that_dies_is_told_of_and_comes_back_without_a_jump(tmp_path):
-    reports: list[Report] = []
+    reports: list[LoopReport] = []
     client = LoopClient(setup_of(tmp_path / "forces"), reports.append)
     try:
         client.start()
@@ -83,7 +83,7 @@ def test_a_loop_that_dies_is_told_of_and_comes_back_without_a_jump(tmp_path):
 
 
 def test_a_loop_that_dies_again_and_again_is_given_up(tmp_path, monkeypatch):
-    monkeypatch.setattr(client_module, "MOST_FAILURES", 1)
+    monkeypatch.setattr(client_module, "MAX_FAILURES", 1)
     client = LoopClient(setup_of(tmp_path / "forces"), lambda report: None)
     os.kill(client.process_id, signal.SIGKILL)
     assert client.ended.wait(60.0)

@@ -6,9 +6,9 @@ import pytest
 
 from operator_node.conformance import DeviceConformance, Reader
 from operator_node.device import DeviceError
+from operator_node.devices import DEVICES
 from operator_node.devices.joystick import axis_of
-from operator_node.emulators.joystick import VirtualJoystick
-from operator_node.lookup import make_device
+from operator_node.devices.virtual_joystick import VirtualJoystick
 
 AXES = 6
 REST = (0.0,) * 4 + (1.0,) * 2 + (0.0,) * 2
@@ -22,7 +22,7 @@ def gamepad():
 
 
 def opened(**options) -> Reader:
-    reader = Reader("joystick", make_device("joystick", options))
+    reader = Reader("joystick", DEVICES.make("joystick", options))
     reader.until(lambda: bool(reader.feed.free_axes), "it is open and has said where it is")
     return reader
 
@@ -108,7 +108,7 @@ def test_the_shortest_tap_is_two_messages(gamepad):
 
 
 def test_a_force_is_felt_as_rumbling(gamepad):
-    device = make_device("joystick", {})
+    device = DEVICES.make("joystick", {})
     device.open()
     device.cue((0.3, 0.0, -0.4))
     assert gamepad.felt == pytest.approx((0.5, 0.5), abs=1e-3)
@@ -129,10 +129,10 @@ def test_joysticks_are_told_apart_by_number_and_name(gamepad):
     reader.feed.close()
     for options, named in (
         ({"dev_name": "wheel"}, "'wheel'.*virtual gamepad, flight stick"),
-        ({"dev": "js2"}, "no number 2"),
+        ({"dev": "js2"}, "no joystick number 2"),
     ):
         with pytest.raises(DeviceError, match=named):
-            make_device("joystick", options).open()
+            DEVICES.make("joystick", options).open()
     other.unplug()
 
 

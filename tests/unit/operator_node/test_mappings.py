@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from custom_ros_tools.errors import ConfigError, UnknownNameError
-from operator_node.lookup import make_mapping
 from operator_node.mappings import MAPPINGS
 from operator_node.mappings.mapping import Mapping
 
 
 def made(name: str, **options) -> Mapping:
-    return make_mapping(name, options)
+    return MAPPINGS.make(name, options, "~config")
 
 
 def random_axes(generator: random.Random, count: int = 4) -> list[float]:
@@ -104,4 +103,4 @@ def test_bad_scale_is_refused_with_key_expected_and_got(name, scale, told):
 
 def test_unknown_mapping_is_told_with_the_known_ones():
     with pytest.raises(UnknownNameError, match="did you mean 'isometric'"):
-        make_mapping("isometrik", {"axes_idx": [0]})
+        MAPPINGS.make("isometrik", {"axes_idx": [0]})

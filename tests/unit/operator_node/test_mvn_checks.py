@@ -90,9 +90,9 @@ def named(fault, seed: int) -> set[str]:
         positions, quats = sender.pose(time_s)
         if number == HALF:
             first = positions, quats
-        frame = decoder.take(*sender.frame(number, time_s, *fault(positions, quats, number, first)))
+        frame = decoder.decode(*sender.frame(number, time_s, *fault(positions, quats, number, first)))
         if isinstance(frame, SegmentFrame):
-            said |= {message for _, message in checks.take(frame, number / HZ)}
+            said |= {message for _, message in checks.check(frame, number / HZ)}
         said |= {*decoder.remarks.values(), *decoder.refusals.values()}
     return said
 
@@ -112,11 +112,11 @@ def test_of_a_healthy_stream_nothing_is_said(seed):
 def test_time_that_goes_back_is_named():
     sender, decoder, checks = suit(), StreamDecoder(), FrameChecks()
     for sample, time_s in ((1, 2.0), (2, 1.0)):
-        findings = checks.take(decoder.take(*sender.datagrams(sample, time_s)), 0.01 * sample)
+        findings = checks.check(decoder.decode(*sender.datagrams(sample, time_s)), 0.01 * sample)
     assert ("time", "went back by 1 s, from 2000 ms") in findings
 
 
 def test_what_was_lost_between_two_frames_makes_no_jump():
     sender, decoder, checks = suit(), StreamDecoder(), FrameChecks()
     for sample in (60, 120):
-        assert checks.take(decoder.take(*sender.datagrams(sample, sample / HZ)), sample / HZ) == []
+        assert checks.check(decoder.decode(*sender.datagrams(sample, sample / HZ)), sample / HZ) == []

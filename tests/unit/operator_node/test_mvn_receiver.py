@@ -17,7 +17,7 @@ from operator_node.mvn.calibration import Calibration
 from operator_node.mvn.hands import AXES, HandAxes
 from operator_node.mvn.player import timed_datagrams
 from operator_node.mvn.receiver import MvnConfig, Silence
-from operator_node.mvn.recording import MAGIC, Recording, read_recording
+from operator_node.mvn.recording import MAGIC, DatagramRecording, read_recording
 from operator_node.mvn.segments import SegmentFrame
 from operator_node.mvn.sender import send
 from operator_node.mvn.skeleton import INDEX, about_z, multiply
@@ -200,7 +200,7 @@ class TestRecording:
     @pytest.fixture
     def path(self, tmp_path):
         path = tmp_path / "new" / "some.mvn"
-        recording = Recording(path)
+        recording = DatagramRecording(path)
         for now_s, data in self.DATA:
             recording.write(now_s, data)
         recording.close()
@@ -235,7 +235,7 @@ class TestRecording:
 
     def test_overwrites_nothing(self, path):
         with pytest.raises(InterfaceError, match="cannot be written: File exists"):
-            Recording(path)
+            DatagramRecording(path)
 
     def test_is_played_faster_and_again(self, path):
         played = timed_datagrams(path, speed=2.0, loop=True)
@@ -243,8 +243,8 @@ class TestRecording:
         assert times == pytest.approx([0.0, 0.125, 0.5, 0.52, 0.645])
 
     def test_of_nothing_is_not_played_for_ever(self, tmp_path):
-        Recording(tmp_path / "empty.mvn").close()
-        with pytest.raises(InterfaceError, match="there is nothing in it"):
+        DatagramRecording(tmp_path / "empty.mvn").close()
+        with pytest.raises(InterfaceError, match="the recording is empty"):
             next(timed_datagrams(tmp_path / "empty.mvn", loop=True))
 
     def test_ends_with_the_device(self, mvn, sender, tmp_path):

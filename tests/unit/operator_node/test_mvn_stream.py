@@ -16,13 +16,13 @@ from operator_node.mvn.segments import (
     SEGMENTS,
     CenterOfMass,
     JointAngles,
-    Motion,
     PersonInfo,
     SegmentFrame,
+    SegmentMotion,
     TimeCode,
     TPose,
 )
-from operator_node.mvn.stream import LONG_GONE, MOST_LATE, StreamDecoder
+from operator_node.mvn.stream import LONG_GONE, MAX_LATE, StreamDecoder
 
 FUZZED = 100_000
 """How many broken datagrams are tried."""
@@ -49,7 +49,7 @@ def by_hand(*, kind=b"02", sample=7, counter=0x80, count=23, time_ms=1234, perso
 def test_a_datagram_written_by_hand_has_760_bytes_and_becomes_a_frame():
     data = by_hand()
     assert len(data) == 760
-    frame = StreamDecoder().take(data)
+    frame = StreamDecoder().decode(data)
     assert frame[:3] == (3, 7, 1234)
     np.testing.assert_array_equal(frame.positions, [[1.0, 0.5, 0.0]] * 23)
     np.testing.assert_array_equal(frame.quats_xyzw, [[0.0, 0.0, 0.0, 1.0]] * 23)
@@ -63,7 +63,7 @@ def test_the_suit_writes_what_is_written_by_hand():
 def test_older_streams_have_no_counts_and_no_sizes():
     data = bytearray(by_hand(size=0))
     data[17] = 0
-    assert isinstance(StreamDecoder().take(bytes(data)), SegmentFrame)
+    assert isinstance(StreamDecoder().decode(bytes(data)), SegmentFrame)
 
 
 @pytest.mark.parametrize("kind", [1, 2])
@@ -74,19 +74,19 @@ def test_poses_are_those_of_the_person_however_they_are_cut(kind, items):
         datagrams = sender.datagrams(sample, sample / HZ)
         assert len(datagrams) == {255: 1, 8: 3, 1: 23}[items]
         random.Random(sample).shuffle(datagrams)
-        (frame,) = [each for each in map(decoder.take, datagrams) if each is not None]
+        (frame,) = [each for each in map(decoder.decode, datagrams) if each is not None]
         assert_same(frame, truth(sample), 3e-6)
 
 
 def test_positions_are_scaled_and_y_up_is_turned():
     expected = truth(30)
     y_up = suit().frame(30, 0.5, 100.0 * expected.positions[:, [1, 2, 0]], expected.quats_xyzw[:, [1, 2, 0, 3]])
-    assert_same(StreamDecoder(position_scale=0.01, y_up=True).take(*y_up), expected)
+    assert_same(StreamDecoder(position_scale=0.01, y_up=True).decode(*y_up), expected)
 
 
 def test_quaternions_of_another_length_are_normalised_and_named():
     decoder, expected = StreamDecoder(), truth(30)
-    assert_same(decoder.take(*suit().frame(30, 0.5, expected.positions, 57.3 * expected.quats_xyzw)), expected)
+    assert_same(decoder.decode(*suit().frame(30, 0.5, expected.positions, 57.3 * expected.quats_xyzw)), expected)
     assert "length 57.3" in decoder.remarks["quaternions"]
 
 
@@ -94,12 +94,14 @@ def test_props_and_fingers_after_the_body_are_left_out():
     items = [struct.pack(">i7f", number, *[number / 10] * 3, 1, 0, 0, 0) for number in range(1, 24 + 4 + 40)]
     data = bytearray(by_hand(count=67, size=67 * 32, items=items))
     data[18:20] = 4, 40
-    np.testing.assert_allclose(StreamDecoder().take(bytes(data)).positions[:, 0], np.arange(1, 24) / 10, rtol=1e-6)
+    np.testing.assert_allclose(StreamDecoder().decode(bytes(data)).positions[:, 0], np.arange(1, 24) / 10, rtol=1e-6)
 
 
 def test_everything_else_that_mvn_streams():
     decoder = StreamDecoder()
-    found = [decoder.take(data) for data in suit(moves=T_POSE, kinds=(12, 13, 20, 21, 22, 24, 25)).datagrams(60, 62.5)]
+    found = [
+        decoder.decode(data) for data in suit(moves=T_POSE, kinds=(12, 13, 20, 21, 22, 24, 25)).datagrams(60, 62.5)
+    ]
     info, t_pose, angles, motion, turning, center, time = found
     assert info == PersonInfo(0, {"name": "Person0", "xmid": "emulator", "color": "3070B0"})
     assert isinstance(t_pose, TPose) and tuple(t_pose.origins) == SEGMENTS
@@ -107,7 +109,7 @@ def test_everything_else_that_mvn_streams():
     assert isinstance(angles, JointAngles) and angles.angles_rad.shape == (22, 3)
     assert ("RightUpperArm", "RightForeArm") in zip(angles.parents, angles.children)
     np.testing.assert_allclose(angles.angles_rad, 0.0, atol=1e-6)
-    assert isinstance(motion, Motion) and motion.values.shape == (23, 9) and motion.ids == tuple(range(1, 24))
+    assert isinstance(motion, SegmentMotion) and motion.values.shape == (23, 9) and motion.ids == tuple(range(1, 24))
     np.testing.assert_allclose(motion.values[:, 3:], 0.0, atol=1e-6)
     assert turning.kind == 22 and turning.values.shape == (23, 10)
     assert isinstance(center, CenterOfMass) and 0.9 < center.position[2] < 1.1
@@ -118,7 +120,7 @@ def test_everything_else_that_mvn_streams():
 def test_bent_joints_have_the_angles_by_which_they_are_bent():
     """In the middle of a reach, by the angle between upper arm and forearm."""
     moves, sample = WALKER, round((1.5 + 1.25) * HZ)
-    angles = StreamDecoder().take(*suit(moves=moves, kinds=(20,)).datagrams(sample, sample / HZ))
+    angles = StreamDecoder().decode(*suit(moves=moves, kinds=(20,)).datagrams(sample, sample / HZ))
     at = list(zip(angles.parents, angles.children)).index(("RightUpperArm", "RightForeArm"))
     p = truth(sample, moves=moves).positions
     upper, fore = p[9] - p[8], p[10] - p[9]
@@ -129,7 +131,7 @@ def test_bent_joints_have_the_angles_by_which_they_are_bent():
 def test_poses_of_type_02_win_over_those_of_type_01():
     decoder, sender = StreamDecoder(), suit(kinds=(2, 1))
     for sample in range(5):
-        assert [bool(decoder.take(data)) for data in sender.datagrams(sample, sample / HZ)] == [True, False]
+        assert [bool(decoder.decode(data)) for data in sender.datagrams(sample, sample / HZ)] == [True, False]
     assert decoder.counts["ignored"] == 5
 
 
@@ -138,7 +140,7 @@ def test_several_people_are_kept_apart():
     for sample in range(10):
         datagrams = [data for each in suits for data in each.datagrams(sample, sample / HZ)]
         random.Random(sample).shuffle(datagrams)
-        frames = [frame for frame in map(decoder.take, datagrams) if frame is not None]
+        frames = [frame for frame in map(decoder.decode, datagrams) if frame is not None]
         assert sorted(frame.person for frame in frames) == [0, 1, 2]
         for frame in frames:
             assert_same(frame, truth(sample, frame.person))
@@ -152,14 +154,14 @@ class TestBadNetwork:
         items, seed = request.param
         network, sender = BadNetwork(0.01, 0.01, 0.01, 0.01, seed=seed), suit(items=items)
         samples = 1200
-        sent = [each for n in range(samples) for each in network.take(sender.datagrams(n, n / HZ))]
+        sent = [each for n in range(samples) for each in network.transmit(sender.datagrams(n, n / HZ))]
         assert min(network.done[what] for what in ("lost", "duplicate", "truncated", "reordered")) > 0
         return network, samples, sent, 1 if items == 255 else 3
 
     def test_no_frame_is_wrong_and_all_is_counted(self, arrived):
         network, samples, sent, parts = arrived
         decoder = StreamDecoder()
-        frames = [frame for each in sent if (frame := decoder.take(each.data)) is not None]
+        frames = [frame for each in sent if (frame := decoder.decode(each.data)) is not None]
         for frame in frames:
             assert_same(frame, truth(frame.sample))
 
@@ -192,28 +194,28 @@ class TestBadNetwork:
 def test_a_stream_that_begins_anew_is_followed():
     decoder, sender = StreamDecoder(), suit()
     for sample in (5000, 5001, 0, 1, 2):
-        assert decoder.take(*sender.datagrams(sample, sample / HZ)).sample == sample
+        assert decoder.decode(*sender.datagrams(sample, sample / HZ)).sample == sample
     assert decoder.counts["late"] == 0
 
 
 def test_a_short_recording_that_is_played_again_and_again_is_followed():
     decoder, sender = StreamDecoder(), suit()
-    taken = [decoder.take(*sender.datagrams(n % 60, n / HZ)) is not None for n in range(180)]
-    assert sum(taken) == 180 - 2 * MOST_LATE
+    taken = [decoder.decode(*sender.datagrams(n % 60, n / HZ)) is not None for n in range(180)]
+    assert sum(taken) == 180 - 2 * MAX_LATE
 
 
 def test_the_counter_may_turn_over():
     decoder, sender = StreamDecoder(), suit()
     for sample in (2**32 - 2, 2**32 - 1, 0, 1):
-        assert decoder.take(*sender.datagrams(sample, 1.0)).sample == sample
+        assert decoder.decode(*sender.datagrams(sample, 1.0)).sample == sample
     assert decoder.counts["skipped"] == decoder.counts["late"] == 0
 
 
 def test_a_datagram_from_far_ahead_does_not_lock_the_stream_out():
     decoder, sender = StreamDecoder(), suit()
-    assert decoder.take(*sender.datagrams(10, 0.1))
-    assert decoder.take(*sender.datagrams(2**31, 0.1))
-    assert decoder.take(*sender.datagrams(11, 0.1))
+    assert decoder.decode(*sender.datagrams(10, 0.1))
+    assert decoder.decode(*sender.datagrams(2**31, 0.1))
+    assert decoder.decode(*sender.datagrams(11, 0.1))
 
 
 BROKEN = {
@@ -234,23 +236,23 @@ BROKEN = {
 @pytest.mark.parametrize("reason", BROKEN)
 def test_what_cannot_be_used_is_refused_with_its_reason(reason):
     decoder = StreamDecoder()
-    assert decoder.take(BROKEN[reason]) is None
+    assert decoder.decode(BROKEN[reason]) is None
     assert decoder.counts[f"refused: {reason}"] == 1
     assert packets.REASONS[reason] in decoder.refusals[reason] and [*decoder.refused] == [reason]
-    assert isinstance(decoder.take(by_hand(sample=8)), SegmentFrame)
+    assert isinstance(decoder.decode(by_hand(sample=8)), SegmentFrame)
 
 
 def test_more_people_than_allowed_are_refused():
     decoder = StreamDecoder(max_people=2)
-    assert [bool(decoder.take(by_hand(person=person))) for person in (4, 9, 5, 4)] == [True, True, False, False]
+    assert [bool(decoder.decode(by_hand(person=person))) for person in (4, 9, 5, 4)] == [True, True, False, False]
     assert decoder.counts["refused: too many people"] == 1 and decoder.counts["duplicate"] == 1
 
 
 def test_people_who_were_made_up_do_not_keep_out_those_who_come_for_long():
     decoder = StreamDecoder(max_people=2)
     for person in (7, 8):
-        decoder.take(*suit(person, kinds=(12,)).datagrams(0, 0.0))
-    taken = [decoder.take(by_hand(sample=sample)) is not None for sample in range(2 * LONG_GONE)]
+        decoder.decode(*suit(person, kinds=(12,)).datagrams(0, 0.0))
+    taken = [decoder.decode(by_hand(sample=sample)) is not None for sample in range(2 * LONG_GONE)]
     assert taken == [False] * (LONG_GONE - 2) + [True] * (LONG_GONE + 2)
 
 
@@ -261,7 +263,7 @@ def test_broken_datagrams_raise_nothing_and_let_nothing_through_that_is_not_fini
     good = [data for n in (0, 60) for data in suit(kinds=KINDS, items=9).datagrams(n, n / HZ)]
     decoder, messages = StreamDecoder(max_people=4), 0
     for number in range(FUZZED):
-        message = decoder.take(broken_datagram(generator, bytearray(generator.choice(good))))
+        message = decoder.decode(broken_datagram(generator, bytearray(generator.choice(good))))
         messages += message is not None
         for part in message or ():
             assert not isinstance(part, np.ndarray) or np.isfinite(part).all(), (number, message)

@@ -17,10 +17,9 @@ from tries import tries
 from operator_node import conformance
 from operator_node.conformance import PATIENCE_S, DeviceConformance, Reader
 from operator_node.device import DeviceError
-from operator_node.devices import spacenav
+from operator_node.devices import DEVICES, spacenav
 from operator_node.devices.spacenav import Spacenav, SpacenavConfig, socket_path
 from operator_node.emulators.spacenavd import NAME, SpacenavDaemon
-from operator_node.lookup import make_device
 
 FULL = 512
 LIBSPNAV = "libspnav.so.0"
@@ -74,7 +73,7 @@ class Reversed(TestSpacenav):
 
 
 class Chattering(TestSpacenav):
-    """A device that goes on saying that it is at rest."""
+    """A device that keeps reporting that it is at rest."""
 
     def make(self):
         device = super().make()
@@ -85,8 +84,8 @@ class Chattering(TestSpacenav):
 @pytest.mark.parametrize(
     "suite, test, arguments, complaint",
     [
-        (Reversed(), "test_each_axis_goes_both_ways_and_back", (1.0,), "that axis 'x' is at 1"),
-        (Chattering(), "test_at_rest_it_has_nothing_to_say", (), "goes on saying something"),
+        (Reversed(), "test_each_axis_goes_both_ways_and_back", (1.0,), "until axis 'x' is at 1"),
+        (Chattering(), "test_at_rest_it_has_nothing_to_say", (), "it keeps reporting readings at rest"),
     ],
 )
 def test_the_suite_notices_what_is_wrong(suite, test, arguments, complaint, tmp_path, monkeypatch):
@@ -110,7 +109,7 @@ def daemon(tmp_path):
 
 
 def opened(daemon: SpacenavDaemon, **options) -> Reader:
-    reader = Reader("spacenav", make_device("spacenav", {"socket": str(daemon.path), **options}))
+    reader = Reader("spacenav", DEVICES.make("spacenav", {"socket": str(daemon.path), **options}))
     reader.until(lambda: bool(reader.readings), "it is open")
     return reader
 
@@ -221,6 +220,14 @@ def hostile_bytes(generator: random.Random) -> bytes:
     return bytes(packets[: len(packets) - generator.choice((0, 0, 0, 5))])
 
 
+REFUSALS = {
+    "a motion beyond 32767",
+    "a button outside 0 to 63",
+    "a packet of an unknown type",
+    "a motion beyond full_scale, which is cut off there",
+}
+
+
 def test_whatever_is_sent_readings_make_sense_and_refusals_have_reasons(tmp_path):
     """From the first word on; `SPACENAV_FUZZ` is how many connections to try."""
     generator = random.Random(3)
@@ -231,7 +238,7 @@ def test_whatever_is_sent_readings_make_sense_and_refusals_have_reasons(tmp_path
     listener.settimeout(PATIENCE_S)
 
     def serve() -> None:
-        for _ in range(connections):
+        while len(done) < connections or (len(reader.feed.refused) < len(REFUSALS) and len(done) < 10 * connections):
             client, _ = listener.accept()
             client.settimeout(PATIENCE_S)
             with client, contextlib.suppress(OSError):  # the client has seen enough, or waited for too long
@@ -242,23 +249,18 @@ def test_whatever_is_sent_readings_make_sense_and_refusals_have_reasons(tmp_path
             done.append(1)
 
     connections, done = int(os.environ.get("SPACENAV_FUZZ", 300)), []
+    reader = Reader("spacenav", DEVICES.make("spacenav", {"socket": path, "full_scale": 1.0}))
     server = threading.Thread(target=serve, daemon=True)
     server.start()
-    reader = Reader("spacenav", make_device("spacenav", {"socket": path, "full_scale": 1.0}))
     while server.is_alive():
         reader.feed._open_at_s = -math.inf  # without the second between two tries
         reader.feed.step(0.01)  # in which the reader checks every reading
     reader.feed.close()
     listener.close()
-    assert len(done) == connections
+    assert len(done) >= connections
     assert reader.is_at_rest
-    assert reader.feed.refused.keys() <= {
-        "a motion beyond 32767",
-        "a button outside 0 to 63",
-        "a packet of an unknown type",
-        "a motion beyond full_scale, which is cut off there",
-    }
-    assert len(reader.feed.refused) == 4 and any(any(reading.axes) for reading in reader.readings)
+    assert reader.feed.refused.keys() == REFUSALS  # how early each comes depends on how fast they are read
+    assert any(any(reading.axes) for reading in reader.readings)
 
 
 def test_socket_is_found_as_libspnav_finds_it(monkeypatch, tmp_path):

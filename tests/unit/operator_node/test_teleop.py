@@ -139,7 +139,7 @@ def test_angles_stay_within_a_turn():
         ({"zlim": [math.nan, 0.5]}, "zlim: expected the least"),
         ({"zlim": [0.5]}, "zlim: expected a list of 2 numbers [m], got 1"),
         ({"hz": 0}, "hz: must be > 0 [Hz], got 0"),
-        ({"parent_frame_id": "target"}, "target_frame_id: must be another one than parent_frame_id, 'target'"),
+        ({"parent_frame_id": "target"}, "target_frame_id: must differ from parent_frame_id, 'target'"),
         ({"max_speed": math.inf}, "max_speed: must be a finite number"),
         ({"target_frame": "target"}, "unknown key 'target_frame'; did you mean 'target_frame_id'?"),
     ],

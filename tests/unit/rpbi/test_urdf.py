@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from custom_ros_tools.errors import ConfigError
+from robot_model.urdf.document import UrdfDocument
+from robot_model.urdf.elements import text_of
 from rpbi.urdf.copies import description_for_ros, files_of, for_pybullet
-from rpbi.urdf.document import UrdfDocument
-from rpbi.urdf.elements import text_of
 
 
 def urdf(folder: Path, inner: str) -> str:

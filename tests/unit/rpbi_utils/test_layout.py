@@ -6,8 +6,8 @@ import struct
 
 import pytest
 
-from rpbi_utils.layout import BYTES, MAX_ARRAY_COLUMNS, Leaf, lay_out
-from rpbi_utils.message_type import MessageType
+from rpbi_utils.bags.layout import BYTES, MAX_ARRAY_COLUMNS, Leaf, lay_out
+from rpbi_utils.bags.message_type import MessageType
 
 MIXED = MessageType.parse("a_msgs/Mixed", "uint8 a\nstring text\nint16[2] pair\nfloat64[] values\ntime stamp\n")
 

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from rpbi_utils import limits
-from rpbi_utils.errors import BagError
-from rpbi_utils.layout import lay_out
-from rpbi_utils.limits import Budget, LimitError
-from rpbi_utils.message_type import MessageType
-from rpbi_utils.row_plan import plan_rows
-from rpbi_utils.tables import TableBuilder, file_stems
+from rpbi_utils.bags import limits
+from rpbi_utils.bags.errors import BagError
+from rpbi_utils.bags.layout import lay_out
+from rpbi_utils.bags.limits import Budget, LimitError
+from rpbi_utils.bags.message_type import MessageType
+from rpbi_utils.bags.row_plan import plan_rows
+from rpbi_utils.bags.tables import TableBuilder, file_stems
 
 LINE = "=" * 80
 
@@ -63,7 +63,7 @@ def test_arrays_of_nothing_take_no_time(length: str) -> None:
 
 
 def test_a_message_has_at_most_so_many_values_and_a_path_so_many_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rpbi_utils.layout.MAX_VALUES", 4)
+    monkeypatch.setattr("rpbi_utils.bags.layout.MAX_VALUES", 4)
     assert len(lay_out(_types("uint8[4] x"), bytes(4)).leaves) == 4
     with pytest.raises(LimitError, match="expected at most 4 values in a message, got more"):
         lay_out(_types("uint8[5] x"), bytes(5))
@@ -88,7 +88,7 @@ def test_the_name_of_a_column_has_at_most_1000_bytes(joint_state_type: MessageTy
 def test_a_table_has_at_most_so_many_columns(
     joint_state_type: MessageType, pack_joint_state: Pack, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rpbi_utils.tables.MAX_COLUMNS", 10)
+    monkeypatch.setattr("rpbi_utils.bags.tables.MAX_COLUMNS", 10)
     builder = TableBuilder("/states")
     for index in range(11):
         builder.add(joint_state_type, pack_joint_state(1, [f"j{index}"], [1.0]), 1.0)
@@ -125,7 +125,7 @@ def test_long_joint_states_are_kept(joint_state_type: MessageType, pack_joint_st
 
 def test_columns_come_as_fields_appear_and_pieces_are_merged(monkeypatch: pytest.MonkeyPatch) -> None:
     text = MessageType.parse("a_msgs/A", "string a\nuint8 b\nbool c")
-    monkeypatch.setattr("rpbi_utils.tables.MOST_PIECES", 7)
+    monkeypatch.setattr("rpbi_utils.bags.tables.MAX_PIECES", 7)
     builder = TableBuilder("/a")
     for index in range(50):
         builder.add(text, struct.pack("<I", index) + b"x" * index + bytes([index, index % 2]), float(index))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 
-from rpbi_utils.layout import MAX_ARRAY_COLUMNS
-from rpbi_utils.message_type import MessageType
-from rpbi_utils.row_plan import plan_rows
+from rpbi_utils.bags.layout import MAX_ARRAY_COLUMNS
+from rpbi_utils.bags.message_type import MessageType
+from rpbi_utils.bags.row_plan import plan_rows
 
 Pack = Callable[..., bytes]
 

@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rpbi_utils import tables
-from rpbi_utils.message_type import MessageType
-from rpbi_utils.tables import TableBuilder
+from rpbi_utils.bags import tables
+from rpbi_utils.bags.message_type import MessageType
+from rpbi_utils.bags.tables import TableBuilder
 
 Pack = Callable[..., bytes]
 NUMBER = MessageType.parse("std_msgs/Float64", "float64 data")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pandas as pd
 import pytest
 
-from rpbi_utils.tables import file_stems, write_table
+from rpbi_utils.bags.tables import file_stems, write_table
 
 
 def test_file_names_are_readable_unique_and_stay_in_the_folder() -> None:
@@ -76,3 +77,23 @@ def test_an_empty_table_can_be_written(tmp_path: Path, name: str) -> None:
     empty = pd.DataFrame({"record_time": np.empty(0)}, index=pd.Index(np.empty(0), name="time"))
     write_table(empty, tmp_path / name)
     assert (tmp_path / name).stat().st_size > 0
+
+
+def test_hdf5_gives_back_what_went_in(table: pd.DataFrame, tmp_path: Path) -> None:
+    table["data"] = [b"\0\xff", b""]
+    write_table(table, tmp_path / "t.hdf5")
+    with h5py.File(tmp_path / "t.hdf5") as file:
+        np.testing.assert_array_equal(file["time"][:], table.index)
+        for name in ("record_time", "position/arm.joint 1", "header/seq"):
+            np.testing.assert_array_equal(file[name][:], table[name])
+            assert file[name].dtype == table[name].dtype
+        assert list(file["text"].asstr()) == ["ä", ""]
+        assert list(file["mixed"].asstr()) == ["1.5", "x"]
+        np.testing.assert_array_equal(file["flag"][:], [1.0, np.nan])
+        assert [each.tobytes() for each in file["data"][:]] == [b"\0\xff", b""]
+
+
+def test_an_hdf5_file_with_a_name_inside_another_is_refused(tmp_path: Path) -> None:
+    table = pd.DataFrame({"data": [1.0], "data/0": [2.0]}, index=pd.Index([0.0], name="time"))
+    with pytest.raises(ValueError, match="'data/0' cannot be a data set of an HDF5 file"):
+        write_table(table, tmp_path / "t.hdf5")

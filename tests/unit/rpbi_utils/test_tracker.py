@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.geometry import Pose, rotation_between
+from robot_model.geometry import Pose, rotation_between
 from rpbi_utils.tracking.config import AprilTagNodeConfig, TrackingNodeConfig
 from rpbi_utils.tracking.one_euro import OneEuroPose, SmoothingConfig
 from rpbi_utils.tracking.tracker import OutlierConfig, OutlierError, PoseTracker
@@ -68,34 +68,34 @@ def test_signs_of_quaternions_do_not_matter() -> None:
 
 def test_an_outlier_is_left_out_and_named() -> None:
     one = tracker()
-    assert one.take(at(0.0), 0.0) == at(0.0)
+    assert one.observe(at(0.0), 0.0) == at(0.0)
     with pytest.raises(OutlierError, match="^outlier: 0.5 m in 0.01 s is more than max_speed 5 m/s allows$"):
-        one.take(at(0.5), 0.01)
+        one.observe(at(0.5), 0.01)
     with pytest.raises(OutlierError, match="^outlier: 3 rad in 0.02 s is more than max_angular_speed 20 rad/s allows$"):
-        one.take(at(0.0, 3.0), 0.02)
-    assert one.take(at(0.01), 0.03) == at(0.01)
+        one.observe(at(0.0, 3.0), 0.02)
+    assert one.observe(at(0.01), 0.03) == at(0.01)
 
 
 def test_where_it_stays_is_where_it_is() -> None:
     one = tracker(in_a_row=3)
-    one.take(at(0.0), 0.0)
+    one.observe(at(0.0), 0.0)
     for stamp_s, x in ((0.01, 1.0), (0.02, 2.0), (0.03, 2.01)):  # the first does not agree with those after it
         with pytest.raises(OutlierError):
-            one.take(at(x), stamp_s)
-    assert one.take(at(2.02), 0.04) == at(2.02)
-    assert tracker(in_a_row=1).take(at(0.0), 0.0) == at(0.0)
+            one.observe(at(x), stamp_s)
+    assert one.observe(at(2.02), 0.04) == at(2.02)
+    assert tracker(in_a_row=1).observe(at(0.0), 0.0) == at(0.0)
     free = tracker(in_a_row=1)
-    free.take(at(0.0), 0.0)
-    assert free.take(at(9.0), 0.01) == at(9.0), "none is left out"
+    free.observe(at(0.0), 0.0)
+    assert free.observe(at(9.0), 0.01) == at(9.0), "none is left out"
 
 
 def test_after_a_gap_and_on_another_clock_it_begins_anew() -> None:
     one = tracker({"min_cutoff_hz": 0.1, "per_speed": 0.0})
-    one.take(at(0.0), 10.0)
-    assert one.take(at(0.02), 10.1) != at(0.02)
-    assert one.take(at(3.0), 10.7) == at(3.0), "unseen for longer than timeout_s"
-    assert one.take(at(5.0), 1.0) == at(5.0), "time has gone back"
-    assert one.take(at(5.0), 1.0) is None and one.take(at(5.0), 0.9) is None, "known, or older"
+    one.observe(at(0.0), 10.0)
+    assert one.observe(at(0.02), 10.1) != at(0.02)
+    assert one.observe(at(3.0), 10.7) == at(3.0), "unseen for longer than timeout_s"
+    assert one.observe(at(5.0), 1.0) == at(5.0), "time has gone back"
+    assert one.observe(at(5.0), 1.0) is None and one.observe(at(5.0), 0.9) is None, "known, or older"
 
 
 OBJECT = {"name": "box", "vicon": "box/box"}

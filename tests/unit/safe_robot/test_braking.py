@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from safe_robot.commands.braking import Braking
+from safe_robot.braking import Braking
 
 V, A, J = 2.0, 10.0, 400.0
 

@@ -7,16 +7,16 @@ import pytest
 from guarded_arm import HOME, KUKA, LIMITS, folding, slider
 
 from custom_ros_tools.errors import ConfigError
-from rpbi.geometry import Pose
+from robot_model.geometry import Pose
 from rpbi.kinematics import Kinematics
-from safe_robot.check import Situation
+from safe_robot.braking import Brake
+from safe_robot.check import CheckContext
 from safe_robot.checks import CHECKS
-from safe_robot.commands.braking import Brake
 from safe_robot.conformance import CheckConformance
 from safe_robot.geometry.obstacles import Obstacle
-from safe_robot.limits import JointLimits, LimitsConfig
+from safe_robot.limits import LimitsConfig, MotionLimits
 from safe_robot.lookup import make_checks
-from safe_robot.motion import Motion, State
+from safe_robot.motion import CommandedMotion, State
 from safe_robot.robot import GuardedRobot
 
 FOLDED = (1.8, 1.72, 0.97, -2.05, -0.24, 2.09, 0.1)
@@ -32,7 +32,7 @@ class Arm(CheckConformance):
     unsafe_step = 0.02
 
     def by(self, step: float, q=HOME):
-        return self.motion(State.at_rest(np.array(q)), np.array(q) + step), Situation()
+        return self.motion(State.at_rest(np.array(q)), np.array(q) + step), CheckContext()
 
     def safe(self):
         return self.by(self.safe_step)
@@ -65,7 +65,7 @@ class TestLinkBox(Arm):
     options = {"boxes": {"lwr_arm_7_link": {"x": [-0.7, None], "z": [0.1, None]}}}
 
     def unsafe(self):
-        return self.motion(State.at_rest(np.array(HOME)), (0.0, 1.5, 0.0, 0.0, 0.0, 0.0, 0.0)), Situation()
+        return self.motion(State.at_rest(np.array(HOME)), (0.0, 1.5, 0.0, 0.0, 0.0, 0.0, 0.0)), CheckContext()
 
 
 class TestLinkVelocity(Arm):
@@ -77,7 +77,7 @@ class TestSelfCollision(Arm):
     check_name = "self_collision"
 
     def unsafe(self):
-        return self.motion(State.at_rest(np.array(HOME)), FOLDED), Situation()
+        return self.motion(State.at_rest(np.array(HOME)), FOLDED), CheckContext()
 
 
 TABLE = Obstacle("table", "box", (1.0, 1.0, 0.1), Pose((0.7, 0.0, 0.0)))
@@ -87,12 +87,12 @@ class TestEnvironment(Arm):
     check_name = "environment"
 
     def by(self, step: float, q=HOME):
-        motion, situation = super().by(step, q)
-        return motion, situation._replace(obstacles=(TABLE,))
+        motion, context = super().by(step, q)
+        return motion, context._replace(obstacles=(TABLE,))
 
     def unsafe(self):
         motion = self.motion(State.at_rest(np.array(HOME)), (0.0, -2.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-        return motion, Situation(obstacles=(TABLE,))
+        return motion, CheckContext(obstacles=(TABLE,))
 
 
 class TestStaleness(Arm):
@@ -101,7 +101,7 @@ class TestStaleness(Arm):
 
     def unsafe(self):
         motion, _ = self.safe()
-        return motion, Situation(age_s=0.2)
+        return motion, CheckContext(age_s=0.2)
 
 
 class TestTracking(Arm):
@@ -111,7 +111,7 @@ class TestTracking(Arm):
     def measured(self, error: float):
         motion, _ = self.by(0.0)
         names = GuardedRobot(KUKA).joint_names
-        return motion, Situation(measured={name: q + error for name, q in zip(names, HOME)})
+        return motion, CheckContext(measured={name: q + error for name, q in zip(names, HOME)})
 
     def safe(self):
         return self.measured(0.01)
@@ -125,7 +125,7 @@ class TestForce(Arm):
     is_about_motion = False
 
     def feels(self, *wrench: float):
-        return self.by(0.0)[0], Situation(wrench=wrench, wrench_age_s=0.0)
+        return self.by(0.0)[0], CheckContext(wrench=wrench, wrench_age_s=0.0)
 
     def safe(self):
         return self.feels(30.0, 30.0, 0.0, 0.0, 5.0, 5.0)
@@ -140,33 +140,33 @@ def test_every_check_is_held_to_the_conformance_suite():
 
 
 def check_of(name: str, guarded: GuardedRobot, limits: dict | None = None, /, **options):
-    joint_limits = JointLimits.of(guarded, LimitsConfig(**(limits or {})), "guard.yaml")
+    joint_limits = MotionLimits.of(guarded, LimitsConfig(**(limits or {})), "guard.yaml")
     return next(c for c in make_checks({name: options}, guarded, joint_limits, "guard.yaml") if c.name == name)
 
 
 @pytest.mark.parametrize("bad", ["nan", "inf", "-inf"])
 def test_a_measured_force_that_is_not_a_number_is_too_large(bad):
     check = check_of("force", GuardedRobot(KUKA))
-    motion = Motion(check.robot, State.at_rest(np.array(HOME)), np.array(HOME), 0.01)
-    assert check.check(motion, Situation(wrench=(float(bad), 0.0, 0.0, 0.0, 0.0, 0.0), wrench_age_s=0.0)) is not None
+    motion = CommandedMotion(check.robot, State.at_rest(np.array(HOME)), np.array(HOME), 0.01)
+    assert check.check(motion, CheckContext(wrench=(float(bad), 0.0, 0.0, 0.0, 0.0, 0.0), wrench_age_s=0.0)) is not None
 
 
 def test_a_robot_that_is_as_late_as_expected_follows_and_one_that_stands_does_not(tmp_path):
     robot = slider(tmp_path)
     check = check_of("tracking", robot, tolerance=0.05, lag_s=0.1)
     start = State(np.array((0.5, 0.0)), np.array((0.8, 0.0)), np.zeros(2))
-    motion = Motion(robot, start, start.position + 0.01 * start.velocity, 0.01)
-    assert check.check(motion, Situation(measured={"slide": 0.42, "turn": 0.0})) is None
-    violation = check.check(motion, Situation(measured={"slide": 0.36, "turn": 0.0}))
+    motion = CommandedMotion(robot, start, start.position + 0.01 * start.velocity, 0.01)
+    assert check.check(motion, CheckContext(measured={"slide": 0.42, "turn": 0.0})) is None
+    violation = check.check(motion, CheckContext(measured={"slide": 0.36, "turn": 0.0}))
     assert str(violation) == "tracking: joint 'slide': error is 0.06 m, limit 0.05 m"
-    assert check.check(motion, Situation(measured={"slide": 0.5, "turn": 0.0})) is not None
+    assert check.check(motion, CheckContext(measured={"slide": 0.5, "turn": 0.0})) is not None
 
 
 @pytest.mark.parametrize("name", ["force", "tracking"])
 def test_without_a_measurement_nothing_is_safe(name):
     check = check_of(name, GuardedRobot(KUKA))
-    motion = Motion(check.robot, State.at_rest(np.array(HOME)), np.array(HOME), 0.01)
-    violation = check.check(motion, Situation())
+    motion = CommandedMotion(check.robot, State.at_rest(np.array(HOME)), np.array(HOME), 0.01)
+    violation = check.check(motion, CheckContext())
     assert violation is not None and "age" in violation.subject
 
 
@@ -177,15 +177,15 @@ def test_origins_of_links_are_those_of_pybullet(tmp_path):
         kinematics = Kinematics(robot.urdf_path)
         assert kinematics.joint_names == robot.joint_names
         expected = [kinematics.forward(row.tolist(), link).position for row in q]
-        np.testing.assert_allclose(robot.link_positions(q, link), expected, atol=1e-6)
+        np.testing.assert_allclose(robot.frames.positions(q, link), expected, atol=1e-6)
 
 
 def test_a_link_box_reaches_where_the_link_is(tmp_path):
     robot = slider(tmp_path)
     check = check_of("link_box", robot, boxes={"hand": {"x": [-0.5, 0.5]}})
     start = State.at_rest(np.array((0.499, 0.0)))
-    assert check.check(Motion(robot, start, np.array((0.4999, 0.0)), 0.01), Situation()) is None
-    violation = check.check(Motion(robot, start, np.array((0.5001, 0.0)), 0.01), Situation())
+    assert check.check(CommandedMotion(robot, start, np.array((0.4999, 0.0)), 0.01), CheckContext()) is None
+    violation = check.check(CommandedMotion(robot, start, np.array((0.5001, 0.0)), 0.01), CheckContext())
     assert (violation.subject, violation.limit) == ("x of link 'hand'", 0.5)
     assert violation.value == pytest.approx(0.5001)
 
@@ -194,8 +194,8 @@ def test_the_speed_of_a_link_is_that_of_its_origin(tmp_path):
     robot = slider(tmp_path)
     check = check_of("link_velocity", robot, links={"hand": 0.25})
     for speed, is_safe in ((0.249, True), (0.251, False)):
-        motion = Motion(robot, State.at_rest(np.zeros(2)), np.array((0.01 * speed, 0.0)), 0.01)
-        violation = check.check(motion, Situation())
+        motion = CommandedMotion(robot, State.at_rest(np.zeros(2)), np.array((0.01 * speed, 0.0)), 0.01)
+        violation = check.check(motion, CheckContext())
         assert (violation is None) == is_safe
     assert violation.value == pytest.approx(0.251) and violation.limit == 0.25
 
@@ -209,11 +209,11 @@ def test_what_joints_could_not_bring_about_at_all_is_not_computed_and_the_answer
     q = np.array(HOME)
     for _ in range(400):
         command = HOME + 0.9 * (q - HOME) + generator.uniform(-1.0, 1.0, 7) * generator.choice((0.002, 0.05))
-        before, place = robot.link_positions(np.stack((q, command)), link)
+        before, place = robot.frames.positions(np.stack((q, command)), link)
         is_inside = bool(((place >= np.minimum(low, before)) & (place <= np.maximum(high, before))).all())
         is_safe = is_inside if name == "link_box" else bool(np.linalg.norm(place - before) <= most * 0.05)
-        motion = Motion(robot, State.at_rest(q), command, 0.05)
-        assert (check.check(motion, Situation()) is None) == is_safe
+        motion = CommandedMotion(robot, State.at_rest(q), command, 0.05)
+        assert (check.check(motion, CheckContext()) is None) == is_safe
         safe, q = safe + is_safe, command
     assert 100 < safe < 300
 
@@ -224,7 +224,7 @@ def test_a_link_outside_its_box_may_only_move_inwards(tmp_path, side):
     check = check_of("link_box", robot, boxes={"hand": {"x": [-0.5, 0.5]}})
     start = State.at_rest(np.array((side * 0.7, 0.0)))
     for after, is_safe in ((0.69, True), (0.71, False)):
-        violation = check.check(Motion(robot, start, np.array((side * after, 0.0)), 0.01), Situation())
+        violation = check.check(CommandedMotion(robot, start, np.array((side * after, 0.0)), 0.01), CheckContext())
         assert (violation is None) == is_safe
 
 
@@ -234,7 +234,7 @@ def test_a_joint_stays_in_its_limits_and_outside_them_may_only_move_inwards(tmp_
     check = check_of("joint_position", robot)
     for before, after, is_safe in ((0.99, 1.0, True), (0.99, 1.01, False), (1.2, 1.19, True), (1.2, 1.21, False)):
         start = State.at_rest(np.array((side * before, 0.0)))
-        violation = check.check(Motion(robot, start, np.array((side * after, 0.0)), 0.01), Situation())
+        violation = check.check(CommandedMotion(robot, start, np.array((side * after, 0.0)), 0.01), CheckContext())
         assert (violation is None) == is_safe, (before, after)
         assert is_safe or (violation.value, violation.limit) == (side * after, side)
 
@@ -246,7 +246,7 @@ def test_both_ways_have_limits(tmp_path, name, side):
     check = check_of(name, robot, LIMITS)
     start = State.at_rest(np.zeros(2))
     for step, is_safe in ((1e-5, True), (0.02, False)):
-        violation = check.check(Motion(robot, start, np.array((0.0, side * step)), 0.01), Situation())
+        violation = check.check(CommandedMotion(robot, start, np.array((0.0, side * step)), 0.01), CheckContext())
         assert (violation is None) == is_safe
     assert violation.subject == "joint 'turn'" and violation.value > violation.limit
 
@@ -258,8 +258,8 @@ def test_the_middle_of_a_braking_is_tried_too(tmp_path):
     there_and_back = np.sin(np.linspace(0.0, np.pi, 100))[:, None] * (0.0, 1.0)
     brake = Brake(there_and_back, *(np.zeros((100, 2)),) * 3)
     q = np.array((0.0, 2.0))
-    assert check.check(Motion(robot, State.at_rest(q), q, 0.01), Situation()) is None
-    violation = check.check(Motion(robot, State.at_rest(q), q, 0.01, brake), Situation())
+    assert check.check(CommandedMotion(robot, State.at_rest(q), q, 0.01), CheckContext()) is None
+    violation = check.check(CommandedMotion(robot, State.at_rest(q), q, 0.01, brake), CheckContext())
     assert violation is not None and violation.is_while_braking
 
 
@@ -267,10 +267,10 @@ def test_links_that_are_too_near_may_only_move_apart():
     check = check_of("self_collision", GuardedRobot(KUKA))
     generator = np.random.default_rng(4)
     q = np.array(FOLDED)
-    pair = check.check(Motion(check.robot, State.at_rest(np.array(HOME)), q, 0.01), Situation()).subject
+    pair = check.check(CommandedMotion(check.robot, State.at_rest(np.array(HOME)), q, 0.01), CheckContext()).subject
     tried = [q + generator.normal(0.0, 0.02, 7) for _ in range(40)]
-    motions = [Motion(check.robot, State.at_rest(q), each, 0.01) for each in tried]
-    answers = [check.check(each, Situation()) for each in motions]
+    motions = [CommandedMotion(check.robot, State.at_rest(q), each, 0.01) for each in tried]
+    answers = [check.check(each, CheckContext()) for each in motions]
     check.distances.place(q)
     before = {each: check.distances.distance(each, 0.01) for each in check.pairs}
     for each, answer in zip(tried, answers):
@@ -287,10 +287,10 @@ def test_distances_that_are_remembered_change_no_answer():
     q = np.array(HOME)
     for _ in range(300):
         step = np.clip(q + generator.normal(0.0, 0.05, 7), -2.0, 2.0)
-        motion = Motion(robot, State.at_rest(q), step, 0.01)
-        remembered = check.check(motion, Situation())
+        motion = CommandedMotion(robot, State.at_rest(q), step, 0.01)
+        remembered = check.check(motion, CheckContext())
         check.proximity.forget(range(len(check.pairs)))
-        assert check.check(motion, Situation()) == remembered
+        assert check.check(motion, CheckContext()) == remembered
         q = q if remembered else step
 
 
@@ -301,7 +301,7 @@ FURTHER = np.array((0.0, 1e-4))
 def stretched(tmp_path, q=(0.0, 0.0), step=FURTHER):
     """Two boxes along x, from the middle of the base to x = 0.85."""
     robot = folding(tmp_path)
-    return check_of("environment", robot), Motion(robot, State.at_rest(np.array(q)), np.array(q) + step, 0.01)
+    return check_of("environment", robot), CommandedMotion(robot, State.at_rest(np.array(q)), np.array(q) + step, 0.01)
 
 
 @pytest.mark.parametrize(
@@ -318,25 +318,25 @@ def stretched(tmp_path, q=(0.0, 0.0), step=FURTHER):
 def test_any_shape_is_kept_away_from(tmp_path, obstacle):
     for x, is_safe in ((0.965, False), (0.972, True)):  # 0.85 of the arm, 0.1 of the obstacle, 0.02 between them
         check, motion = stretched(tmp_path, step=np.array((0.0, 0.0)))
-        away = Motion(check.robot, State.at_rest(np.array((1.0, 0.0))), np.zeros(2), 0.01)
+        away = CommandedMotion(check.robot, State.at_rest(np.array((1.0, 0.0))), np.zeros(2), 0.01)
         there = obstacle._replace(pose=Pose((x, 0.0, 0.0)))
-        violation = check.check(away, Situation(obstacles=(there,)))
+        violation = check.check(away, CheckContext(obstacles=(there,)))
         assert (violation is None) == is_safe
-        assert check.check(motion, Situation(obstacles=(there,))) is None, "what stands comes no nearer"
-    assert check.check(away, Situation(obstacles=(there,))) is None
-    assert check.check(away, Situation(obstacles=())) is None
+        assert check.check(motion, CheckContext(obstacles=(there,))) is None, "what stands comes no nearer"
+    assert check.check(away, CheckContext(obstacles=(there,))) is None
+    assert check.check(away, CheckContext(obstacles=())) is None
 
 
 def test_what_is_around_the_robot_may_come_go_and_move(tmp_path):
     check, motion = stretched(tmp_path)
     near, far = (BALL._replace(pose=Pose((0.6, y, 0.0))) for y in (0.14, 0.3))
     for obstacles, is_safe in (((), True), ((near,), False), ((far,), True), ((far, near), False), ((far, BALL), True)):
-        assert (check.check(motion, Situation(obstacles=obstacles)) is None) == is_safe, obstacles
-    back = Motion(check.robot, motion.start, motion.start.position - FURTHER, 0.01)
-    assert check.check(back, Situation(obstacles=(near,))) is None, "away from what came near it may go"
+        assert (check.check(motion, CheckContext(obstacles=obstacles)) is None) == is_safe, obstacles
+    back = CommandedMotion(check.robot, motion.start, motion.start.position - FURTHER, 0.01)
+    assert check.check(back, CheckContext(obstacles=(near,))) is None, "away from what came near it may go"
     nowhere = BALL._replace(pose=Pose((np.nan, 0.0, 0.0)))
     with pytest.raises(ValueError, match="obstacle 'ball': expected finite numbers"):
-        check.check(motion, Situation(obstacles=(nowhere,)))
+        check.check(motion, CheckContext(obstacles=(nowhere,)))
 
 
 RAIL = """<robot name="rail"><link name="base"/>
@@ -350,26 +350,28 @@ def test_how_far_joints_have_moved_since_a_distance_was_looked_at_counts(tmp_pat
     path = tmp_path / "rail.urdf"
     path.write_text(RAIL)
     check = check_of("environment", GuardedRobot(str(path)))
-    around = Situation(obstacles=(BALL._replace(pose=Pose((0.6, 0.0, 0.0))),))  # 0.4 m away
+    around = CheckContext(obstacles=(BALL._replace(pose=Pose((0.6, 0.0, 0.0))),))  # 0.4 m away
     still, there, too_far = (np.linspace(0.0, brake_m, 40) for brake_m in (0.0, 0.32, 0.36))
     too_far_and_back = np.concatenate((np.linspace(0.0, 0.41, 40), np.linspace(0.41, 0.0, 40)))
     motions = ((0.0, still, True), (0.0, too_far_and_back, False), (0.05, there, True), (0.05, too_far, False))
     for x, way, is_safe in motions:
-        check.check(Motion(check.robot, State.at_rest(np.zeros(1)), np.zeros(1), 0.01), around)  # distances are known
+        check.check(
+            CommandedMotion(check.robot, State.at_rest(np.zeros(1)), np.zeros(1), 0.01), around
+        )  # distances are known
         start = State.at_rest(np.array((x,)))
         brake = Brake(way[:, None], *(np.zeros((len(way), 1)),) * 3)
-        violation = check.check(Motion(check.robot, start, start.position, 0.01, brake), around)
+        violation = check.check(CommandedMotion(check.robot, start, start.position, 0.01, brake), around)
         assert (violation is None) == is_safe, way.max()
 
 
 def test_a_factor_takes_as_much_of_the_range_from_both_ends(tmp_path):
-    limits = JointLimits.of(slider(tmp_path), LimitsConfig(position_factor=0.5), "guard.yaml")
+    limits = MotionLimits.of(slider(tmp_path), LimitsConfig(position_factor=0.5), "guard.yaml")
     assert limits.lower.tolist() == [-0.5, -1.0] and limits.upper.tolist() == [0.5, 1.0]
 
 
 def test_where_nobody_tells_of_the_environment_nothing_is_safe(tmp_path):
     check, motion = stretched(tmp_path)
-    assert "nobody tells what is around" in str(check.check(motion, Situation()))
+    assert "no source of bodies around" in str(check.check(motion, CheckContext()))
 
 
 BOX = """
@@ -407,11 +409,11 @@ def test_a_world_file_tells_of_bodies_in_the_root_of_the_robot_that_stands_in_it
     box, wall = check._obstacles
     assert (box.name, box.kind, box.size) == ("box", "box", (0.2, 0.2, 0.2))
     assert box.pose.position == pytest.approx((0.4, 0.5, 0.0)) and wall.kind == "plane"
-    turned = Motion(robot, State.at_rest(np.array((0.0, 0.0))), np.array((0.0, 1.5)), 0.01)
-    assert check.check(turned, Situation()).subject == "link 'lower' and 'box'"
-    live = Situation(obstacles=(BALL._replace(pose=Pose((0.6, 0.12, 0.0))),))
+    turned = CommandedMotion(robot, State.at_rest(np.array((0.0, 0.0))), np.array((0.0, 1.5)), 0.01)
+    assert check.check(turned, CheckContext()).subject == "link 'lower' and 'box'"
+    live = CheckContext(obstacles=(BALL._replace(pose=Pose((0.6, 0.12, 0.0))),))
     assert check.check(turned, live).subject == "link 'lower' and 'box'"
-    assert check.check(Motion(robot, turned.start, FURTHER, 0.01), live).subject == "link 'lower' and 'ball'"
+    assert check.check(CommandedMotion(robot, turned.start, FURTHER, 0.01), live).subject == "link 'lower' and 'ball'"
     check.distances.place(np.zeros(2))
     assert check.distances.distance(("lower", 1), 5.0) == pytest.approx(2.45, abs=1e-3)
 
@@ -477,12 +479,12 @@ def test_a_box_the_wrong_way_round_is_refused(tmp_path):
 
 def test_stamps_must_go_on_and_targets_must_come_while_the_robot_moves():
     check = check_of("staleness", GuardedRobot(KUKA))
-    still = Motion(check.robot, State.at_rest(np.array(HOME)), np.array(HOME), 0.01)
+    still = CommandedMotion(check.robot, State.at_rest(np.array(HOME)), np.array(HOME), 0.01)
     moving = State(np.array(HOME), np.full(7, 0.1), np.zeros(7))
-    assert check.check(still, Situation(stamp_step_s=0.01, since_command_s=60.0)) is None
+    assert check.check(still, CheckContext(stamp_step_s=0.01, since_command_s=60.0)) is None
     for step_s in (0.0, -0.01, float("nan")):
-        assert check.check(still, Situation(stamp_step_s=step_s)) is not None
-    goes_on = Motion(check.robot, moving, np.array(HOME), 0.01)
-    assert check.check(goes_on, Situation(since_command_s=0.05)) is None
-    assert check.check(goes_on, Situation(since_command_s=0.15)) is not None
-    assert check.check(still, Situation(age_s=-0.2)) is not None
+        assert check.check(still, CheckContext(stamp_step_s=step_s)) is not None
+    goes_on = CommandedMotion(check.robot, moving, np.array(HOME), 0.01)
+    assert check.check(goes_on, CheckContext(since_command_s=0.05)) is None
+    assert check.check(goes_on, CheckContext(since_command_s=0.15)) is not None
+    assert check.check(still, CheckContext(age_s=-0.2)) is not None

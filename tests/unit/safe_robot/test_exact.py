@@ -11,8 +11,8 @@ import pytest
 from guarded_arm import guard_of
 
 from custom_ros_tools.errors import MissingDependency
-from rpbi.geometry import Pose
-from safe_robot.check import Situation
+from robot_model.geometry import Pose
+from safe_robot.check import CheckContext
 from safe_robot.geometry.distances import LinkDistances
 from safe_robot.geometry.obstacles import Obstacle
 from safe_robot.robot import GuardedRobot
@@ -76,7 +76,7 @@ def distance(robot, obstacle, geometry, at) -> float:
 def test_the_peg_goes_into_a_hollow_up_to_its_walls_and_with_hulls_stays_before_it(peg, tmp_path):
     pytest.importorskip("hppfcl")
     pytest.importorskip("daqp")
-    around = Situation(obstacles=(mesh_of(tmp_path / "trough.obj", TROUGH),))
+    around = CheckContext(obstacles=(mesh_of(tmp_path / "trough.obj", TROUGH),))
     exact, hulls = (
         guard_of(peg, policy="limit", checks={"environment": {"margin_m": MARGIN_M, "geometry": geometry}})
         for geometry in ("exact", "hulls")

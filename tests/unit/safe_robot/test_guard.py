@@ -10,7 +10,7 @@ import pytest
 from guarded_arm import HOME, KUKA, LIMITS, PERIOD_S, decide, folding, guard_of, slider, worst_shares
 
 from custom_ros_tools.errors import ConfigError
-from safe_robot.check import Check, Situation, Violation
+from safe_robot.check import Check, CheckContext, Violation
 from safe_robot.guard import Decision
 from safe_robot.robot import GuardedRobot
 
@@ -83,7 +83,7 @@ def test_an_exception_in_a_check_stops_everything(tmp_path):
     class Broken(Check):
         name = "broken"
 
-        def check(self, motion, situation):
+        def check(self, motion, context):
             raise ZeroDivisionError
 
     guard = guard_of(slider(tmp_path))
@@ -137,11 +137,11 @@ def test_it_says_when_targets_fail_to_come_while_the_robot_moves_and_only_then(t
     guard = guard_of(robot)
     targets = list(smooth(robot, 1.0))
     decide(guard, targets[0])
-    assert guard.late(Situation(since_command_s=10.0)) is None
+    assert guard.check_watchdogs(CheckContext(since_command_s=10.0)) is None
     for target in targets[1:50]:
         assert decide(guard, target).violation is None
-    assert guard.late(Situation(since_command_s=0.09)) is None
-    assert guard.late(Situation(since_command_s=0.11)).check == "staleness"
+    assert guard.check_watchdogs(CheckContext(since_command_s=0.09)) is None
+    assert guard.check_watchdogs(CheckContext(since_command_s=0.11)).check == "staleness"
     assert guard.is_halted
 
 

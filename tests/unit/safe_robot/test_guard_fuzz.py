@@ -1,4 +1,4 @@
-"""A sample of the hostile targets of `benchmarks/guard_fuzz.py`; and its oracle finds what a bad guard lets through."""
+"""A sample of the hostile targets of `robustness/guard_fuzz.py`; and its oracle finds what a bad guard lets through."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from safe_robot.geometry.proximity import Proximity
+from safe_robot.checks.proximity import Proximity
 
 pytest.importorskip("pinocchio")
 pytest.importorskip("daqp")
-sys.path.append(str(Path(__file__).resolve().parents[3] / "benchmarks"))
+sys.path.append(str(Path(__file__).resolve().parents[3] / "robustness"))
 from fuzz.climbing import TOLERANCE_M, Climber  # noqa: E402
 from fuzz.grid import Grid  # noqa: E402
 from fuzz.hostile import fuzz  # noqa: E402

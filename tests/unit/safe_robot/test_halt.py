@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from guarded_arm import LIMITS, PERIOD_S, decide, guard_of, slider, worst_shares
 
-from safe_robot.check import Check, Situation
+from safe_robot.check import Check, CheckContext
 from safe_robot.guard import Guard
 
 ROUNDING = 1e-6
@@ -23,7 +23,7 @@ class Broken(Check):
     name = "broken"
     watches = True
 
-    def check(self, motion, situation):
+    def check(self, motion, context):
         """See `Check`."""
         raise ZeroDivisionError
 
@@ -37,7 +37,7 @@ def nonsense(guard: Guard) -> None:
 
 
 def stale(guard: Guard) -> None:
-    assert guard.late(Situation(since_command_s=1.0)) is not None
+    assert guard.check_watchdogs(CheckContext(since_command_s=1.0)) is not None
 
 
 def fail(guard: Guard) -> None:
@@ -47,7 +47,7 @@ def fail(guard: Guard) -> None:
 
 def fail_later(guard: Guard) -> None:
     with broken(guard):
-        guard.late(Situation())
+        guard.check_watchdogs(CheckContext())
 
 
 @contextmanager

@@ -16,7 +16,6 @@ from safe_robot.checks import CHECKS
 from safe_robot.commands.shaping import ShapingConfig
 from safe_robot.config import GuardConfig, NodeConfig
 from safe_robot.limits import LimitsConfig
-from safe_robot.lookup import check_class
 from safe_robot.ros.parameters import guard_of
 
 VALUES = (
@@ -38,7 +37,7 @@ def keys() -> Iterator[tuple[str, ...]]:
     yield from (("shape", key) for key in ShapingConfig.model_fields)
     for name in CHECKS:
         yield "checks", name
-        yield from (("checks", name, key) for key in check_class(name).Config.model_fields)
+        yield from (("checks", name, key) for key in CHECKS.find(name).Config.model_fields)
     yield from (("checks", name) for name in ("nothing", "math:sin", "no_module:Name"))
     yield from (("checker", "jointpositionlimit"), ("checker", "jointpositionlimit", "active"), ("checker", "nothing"))
 

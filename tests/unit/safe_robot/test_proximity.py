@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from guarded_arm import HOME, KUKA
 
-from rpbi.geometry import Pose
-from safe_robot.commands.braking import Brake
+from robot_model.geometry import Pose
+from safe_robot.braking import Brake
+from safe_robot.checks.proximity import Proximity, _spread
 from safe_robot.geometry.distances import LinkDistances
 from safe_robot.geometry.obstacles import Obstacle
-from safe_robot.geometry.proximity import Proximity, _spread
-from safe_robot.motion import Motion, State
+from safe_robot.motion import CommandedMotion, State
 from safe_robot.robot import GuardedRobot
 
 MARGIN_M = 0.02
@@ -33,7 +33,7 @@ def swing(distances, start, way):
     """Returns a motion that goes some way from rest, and half of it back."""
     share = np.sin(0.75 * np.pi * np.linspace(0.0, 1.0, ROWS)) ** 2
     brake = Brake(share[:, None] * way, *np.zeros((3, ROWS, len(way))))
-    return Motion(distances._robot, State.at_rest(start), start, 0.01, brake)
+    return CommandedMotion(distances._robot, State.at_rest(start), start, 0.01, brake)
 
 
 def least_distance_m(distances, motion) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from guarded_arm import KUKA
 
-from rpbi.geometry import Pose, normalized
+from robot_model.geometry import Pose, normalized
 from safe_robot.checks.self_collision import pairs_that_may_meet
 from safe_robot.geometry.distances import LinkDistances
 from safe_robot.geometry.obstacles import Obstacle
@@ -151,7 +151,7 @@ def test_shapes_are_where_the_description_puts_them(tmp_path):
         for link in ("hand", "plate"):
             frame, place = robot.frames.place(link)
             origin = (robot.frames.at(q[None])[0, frame] @ place)[:3, 3]
-            np.testing.assert_allclose(origin, robot.link_positions(q[None], link)[0], atol=1e-12)
+            np.testing.assert_allclose(origin, robot.frames.positions(q[None], link)[0], atol=1e-12)
         bounds, measured = bounds_and_distances(distances, pairs, separation, q, learn=True)
         assert (bounds <= measured).all() and (measured - bounds < LOOSE_M).all()
 

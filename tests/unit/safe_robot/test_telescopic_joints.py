@@ -10,7 +10,7 @@ from guarded_arm import decide, guard_of
 
 from custom_ros_tools.errors import ConfigError
 from safe_robot.guard import Guard
-from safe_robot.robot import MOST_OUTSIDE, GuardedRobot
+from safe_robot.robot import MAX_OUTSIDE, GuardedRobot
 
 CRANE = """<robot name="crane"><link name="base"/><link name="boom"/><link name="trolley"/><link name="hook"/>
   <joint name="turn" type="revolute"><parent link="base"/><child link="boom"/><axis xyz="0 0 1"/>
@@ -40,22 +40,22 @@ def test_no_link_goes_further_than_by_its_reach_from_wherever_a_joint_may_start(
     robot = crane(tmp_path)
     assert robot.telescopic == ("reach",)
     reach, chance = robot.reach(link, 0.0), np.random.default_rng(4)
-    low, high = np.array((-3.0, -MOST_OUTSIDE)), np.array((3.0, 1.0 + MOST_OUTSIDE))
+    low, high = np.array((-3.0, -MAX_OUTSIDE)), np.array((3.0, 1.0 + MAX_OUTSIDE))
     q = chance.uniform(low, high, (2000, 2))
     q[::2, 1] = high[1]  # where the boom is longest
     after = np.clip(q + chance.uniform(-0.1, 0.1, q.shape), low, high)
-    way = np.linalg.norm(robot.link_positions(after, link) - robot.link_positions(q, link), axis=1)
+    way = np.linalg.norm(robot.frames.positions(after, link) - robot.frames.positions(q, link), axis=1)
     shares = way / (np.abs(after - q) @ reach)
     assert 0.5 < shares.max() <= 1.0
 
 
 def test_a_joint_that_is_further_outside_may_not_start(tmp_path):
     robot = crane(tmp_path)
-    started(robot, 1.0 + 0.99 * MOST_OUTSIDE)
-    violation = decide(guard_of(robot), (0.0, 1.0 + 1.5 * MOST_OUTSIDE)).violation
-    assert violation[:4] == ("start", "joint 'reach'", pytest.approx(0.15), MOST_OUTSIDE)
+    started(robot, 1.0 + 0.99 * MAX_OUTSIDE)
+    violation = decide(guard_of(robot), (0.0, 1.0 + 1.5 * MAX_OUTSIDE)).violation
+    assert violation[:4] == ("start", "joint 'reach'", pytest.approx(0.15), MAX_OUTSIDE)
     assert str(violation) == "start: joint 'reach': distance beyond its limits is 0.15 m, limit 0.1 m"
-    violation = decide(guard_of(robot), (0.0, -1.5 * MOST_OUTSIDE)).violation
+    violation = decide(guard_of(robot), (0.0, -1.5 * MAX_OUTSIDE)).violation
     assert violation[:2] == ("start", "joint 'reach'")
 
 

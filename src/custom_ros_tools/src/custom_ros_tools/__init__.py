@@ -1,1 +1,1 @@
-"""What every package of the workspace shares; free of ROS outside `custom_ros_tools.ros`."""
+"""Shared by every package of the workspace; free of ROS outside `custom_ros_tools.ros`."""

@@ -17,13 +17,13 @@ import yaml
 from .errors import ConfigError, Problem, closest, shortened
 
 _SOURCES = Path(__file__).resolve().parents[3]
-"""Where the packages of this workspace are, if it runs from its sources."""
-MOST_BYTES = 16_000_000
-"""A YAML file or text may be so long."""
-MOST_VALUES = 1_000_000
-"""And have so many values, with those that aliases (`*NAME`) repeat counted each time."""
-LONGEST_NUMBER = 1000
-"""Characters of a number; a longer one without a tag is a text."""
+"""Folder of the packages of this workspace, if it runs from its sources."""
+MAX_BYTES = 16_000_000
+"""Largest length of a YAML file or text; longer ones are rejected."""
+MAX_VALUES = 1_000_000
+"""Largest number of values in it, with those that aliases (`*NAME`) repeat counted each time; more are rejected."""
+MAX_NUMBER_LENGTH = 1000
+"""Largest number of characters of a number; longer scalars without a tag are texts."""
 _INT, _FLOAT = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
 _PACKAGE = re.compile(r"package://(?P<uri>[^/{}]+)|\{(?P<braces>[^{}]*)\}")
 
@@ -31,7 +31,7 @@ _PACKAGE = re.compile(r"package://(?P<uri>[^/{}]+)|\{(?P<braces>[^{}]*)\}")
 def ros_package_path(package: str) -> str:
     """Returns the folder of a ROS package.
 
-    It is looked for in ROS_PACKAGE_PATH, and then among the packages that this one stands with.
+    It is searched for in ROS_PACKAGE_PATH, and then beside this package.
 
     Raises:
         ConfigError: If there is no such package.
@@ -48,7 +48,7 @@ def ros_package_path(package: str) -> str:
 
 @lru_cache(maxsize=4)
 def _packages(search_path: str) -> rospkg.RosPack:
-    """Returns what is known under one value of ROS_PACKAGE_PATH; reading it again would cost a crawl."""
+    """Returns the packages found under one value of ROS_PACKAGE_PATH, cached, since each search is a crawl."""
     is_source = (_SOURCES / "custom_ros_tools" / "package.xml").is_file()  # installed, it stands with other things
     return rospkg.RosPack([*rospkg.get_ros_paths(), *([str(_SOURCES)] if is_source else [])])
 
@@ -69,8 +69,8 @@ def replace_package(path: str) -> str:
 def read_file(path: str | Path, most_bytes: int | None = None) -> bytes:
     """Returns the content of an ordinary file.
 
-    Others, such as pipes, devices and the kernel's own files in /proc, might never end, or never begin. Those of /proc
-    say that they are empty, and are.
+    Other files, such as pipes, devices and the kernel's own files in /proc, might never end, or block. Those of /proc
+    report size 0, and are read as empty.
 
     Args:
         most_bytes: The largest size.
@@ -91,7 +91,7 @@ def read_file(path: str | Path, most_bytes: int | None = None) -> bytes:
         return file.read(status.st_size)
 
 
-def load_config(path: str, most_bytes: int = MOST_BYTES) -> dict[str, Any]:
+def load_config(path: str, most_bytes: int = MAX_BYTES) -> dict[str, Any]:
     """Returns the mapping in a YAML file; `{package}/path` and `package://package/path` are resolved.
 
     Raises:
@@ -108,7 +108,7 @@ def load_config(path: str, most_bytes: int = MOST_BYTES) -> dict[str, Any]:
     return load_configs(text, path)
 
 
-def load_configs(s: str, file: str = "text", most_characters: int = MOST_BYTES) -> dict[str, Any]:
+def load_configs(s: str, file: str = "text", most_characters: int = MAX_BYTES) -> dict[str, Any]:
     """Returns the mapping in the YAML text `s`, which messages call `file`; an empty text is an empty mapping.
 
     Raises:
@@ -134,13 +134,14 @@ def load_configs(s: str, file: str = "text", most_characters: int = MOST_BYTES) 
 
 
 def config_to_str(config: Mapping[str, Any]) -> str:
-    """Returns a mapping of plain data as YAML text, in its own order; `load_configs` gives the same mapping back."""
+    """Returns a mapping of plain data as YAML text, in its own order; `load_configs` returns the same mapping from "
+    "it."""
     return str(yaml.safe_dump(dict(config), sort_keys=False))
 
 
 @contextmanager
 def _without_collections() -> Iterator[None]:
-    """Keeps the garbage collector from going through what is just being parsed, which would stop all threads."""
+    """Excludes newly parsed objects from garbage collection, whose passes over them would stop all threads."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -162,29 +163,32 @@ def _dismantle(root: yaml.Node) -> None:
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """The safe loader, which moreover refuses a key that stands twice in one mapping, and texts that unfold too far."""
+    """The safe loader; it also rejects a key that occurs twice in one mapping, and texts whose aliases expand too "
+    "far."""
 
     def get_single_data(self) -> Any:
         node = self.get_single_node()
         if node is None:
             return None
-        if _size(node, {}) > MOST_VALUES:
-            raise yaml.YAMLError(f"its aliases repeat more than {MOST_VALUES} values")
+        if _size(node, {}) > MAX_VALUES:
+            raise yaml.YAMLError(f"its aliases repeat more than {MAX_VALUES} values")
         try:
             return self.construct_document(node)
         finally:
             _dismantle(node)
 
     def resolve(self, kind: type[yaml.Node], value: Any, implicit: Any) -> Any:
-        """Resolves a scalar that is longer than any number as a text: to match it would stop all threads."""
-        if kind is yaml.ScalarNode and len(value) > LONGEST_NUMBER:
+        """Resolves a scalar that is longer than any number as a text: matching it against patterns would stop all
+        threads.
+        """
+        if kind is yaml.ScalarNode and len(value) > MAX_NUMBER_LENGTH:
             implicit = (False, True)
         return super().resolve(kind, value, implicit)
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
         is_number = isinstance(node, yaml.ScalarNode) and node.tag in (_INT, _FLOAT)
         try:
-            if is_number and len(node.value) > LONGEST_NUMBER:  # it would be worked out digit by digit
+            if is_number and len(node.value) > MAX_NUMBER_LENGTH:  # it would be computed digit by digit
                 raise ValueError("too long")
             return super().construct_object(node, deep)
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
@@ -200,7 +204,7 @@ class _StrictLoader(yaml.SafeLoader):
             if key_node.tag == "tag:yaml.org,2002:merge" or not isinstance(key_node, yaml.ScalarNode):
                 continue
             key = self.construct_object(key_node)
-            if not isinstance(key, Hashable):  # which making the mapping reports
+            if not isinstance(key, Hashable):  # reported when the mapping is constructed
                 continue
             if key in seen:
                 first = seen[key].start_mark.line + 1

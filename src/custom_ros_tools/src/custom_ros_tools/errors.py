@@ -1,6 +1,6 @@
-"""Errors by whose fault they are; every one of them is an `InterfaceError`.
+"""Errors, grouped by whose fault they are; every one of them is an `InterfaceError`.
 
-Each takes data and writes its own sentence, so that the wording lives in one place.
+Each holds data and composes its own message, so that the wording lives in one place.
 """
 
 import difflib
@@ -8,29 +8,29 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
-LONGEST_QUOTE = 60
-"""So much of what a file says is repeated in a message; it may be a file that nobody should see."""
-LONGEST_LINE = 2_000
-"""Characters of a line that says what is wrong."""
-MOST_LINES = 100
-"""Lines of an answer that says what is wrong."""
+MAX_QUOTE_LENGTH = 60
+"""Largest number of characters of a file that a message quotes; the file may be confidential."""
+MAX_LINE_LENGTH = 2_000
+"""Largest length of a line of a message."""
+MAX_LINES = 100
+"""Largest number of lines of a message."""
 
 
 def shortened(text: str) -> str:
-    """Returns a text that is to be quoted, with its end left out if it is long."""
-    return text if len(text) <= LONGEST_QUOTE else f"{text[: LONGEST_QUOTE - 3]}..."
+    """Returns a text for quotation, shortened if it is long."""
+    return text if len(text) <= MAX_QUOTE_LENGTH else f"{text[: MAX_QUOTE_LENGTH - 3]}..."
 
 
 def bounded(text: str) -> str:
-    """Returns a message with at most 100 lines of at most 2,000 characters, whatever of its caller it repeats."""
+    """Returns a message with at most 100 lines of at most 2,000 characters, whatever input of the caller it quotes."""
     lines = text.split("\n")
-    kept = [line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}..." for line in lines[:MOST_LINES]]
-    return "\n".join([*kept, f"... and {len(lines) - MOST_LINES} lines more"] if len(lines) > MOST_LINES else kept)
+    kept = [line if len(line) <= MAX_LINE_LENGTH else f"{line[:MAX_LINE_LENGTH]}..." for line in lines[:MAX_LINES]]
+    return "\n".join([*kept, f"... and {len(lines) - MAX_LINES} lines more"] if len(lines) > MAX_LINES else kept)
 
 
 def closest(name: str, known: Iterable[str]) -> str | None:
-    """Returns the known name that looks most like `name`, or None when none is near (case is ignored)."""
-    if len(name) > LONGEST_QUOTE:  # the search takes long for long ones
+    """Returns the known name most similar to `name`, or None if none is similar (case is ignored)."""
+    if len(name) > MAX_QUOTE_LENGTH:  # the search is slow for long names
         return None
     by_lower_case = {candidate.lower(): candidate for candidate in known}
     match = difflib.get_close_matches(name.lower(), by_lower_case, n=1)
@@ -70,7 +70,7 @@ class Problem:
 
 
 class ConfigError(InterfaceError):
-    """The author of the configuration has to change something; it has all problems, in the order of the files."""
+    """The author of the configuration has to change something; has all problems, in the order of the files."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
@@ -81,7 +81,7 @@ class ConfigError(InterfaceError):
 
 
 class UnknownNameError(InterfaceError):
-    """The caller named something that does not exist; the kind says what sort of thing, such as `"joint"`."""
+    """The caller used an unknown name; `kind` is the kind of object, such as `"joint"`."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
         self.kind, self.name, self.known = kind, name, tuple(known)
@@ -96,7 +96,7 @@ class UnknownNameError(InterfaceError):
 
 @dataclass(eq=False)
 class MissingDependency(InterfaceError):  # noqa: N818 (the name says what is the matter)
-    """An optional library is not installed; `how` says what to do about it, such as a command to type."""
+    """An optional library is not installed; `how` is a remedy, such as a command to type."""
 
     package: str
     how: str
@@ -111,8 +111,8 @@ class PluginError(InterfaceError):
 
     Attributes:
         plugin: Its name, as `module:Class`.
-        doing: What it was about to do, such as `before_step`, and where it says so itself, for what.
-        cause: What happened, with file and line.
+        doing: The call that failed, such as `before_step`, if necessary with its object.
+        cause: The error, with file and line.
     """
 
     plugin: str
@@ -124,7 +124,7 @@ class PluginError(InterfaceError):
 
 
 class PhysicsError(InterfaceError):
-    """PyBullet refused a call that the configuration allows; it says what was asked for, and what PyBullet said."""
+    """PyBullet rejected a call that the configuration allows; has the request and PyBullet's message."""
 
 
 @contextmanager
@@ -132,10 +132,10 @@ def collecting_problems() -> Iterator[Callable[[], AbstractContextManager[None]]
     """Collects the problems of several parts of a configuration, so that all of them are reported at once.
 
     Yields:
-        What makes a context for each part: `with collecting_problems() as part`, then `with part(): ...` for each.
+        A factory of contexts for the parts: `with collecting_problems() as part`, then `with part(): ...` for each.
 
     Raises:
-        ConfigError: At the end, if a part raised one; it has the problems of all.
+        ConfigError: At the end, if a part raised one; has the problems of all.
     """
     problems: list[Problem] = []
 

@@ -12,7 +12,7 @@ QUANTITIES = ("position", "velocity", "effort")
 
 
 class MissingJointsError(InterfaceError):
-    """A joint state lacks joints that are asked for; `known` are those that it has."""
+    """A joint state lacks requested joints; `known` are those that it has."""
 
     def __init__(self, names: Sequence[str], known: Sequence[str]) -> None:
         self.names, self.known = tuple(names), tuple(known)
@@ -67,11 +67,11 @@ class JointValues:
         return cls(joints, *values)
 
     def in_order(self, names: Sequence[str], ns: str = "") -> JointValues:
-        """Returns the values of some joints in the order asked for; a quantity that is not given stays so.
+        """Returns the values of some joints in the requested order; a quantity that is missing stays empty.
 
         Args:
-            names: The joints, which the result names as they are named here.
-            ns: What their names here begin with, as `ns` in `ns/joint`; empty if they begin with nothing.
+            names: The joints, under which the result lists them.
+            ns: Prefix of their names here, as `ns` in `ns/joint`; empty for none.
 
         Raises:
             MissingJointsError: If joints are missing; it names all of them.
@@ -109,16 +109,16 @@ class JointValues:
 
 @dataclass(frozen=True)
 class JointConversion:
-    """How the values of a joint are told to somebody who counts otherwise.
+    """Conversion of the values of a joint to other names and units.
 
     A position q becomes `sign * factor * q + offset`, a velocity v `sign * factor * v`, an effort e `sign * e`.
 
     Attributes:
         joint: Its name here.
         name: Its name there.
-        sign: 1, or -1 where the joint turns the other way.
-        factor: How many of their units one of ours is.
-        offset: Their position [their unit] where ours is 0.
+        sign: 1, or -1 if the joint rotates the other way there.
+        factor: Number of their units per unit here.
+        offset: Their position [their unit] at position 0 here.
     """
 
     joint: str
@@ -128,6 +128,6 @@ class JointConversion:
     offset: float = 0.0
 
     def inverse(self) -> JointConversion:
-        """Returns the way back."""
+        """Returns the inverse conversion."""
         offset = -self.offset * self.sign / self.factor
         return replace(self, joint=self.name, name=self.joint, factor=1.0 / self.factor, offset=offset)

@@ -1,4 +1,4 @@
-"""What `attach_marker` may be told in `~config`."""
+"""Configuration of `attach_marker`."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ MARKER_TYPES = (
 MARKER_ACTIONS = ("ADD", "MODIFY", "DELETE", "DELETEALL")
 """Names of its constants for `action`."""
 SHAPES = ("ARROW", "CUBE", "SPHERE", "CYLINDER", "MESH_RESOURCE")
-"""Types that are drawn from what this configuration holds; the others need points or a text."""
+"""Types that this configuration is sufficient for; the others need points or a text."""
 
 
 def _in_any_case(names: Sequence[str]) -> WithJsonSchema:
-    """Returns the JSON Schema of constants, of which editors propose the usual spelling."""
+    """Returns the JSON Schema of constants, with the usual spelling for editors to propose."""
     usual = {"type": "string", "enum": [name.lower() for name in names]}
     return WithJsonSchema({"anyOf": [usual, {"type": "string", "pattern": "^[A-Za-z_]+$"}]})
 
 
 def _one_of(names: Sequence[str], kind: str) -> AfterValidator:
-    """Returns what finds the name of a constant that is written in any case."""
+    """Returns a validator that finds the name of a constant in any case."""
 
     def upper(name: str) -> str:
         if name.upper() not in names:
@@ -53,11 +53,11 @@ def _one_of(names: Sequence[str], kind: str) -> AfterValidator:
 
 
 class MarkerNodeConfig(ConfigModel):
-    """How the marker is published."""
+    """Topic and rate of the marker."""
 
     topic_name: TopicName = Field(description="Topic of the visualization_msgs/Marker.")
-    hz: Hz = Field(50.0, description="How often it is sent, in wall time.")
-    broadcast_offset: Switch = Field(False, description="Whether the marker's pose is on TF too.")
+    hz: Hz = Field(50.0, description="Rate at which it is published, in wall time.")
+    broadcast_offset: Switch = Field(False, description="Whether the marker's pose is published on TF, too.")
     child_frame_id: FrameId | None = Field(
         None, description="TF frame at the marker; required with `broadcast_offset`."
     )
@@ -72,7 +72,7 @@ class MarkerNodeConfig(ConfigModel):
 class MarkerConfig(ConfigModel):
     """A marker at a fixed pose in a TF frame."""
 
-    node: MarkerNodeConfig = Field(description="How it is published.")
+    node: MarkerNodeConfig = Field(description="Topic and rate.")
     frame_id: FrameId = Field("map", description="TF frame that it is attached to.")
     type: Annotated[
         str, _one_of(MARKER_TYPES, "type"), _in_any_case(MARKER_TYPES), Expects("the name of a marker type")
@@ -82,7 +82,7 @@ class MarkerConfig(ConfigModel):
     action: Annotated[
         str, _one_of(MARKER_ACTIONS, "action"), _in_any_case(MARKER_ACTIONS), Expects("the name of a marker action")
     ] = Field("ADD", description="Constant of the message in any case: `add`, `modify`, `delete` or `deleteall`.")
-    position: Position = Field((0.0, 0.0, 0.0), description="Where it is in that frame.")
+    position: Position = Field((0.0, 0.0, 0.0), description="Position in that frame.")
     orientation: Annotated[ListOf[float], Expects("roll, pitch, yaw or a quaternion x, y, z, w")] = Field(
         (0.0, 0.0, 0.0),
         description="Roll, pitch, yaw or a quaternion x, y, z, w in that frame.",
@@ -114,7 +114,7 @@ class MarkerConfig(ConfigModel):
 
     @property
     def mesh_uri(self) -> str:
-        """Where RViz finds the mesh; empty if there is none. `{package}/file` and plain paths become URIs."""
+        """URI of the mesh for RViz; empty if there is none. `{package}/file` and plain paths become URIs."""
         path = self.mesh_resource or ""
         if path.startswith("{"):
             return "package://" + path[1:].replace("}", "", 1)

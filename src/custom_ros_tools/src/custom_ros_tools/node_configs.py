@@ -1,4 +1,4 @@
-"""What the nodes of this package take as private parameters and in `~config`."""
+"""Private parameters and `~config` of the nodes of this package."""
 
 from __future__ import annotations
 
@@ -13,55 +13,57 @@ from .marker_config import MarkerConfig
 from .schema import ConfigModel, Hz, KeyedError, ListOf, Positive, Switch, Text, Unit, optional
 
 PER_SI_UNIT = {"rad": 1.0, "deg": 180.0 / math.pi, "m": 1.0, "mm": 1000.0}
-"""How many of a unit one rad or m is."""
+"""Number of units per rad or m."""
 
 
 class StartParameters(ConfigModel):
-    """Of a node that is switched on and off."""
+    """Parameters of a node that is switched on and off."""
 
     start_on_init: Switch = Field(False, description="Whether it is on from the start.")
 
 
 class RateParameters(ConfigModel):
-    """Of a node that repeats what it says."""
+    """Parameters of a node that repeats a message."""
 
-    hz: Hz = Field(100.0, description="How often it is said, in wall time.")
+    hz: Hz = Field(100.0, description="Rate of the message, in wall time.")
 
 
 class RemappedJoint(ConfigModel):
-    """How a driver counts a joint: `sign * position * unit + offset`."""
+    """Conversion of a joint to a driver: `sign * position * unit + offset`."""
 
     joint: Text = Field(description="The joint in the simulator.")
-    rename: Text | None = Field(None, description="Its name at the driver; without it, the same.")
+    rename: Text | None = Field(None, description="Its name at the driver; by default the same.")
     unit: Literal["rad", "deg", "m", "mm"] = Field(
-        "rad", description="The driver's unit of positions, and of velocities a second; rad and m leave numbers alone."
+        "rad",
+        description="The driver's unit of positions, and of velocities per second; rad and m leave numbers unchanged.",
     )
-    sign: Literal[1, -1] = Field(1, description="-1 where the driver counts the other way; of efforts too.")
-    offset: float = Field(0.0, description="The driver's position, in its unit, where the simulator's is 0.")
+    sign: Literal[1, -1] = Field(1, description="-1 if the driver's direction is opposite; applies to efforts, too.")
+    offset: float = Field(0.0, description="The driver's position, in its unit, at position 0 of the simulator.")
 
     def conversion(self) -> JointConversion:
-        """Returns what leads from the simulator to the driver."""
+        """Returns the conversion from the simulator to the driver."""
         return JointConversion(self.joint, self.rename or self.joint, self.sign, PER_SI_UNIT[self.unit], self.offset)
 
 
 class StartWithin(ConfigModel):
-    """What must be near before anything is handed on, so that no robot jumps when that is switched on."""
+    """Condition for switching on: the robot is near the first command, so that it does not jump."""
 
-    topic: Text = Field(description="Joint states of the robot that is commanded, named and counted as commands are.")
+    topic: Text = Field(description="Joint states of the commanded robot, in the names and units of the commands.")
     tolerance: Annotated[Positive, Unit("rad or m")] = Field(
-        0.05, description="How far a joint of it may be from where the first command would have it."
+        0.05, description="Largest difference of a joint from its first command."
     )
 
 
 class RemapConfig(ConfigModel):
-    """Which joints of a joint state are handed on, and how they are named and counted there."""
+    """Selection and order of the forwarded joints, and their names and units there."""
 
     joint_names: ListOf[Text] | None = Field(
-        None, description="Joints to hand on in this order, named as they come; without it, all as they come."
+        None,
+        description="Joints to forward in this order, under their names here; by default all, in the order received.",
     )
-    joints: ListOf[RemappedJoint] = Field((), description="Joints that the driver names or counts otherwise.")
-    inverse: Switch = Field(False, description="Whether `joints` is undone: from the driver to the simulator.")
-    start_within: StartWithin | None = optional("What must be near for it to be switched on.")
+    joints: ListOf[RemappedJoint] = Field((), description="Joints whose name or unit differs at the driver.")
+    inverse: Switch = Field(False, description="Whether `joints` is inverted: from the driver to the simulator.")
+    start_within: StartWithin | None = optional("Condition for switching on.")
 
     @model_validator(mode="after")
     def _joints_differ_in_name(self) -> RemapConfig:
@@ -70,7 +72,7 @@ class RemapConfig(ConfigModel):
         return self
 
     def conversions(self) -> tuple[JointConversion, ...]:
-        """Returns what is done to the joints that are handed on."""
+        """Returns the conversions of the forwarded joints."""
         there = (each.conversion() for each in self.joints)
         conversions = (each.inverse() if self.inverse else each for each in there)
         wanted = self.joint_names
@@ -86,9 +88,9 @@ def _require_unique(key: str, names: Iterable[str]) -> None:
 
 
 class FloatArrayConfig(RemapConfig):
-    """Which numbers of a joint state, in which order."""
+    """Selection and order of the numbers of a joint state."""
 
-    field: Literal["position", "velocity", "effort"] = Field("position", description="Which numbers of the joints.")
+    field: Literal["position", "velocity", "effort"] = Field("position", description="Quantity to publish.")
 
 
 NODE_CONFIGS: dict[str, type[ConfigModel]] = {

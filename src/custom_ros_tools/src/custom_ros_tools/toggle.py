@@ -1,13 +1,13 @@
-"""Something that is switched on and off."""
+"""A function that is switched on and off."""
 
 import threading
 from collections.abc import Callable
 
 
 class Toggle:
-    """Keeps whether something is on, and refuses to switch it to what it is already.
+    """Stores whether something is on, and refuses to switch it to its present state.
 
-    `start` switches it on and `stop` off; messages call it by its name.
+    `start` switches it on and `stop` off; `name` is its name in messages.
     """
 
     def __init__(self, name: str, start: Callable[[], None], stop: Callable[[], None]) -> None:

@@ -1,6 +1,6 @@
-"""Rotations and poses: between quaternions, roll-pitch-yaw and matrices.
+"""Rotations and poses: conversions between quaternions, roll-pitch-yaw and matrices.
 
-Quaternions are x, y, z, w. Roll, pitch and yaw turn about the fixed x, y and z axis in this order, as in URDF.
+Quaternions are x, y, z, w. Roll, pitch and yaw rotate about the fixed x, y and z axis in this order, as in URDF.
 """
 
 from __future__ import annotations
@@ -19,16 +19,21 @@ from .schema import ConfigModel, FrameId, KeyedError, Position, Quat
 Array = NDArray[np.float64]
 
 MATRIX_TOLERANCE = 1e-3
-"""How far the rows of a rotation matrix may be from unit length and right angles."""
-SMALLEST_NORM = 1e-6
-"""A shorter quaternion counts as zero."""
+"""Largest deviation of the rows of a rotation matrix from unit length and right angles; beyond it the matrix is
+rejected.
+"""
+MIN_NORM = 1e-6
+"""Least length of a quaternion; shorter ones count as zero."""
 
 
 def finite_vector(values: ArrayLike, length: int, name: str) -> Array:
     """Returns values as a vector, shape (length,).
 
+    Args:
+        name: Name of the values in messages.
+
     Raises:
-        ValueError: If there are more or fewer, or one is not finite; it calls them by `name`.
+        ValueError: If the number of values differs, or one is not finite.
     """
     vector = np.asarray(values, dtype=float)
     if vector.shape != (length,):
@@ -46,7 +51,7 @@ def unit_quat(quat_xyzw: ArrayLike) -> Array:
     """
     quat = finite_vector(quat_xyzw, 4, "quaternion")
     norm = np.linalg.norm(quat)
-    if norm < SMALLEST_NORM:
+    if norm < MIN_NORM:
         raise ValueError("quaternion: must not be zero; no rotation is 0, 0, 0, 1")
     return np.asarray(quat / norm)
 
@@ -143,7 +148,7 @@ class StaticTransform(ConfigModel):
             got = f"{len(arguments)} arguments" if arguments else "none"
             raise ConfigError([Problem(_ARGUMENTS, "", f"expected {wanted}, got {got}")])
         problems: list[Problem] = []
-        numbers = [1.0] * (len(keys) - 2)  # they stand in for those that are none while the rest is checked
+        numbers = [1.0] * (len(keys) - 2)  # placeholders for invalid values while the rest is checked
         for index, text in enumerate(arguments[:-2]):
             try:
                 numbers[index] = float(text)

@@ -1,4 +1,4 @@
-"""What every solver has to do, as tests for pytest; derive from `SolverConformance` to try a solver of your own."""
+"""Tests for pytest that every solver passes; derive from `SolverConformance` to try a solver of your own."""
 
 import math
 import os
@@ -14,17 +14,17 @@ from typing import Any, ClassVar
 import pytest
 
 from custom_ros_tools.errors import UnknownNameError
-from rpbi.geometry import Pose, Quaternion, normalized
-from rpbi.kinematics import Kinematics
-from rpbi.kinematics.limits import Limits
-from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
+from robot_model.geometry import Pose, Quaternion, angle_between, normalized
+from robot_model.limits import Limits
+from robot_model.model import RobotModel
+from robot_model.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
 
-from .lookup import make_solver
 from .problem import IKProblem, IKSolution
 from .solver import Solver
+from .solvers import SOLVERS
 
 PROBLEMS = "IK_CONFORMANCE_PROBLEMS"
-"""Environment variable: how many random problems to solve in place of `random_problems`."""
+"""Environment variable: number of random problems in place of `random_problems`."""
 _IN_ANOTHER_PROCESS = """
 import pickle, sys
 from ik_ros.lookup import make_solver
@@ -37,15 +37,15 @@ pickle.dump([solver.solve(problem) for problem in problems], open(sys.argv[1], "
 class SolverConformance:
     """Tests that any solver of a link's pose passes.
 
-    A subclass names the solver and its robot, and overrides what is not so with its solver.
+    A subclass names the solver and its robot, and overrides whatever differs for its solver.
 
     Attributes:
-        solver_name: What `make_solver` is asked for: a name of the table, or `"their_package.module:Class"`.
+        solver_name: Argument of `make_solver`: a name of the table, or `"their_package.module:Class"`.
         options: Its options. `urdf_filename`, `base_link` and `tip_link` are where `forward` finds the robot.
         least_share: The least share of reachable problems to be solved.
-        reachable_problems: How many of those to try.
-        random_problems: How many problems to try, reachable or not, of which only limits and finiteness count.
-        reach_m: How far from the base random targets are [m].
+        reachable_problems: Number of those to try.
+        random_problems: Number of problems, reachable or not, for which only limits and finiteness are checked.
+        reach_m: Largest distance of random targets from the base [m].
     """
 
     solver_name: ClassVar[str]
@@ -59,18 +59,17 @@ class SolverConformance:
 
     def make(self) -> Solver:
         """Returns a new solver."""
-        return make_solver(self.solver_name, self.options)
+        return SOLVERS.make(self.solver_name, self.options)
 
     def problem(self, target: Pose, start: Mapping[str, float], seed: int = 0) -> IKProblem:
         """Returns the problem of going to a target."""
         return IKProblem(target=target, start=start, seed=seed)
 
     def forward(self, positions: Sequence[float]) -> Pose:
-        """Returns where the link is in the base, by other means than the solver's own: PyBullet's."""
+        """Returns where the link is in the base, by other means than the solver's own: `robot_model`."""
         at = dict(zip(self.solver.joint_names, positions))
         q = [at.get(name, 0.0) for name in self.robot.joint_names]
-        base, tip = (self._link_pose(q, str(self.options[link])) for link in ("base_link", "tip_link"))
-        return base.inverse() @ tip
+        return self.robot.pose(q, str(self.options["tip_link"]), str(self.options["base_link"]))
 
     def positions(self, generator: random.Random) -> list[float]:
         """Returns random positions within limits."""
@@ -89,16 +88,9 @@ class SolverConformance:
         return Limits(self.solver.lower, self.solver.upper, [True] * len(self.solver.joint_names))
 
     @cached_property
-    def robot(self) -> Kinematics:
-        """The robot in PyBullet."""
-        return Kinematics(str(self.options["urdf_filename"]))
-
-    def _link_pose(self, q: Sequence[float], link: str) -> Pose:
-        """Returns where a link is in the robot's root."""
-        try:
-            return self.robot.forward(q, link)
-        except ValueError:  # the root, which is where it is
-            return Pose()
+    def robot(self) -> RobotModel:
+        """The robot, read from its URDF."""
+        return RobotModel(str(self.options["urdf_filename"]))
 
     def start_at(self, positions: Sequence[float]) -> dict[str, float]:
         """Returns positions by joint."""
@@ -112,7 +104,7 @@ class SolverConformance:
         ]
 
     def checked(self, problem: IKProblem) -> IKSolution:
-        """Returns an answer that has order, length, finiteness, limits and words, and is true if it says success."""
+        """Returns an answer after checks of order, length, finiteness, limits, message, and of a claimed success."""
         solution = self.solver.solve(problem)
         assert solution.joint_names == self.solver.joint_names, "joints are in another order"
         assert len(solution.positions) == len(self.solver.joint_names), solution
@@ -198,9 +190,7 @@ class SolverConformance:
 
 def distances(pose: Pose, other: Pose) -> tuple[float, float]:
     """Returns distance [m] and angle [rad] between two poses."""
-    same_side = math.copysign(1.0, sum(a * b for a, b in zip(pose.quat_xyzw, other.quat_xyzw)))
-    chord = math.dist(pose.quat_xyzw, [same_side * component for component in other.quat_xyzw])
-    return math.dist(pose.position, other.position), 4.0 * math.asin(min(1.0, chord / 2.0))
+    return math.dist(pose.position, other.position), angle_between(pose.quat_xyzw, other.quat_xyzw)
 
 
 def random_quat(generator: random.Random) -> Quaternion:

@@ -25,44 +25,44 @@ from .problem_stream import JointRateLimiterConfig
 
 
 class RobotIKConfig(ConfigModel):
-    """What the robot's own inverse kinematics is asked; the keys are those of its message."""
+    """Options of the robot's own inverse kinematics; the keys are those of its message."""
 
     robot_name: Name = Field(description="The robot; its YAML has `start_ik_callback: true`.")
     link_name: Text = Field(description="The link that goes to the target.")
     parent_frame_id: FrameId = Field(description="TF frame of the world.")
     child_frame_id: FrameId = Field(description="TF frame that is the target.")
-    lowerLimits: ListOf[float] = Field((), description="Of each joint that a motor can move, as the next three.")
+    lowerLimits: ListOf[float] = Field((), description="One for each joint that a motor can move, as the next three.")
     upperLimits: ListOf[float] = Field((), description="These four go together [rad or m].")
-    jointRanges: ListOf[float] = Field((), description="How far each may be from its rest posture, in proportion.")
+    jointRanges: ListOf[float] = Field((), description="Range of each about its rest posture, relative to the others.")
     resetPoses: ListOf[float] = Field((), description="Rest posture.")
-    jointDamping: ListOf[NonNegative] = Field((), description="How unwilling each joint is to move.")
+    jointDamping: ListOf[NonNegative] = Field((), description="Weight of the motion of each joint.")
     solver: Literal[0, 1] = Field(0, description="0 damped least squares, 1 selectively damped least squares.")
     maxNumIterations: Count = Field(0, description="Most iterations from one start; 0 is up to the robot.")
     residualThreshold: NonNegative = Field(0.0, description="Distance at which the search stops [m].")
 
 
 class TargetParameters(ConfigModel):
-    """How often a target is published, and for how long it counts."""
+    """Rate of targets, and the time for which each one counts."""
 
-    hz: Hz = Field(50.0, description="How often it is published, in wall time.")
-    tf_timeout_s: Seconds = Field(0.5, description="How long it lasts when its TF stops; then nothing is published.")
+    hz: Hz = Field(50.0, description="Rate of publication, in wall time.")
+    tf_timeout_s: Seconds = Field(0.5, description="Longest time without new TF; then nothing is published.")
 
 
 class SetupParameters(StartParameters, TargetParameters):
-    """What problems are made of."""
+    """Inputs of problems."""
 
     parent_frame_id: FrameId | None = Field(None, description="TF frame that the target is in: the solver's base.")
     child_frame_id: FrameId | None = Field(None, description="TF frame that is the target.")
-    init_bx: NonNegative = Field(0.0, description="How far off the target along its x axis will do, both ways [m].")
+    init_bx: NonNegative = Field(0.0, description="Largest error along the target's x axis, both ways [m].")
     init_by: NonNegative = Field(0.0, description="The same along y [m].")
     init_bz: NonNegative = Field(0.0, description="The same along z [m].")
-    init_brx: NonNegative = Field(0.0, description="How far turned about its x axis will do, both ways [rad].")
+    init_brx: NonNegative = Field(0.0, description="Largest rotation about its x axis, both ways [rad].")
     init_bry: NonNegative = Field(0.0, description="The same about y [rad].")
     init_brz: NonNegative = Field(0.0, description="The same about z [rad].")
     goals: dict[Text, ListOf[float]] = Field({}, description="First goals of tasks that change, by task.")
     wait_for_start: Switch = Field(True, description="Whether the first problem waits for a start.")
-    max_num_prev_solutions: Count = Field(1, description="How many previous solutions a problem has.")
-    seed: Count = Field(0, description="Of whatever is random in the solver.")
+    max_num_prev_solutions: Count = Field(1, description="Number of previous solutions in a problem.")
+    seed: Count = Field(0, description="Seed of everything random in the solver.")
 
     @model_validator(mode="after")
     def _frames_go_together(self) -> SetupParameters:
@@ -77,7 +77,7 @@ class SetupParameters(StartParameters, TargetParameters):
 class SolverNodeParameters(StartParameters):
     """Private parameters of the node itself; all others are the solver's."""
 
-    base_frame_id: str = Field("", description="TF frame of the solver's base; empty takes poses as they are.")
+    base_frame_id: str = Field("", description="TF frame of the solver's base; if empty, poses are not transformed.")
     continuity: JointRateLimiterConfig | None = Field(
         None, description="Keeps targets within the velocities of the joints."
     )

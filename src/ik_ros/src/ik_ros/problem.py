@@ -4,8 +4,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from rpbi.geometry import Pose, Vector, normalized
-from rpbi.kinematics.problem import LARGEST
+from robot_model.geometry import Pose, Vector, normalized
+from robot_model.limits import MAX_MAGNITUDE
 
 JointPositions = Mapping[str, float]
 """Positions by joint [rad or m]."""
@@ -13,7 +13,7 @@ JointPositions = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Waypoint:
-    """What a link passes at a time.
+    """A pose that a link passes at a time.
 
     Attributes:
         time_s: When, from the start [s].
@@ -26,18 +26,18 @@ class Waypoint:
 
 @dataclass(frozen=True)
 class IKProblem:
-    """What a solver is asked; what a problem does not need stays empty.
+    """A problem for a solver; fields that it does not need stay empty.
 
     Attributes:
         target: Pose of the solver's link in its base frame; quaternions of any length but 0.
-        position_tolerance: How far off the target the link may be along each axis of the target, both ways [m].
-        rotation_tolerance: How far it may be turned about each of them, both ways [rad]; from pi on, as it likes.
-        start: Where the search starts, by joint [rad or m]; joints that are left out start at the middle of their
+        position_tolerance: Largest error along each axis of the target, both ways [m].
+        rotation_tolerance: Largest rotation about each of them, both ways [rad]; free from pi on.
+        start: Start of the search, by joint [rad or m]; joints that are left out start at the middle of their
             limits. Positions outside limits are brought in, with a warning.
         previous: Previous solutions, newest last; solvers that can stay near them.
         goals: Values of the goals of tasks by the name of the task, for solvers that have tasks.
-        waypoints: What the link passes, by time, for solvers of trajectories.
-        seed: Of whatever is random: solvers that are deterministic give equal problems equal answers.
+        waypoints: Waypoints of the link, by time, for solvers of trajectories.
+        seed: Seed of everything random: a deterministic solver returns equal answers for equal problems.
 
     Raises:
         ValueError: If a number is not finite or out of its range; it names the field.
@@ -90,8 +90,8 @@ def _numbers(what: str, values: Sequence[float], count: int | None = None) -> tu
 
 def _number(what: str, value: float) -> float:
     value = float(value)
-    if not abs(value) <= LARGEST:
-        raise ValueError(f"{what}: expected finite numbers, {LARGEST:g} at most; got {value:g}")
+    if not abs(value) <= MAX_MAGNITUDE:
+        raise ValueError(f"{what}: expected finite numbers, {MAX_MAGNITUDE:g} at most; got {value:g}")
     return value
 
 
@@ -112,19 +112,19 @@ class SampledTrajectory:
 
 @dataclass(frozen=True)
 class IKSolution:
-    """Where a solver got to.
+    """Result of a solver.
 
     Attributes:
         success: Whether all that was asked for is met within the tolerances, and the limits are held.
-        message: How well it went, or why not, in words with numbers.
+        message: Description of the result, in words with numbers.
         joint_names: The solver's n joints, always in the same order.
         positions: n positions within limits [rad or m]; without success, the best that were found, and without any
             of those, where the search started.
-        position_error_m: How far the link is off its target beyond the tolerance [m]; for several, the largest.
-        orientation_error_rad: How far it is turned beyond the tolerance [rad]; for several, the largest.
-        alternatives: Other solutions, the best first, of solvers that look for more than one; n positions each.
-        trajectory: Of solvers of trajectories; `positions` are then its last ones.
-        base_pose: Of robots whose root floats: where it is then in the solver's base frame.
+        position_error_m: Distance of the link from its target beyond the tolerance [m]; for several, the largest.
+        orientation_error_rad: Rotation from the target beyond the tolerance [rad]; for several, the largest.
+        alternatives: Other solutions, the best first, if the solver searches several; n positions each.
+        trajectory: Trajectory, from solvers of trajectories; `positions` are then its last ones.
+        base_pose: Pose of a floating root in the solver's base frame; None for a fixed one.
     """
 
     success: bool

@@ -17,7 +17,7 @@ LONGEST_PERIOD_S = 0.1
 
 
 class JointRateLimiterConfig(ConfigModel):
-    """How targets follow each other."""
+    """Timing of a stream of targets."""
 
     max_velocity: Positive | dict[str, Positive] | None = Field(
         None,
@@ -33,11 +33,11 @@ class JointRateLimiter:
     """Keeps the joints between two targets within their velocities.
 
     Where the solution is further away, the target goes as far towards it as the slowest joint allows, all joints in
-    proportion. So near a singularity, where little movement of the link takes much of the joints, the robot falls
-    behind instead of jumping, and it crosses over to another posture at the speed of its joints.
+    proportion. Near a singularity, where small motions of the link need large ones of the joints, the robot therefore
+    lags instead of jumping, and it changes to another posture at the speed of its joints.
 
     Args:
-        config: How.
+        config: Its configuration.
         joint_names: The n joints.
         velocity_limits: Their velocities by the URDF [rad/s or m/s]; 0 and inf mean that it has none.
 
@@ -66,9 +66,9 @@ class JointRateLimiter:
         self._limits = config.velocity_scale * np.array(list(limits.values()))
         self._last: np.ndarray | None = None
 
-    def begin(self, positions: Sequence[float]) -> None:
-        """Goes on from n positions [rad or m]; else the first target is wherever the first solution is."""
-        self._last = np.array(positions, dtype=float)
+    def begin(self, positions: Sequence[float] | None) -> None:
+        """Continues from n positions [rad or m]; after None, the first target is the first solution."""
+        self._last = None if positions is None else np.array(positions, dtype=float)
 
     def next(self, solution: Sequence[float], period_s: float) -> tuple[np.ndarray, float]:
         """Returns the next target.
@@ -95,7 +95,7 @@ class ProblemStream:
     """Solves problems one after the other, each from where the last one led.
 
     Args:
-        solver: What solves them.
+        solver: The solver.
         continuity: Keeps the joints within their velocities; without it, targets are the solutions.
 
     Attributes:
@@ -109,6 +109,13 @@ class ProblemStream:
         self._goal: tuple[float, ...] | None = None
         self._last: JointPositions = {}
         self._last_s: float | None = None
+
+    def restart(self) -> None:
+        """Treats the next problem as the first."""
+        self.target = self._goal = self._last_s = None
+        self._last = {}
+        if self._continuity is not None:
+            self._continuity.begin(None)
 
     def solve(self, problem: IKProblem, stamp_s: float = 0.0) -> IKSolution:
         """Solves the next problem.

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import model_validator
 
 from custom_ros_tools.schema import ConfigModel, KeyedError, ListOf, Position, PositiveMetres, Quat, Text
-from rpbi.geometry import Pose
+from robot_model.geometry import Pose
 
 
 class Core(NamedTuple):
@@ -16,7 +16,7 @@ class Core(NamedTuple):
 
     Attributes:
         half: Half lengths along x, y, z [m].
-        radius: How far around this the surface is [m].
+        radius: Distance of the surface from it [m].
     """
 
     half: np.ndarray
@@ -32,10 +32,10 @@ class ShapeConfig(ConfigModel):
     """A shape; one of `sphere`, `box` and `capsule`.
 
     Attributes:
-        name: What tasks and messages call it.
+        name: Its name in tasks and messages.
         link: The link it belongs to; None: it stands in the base.
-        position: Where its middle is, in the link or base [m].
-        orientation: How it is turned there, quaternion x, y, z, w.
+        position: Its centre, in the link or base [m].
+        orientation: Its orientation there, quaternion x, y, z, w.
         sphere: Its radius [m].
         box: Its whole lengths along x, y, z [m].
         capsule: Its radius, and its length along z between the centres of the round ends [m].
@@ -67,7 +67,7 @@ class ShapeConfig(ConfigModel):
 
     @property
     def core(self) -> Core:
-        """What is left of it without its roundness."""
+        """Its core: the shape without its roundness."""
         if self.sphere is not None:
             return Core(np.zeros(3), self.sphere)
         if self.capsule is not None:

@@ -1,4 +1,4 @@
-"""What every solver of inverse kinematics is."""
+"""The interface of solvers of inverse kinematics."""
 
 import logging
 from abc import ABC, abstractmethod
@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from custom_ros_tools.schema import ConfigModel
-from rpbi.kinematics.limits import Limits
-from rpbi.urdf.joints import LIMIT_ROUNDING
+from robot_model.limits import LIMIT_ROUNDING, Limits
 
 from .problem import IKProblem, IKSolution
 
@@ -17,8 +16,9 @@ _log = logging.getLogger(__name__)
 class Solver(ABC):
     """Solves problems of inverse kinematics for one robot.
 
-    The options of a subclass are its `Config`, in YAML or as parameters of the solver's node. What cannot be solved is
-    an answer (`success` is false, and `message` says why); an exception means that the problem makes no sense.
+    The options of a subclass are its `Config`, in YAML or as parameters of the solver's node. A problem without
+    solution is an answer (`success` is false, and `message` has the reason); an exception means that the problem is
+    invalid.
 
     Attributes:
         Config: Model of its options.

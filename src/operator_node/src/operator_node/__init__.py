@@ -1,1 +1,1 @@
-"""People in the world: input devices, mappings, force feedback, motion capture, teleoperation."""
+"""Input devices, mappings, force feedback, motion capture and teleoperation."""

@@ -1,4 +1,4 @@
-"""What every input device is."""
+"""Interface of all input devices."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from custom_ros_tools.schema import ConfigModel
 
 @dataclass(eq=False)
 class DeviceError(InterfaceError):
-    """A device is not there, has gone, or sends what makes no sense; `reason` says which, and what to do about it."""
+    """A device is absent, has disconnected or sends invalid data; `reason` states which, and a remedy."""
 
     device: str
     reason: str
@@ -21,17 +21,17 @@ class DeviceError(InterfaceError):
 
 
 class DeviceClosedError(DeviceError):
-    """The person has closed the device, as by the cross of its window: it is not to be opened again."""
+    """The user has closed the device, for example its window; it must not be opened again."""
 
 
 class Reading(NamedTuple):
-    """What a device says at one moment.
+    """State of a device at one moment.
 
     Attributes:
         axes: A number in [-1, 1] for each axis of the device.
         buttons: 1 for each button that is held, 0 for the others.
-        events: What is native to the device and came since the last reading, in order, for topics of its own.
-        refused: What came since the last reading and makes no sense, as the reason for each.
+        events: Native events of the device since the last reading, in order; for topics of its own.
+        refused: Reason for each invalid input since the last reading.
     """
 
     axes: tuple[float, ...]
@@ -41,18 +41,19 @@ class Reading(NamedTuple):
 
 
 class Device(ABC):
-    """An input device, opened, read and closed by one thread, which is the main one.
+    """An input device; one thread, the main thread, opens, reads and closes it.
 
-    Its options are its `Config`, in YAML or as parameters of its node, and the only argument that it is made with. It
-    only says what the hardware says: retrying, repeating, stamps and the last reading when it has gone are up to
-    `DeviceFeed`, and so are checks that what it says is finite and within [-1, 1], and that nothing jumps.
+    Its options are its `Config`, read from YAML or from parameters of its node; they are the only argument of its
+    constructor. A device only reports the state of its hardware. `DeviceFeed` does the rest: it retries, repeats,
+    stamps and publishes the last reading when a device has gone; it checks that values are finite and within [-1, 1],
+    and prevents jumps.
 
     Attributes:
         Config: Model of its options.
-        axes: Names of its axes, in the order of the message; of some devices known once they are open.
+        axes: Names of its axes, in the order of the message; some devices know them only once they are open.
         buttons: Names of its buttons, likewise.
-        ros_topics: `module:Class` of what publishes its events on topics of their own, and takes what it is sent; empty
-            if a `sensor_msgs/Joy` is all that there is.
+        ros_topics: `module:Class` that publishes its events on topics of their own and subscribes to its inputs; empty
+            if the device has no topics other than `sensor_msgs/Joy`.
     """
 
     Config: ClassVar[type[ConfigModel]]
@@ -62,41 +63,41 @@ class Device(ABC):
 
     @abstractmethod
     def open(self) -> None:
-        """Connects to the device; after a `close`, once more.
+        """Connects to the device; reconnects after `close`.
 
         Raises:
-            DeviceError: If it is not there. It may be later: whoever reads it tries again.
+            DeviceError: If it is absent. It may appear later: the caller tries again.
             MissingDependency: If it needs a library that is not installed.
         """
 
     @abstractmethod
     def read(self, timeout_s: float) -> Reading | None:
-        """Returns the newest reading once there is a new one, or None after some time without.
+        """Returns the next new reading, or None if there is none within the timeout.
 
         The first reading after `open` is the present state, as soon as it is known.
 
         Args:
-            timeout_s: How long to wait [s]; 0 does not wait.
+            timeout_s: Longest time to wait [s]; 0 does not wait.
 
         Raises:
-            DeviceError: If the device has gone; it is to be closed then.
-            DeviceClosedError: If the person has closed it.
+            DeviceError: If the device has gone; the caller closes it then.
+            DeviceClosedError: If the user has closed it.
         """
 
     @abstractmethod
     def close(self) -> None:
-        """Lets go of the device; it may be called at any time, and twice."""
+        """Releases the device; may be called at any time, and repeatedly."""
 
     def at_rest(self) -> Reading:
-        """Returns the reading when nobody touches the device: 0 everywhere, unless it is built otherwise.
+        """Returns the reading of an untouched device: 0 everywhere, unless its hardware differs.
 
-        It is the last one when the device goes or is closed; its events let go of what is held.
+        It is published last when the device goes or is closed; its events release all keys and buttons that are held.
         """
         return Reading((0.0,) * len(self.axes), (0,) * len(self.buttons))
 
     def cue(self, force: Sequence[float]) -> None:  # noqa: B027 (most devices have nothing to feel)
-        """Has the person feel a force as the device can, for instance by rumbling.
+        """Renders a force as far as the device can, for example by rumbling.
 
         Args:
-            force: x, y, z, each in [-1, 1] of what the device can do.
+            force: x, y, z, each in [-1, 1], as a share of the largest force of the device.
         """

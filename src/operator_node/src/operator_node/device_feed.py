@@ -1,4 +1,4 @@
-"""Keeps a device open and hands on what it says, if it may be trusted."""
+"""Keeps a device open and publishes its readings once they are checked."""
 
 import logging
 import math
@@ -17,57 +17,61 @@ from custom_ros_tools.schema import ConfigModel, HzOrOff, NonNegative
 from .device import Device, DeviceClosedError, DeviceError, Reading
 
 REOPENING_PERIOD_S = 1.0
-"""How often a device that is not there is looked for."""
+"""Period at which an absent device is looked for [s]."""
 WARNING_PERIOD_S = 5.0
-"""How often the same is warned of at most."""
+"""Shortest time between two equal warnings [s]."""
 AT_REST = 0.1
-"""So near its value at rest, an axis counts as let go."""
-MOST_READINGS = 1000
-"""Readings that are put together into one at most, so that a device that never falls silent is heard all the same."""
-MOST_REASONS, OTHER_REASONS = 100, "other reasons"
-"""So many reasons are told apart: those of a device of somebody else's may have numbers in them."""
-MOST_POSTED = 1000
-"""Of what waits for a device that does not answer, the newest counts."""
+"""Distance from its value at rest within which an axis counts as released."""
+MAX_READINGS = 1000
+"""Largest number of readings that are merged into one, so that a device that never pauses is published all the same."""
+MAX_REASONS, OTHER_REASONS = 100, "other reasons"
+"""Largest number of reasons that are counted separately, since reasons from devices of other packages may contain
+numbers; further ones are counted together.
+"""
+MAX_POSTED = 1000
+"""Largest number of actions that wait for a device; the oldest are dropped beyond it."""
 HELD_S = 5.0
-"""What has not been at rest for so long since the device was opened is warned of [s]."""
+"""Time after opening at which axes and buttons that have not been at rest yet are reported in a warning [s]."""
 logger = logging.getLogger(__name__)
 
 
 class FeedConfig(ConfigModel):
-    """How readings are handed on; the names are those of `joy_node`."""
+    """Rates at which readings are published; the names are those of `joy_node`."""
 
     autorepeat_rate: HzOrOff = Field(
-        20.0, description="How often a reading that does not change is repeated, so that others know that it counts."
+        20.0,
+        description="Rate at which an unchanged reading is repeated, so that subscribers know that it is still valid.",
     )
     coalesce_interval: NonNegative = Field(
-        0.001, description="For how long motions are put together into one reading; buttons are handed on at once [s]."
+        0.001, description="Time during which motions are merged into one reading; buttons are published at once [s]."
     )
 
 
 class DeviceFeed:
-    """Keeps a device open, checks what it says, and hands it on.
+    """Keeps a device open, checks its readings, and publishes them.
 
-    A device that is not there is looked for once a second. The first reading after it was found is one at rest, and
-    each axis and button stays at rest until it has been there: what is held while a node starts, or a plug is put in,
-    moves nothing; `held` names it. When the device goes or is closed, the last reading is at rest, too.
+    An absent device is looked for once a second. The first reading after opening is one at rest. Each axis and button
+    stays at rest until the device has reported it at rest, so that nothing that is held while a node starts or a device
+    is plugged in causes a motion; `held` names these axes and buttons. When the device goes or is closed, the last
+    reading is at rest, too.
 
-    Readings that make no sense are counted, and the last good one counts on. Whatever a device raises, nothing but
-    what is said at `step` gets out.
+    Invalid readings are counted and dropped; the last valid one stays in force. Exceptions of the device do not escape,
+    except those documented for `step`.
 
-    All but `post` belongs to one thread.
+    All methods except `post` belong to one thread.
 
     Args:
-        name: What the device is called in messages.
+        name: Name of the device in messages.
         device: The device, not open.
-        config: How often, and how much at once.
-        publish: Takes the readings.
+        config: Rates and merging.
+        publish: Called with each reading.
 
     Attributes:
         problem: Why the device is not open; None if it is.
-        published: Count of readings handed on.
-        refused: Count of readings that were not, by reason.
+        published: Number of published readings.
+        refused: Number of refused readings, by reason.
         free_axes: Indices of the axes that have been at rest since the device was opened.
-        held: Names of axes and buttons that have not.
+        held: Names of axes and buttons that have not been at rest since then.
     """
 
     def __init__(self, name: str, device: Device, config: FeedConfig, publish: Callable[[Reading], None]) -> None:
@@ -80,20 +84,20 @@ class DeviceFeed:
         self.held: tuple[str, ...] = ()
         self._free_buttons: set[int] = set()
         self._held_warning_due_s = math.inf
-        self._buttons: tuple[int, ...] = ()
-        """As the device has them."""
+        self._buttons: tuple[int, ...] | None = None
+        """Buttons of the last reading; None before the first one since the device was opened."""
         self._open_at_s = self._repeat_at_s = -math.inf
         self._is_absent = False
         self._warned_s: dict[str, float] = {}
-        self._posted: deque[Callable[[], None]] = deque(maxlen=MOST_POSTED)
+        self._posted: deque[Callable[[], None]] = deque(maxlen=MAX_POSTED)
         self._pause = threading.Event()
 
     def run(self, is_over: Callable[[], bool], period_s: float = 0.02) -> None:
-        """Hands readings on until it is over or the person closes the device, and closes it then.
+        """Publishes readings until `is_over` returns True or the user closes the device; closes the device at the end.
 
         Args:
-            is_over: Asked about once in a period.
-            period_s: How long it may take until it is asked again, and what was posted is done [s].
+            is_over: Called once a period.
+            period_s: Longest time between two calls of `is_over`, and until posted actions are run [s].
 
         Raises:
             MissingDependency: If the device needs a library that is not installed.
@@ -107,10 +111,10 @@ class DeviceFeed:
             self.close()
 
     def step(self, timeout_s: float) -> None:
-        """Opens the device if need be, and waits for one reading.
+        """Runs the posted actions, opens the device if necessary, and waits for one reading.
 
         Raises:
-            DeviceClosedError: If the person has closed the device; there was a last reading.
+            DeviceClosedError: If the user has closed the device; a last reading at rest was published.
             MissingDependency: If the device needs a library that is not installed.
         """
         for _ in range(len(self._posted)):
@@ -134,7 +138,7 @@ class DeviceFeed:
             self._lose(cause_of(error))
             return
         if reading is not None:
-            self._take(reading)
+            self._process(reading)
         if self._last is not None and time.monotonic() >= self._repeat_at_s:
             self._hand_on(self._last)
         if self.held and time.monotonic() >= self._held_warning_due_s:
@@ -142,11 +146,13 @@ class DeviceFeed:
             logger.warning("%s: %s", self._name, held_text(self.held))
 
     def post(self, action: Callable[[], None]) -> None:
-        """Has the feed's thread do something with the device before its next reading; any thread may call this."""
+        """Schedules an action on the device; the feed's thread runs it before the next reading. Any thread may call
+        this.
+        """
         self._posted.append(action)
 
     def close(self) -> None:
-        """Closes the device, after a last reading at rest."""
+        """Closes the device and publishes a last reading at rest."""
         if self.problem is None:
             self._leave()
         self.problem = "closed"
@@ -168,16 +174,16 @@ class DeviceFeed:
             self._is_absent = True
             return
         if self._is_absent:
-            logger.info("%s: it is there now", self._name)
+            logger.info("%s: it is available now", self._name)
         self.problem, self._is_absent = None, False
         self.free_axes.clear()
         self._free_buttons.clear()
         self.held, self._held_warning_due_s = (), time.monotonic() + HELD_S
-        self._last = None
+        self._last = self._buttons = None
         self._hand_on(self._resting())
 
     def _lose(self, reason: str) -> None:
-        """Closes a device that has gone."""
+        """Closes a device that has gone and publishes a last reading at rest."""
         if not self._is_absent:
             logger.warning("%s: %s", self._name, reason)
         self._is_absent = True
@@ -204,13 +210,13 @@ class DeviceFeed:
         return Reading((0.0,) * len(device.axes), (0,) * len(device.buttons))
 
     def _next(self, timeout_s: float) -> Reading | None:
-        """Returns the next reading, and with it those that follow within the coalescing time."""
+        """Returns the next reading, merged with those that follow within `coalesce_interval`."""
         first = self._read(timeout_s)
         if first is None or first.buttons != self._buttons:
             return first
         end_s = time.monotonic() + self._config.coalesce_interval
         reading, events, refused = first, [*first.events], [*first.refused]
-        for _ in range(MOST_READINGS):
+        for _ in range(MAX_READINGS):
             left_s = end_s - time.monotonic()
             if left_s <= 0.0 or reading.buttons != first.buttons or events or refused:
                 break
@@ -222,17 +228,17 @@ class DeviceFeed:
         return reading._replace(events=tuple(events), refused=tuple(refused))
 
     def _read(self, timeout_s: float) -> Reading | None:
-        """Returns what the device says, None if that is nothing, or no reading at all."""
+        """Returns the next reading of the device, or None if there is none or it is no `Reading`."""
         said = self._device.read(timeout_s)
         if said is None:
             return None
         try:
             return Reading(*map(tuple, said))
         except TypeError:
-            self._refuse("it says what is no reading", f"got {said!r:.100}")
+            self._refuse("it returned something other than a reading", f"got {said!r:.100}")
             return None
 
-    def _take(self, reading: Reading) -> None:
+    def _process(self, reading: Reading) -> None:
         for reason in reading.refused:
             self._refuse(str(reason))
         self._buttons = reading.buttons
@@ -245,7 +251,7 @@ class DeviceFeed:
             self._hand_on(reading)
 
     def _from_rest(self, reading: Reading) -> Reading:
-        """Returns a reading in which whatever has not been at rest since the device was opened is."""
+        """Returns a reading in which every axis and button that has not been at rest since opening is at rest."""
         resting = self._resting().axes
         for index, (value, rest) in enumerate(zip(reading.axes, resting)):
             if abs(value - rest) <= AT_REST:
@@ -270,7 +276,7 @@ class DeviceFeed:
         self._publish(reading)
 
     def _refuse(self, reason: str, detail: str = "") -> None:
-        if reason not in self.refused and len(self.refused) >= MOST_REASONS:
+        if reason not in self.refused and len(self.refused) >= MAX_REASONS:
             reason, detail = OTHER_REASONS, f"{reason}; {detail}"
         self.refused[reason] += 1
         now_s = time.monotonic()
@@ -287,14 +293,14 @@ class DeviceFeed:
 
 
 def held_text(held: Sequence[str]) -> str:
-    """Returns what to say of axes and buttons that have not been at rest since the device was opened."""
-    return f"{', '.join(held)} not at rest since it was opened; let go: until then it counts as if it were"
+    """Returns a warning about axes and buttons that have not been at rest since the device was opened."""
+    return f"{', '.join(held)} not at rest since it was opened; release it: until then it counts as at rest"
 
 
 def problem_of(reading: Reading, axes: Sequence[str], buttons: Sequence[str]) -> str | None:
-    """Returns why a reading makes no sense, None if it does.
+    """Returns why a reading is invalid, or None if it is valid.
 
-    The reasons are few, so that they can be counted.
+    There are few different reasons, so that they can be counted.
 
     Args:
         reading: The reading.
@@ -302,9 +308,9 @@ def problem_of(reading: Reading, axes: Sequence[str], buttons: Sequence[str]) ->
         buttons: Names of its buttons.
     """
     if len(reading.axes) != len(axes):
-        return f"a reading of another number of axes than the {len(axes)} of the device"
+        return f"a reading whose number of axes differs from the {len(axes)} of the device"
     if len(reading.buttons) != len(buttons):
-        return f"a reading of another number of buttons than the {len(buttons)} of the device"
+        return f"a reading whose number of buttons differs from the {len(buttons)} of the device"
     for name, value in zip(axes, reading.axes):
         if not isinstance(value, Real) or value != value or abs(value) == math.inf:
             return f"axis '{name}' is not a finite number"

@@ -1,4 +1,4 @@
-"""Names and codes of keys, and the axes and buttons that are made of those that are held."""
+"""Names and codes of keys, and axes and buttons made from the keys that are held."""
 
 from collections.abc import Collection
 from typing import Annotated, Any
@@ -92,7 +92,7 @@ KEY_CODES: dict[str, int] = {
     "EURO": 321,
     "UNDO": 322,
 }
-"""Code of each key by its name, which is what follows `KEY_` in `keyboard/Key`; the codes are those of SDL 1.2."""
+"""Code of each key by its name, which is the part after `KEY_` in `keyboard/Key`; the codes are those of SDL 1.2."""
 
 
 def _digit_as_text(value: Any) -> Any:
@@ -112,13 +112,13 @@ KeyName = Annotated[
     AlsoTakes({"type": "integer", "minimum": 0, "maximum": 9}),
     Expects("the name of a key, such as LEFT or b"),
 ]
-"""A key by its name; YAML reads 1 as a number, which is taken for the key 1."""
+"""Name of a key; YAML reads 1 as a number, which stands for the key 1."""
 KeyPair = Annotated[tuple[KeyName, KeyName], Field(strict=False)]
-"""The keys of an axis: the one that makes it negative, the one that makes it positive."""
+"""The two keys of an axis: the negative one and the positive one."""
 
 
 class KeyAxes:
-    """Makes axes and buttons of keys that are held.
+    """Maps held keys to axes and buttons.
 
     An axis is 1 while its positive key is held, -1 while its negative one is, and 0 with both or none; a button is 1
     while its key is held.
@@ -133,6 +133,6 @@ class KeyAxes:
         self._buttons = [KEY_CODES[name] for name in buttons]
 
     def reading(self, held: Collection[int]) -> Reading:
-        """Returns what the keys make, from the codes of those that are held."""
+        """Returns axes and buttons for the codes of the keys that are held."""
         axes = tuple(float((positive in held) - (negative in held)) for negative, positive in self._axes)
         return Reading(axes, tuple(int(code in held) for code in self._buttons))

@@ -1,4 +1,4 @@
-"""A node that maps a device in a way of its own."""
+"""Public import path of the node that maps a device; users derive from it."""
 
 from operator_node.ros.mappings.operator_node import OperatorNode, main
 

@@ -15,77 +15,91 @@ from custom_ros_tools.schema import (
     PositiveMetres,
     Quat,
     Seconds,
+    Text,
     Unit,
 )
 
 from .key_axes import KeyName, KeyPair
 
 SecondsOrOff = Annotated[float, Field(ge=0), Unit("s")]
-"""A time, where 0 is for ever."""
+"""A time [s]; 0 means forever."""
 
 
 class InputParameters(ConfigModel):
-    """When input counts as ceased; when nobody publishes it any more, it has in any case."""
+    """Time after which input counts as lost; it also does once it has no publisher."""
 
     input_timeout_s: SecondsOrOff = Field(
         0.0,
-        description="After how long without input it has ceased; 0 waits for ever, for devices that tell changes only.",
+        description="Time without input after which it counts as lost; 0 waits forever, for devices that report "
+        "changes only.",
     )
 
 
 class OperatorParameters(StartParameters, InputParameters):
-    """Of the nodes that map a device."""
+    """Parameters of the nodes that map a device."""
 
     repeat_hz: HzOrOff = Field(
-        20.0, description="How often a signal that is not zero is repeated while input stays the same; 0 is never."
+        20.0, description="Rate at which a nonzero signal is repeated while the input stays the same; 0 never repeats."
     )
 
 
 class LoggerParameters(ConfigModel):
-    """What is kept of a signal, and how often it is said."""
+    """Time span of the window, and how often it is published."""
 
-    window_duration: Seconds = Field(1.0, description="How long a signal is kept.")
-    hz: HzOrOff = Field(0.0, description="How often the window is published, in wall time; 0 with each signal.")
+    window_duration: Seconds = Field(1.0, description="Time span shown in the window.")
+    hz: HzOrOff = Field(
+        0.0, description="Rate at which the window is published, in wall time; 0 publishes it with each signal."
+    )
 
 
 class JoyRemapParameters(InputParameters):
-    """How often a device that tells changes only is repeated."""
+    """Rate at which the reading of a device that reports changes only is repeated."""
 
-    hz: Hz = Field(100.0, description="How often, in wall time.")
+    hz: Hz = Field(100.0, description="Rate, in wall time.")
 
 
 class KeyboardToJoyConfig(ConfigModel):
-    """Which keys are axes and buttons."""
+    """Keys of axes and buttons."""
 
-    axes: ListOf[KeyPair] = Field(description="For each axis the key that makes it -1 and the one that makes it 1.")
+    axes: ListOf[KeyPair] = Field(description="For each axis, the key that makes it -1 and the key that makes it 1.")
     buttons: ListOf[KeyName] = Field((), description="The key of each button.")
 
 
 class KeyboardToJoyParameters(ConfigModel):
-    """How often keys are told, and how long they count as held."""
+    """Rate of the messages, and time for which keys count as held."""
 
-    hz: Hz = Field(100.0, description="How often, in wall time; a key that goes down or up is told at once.")
+    hz: Hz = Field(100.0, description="Rate, in wall time; a key that goes down or up is published at once.")
     key_timeout_s: SecondsOrOff = Field(
         0.0,
-        description="How long a key counts as held after it went down, for keyboards that repeat keys but may lose "
-        "that one comes up; 0 is until it comes up.",
+        description="Time for which a key counts as held after it went down, for keyboards that repeat keys but may "
+        "miss "
+        "a release; 0 means until it is released.",
     )
 
 
 class TeleopParameters(StartParameters):
-    """When a frame that is teleoperated moves."""
+    """Time after which a teleoperated frame stops without a signal."""
 
     input_timeout_s: SecondsOrOff = Field(
-        0.5, description="How long a signal lasts when no other comes; then the frame stands still. 0 is for ever."
+        0.5,
+        description="Time for which a signal stays in force when no other follows; then the frame stops. 0 means "
+        "forever.",
     )
 
 
 class InteractiveTargetConfig(ConfigModel):
     """A TF frame that is dragged in RViz."""
 
-    parent_frame_id: FrameId = Field(description="The frame that it is in.")
+    parent_frame_id: FrameId = Field(description="Parent frame.")
     child_frame_id: FrameId = Field(description="Its name.")
-    position: Position = Field((0.0, 0.0, 0.0), description="Where it is at first.")
-    quat_xyzw: Quat = Field((0.0, 0.0, 0.0, 1.0), description="How it is turned at first.")
+    position: Position = Field((0.0, 0.0, 0.0), description="Initial position.")
+    quat_xyzw: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Initial orientation.")
     size_m: PositiveMetres = Field(0.2, description="Size of the handles.")
-    hz: Hz = Field(50.0, description="How often it is broadcast, in wall time.")
+    hz: Hz = Field(50.0, description="Rate at which it is broadcast, in wall time.")
+
+
+class MvnTopicsConfig(ConfigModel):
+    """Private parameters of the node that publishes people from MVN."""
+
+    parent_frame_id: FrameId = Field("rpbi/world", description="TF frame in which MVN's world stands.")
+    recording_folder: Text = Field("~/mvn", description="Folder for the files that `mvn/record` writes.")

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 
 def reconstruct_interface_log_msg(msg: Any, Nd: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Returns what a message of `operator_node/window` has.
+    """Returns the times and signals of a message of `operator_node/window`.
 
     Args:
         msg: The message; its `data` are records of a time and a signal, one after the other.
-        Nd: How many numbers a signal has.
+        Nd: Numbers per signal.
 
     Returns:
         Times [s], shape (N,), oldest first, and signals, shape (Nd, N).

@@ -1,4 +1,4 @@
-"""The last seconds of a signal."""
+"""The most recent part of a signal."""
 
 import math
 from collections import deque
@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 
 class SignalWindow:
-    """Keeps the signals of some time, and those only.
+    """Buffers the signals of a time span.
 
     Args:
-        duration_s: How old a signal may be [s].
-        most: How many are kept at most: time that stands still must not fill the memory.
+        duration_s: Age beyond which signals are dropped [s].
+        most: Largest number of signals; the oldest are dropped beyond it, so that a stopped clock cannot fill the
+            memory.
     """
 
     def __init__(self, duration_s: float, most: int = 20_000) -> None:
@@ -19,14 +20,14 @@ class SignalWindow:
 
     @property
     def size(self) -> int:
-        """How many numbers a signal has; 0 if there is none."""
+        """Numbers per signal; 0 if there is none."""
         return len(self._records[0]) - 1 if self._records else 0
 
     def add(self, time_s: float, signal: Sequence[float]) -> None:
         """Adds the newest signal, at a time [s].
 
-        Those from before are forgotten if the signal has another size, or if time has gone back, as it does when a
-        simulation begins again.
+        All earlier signals are dropped if the size of the signal changes or time goes back, as it does when a
+        simulation is restarted.
 
         Raises:
             ValueError: If the signal is empty or not finite; then nothing is added.
@@ -39,7 +40,7 @@ class SignalWindow:
         self.forget(time_s)
 
     def forget(self, now_s: float) -> None:
-        """Forgets the signals that are too old at a time [s]."""
+        """Drops the signals that are too old at a time [s]."""
         while self._records and now_s - self._records[0][0] > self._duration_s:
             self._records.popleft()
 

@@ -1,4 +1,4 @@
-"""A frame that a person moves by velocities, within a box."""
+"""A frame that a user moves by velocities, within a box."""
 
 from __future__ import annotations
 
@@ -13,27 +13,30 @@ from custom_ros_tools.schema import ConfigModel, FrameId, Hz, KeyedError, Positi
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
 LATE_PERIODS = 2
-"""So many periods count at most from one step to the next: a timer that is late makes no jump."""
+"""Longest interval of one step, in periods; the rest of a longer one is dropped, so that a late timer causes no jump.
+"""
 _Limit = Annotated[float, Field(allow_inf_nan=True), Unit("m")]
 Limits = Annotated[tuple[_Limit, _Limit], Field(strict=False)]
 
 
 class TeleopConfig(ConfigModel):
-    """The frame, and how far and how fast it goes."""
+    """The frame, and its limits of position and speed."""
 
     target_frame_id: FrameId = Field(description="The frame that is moved.")
-    parent_frame_id: FrameId = Field("world", description="The frame that it moves in, where it is to begin with.")
-    hz: Hz = Field(100.0, description="How often it is moved and broadcast, in wall time.")
-    xlim: Limits = Field((-math.inf, math.inf), description="Least and largest x; 0 is between them.")
+    parent_frame_id: FrameId = Field("world", description="Parent frame; the frame starts at its origin.")
+    hz: Hz = Field(100.0, description="Rate at which it is moved and broadcast, in wall time.")
+    xlim: Limits = Field((-math.inf, math.inf), description="Least and largest x; 0 lies between them.")
     ylim: Limits = Field((-math.inf, math.inf), description="Least and largest y.")
     zlim: Limits = Field((-math.inf, math.inf), description="Least and largest z.")
-    max_speed: Annotated[Positive, Unit("m/s")] = Field(2.0, description="A signal that is faster is slowed to this.")
+    max_speed: Annotated[Positive, Unit("m/s")] = Field(
+        2.0, description="Largest speed; faster signals are reduced to it."
+    )
     max_turn_rate: Annotated[Positive, Unit("rad/s")] = Field(
-        2.0 * math.pi, description="Likewise for each rate of roll, pitch and yaw."
+        2.0 * math.pi, description="Largest rate of roll, pitch and yaw, each; faster ones are reduced to it."
     )
 
     broadcast_always: Switch = Field(
-        False, description="Whether it is broadcast while it is switched off, too, for those who go there first."
+        False, description="Whether it is broadcast while it is switched off, too, so that others can move to it first."
     )
 
     @model_validator(mode="after")
@@ -44,7 +47,7 @@ class TeleopConfig(ConfigModel):
                 got = f"got [{least:g}, {largest:g}]"
                 raise KeyedError(key, f"expected the least and the largest value, with 0 between them, {got}")
         if self.target_frame_id == self.parent_frame_id:
-            raise KeyedError("target_frame_id", f"must be another one than parent_frame_id, '{self.parent_frame_id}'")
+            raise KeyedError("target_frame_id", f"must differ from parent_frame_id, '{self.parent_frame_id}'")
         return self
 
     @property
@@ -54,7 +57,7 @@ class TeleopConfig(ConfigModel):
 
 
 class TeleopPose(NamedTuple):
-    """Where a frame is in its parent.
+    """Pose of a frame in its parent.
 
     Attributes:
         position: x, y, z [m].
@@ -66,18 +69,17 @@ class TeleopPose(NamedTuple):
 
 
 class Teleop:
-    """Moves a frame by a signal, from where it is: nothing but `reset` puts it anywhere at once.
+    """Moves a frame by a velocity signal; only `reset` changes its pose at once.
 
-    A signal is a velocity, and an interval between two steps never counts more than `LATE_PERIODS`, so that no step is
-    longer than `max_speed * LATE_PERIODS / hz`, whatever the signal does when it begins, ceases and comes back.
-    Times are those of a clock that never goes back [s].
+    A step never counts more than `LATE_PERIODS` periods. No step is therefore longer than `max_speed * LATE_PERIODS /
+    hz`, whenever the signal starts, stops or resumes. Times are those of a clock that never goes back [s].
 
     Args:
-        config: What moves, and how far and how fast.
-        timeout_s: How long a signal lasts when no other comes [s]; 0 is for ever.
+        config: The frame and its limits.
+        timeout_s: Time for which a signal stays in force when no other follows [s]; 0 means forever.
 
     Attributes:
-        pose: Where the frame is in its parent.
+        pose: Pose of the frame in its parent.
     """
 
     def __init__(self, config: TeleopConfig, timeout_s: float = 0.0) -> None:
@@ -87,19 +89,21 @@ class Teleop:
         self._commanded_s = self._stepped_s = -math.inf
 
     def command(self, signal: Sequence[float], now_s: float) -> bool:
-        """Sets the velocity until the next signal; returns whether it had to be slowed.
+        """Sets the velocity until the next signal; returns whether it was reduced to the limits.
 
         Args:
-            signal: Velocity along x, y, z of the parent [m/s], and perhaps rates of roll, pitch and yaw [rad/s], which
-                are 0 otherwise.
+            signal: Velocity along x, y, z of the parent [m/s], optionally followed by the rates of roll, pitch and yaw
+                [rad/s], which are 0 otherwise.
             now_s: The time.
 
         Raises:
-            ValueError: If it has not 3 or 6 finite numbers; then the frame stands still.
+            ValueError: If it does not consist of 3 or 6 finite numbers; then the frame stops.
         """
         self.stop()
         if len(signal) not in (3, 6):
-            raise ValueError(f"expected 3 numbers (velocity) or 6 (and rates of roll, pitch, yaw), got {len(signal)}")
+            raise ValueError(
+                f"expected 3 numbers (velocity) or 6 (velocity and rates of roll, pitch, yaw), got {len(signal)}"
+            )
         if not all(map(math.isfinite, signal)):
             raise ValueError(f"must be finite, got {', '.join(f'{v:g}' for v in signal)}")
         x, y, z, *rates = signal
@@ -113,18 +117,18 @@ class Teleop:
         return share < 1.0 or self._angular != tuple(rates or ZERO)
 
     def stop(self) -> None:
-        """Stands still until the next signal."""
+        """Stops until the next signal."""
         self._linear = self._angular = ZERO
 
     @property
     def moves(self) -> bool:
-        """Whether a signal is in force that moves it."""
+        """Whether the present signal moves the frame."""
         return any(self._linear + self._angular)
 
     def step(self, now_s: float) -> TeleopPose:
-        """Moves the frame for the time since the last step; returns where it is.
+        """Moves the frame for the time since the last step; returns its pose.
 
-        A signal that is too old ends.
+        A signal older than the timeout ends.
         """
         dt_s = min(max(now_s - self._stepped_s, 0.0), LATE_PERIODS / self._config.hz)
         self._stepped_s = now_s
@@ -142,10 +146,10 @@ class Teleop:
         return self.pose
 
     def reset(self, pose: TeleopPose) -> None:
-        """Puts the frame somewhere, where it stands still until the next signal.
+        """Sets the pose of the frame; it stands still until the next signal.
 
         Raises:
-            ValueError: If that is outside of the box, or not finite; then it stays where it is, and moves on.
+            ValueError: If the pose is outside of the box or not finite; then the frame keeps its pose and its motion.
         """
         if not all(map(math.isfinite, (*pose.position, *pose.rpy))):
             raise ValueError("must be finite")

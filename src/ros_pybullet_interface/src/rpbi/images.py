@@ -1,16 +1,17 @@
-"""What cameras see as arrays, without ROS and without a process of its own: for scripts and notebooks."""
+"""Camera images as arrays, without ROS and without a renderer process, for scripts and notebooks."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from custom_ros_tools.errors import UnknownNameError
-from rpbi.engine.load_log import LoadLogReader
 from rpbi.render.camera import looking_at
 from rpbi.render.frame import Camera, Frame
 from rpbi.render.messages import Scene
 from rpbi.render.mirror import Mirror
 from rpbi.render.renderers import open_renderer
+
+from .world.load_log import LoadLogReader
 
 if TYPE_CHECKING:
     from rpbi.world import World
@@ -46,7 +47,7 @@ class CameraImages:
             ValueError: If nobody has put its pose yet.
         """
         world = self._world
-        world.take_inputs()
+        world.apply_inputs()
         name = camera or next(iter(world.cameras), "")
         if name not in world.cameras:
             raise UnknownNameError("camera", name, list(world.cameras))
@@ -54,7 +55,7 @@ class CameraImages:
         sample = sensor.read(world.clock.tick)
         if sample is None:
             raise ValueError(f"where is '{name}'? Put its pose into '{name}/pose'")
-        for entry in self._unread.take():
+        for entry in self._unread.drain():
             self._mirror.apply(entry)
         known = Camera.of(sensor.config, sensor.topic_name)
         self._renderer.make_room(known.intrinsics)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numbers
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
@@ -17,7 +17,7 @@ Tuple = TypeVar("Tuple", bound=tuple)
 
 
 def as_tuple(kind: type[Tuple], given: Any) -> Tuple:
-    """Returns a named tuple of that kind; one that is given comes back as it is.
+    """Returns a named tuple of that kind; an instance is returned as it is.
 
     Args:
         kind: A class of named tuples.
@@ -29,7 +29,7 @@ def as_tuple(kind: type[Tuple], given: Any) -> Tuple:
     if isinstance(given, kind):
         return given
     plain = _without_arrays(given)
-    fields: tuple[str, ...] = vars(kind)["_fields"]
+    fields: tuple[str, ...] = cast(Any, kind)._fields
     if not isinstance(plain, Mapping) and not (isinstance(plain, (list, tuple)) and len(plain) <= len(fields)):
         raise ValueError(f"expected a {kind.__name__}, or a mapping with {', '.join(fields)}; got {shown(given)}")
     unknown = [str(key) for key in plain if key not in fields] if isinstance(plain, Mapping) else []

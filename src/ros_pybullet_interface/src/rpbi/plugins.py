@@ -1,81 +1,32 @@
-"""What classes of other packages must have, and errors that name them when they fail."""
+"""Errors that name the class of another package when it fails, and checks of its samples."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from pydantic import ValidationInfo
-
-from custom_ros_tools.errors import ConfigError, InterfaceError, PluginError
+from custom_ros_tools.errors import InterfaceError, PluginError
 from custom_ros_tools.plugins import cause_of, full_name, own_folders
-from custom_ros_tools.schema import ConfigModel, InnerProblemsError, KeyedError
-from custom_ros_tools.schema.type_names import shown
-
-_Kind = TypeVar("_Kind")
-_Model = TypeVar("_Model", bound=ConfigModel)
 
 _OWN_PACKAGE = __name__.split(".")[0]
 own_folders.append(str(Path(__file__).parent))
 
 
-def config_of(found: Any, base: type[_Kind]) -> type[_Kind]:
-    """Returns the model of the YAML of a class.
-
-    Raises:
-        ValueError: If it has none, or another one.
-    """
-    model = getattr(found, "Config", None)
-    if isinstance(model, type) and issubclass(model, base):
-        return model
-    raise ValueError(f"expected a Config in '{full_name(found)}' that is a subclass of {full_name(base)}")
-
-
-def entry_config(
-    entry: Any, info: ValidationInfo, base: type[_Model], class_of: Callable[[str], Any], expected: str
-) -> _Model:
-    """Returns the configuration of an entry with a `type`, by the model of its class; for pydantic's validators.
-
-    Args:
-        entry: What YAML says, or the configuration itself.
-        base: What the configuration is at least.
-        class_of: Returns the class of a type; it raises ValueError if there is none.
-        expected: What was expected if it is no mapping with a type.
-
-    Raises:
-        ValueError: If it does not fit.
-    """
-    if isinstance(entry, base):
-        return entry
-    kind = entry.get("type") if isinstance(entry, Mapping) else None
-    if not isinstance(kind, str):
-        raise ValueError(f"expected {expected}; got {shown(entry)}")
-    try:
-        model = config_of(class_of(kind), base)
-    except ValueError as error:
-        raise KeyedError("type", str(error)) from None
-    context = info.context or {}
-    try:
-        return model.parse(entry, context.get("file", ""), context)
-    except ConfigError as error:
-        raise InnerProblemsError(error.problems) from None
-
-
 def is_foreign(thing: Any) -> bool:
-    """Tells whether a class or function, or the class of anything else, comes from another package."""
+    """Returns whether a class, a function, or the class of an object comes from another package."""
     return full_name(thing).split(":")[0].split(".")[0] != _OWN_PACKAGE
 
 
-def blame(thing: Any, doing: str, error: Exception) -> None:
-    """Raises a PluginError if something of another package failed, unless that said what is wrong in our own way.
+def raise_plugin_error(thing: Any, doing: str, error: Exception) -> None:
+    """Raises a PluginError for an error in code of another package, unless it is an InterfaceError.
 
-    Errors of this package's own classes are left alone: they are bugs, of which all should be seen.
+    Errors of this package's own classes are bugs, and keep their traceback.
 
     Args:
-        thing: What failed: a class, a function, or an object of such a class.
-        doing: What it was doing.
-        error: What it raised.
+        thing: The class, function or object that failed.
+        doing: Its action, for the message.
+        error: The error that it raised.
 
     Raises:
         PluginError: In that case.
@@ -85,20 +36,20 @@ def blame(thing: Any, doing: str, error: Exception) -> None:
 
 
 @contextmanager
-def blaming(thing: Any, doing: str) -> Iterator[None]:
-    """Blames something for all that goes wrong meanwhile, see `blame`."""
+def plugin_errors(thing: Any, doing: str) -> Iterator[None]:
+    """Passes all errors of its block to `raise_plugin_error`."""
     try:
         yield
     except Exception as error:
-        blame(thing, doing, error)
+        raise_plugin_error(thing, doing, error)
         raise
 
 
 def check_sample(sample: Any, sample_type: Any, name: str) -> None:
-    """Checks what a sensor has read.
+    """Checks a sample of a sensor.
 
     Raises:
-        TypeError: If it is something else.
+        TypeError: If it has another type.
         ValueError: If it has another name, or a number in it is not finite.
     """
     if type(sample) is not sample_type:

@@ -1,10 +1,12 @@
-"""What sensors return: immutable values, all SI units, poses in `rpbi/world` unless said otherwise."""
+"""Samples of sensors: immutable values, all SI units, poses in `rpbi/world` unless noted otherwise."""
 
 from collections.abc import Callable
 from functools import cached_property
 from typing import NamedTuple
 
-from .geometry import Pose, Quaternion, Twist, Vector, plus, scaled
+from robot_model.geometry import Quaternion, Vector, plus, scaled
+
+from .geometry import Pose, Twist
 
 
 class JointStateSample(NamedTuple):
@@ -56,13 +58,13 @@ class BaseStateSample(NamedTuple):
 
 
 class BodyState(NamedTuple):
-    """Where a body is, as a mirror of the world needs to know it.
+    """State of a body, as a mirror of the world needs it.
 
     Attributes:
         name: The body.
-        base: Position [m] and quaternion xyzw of the base's inertial frame, as PyBullet gives and takes it.
+        base: Position [m] and quaternion xyzw of the base's inertial frame, as in PyBullet.
         joints: Positions of all joints [rad or m] in index order, of a ball joint its turn as x, y, z, w.
-        nodes: Where the simulated corners of a soft body are [m]; rigid bodies have none.
+        nodes: Positions of the simulated corners of a soft body [m]; rigid bodies have none.
     """
 
     name: str
@@ -90,7 +92,7 @@ class SceneSample(NamedTuple):
 
 
 class WrenchSample(NamedTuple):
-    """What a force-torque sensor feels.
+    """Measurement of a force-torque sensor.
 
     Attributes:
         name: `ROBOT/JOINT`.
@@ -112,11 +114,11 @@ class ContactPoint(NamedTuple):
 
     Attributes:
         link: The body's link.
-        other_body: What it touches; the body itself if two of its links touch.
-        other_link: That one's link.
-        position: Where, on the surface of the body [m].
+        other_body: The body that it touches; the body itself if two of its links touch.
+        other_link: Link of the other body.
+        position: Position on the surface of the body [m].
         normal: Unit vector of the contact, from the other one towards the body.
-        depth: How deep the two are in each other [m]; negative where force bridges a gap.
+        depth: Penetration [m]; negative where force bridges a gap.
         normal_force: Force along the normal [N], not negative.
         friction_directions: Two unit vectors across the normal.
         friction_forces: Forces along these two [N].
@@ -208,7 +210,7 @@ class ViconSample(NamedTuple):
         name: `BODY/SENSOR`, which are Vicon's subject and segment.
         frame: TF frame that is reported.
         pose: Its pose in the world.
-        age_ns: How long ago it was there [ns].
+        age_ns: Age of the pose [ns].
     """
 
     name: str
@@ -238,7 +240,7 @@ class AprilTagsSample(NamedTuple):
         name: The sensor.
         frame: TF frame of the camera, an optical one.
         tags: Those that are seen.
-        age_ns: How long ago they were seen [ns].
+        age_ns: Age of the detections [ns].
     """
 
     name: str

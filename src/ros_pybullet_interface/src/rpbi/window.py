@@ -1,4 +1,4 @@
-"""PyBullet's own window: its keys and mouse, where it looks from, and what it shows."""
+"""PyBullet's own window: keys, mouse, camera, image."""
 
 import shutil
 import time
@@ -18,8 +18,8 @@ RECORD = "--mp4="
 TRIED_CALLS = 10
 
 
-class KeyEvent(NamedTuple):
-    """Something that happened to a key.
+class WindowKeyEvent(NamedTuple):
+    """Event of a key.
 
     Attributes:
         key: ASCII code, or PyBullet's code of a key without one.
@@ -31,14 +31,14 @@ class KeyEvent(NamedTuple):
 
 
 class MouseEvent(NamedTuple):
-    """Something that the mouse did.
+    """Event of the mouse.
 
     Attributes:
         kind: 1 it moved, 2 a button changed.
         x: From the left edge of the window [px].
         y: From its top edge [px].
         button: 0 left, 1 middle, 2 right; -1 on a move.
-        state: Of the button, as of a key.
+        state: State of the button, as for a key.
     """
 
     kind: int
@@ -63,24 +63,24 @@ class Window:
         """Switches off what keys do in the window itself: `i` holds it up, for instance; Escape still closes it."""
         self._pb.configureDebugVisualizer(pybullet.COV_ENABLE_KEYBOARD_SHORTCUTS, 0)
 
-    def key_events(self) -> Iterator[KeyEvent]:
-        """Yields what keys did since the last time, and one event of each that is held; it takes half a microsecond."""
+    def key_events(self) -> Iterator[WindowKeyEvent]:
+        """Yields events of keys since the last call, and one of each that is held; this costs half a microsecond."""
         for key, state in self._pb.getKeyboardEvents().items():
             if key >= 0:  # keys that PyBullet has no code of are all -1
-                for happened in self._keys.take(key, state):
-                    yield KeyEvent(key, happened)
+                for happened in self._keys.observe(key, state):
+                    yield WindowKeyEvent(key, happened)
 
     def mouse_events(self) -> Iterator[MouseEvent]:
-        """Yields what the mouse did since the last time."""
+        """Yields events of the mouse since the last call."""
         for kind, x, y, button, state in self._pb.getMouseEvents():
             if button < 0:
                 yield MouseEvent(kind, x, y, button, 0)
             else:
-                for happened in self._buttons.take(button, state):
+                for happened in self._buttons.observe(button, state):
                     yield MouseEvent(kind, x, y, button, happened)
 
     def camera(self) -> ResetDebugVisualizerCamera:
-        """Returns from where the window looks, as the mouse has left it."""
+        """Returns the view of the window, as the mouse has left it."""
         found = self._pb.getDebugVisualizerCamera()
         yaw, pitch, distance, target = found[8:12]
         return ResetDebugVisualizerCamera.model_construct(
@@ -88,11 +88,11 @@ class Window:
         )
 
     def look(self, camera: ResetDebugVisualizerCamera) -> None:
-        """Looks from somewhere else."""
+        """Sets the view of the window."""
         self._pb.resetDebugVisualizerCamera(**camera.kwargs())
 
     def seconds_per_call(self) -> float:
-        """Returns how long PyBullet takes to answer now, which it does between two frames of the window [s]."""
+        """Returns the present duration of a call of PyBullet, answered between two frames of the window [s]."""
         begin_s = time.monotonic()
         for _ in range(TRIED_CALLS):
             self._pb.getPhysicsEngineParameters()
@@ -121,13 +121,13 @@ class Window:
 
 
 def check_recording(options: str) -> None:
-    """Sees to it that a video of the window that is asked for will be made.
+    """Checks that a requested video of the window can be recorded.
 
     Args:
-        options: Those of `connect`.
+        options: The options of `connect`.
 
     Raises:
-        MissingDependency: If ffmpeg is missing, of which PyBullet says nothing.
+        MissingDependency: If ffmpeg is missing, which PyBullet does not report.
     """
     if RECORD in options and shutil.which("ffmpeg") is None:
         raise MissingDependency("ffmpeg", f"connect.options {RECORD} needs it: apt-get install ffmpeg")
@@ -140,18 +140,17 @@ PRESSED = DOWN | TRIGGERED
 
 
 class ButtonHistory:
-    """Takes apart what PyBullet tells in one number, which may hold a press and a release.
+    """Splits PyBullet's state of a button, which may hold both a press and a release.
 
-    What happens to a button between two frames of the window reaches us as the last of it: a short tap as a release, a
-    release and a new press as a press. Both are told apart here by what was known before, so that presses and releases
-    always alternate, and none is told twice.
+    PyBullet reports only the last event between two frames of the window: a short tap as a release, a release and a new
+    press as a press. The previous state separates them: presses and releases always alternate.
     """
 
     def __init__(self) -> None:
         self._held: set[int] = set()
 
-    def take(self, button: int, state: int) -> list[int]:
-        """Returns what has happened to a button since the last time, in order.
+    def observe(self, button: int, state: int) -> list[int]:
+        """Returns the events of a button since the last call, in order.
 
         Args:
             button: Its code.

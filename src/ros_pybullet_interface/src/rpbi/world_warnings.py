@@ -1,4 +1,4 @@
-"""What is probably not meant in a world, although it can be built."""
+"""Warnings of probable mistakes in a world that can be built."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -7,6 +7,8 @@ import numpy as np
 import pybullet
 
 from custom_ros_tools.errors import Problem, closest, hint
+from robot_model.geometry import dot, minus, scaled
+from robot_model.urdf.document import UrdfDocument
 from rpbi.bodies import Body
 from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.bodies.robots.robot_config import RobotConfig
@@ -14,11 +16,9 @@ from rpbi.bodies.shape_object import ShapeObject
 from rpbi.config.world import WORLD_FRAME
 from rpbi.engine.client import MAXIMAL_COORDINATES
 from rpbi.engine.inputs import PoseInput
-from rpbi.geometry import dot, minus, scaled
 from rpbi.meshes.triangles import volumes
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.urdf.copies import weighed_by_pybullet
-from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.joints import Joint
 from rpbi.world import World
 
@@ -38,7 +38,7 @@ PLANE_ADVICE = (
 
 
 def world_warnings(world: World) -> list[Problem]:
-    """Returns what looks wrong at the start of a world that has made no step yet, by the files that say it."""
+    """Returns probable mistakes in a world that has made no step yet, by file."""
     return [
         *_Frames(world).warnings(),
         *_gravity(world),
@@ -154,7 +154,7 @@ def _some(names: Sequence[str]) -> str:
 
 
 def _shape_kinds(body: Body) -> set[int]:
-    """Returns PyBullet's kinds of all collision shapes of a body, none in maximal coordinates, where it tells none."""
+    """Returns PyBullet's kinds of all collision shapes of a body; in maximal coordinates PyBullet reports none."""
     if body.dynamics_info(-1)[10] == MAXIMAL_COORDINATES:
         return set()
     links = (-1, *body.link_indices)
@@ -162,12 +162,12 @@ def _shape_kinds(body: Body) -> set[int]:
 
 
 def _needs_points(body: Body) -> bool:
-    """Tells whether a body can fall and slide and stands on more than one contact point, as all but a ball do."""
+    """Returns whether a body can fall and slide and stands on more than one contact point, as all but a ball do."""
     return not _is_still(body, -1) and _shape_kinds(body) != {pybullet.GEOM_SPHERE}
 
 
 def _is_below(world: World, plane: Body, body: Body) -> bool:
-    """Tells whether a plane carries a body against gravity, now or once it has fallen."""
+    """Returns whether a plane carries a body against gravity, now or once it has fallen."""
     found = world.pb.getClosestPoints(body.body_id, plane.body_id, MAX_FALL_M)
     if not found:
         return False
@@ -182,7 +182,7 @@ def _is_below(world: World, plane: Body, body: Body) -> bool:
 
 
 def _has_place(world: World, body: Body) -> bool:
-    """Tells whether a body is felt, and is where it will be: not where another node's frame will take it from."""
+    """Returns whether a body has collisions and is at its place, which another node's frame will not change."""
     is_placed = body.object_tf is None or world.config.pose_of(body.object_tf.tf_id) is not None
     return body.has_physics and not body.is_soft and is_placed
 
@@ -196,7 +196,7 @@ def _are_still(one: Body, other: Body, link: int, other_link: int) -> bool:
 
 
 def _is_still(body: Body, link: int) -> bool:
-    """Tells whether a link stays where it is, whatever pushes it: the base if it is fixed, and what is fixed to it."""
+    """Returns whether a link is static: a fixed base, and all links fixed to it."""
     if body.is_soft:
         return False
     if not body.has_physics:
@@ -246,8 +246,8 @@ class _Frames:
         frames: set[str] = set()
         for sensor in self._world.sensors_of(body.name):
             if isinstance(sensor, LinkPoseSensor):
-                frames.update(sensor.frames)
-                if sensor.frames == (f"rpbi/{body.name}/{body.root_link}",):
+                frames.update(sensor.tf_frames)
+                if sensor.tf_frames == (f"rpbi/{body.name}/{body.root_link}",):
                     frames.update(f"rpbi/{body.name}/{body.link_name(index)}" for index in body.link_indices)
         return frames
 

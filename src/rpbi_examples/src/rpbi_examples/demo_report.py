@@ -1,4 +1,4 @@
-"""What the demo says about its recording, in pictures and words."""
+"""Report of the demo's recording, in pictures and words."""
 
 from collections.abc import Collection, Mapping
 from pathlib import Path
@@ -15,7 +15,7 @@ import pandas as pd  # noqa: E402
 
 ENOUGH = 0.95
 """Share of its rate that a topic must reach."""
-LEAST_SPAN_RAD = 0.2
+MIN_SPAN_RAD = 0.2
 """Smallest range of a joint's plot, so that a joint at rest looks like one [rad or m]."""
 
 
@@ -62,7 +62,7 @@ def plot_joints(states: pd.DataFrame, targets: pd.DataFrame, path: Path) -> None
         axis.plot(states.index - start_s, states[column], color="#22333f", lw=1.0, label="position")
         axis.set_ylabel(column.removeprefix("position/").removesuffix("_joint") + "\n[rad]", fontsize=8)
         low, high = axis.get_ylim()
-        half = max((high - low) / 2.0, LEAST_SPAN_RAD / 2.0)
+        half = max((high - low) / 2.0, MIN_SPAN_RAD / 2.0)
         axis.set_ylim((low + high) / 2.0 - half, (low + high) / 2.0 + half)
         axis.grid(alpha=0.3)
     axes[0, 0].legend(loc="upper right", ncols=2, fontsize=8)
@@ -145,16 +145,16 @@ def save_depth(depth_m: npt.NDArray[np.float32], far_m: float, path: Path) -> No
 
 
 def failures(summary: Mapping[str, Any], required: Collection[str]) -> list[str]:
-    """Returns a line for each required topic that came too seldom, and for physics that was too slow."""
+    """Returns a line for each required topic with too low a rate, and for physics that was too slow."""
     factor = summary["figures"]["real_time_factor"]
     lines = [] if factor >= ENOUGH else [f"physics ran at {factor:.0%} of real time, {_load(summary)}"]
     return lines + [f"{topic} came at less than {ENOUGH:.0%} of its rate" for topic in _too_few(summary, required)]
 
 
 def slow_lines(summary: Mapping[str, Any], images: Collection[str], required: Collection[str], world: str) -> list[str]:
-    """Returns what came too seldom because the machine is slow or busy: what limits it, and what to do.
+    """Returns the topics that were slow because the machine is slow or busy, with the cause and a remedy.
 
-    Images share a line; for topics that are required this is no excuse. `world` is the main YAML file.
+    Images share a line; for required topics this is no excuse. `world` is the main YAML file.
     """
     topics, lines = summary["topics"], []
     slow_images = _too_few(summary, images)

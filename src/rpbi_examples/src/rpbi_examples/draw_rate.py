@@ -1,4 +1,4 @@
-"""How many images of a world this machine draws: what limits its cameras, with neither physics nor ROS beside."""
+"""Rate at which this machine draws images of a world, the limit of its cameras, without physics and ROS."""
 
 import argparse
 import json
@@ -7,7 +7,7 @@ import sys
 import time
 
 from custom_ros_tools.errors import InterfaceError
-from rpbi.geometry import Pose
+from robot_model.geometry import Pose
 from rpbi.render.camera import Intrinsics, depth_in_metres
 from rpbi.render.frame import Camera
 from rpbi.render.mirror import Mirror
@@ -25,7 +25,7 @@ def draw_rate_hz(world: str, camera: Pose, seconds: float, renderer: str) -> flo
     Args:
         world: Main YAML file.
         camera: Pose of the camera's optical frame in the world.
-        seconds: How long to measure.
+        seconds: Duration of the measurement.
         renderer: Name of the renderer to measure, as in the diagnostics.
 
     Returns:
@@ -48,7 +48,7 @@ def draw_rate_hz(world: str, camera: Pose, seconds: float, renderer: str) -> flo
 
 
 def measure(world: str, camera: Pose, seconds: float, use_egl: bool) -> float:
-    """Draws in this process for so long [s]; returns images a second."""
+    """Draws in this process for a time [s]; returns images per second."""
     loaded = World.from_file(world)
     config = loaded.config.rgbd_sensor
     assert config is not None

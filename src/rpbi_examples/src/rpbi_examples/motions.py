@@ -1,4 +1,4 @@
-"""How things in the examples move: a figure eight, circles, an orbit, a route, joints that swing, and a grasp."""
+"""Motions in the examples: a figure eight, circles, an orbit, a route, joints that swing, and a grasp."""
 
 import math
 from collections.abc import Sequence
@@ -9,8 +9,8 @@ from pydantic import Field
 from custom_ros_tools.node_configs import StartParameters
 from custom_ros_tools.schema import Hz, NonNegative, Seconds
 from custom_ros_tools.transforms import Array, quat_of
+from robot_model.geometry import Quaternion, Vector
 from rpbi.control.trajectories.trajectory import minimum_jerk
-from rpbi.geometry import Quaternion, Vector
 
 CIRCLE_RADIUS = 0.12
 """Radius of the circles [m]."""
@@ -43,9 +43,9 @@ TO_MIDDLE_S = 3.0
 SWING_PERIOD_S = 4.0
 """Time that one joint swings [s]."""
 SWING_RAMP_S = 0.6
-"""Time in which a swing gets to its full speed, and comes to rest at its end [s]."""
+"""Time in which a swing reaches its full speed, and stops at its end [s]."""
 SWING_AMPLITUDE = 1.0
-"""How far it swings to either side [rad or m]; less where its limits ask for it."""
+"""Amplitude of a swing [rad or m]; smaller where its limits require it."""
 SWING_MARGIN = 0.95
 """Share of the way to a limit that is used."""
 FINGERS_OPEN, FINGERS_CLOSED = 0.04, 0.0
@@ -58,8 +58,8 @@ class FigureEight(StartParameters):
     """A lemniscate of Gerono in the x-y plane of its frame."""
 
     start_on_init: bool = Field(True, description="Whether it moves from the start on.")
-    hz: Hz = Field(50.0, description="How often its frame is broadcast.")
-    tf_ns: str = Field("", description="What the names of its frames begin with, such as rpbi.")
+    hz: Hz = Field(50.0, description="Rate at which its frame is broadcast.")
+    tf_ns: str = Field("", description="Prefix of the names of its frames, such as rpbi.")
     width: NonNegative = Field(0.4, description="From end to end, along y [m].")
     height: NonNegative = Field(0.2, description="Height of each loop, along x [m].")
     period_s: Seconds = Field(10.0, description="Time of one round [s].")
@@ -95,12 +95,12 @@ def camera_pose(time_s: float) -> tuple[Vector, Array]:
     position = ORBIT_RADIUS * math.cos(angle), ORBIT_RADIUS * math.sin(angle), ORBIT_HEIGHT
     yaw = angle + math.pi / 2.0  # to the camera's right is where the circle goes, seen from its centre backwards
     tilt = -math.pi / 2.0 - math.atan2(ORBIT_HEIGHT - TARGET_HEIGHT, ORBIT_RADIUS)
-    # first about x by `tilt`, which lets z point forward and down, then about the vertical by `yaw`
+    # first about x by `tilt`, so that z points forward and down, then about the vertical by `yaw`
     return position, quat_of((tilt, 0.0, yaw))
 
 
 class PlanarPose(NamedTuple):
-    """Where something stands on the floor: x and y [m], and the angle about the vertical [rad]."""
+    """Pose on the floor: x and y [m], and the angle about the vertical [rad]."""
 
     x: float
     y: float
@@ -122,7 +122,7 @@ class Route:
         self._next = 0
 
     def velocity(self, pose: PlanarPose) -> PlanarPose:
-        """Returns the velocity [m/s, m/s, rad/s] in its own frame with which a base goes on from a pose."""
+        """Returns the velocity [m/s, m/s, rad/s], in its own frame, with which a base continues from a pose."""
         distance, angle = _left(pose, self._waypoints[self._next])
         if math.hypot(*distance) < REACHED_M and abs(angle) < REACHED_RAD:
             self._next = (self._next + 1) % len(self._waypoints)
@@ -138,7 +138,7 @@ def _left(pose: PlanarPose, goal: PlanarPose) -> tuple[tuple[float, float], floa
 
 
 class GraspStep(NamedTuple):
-    """Where the point between the fingertips is to be, on the floor and above it, and each finger [m]."""
+    """Position of the point between the fingertips, on the floor and above it, and of each finger [m]."""
 
     place: PlanarPose
     height: float
@@ -159,8 +159,8 @@ def pick_and_place(box: PlanarPose, goal: PlanarPose) -> tuple[GraspStep, ...]:
     """Returns the steps that bring a box to a place, each of which moves either the hand or the fingers.
 
     Args:
-        box: Where its centre is; which of its four sides faces where does not matter.
-        goal: Where it is to be.
+        box: Position of its centre; its orientation by multiples of 90 deg does not matter.
+        goal: Target position of its centre.
     """
     box = box._replace(yaw=math.remainder(box.yaw, math.pi / 2.0))
     return (
@@ -182,8 +182,8 @@ class Swing:
         start: Where the n joints are at time 0 [rad or m].
         lower: Their lower limits; -inf where there is none.
         upper: Their upper limits.
-        middle: What they swing about; 0 if left out, as near as limits allow.
-        amplitude: How far to either side [rad or m]; less where limits ask for it.
+        middle: Centres of the swings; 0 if left out, as near as limits allow.
+        amplitude: Motion to either side [rad or m]; less where limits require it.
     """
 
     def __init__(

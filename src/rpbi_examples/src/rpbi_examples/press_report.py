@@ -13,22 +13,22 @@ from numpy.typing import NDArray
 TOUCHED_M = 0.001
 """From this depth on the tool counts as touching [m]."""
 RELEASED_S = 0.5
-"""A press is over when the tool has not touched for so long [s]."""
-SHORTEST_S = 0.3
+"""Time without contact after which a press is over [s]."""
+MIN_PRESS_S = 0.3
 """Presses that are shorter are not judged [s]."""
-LONGEST_GAP_S = 0.05
+MAX_GAP_S = 0.05
 """Without a sample for longer, the simulator stood still, and that time of a press does not count [s]."""
-SHORTEST_SHARE = 0.5
+MIN_SHARE = 0.5
 """A press is not judged if less of its time counts."""
 
 
 class Sample(NamedTuple):
-    """What there was at one moment.
+    """State at one moment.
 
     Attributes:
         time_s: Since the start [s].
         handle_z: Height of the handle [m].
-        target_z: Height that the tool is to have in the world [m].
+        target_z: Target height of the tool in the world [m].
         tool_z: Height of the tool [m].
         measured_n: Force on the tool along z, by its sensor [N].
         felt_n: Force on the handle along z [N].
@@ -91,7 +91,7 @@ class Press:
     """Collects what happens until the tool has been pressed and released.
 
     Args:
-        stiffness: Of the box [N/m].
+        stiffness: Stiffness of the box [N/m].
         force_scale: Force on the handle for each newton on the tool.
         touch_height: Height of the tool at which it touches the box [m].
     """
@@ -103,7 +103,7 @@ class Press:
         self._released_s = 0.0
 
     def add(self, sample: Sample) -> None:
-        """Takes what there is now."""
+        """Adds the present state."""
         if self._depth_m(sample) > TOUCHED_M:
             self._has_touched, self._released_s = True, sample.time_s
         self.samples.append(sample)
@@ -119,14 +119,14 @@ class Press:
             [(each.time_s, self._depth_m(each), each.measured_n, each.felt_n) for each in self.samples]
         ).T
         touching = np.flatnonzero(depths_m > TOUCHED_M)
-        if not touching.size or times_s[touching[-1]] - times_s[touching[0]] < SHORTEST_S:
+        if not touching.size or times_s[touching[-1]] - times_s[touching[0]] < MIN_PRESS_S:
             return None
         duration_s = float(times_s[touching[-1]] - times_s[touching[0]])
         gaps_s = np.diff(times_s, prepend=times_s[0])
-        counted = (depths_m > 0.0) & (gaps_s <= LONGEST_GAP_S)
+        counted = (depths_m > 0.0) & (gaps_s <= MAX_GAP_S)
         counted[: touching[0]] = counted[touching[-1] + 1 :] = False
         weights_s = gaps_s * counted
-        if weights_s.sum() < SHORTEST_SHARE * duration_s:
+        if weights_s.sum() < MIN_SHARE * duration_s:
             return None
 
         def mean(values: NDArray[np.float64]) -> float:
@@ -158,7 +158,7 @@ class Press:
         """Draws force and heights over time.
 
         Args:
-            figure: A `matplotlib.figure.Figure`; what it has is replaced.
+            figure: A `matplotlib.figure.Figure`; its content is replaced.
         """
         figure.clear()  # type: ignore[attr-defined]
         upper, lower = figure.subplots(2, 1, sharex=True)  # type: ignore[attr-defined]
@@ -179,7 +179,7 @@ class Press:
 
     def write_figure(self, path: Path) -> None:
         """Writes the figure as PNG."""
-        from matplotlib.figure import Figure  # takes half a second, which nobody else has to wait for
+        from matplotlib.figure import Figure  # importing it lasts half a second, for which no other caller has to wait
 
         figure = Figure(figsize=(7.0, 5.0), dpi=120, layout="tight")
         self.draw(figure)

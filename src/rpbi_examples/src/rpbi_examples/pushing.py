@@ -1,4 +1,4 @@
-"""How an arm pushes a box over the floor with the ball at its hand, from one place to another and back."""
+"""Motion of an arm that pushes a box over the floor with the ball at its hand, from one place to another and back."""
 
 import math
 from collections.abc import Sequence
@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from robot_model.geometry import Vector
 from rpbi.control.trajectories.trajectory import minimum_jerk
-from rpbi.geometry import Vector
 from rpbi.kinematics import Kinematics
 from rpbi.kinematics.problem import PybulletProblem
 
@@ -18,31 +18,31 @@ from .motions import PlanarPose
 BALL = "end_effector_ball"
 BALL_RADIUS_M = 0.015
 PLACES = ((-0.6, 0.2), (-0.6, -0.2))
-"""Where the centre of the box is pushed to, one after the other: x and y in the frame of the arm's base [m]."""
+"""Targets of the centre of the box, in turn: x and y in the frame of the arm's base [m]."""
 HALF_SIDES_M = (0.10, 0.08)
 """Half of the box's sides along its own x and y [m]."""
 NEAR_M = 0.05
-"""A box that one push more would not bring nearer by so much is there [m]."""
+"""Least improvement by one more push for which a box is still pushed [m]."""
 CLEARANCE_M = 0.04
-"""How far the ball is from the box before and after a push [m]."""
+"""Distance of the ball from the box before and after a push [m]."""
 GAP_M = 0.001
-"""How far it is from the box when it begins to push, from rest [m]."""
+"""Distance of the ball from the box at the start of a push, from rest [m]."""
 PUSH_HEIGHT_M, TRAVEL_HEIGHT_M = 0.05, 0.25
 """Height of the ball [m] while it pushes, and above the box."""
 PUSH_SPEED, TRAVEL_SPEED = 0.15, 0.35
 """Mean speed of the ball [m/s]."""
 JOINT_SPEED = 0.8
 """Mean speed of the joint that has farthest to go [rad/s], on the way from any posture."""
-SHORTEST_S = 0.5
+MIN_DURATION_S = 0.5
 """Least time for a straight line [s]."""
 SPACING_M = 0.02
 """Distance of the points of a line for which inverse kinematics are solved [m]."""
 POINTING_DOWN = (1.0, 0.0, 0.0, 0.0)
 """Orientation of the hand as x, y, z, w."""
 POSTURE = np.radians((0.0, 30.0, 0.0, -90.0, 0.0, 60.0, 0.0))
-"""Where the search for joint positions starts [rad]..."""
+"""Start of the search for joint positions [rad]."""
 ELBOW_LEAN = 1.5
-"""... with the third joint turned by so much for each metre that the ball is to the side [rad/m]."""
+"""Rotation of the third joint in that start for each metre of the ball to the side [rad/m]."""
 
 
 class Push(NamedTuple):
@@ -67,8 +67,8 @@ class Move(NamedTuple):
     """Joint positions over time, from rest to rest.
 
     Attributes:
-        path: Positions of the joints [rad] along the way, which goes from 0 to 1.
-        duration_s: How long it takes [s].
+        path: Positions of the joints [rad] along the path, whose parameter goes from 0 to 1.
+        duration_s: Duration [s].
     """
 
     path: CubicSpline
@@ -86,9 +86,9 @@ class Move(NamedTuple):
 
 
 def next_push(box: PlanarPose, goal: tuple[float, float]) -> Push | None:
-    """Returns the push that brings a box nearest to a goal, None if it is there.
+    """Returns the push that brings a box nearest to a goal, None if the box is there.
 
-    The ball pushes the middle of one of the four sides, straight at it: so the box hardly turns.
+    The ball pushes the middle of one of the four sides, perpendicular to it, so that the box hardly turns.
     """
     best, least = None, math.dist((box.x, box.y), goal) - NEAR_M
     for turns in range(4):
@@ -140,7 +140,7 @@ class Pusher:
     def _approach(self, positions: Sequence[float], point: Vector) -> Move:
         """Returns the move from any posture [rad] to the one with the ball at a point [m]."""
         ends = np.array((positions, self._solve(point)))
-        return Move(CubicSpline((0.0, 1.0), ends), max(np.abs(ends[1] - ends[0]).max() / JOINT_SPEED, SHORTEST_S))
+        return Move(CubicSpline((0.0, 1.0), ends), max(np.abs(ends[1] - ends[0]).max() / JOINT_SPEED, MIN_DURATION_S))
 
     def _line(self, start: Vector, end: Vector, speed: float) -> Move:
         """Returns the move of the ball along a straight line [m] at a mean speed [m/s]."""
@@ -148,7 +148,7 @@ class Pusher:
         ways = np.linspace(0.0, 1.0, max(2, math.ceil(length / SPACING_M) + 1))
         points = np.outer(1.0 - ways, start) + np.outer(ways, end)
         return Move(
-            CubicSpline(ways, [self._solve(point) for point in points.tolist()]), max(length / speed, SHORTEST_S)
+            CubicSpline(ways, [self._solve(point) for point in points.tolist()]), max(length / speed, MIN_DURATION_S)
         )
 
     def _solve(self, point: Sequence[float]) -> tuple[float, ...]:

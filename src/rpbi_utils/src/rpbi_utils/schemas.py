@@ -3,30 +3,20 @@
 from pathlib import Path
 
 from custom_ros_tools.schema import ConfigModel
-from custom_ros_tools.schema.json_schema import explained, json_schema, schema_text, write_schemas
-from rpbi_utils.stand_in.config import RobotLimits, StandInConfig
+from custom_ros_tools.schema.json_schema import json_schema, schema_texts
+from rpbi_utils.fake_driver.config import FakeDriverConfig, RobotLimits
+from rpbi_utils.interpolation.config import TrajectoryConfig
 from rpbi_utils.tracking.config import TrackingNodeConfig
 
 FILES: dict[str, type[ConfigModel]] = {
     "robot_limits": RobotLimits,
-    "stand_in": StandInConfig,
+    "stand_in": FakeDriverConfig,
     "tracked_objects": TrackingNodeConfig,
+    "trajectory": TrajectoryConfig,
 }
 
 
 def schema_files(root: Path) -> dict[Path, str]:
-    """Returns what the files should have.
-
-    Args:
-        root: The workspace.
-    """
-    folder = root / "src/rpbi_utils/schema"
-    return {
-        folder / f"{name}.schema.json": schema_text(explained(json_schema(model, name)))
-        for name, model in FILES.items()
-    }
-
-
-def main() -> None:
-    """Runs the command that writes the schemas anew."""
-    write_schemas(schema_files)
+    """Returns the text of each file of a workspace."""
+    found = {name: json_schema(model, name) for name, model in FILES.items()}
+    return schema_texts(root / "src/rpbi_utils/schema", found)

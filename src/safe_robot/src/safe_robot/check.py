@@ -1,4 +1,4 @@
-"""What every check is."""
+"""The interface of checks."""
 
 import math
 from abc import ABC, abstractmethod
@@ -8,12 +8,13 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
+from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.schema import ConfigModel, Switch
+from safe_robot.motion import Bound
 
-from .commands.detour import Bound
 from .geometry.obstacles import Obstacle
-from .limits import JointLimits
-from .motion import Motion
+from .limits import MotionLimits
+from .motion import CommandedMotion
 from .robot import GuardedRobot
 
 
@@ -24,13 +25,13 @@ class CheckConfig(ConfigModel):
 
 
 class Violation(NamedTuple):
-    """Why a target is not safe.
+    """Reason why a target is not safe.
 
     Attributes:
         check: Name of the check.
         subject: The joint, the link, the pair of links, or what else it is about.
-        value: What the target would bring about, in `unit`; NaN, as `limit`, if it is not about a number.
-        limit: What is allowed, in `unit`.
+        value: Value that the target would cause, in `unit`; NaN, as `limit`, if there is no number.
+        limit: Allowed value, in `unit`.
         unit: The unit of both.
         is_while_braking: Whether it is not the target itself but the braking from it that is not safe.
         quantity: The quantity of the subject that value and limit are of; empty if the subject itself is one.
@@ -55,16 +56,16 @@ class Violation(NamedTuple):
         return f"{self.check}: {subject}{while_braking} is {numbers}"
 
 
-class Inside(NamedTuple):
+class MarginViolation(NamedTuple):
     """Two things that are nearer to each other than their margin.
 
     Attributes:
         check: Name of the check.
-        pair: Which they are, in the check's own terms.
-        subject: Which they are, for messages.
-        distance_m: How near [m].
-        margin_m: How near they may be [m].
-        gradient: How fast they go apart as each of n joints moves [m/rad or 1].
+        pair: The two, in the check's own terms.
+        subject: The two, for messages.
+        distance_m: Distance [m].
+        margin_m: Smallest allowed distance [m].
+        gradient: Change of distance by the motion of each of n joints [m/rad or 1].
     """
 
     check: str
@@ -75,19 +76,19 @@ class Inside(NamedTuple):
     gradient: np.ndarray
 
 
-class Situation(NamedTuple):
-    """What a target is judged by, beside the motion.
+class CheckContext(NamedTuple):
+    """Everything beside the motion by which a target is judged.
 
     Attributes:
         now_s: The present time [s], of a clock that never goes back.
-        age_s: How old the target is [s]; 0 if nobody knows.
-        stamp_step_s: How much later its stamp is than that of the target before [s]; None without one.
-        since_command_s: How long ago the command before was sent [s].
+        age_s: Age of the target [s]; 0 if unknown.
+        stamp_step_s: Difference to the stamp of the target before [s]; None without one.
+        since_command_s: Time since the command before [s].
         measured: Measured positions by joint [rad or m], empty if there are none.
-        measured_age_s: How old they are [s].
+        measured_age_s: Their age [s].
         wrench: Measured force x, y, z [N] and torque x, y, z [N m].
-        wrench_age_s: How old they are [s]; inf if there are none.
-        obstacles: Bodies of the environment, as they are now; None if nobody tells. Equal ones are the same tuple.
+        wrench_age_s: Its age [s]; inf if there is none.
+        obstacles: Present bodies of the environment; None without a source. Equal ones are the same tuple.
     """
 
     now_s: float = 0.0
@@ -118,8 +119,8 @@ class Check(ABC):
         Config: Model of its options.
         name: Its name in the table and in messages.
         is_default: Whether it is made without being named in the configuration.
-        watches: Whether it is about the situation, not the command, so that it is made also while no target comes.
-        takes_obstacles: Whether it asks what is around the robot, `Situation.obstacles`.
+        watches: Whether it is about the context, not the command, so that it is made also while no target comes.
+        takes_obstacles: Whether it asks what is around the robot, `CheckContext.obstacles`.
     """
 
     Config: ClassVar[type[CheckConfig]] = CheckConfig
@@ -128,31 +129,39 @@ class Check(ABC):
     watches: ClassVar[bool] = False
     takes_obstacles: ClassVar[bool] = False
 
-    def __init__(self, config: Any, robot: GuardedRobot, limits: JointLimits, file: str) -> None:
+    def __init__(self, config: Any, robot: GuardedRobot, limits: MotionLimits, file: str) -> None:
         self.config, self.robot, self.limits, self.file = config, robot, limits, file
 
     @abstractmethod
-    def check(self, motion: Motion, situation: Situation) -> Violation | None:
-        """Returns what is not safe about a motion, None if nothing is.
+    def check(self, motion: CommandedMotion, context: CheckContext) -> Violation | None:
+        """Returns the violation of a motion, None if it is safe.
 
-        What is not a number is never safe. A robot that is outside a limit of where it may be, may go further in.
+        NaN is never safe. A robot outside a position limit may move back towards it.
         """
 
     def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> Sequence[Bound]:
-        """Returns what keeps the robot safe near some configurations on its way to rest; only for the policy `limit`.
+        """Returns bounds that keep the robot safe near some configurations on its way to rest; only for the policy
+        `limit`.
 
-        It helps to find a command that `check` will let pass, and judges nothing. It is called after `check`.
+        They serve to find a command that passes `check`, and decide nothing. It is called after `check`.
 
         Args:
             rows: The configurations, k x n positions [rad or m].
-            spread: How far from there n joints may come instead; what is out of their reach may be left out.
-            before: n positions where it is: what is not safe there may not become worse.
+            spread: Largest deviation of n joints from there; bounds out of their reach may be left out.
+            before: n present positions: violations there may not increase.
         """
         return ()
 
-    def inside(self, q: np.ndarray) -> Sequence[Inside]:
+    def inside(self, q: np.ndarray) -> Sequence[MarginViolation]:
         """Returns what is nearer than its margin in a configuration of n positions; it is called after `check`."""
         return ()
+
+    def require_link(self, link: str, key: str) -> None:
+        """Raises a ConfigError about an option that has a link as a key unless the robot has the link."""
+        try:
+            self.robot.check_link(link)
+        except UnknownNameError as error:
+            raise ConfigError([Problem(self.file, f"checks.{self.name}.{key}.{link}", str(error))]) from None
 
     def first_above(
         self, values: np.ndarray, limit: np.ndarray, quantity: str, unit: tuple[str, str]

@@ -1,4 +1,4 @@
-"""What a guard is told."""
+"""The configuration of a guard."""
 
 from typing import Annotated, Any, Literal
 
@@ -16,13 +16,13 @@ class GuardConfig(ConfigModel):
 
     policy: Literal["reject", "limit"] = Field(
         "reject",
-        description="What happens to a target that is not safe: reject sends nothing and halts; limit sends what is"
-        " safe instead, and goes on.",
+        description="Policy for unsafe targets: reject sends nothing and halts; limit sends a safe command instead,"
+        " and goes on.",
     )
     on_halt: Literal["nothing", "brake"] = Field(
         "nothing",
-        description="What is sent after a halt in the middle of a motion: nothing; or, one each period_s, the braking"
-        " that was found safe with the last command.",
+        description="Commands after a halt in the middle of a motion: none; or, one each period_s, the braking that"
+        " was found safe with the last command.",
     )
     period_s: Annotated[Seconds, Field(ge=1e-5, le=10.0)] = Field(
         0.009,
@@ -32,13 +32,13 @@ class GuardConfig(ConfigModel):
     joint_names: ListOf[Text] = Field((), description="The joints that are guarded; by default all of the robot.")
     limits: LimitsConfig = Field(LimitsConfig(), description="Limits of the joints.")
     shape: ShapingConfig | None = optional(
-        "How targets that joints cannot follow are smoothed, before they are judged; without it they are not."
+        "Smoothing of targets that joints cannot follow, before the checks; without it there is none."
     )
     start_from: Literal["measured", "target"] = Field(
-        "measured", description="Where the robot is before the first command: as measured, or as the first target says."
+        "measured", description="State of the robot before the first command: as measured, or the first target."
     )
     start_tolerance: NonNegative = Field(
-        0.05, description="How far the first target may be from where the robot is [rad or m]."
+        0.05, description="Largest distance of the first target from the robot's position [rad or m]."
     )
     checks: dict[str, dict[str, Any]] = Field({}, description="Options of checks by name.")
 
@@ -53,7 +53,7 @@ class GuardConfig(ConfigModel):
 
 
 class NodeConfig(ConfigModel):
-    """What the guard's node does beside deciding."""
+    """Options of the guard's node beside those of its decisions."""
 
     publish_as_joint_state: Switch = Field(
         True, description="Whether commands are joint states; else bare numbers in the order of the joints."
@@ -64,12 +64,12 @@ class NodeConfig(ConfigModel):
     )
     silence_s: Seconds = Field(
         0.02,
-        description="How old the newest target may be when one is sent on; older ones wait for a newer one, and a"
+        description="Largest age of the newest target when one is sent on; older ones wait for a newer one, and a"
         " source that died is followed no longer than this.",
     )
     base_frame: Text | None = Field(
         None,
-        description="TF frame of the robot's root, which markers are shown in; with it the check `environment` takes"
+        description="TF frame of the robot's root, which markers are shown in; with it the check `environment` uses"
         " the bodies of rpbi/markers.",
     )
     left_out: ListOf[Text] = Field(

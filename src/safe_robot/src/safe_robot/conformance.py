@@ -9,10 +9,10 @@ import pytest
 
 from custom_ros_tools.errors import ConfigError
 
-from .check import Check, Situation
-from .limits import JointLimits, LimitsConfig
+from .check import Check, CheckContext
+from .limits import LimitsConfig, MotionLimits
 from .lookup import make_checks
-from .motion import Motion, State
+from .motion import CommandedMotion, State
 from .robot import GuardedRobot
 
 
@@ -27,7 +27,7 @@ class CheckConformance:
         limits: Limits of the robot's joints.
         urdf: The robot's description.
         period_s: Period of the motions [s].
-        is_about_motion: Whether it judges the motion, else it only judges the situation.
+        is_about_motion: Whether it judges the motion, else it only judges the context.
     """
 
     check_name: ClassVar[str]
@@ -39,19 +39,19 @@ class CheckConformance:
 
     # --- What a subclass has.
 
-    def safe(self) -> tuple[Motion, Situation]:
+    def safe(self) -> tuple[CommandedMotion, CheckContext]:
         """Returns what is safe."""
         raise NotImplementedError
 
-    def unsafe(self) -> tuple[Motion, Situation]:
+    def unsafe(self) -> tuple[CommandedMotion, CheckContext]:
         """Returns what is not safe."""
         raise NotImplementedError
 
     # --- What it may use.
 
-    def motion(self, start: State, command: Any) -> Motion:
+    def motion(self, start: State, command: Any) -> CommandedMotion:
         """Returns the motion of a command, without braking."""
-        return Motion(self.robot, start, np.array(command, dtype=float), self.period_s)
+        return CommandedMotion(self.robot, start, np.array(command, dtype=float), self.period_s)
 
     @property
     def robot(self) -> GuardedRobot:
@@ -61,7 +61,7 @@ class CheckConformance:
     def make(self) -> Check:
         """Returns a new check."""
         robot = self.robot
-        limits = JointLimits.of(robot, LimitsConfig(**self.limits), "guard.yaml")
+        limits = MotionLimits.of(robot, LimitsConfig(**self.limits), "guard.yaml")
         options = {self.check_name: {**self.options, "active": True}}
         return next(each for each in make_checks(options, robot, limits, "guard.yaml") if self._is_it(each))
 
@@ -95,13 +95,13 @@ class CheckConformance:
         """Comparisons with it are false, so a check that looks for what is too large would let it pass."""
         if not self.is_about_motion:
             pytest.skip(f"'{self.check_name}' does not look at the motion")
-        motion, situation = self.safe()
+        motion, context = self.safe()
         nowhere = self.motion(motion.start, [math.nan] * len(motion.start.position))
-        assert self.make().check(nowhere, situation) is not None
+        assert self.make().check(nowhere, context) is not None
 
     def test_an_unknown_option_is_named(self) -> None:
         """A misspelt one would leave a limit away unnoticed."""
         robot = self.robot
-        limits = JointLimits.of(robot, LimitsConfig(), "guard.yaml")
+        limits = MotionLimits.of(robot, LimitsConfig(), "guard.yaml")
         with pytest.raises(ConfigError, match=f"guard.yaml: checks.{self.check_name}.no_such_option"):
             make_checks({self.check_name: {"no_such_option": 1}}, robot, limits, "guard.yaml")

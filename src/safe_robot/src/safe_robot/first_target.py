@@ -6,14 +6,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from custom_ros_tools.errors import ConfigError, Problem
-
-from .check import Check, Situation, Violation
-from .config import GuardConfig
-from .motion import Motion, State
-from .robot import MOST_OUTSIDE, GuardedRobot
+from safe_robot.check import Check, CheckContext, Violation
+from safe_robot.config import GuardConfig
+from safe_robot.motion import CommandedMotion, State
+from safe_robot.robot import MAX_OUTSIDE, GuardedRobot
 
 SLOW_S = 1e6
-"""How long the way from where the robot is to the first target is taken to last [s]: it is not judged by speed."""
+"""Assumed duration of the motion to the first target [s]; so long that its speed is not judged."""
 
 UNKNOWN = (
     "no measured positions of all guarded joints on joint_states/measured; publish them there, or, where nothing"
@@ -25,7 +24,7 @@ class FirstTarget:
     """Judges the first target after a start.
 
     Args:
-        config: What to guard and how.
+        config: Configuration of the guard.
         robot: The robot.
         checks: The checks that are made.
         file: Where the configuration comes from, for messages.
@@ -40,23 +39,23 @@ class FirstTarget:
             raise ConfigError([Problem(file, "checks.joint_position.active", message)])
         self._config, self._robot, self._checks = config, robot, checks
 
-    def judged(self, target: np.ndarray, last: np.ndarray | None, situation: Situation) -> State | Violation:
-        """Returns the state in which the robot starts, at rest; else why it cannot.
+    def judged(self, target: np.ndarray, last: np.ndarray | None, context: CheckContext) -> State | Violation:
+        """Returns the state in which the robot starts, at rest, or the reason why it cannot.
 
         Args:
             target: n positions [rad or m].
             last: The n positions that were commanded last [rad or m]; None if none were.
-            situation: What else counts.
+            context: Everything else that the decision depends on.
         """
-        there = self._whereabouts(target, last, situation)
+        there = self._whereabouts(target, last, context)
         if there is None:
             return Violation("start", "measured positions", math.inf, 0.0, "s", words=UNKNOWN)
         violation = self._far_from(there, target) or self._far_outside(there)
         if violation is not None:
             return violation
-        slow = Motion(self._robot, State.at_rest(there), target, SLOW_S)
+        slow = CommandedMotion(self._robot, State.at_rest(there), target, SLOW_S)
         for check in self._checks:
-            if violation := check.check(slow, situation):
+            if violation := check.check(slow, context):
                 return violation
         if self._config.shape is None:
             return State.at_rest(target)
@@ -64,10 +63,10 @@ class FirstTarget:
             return State.at_rest(there)
         return State.at_rest(last)
 
-    def _whereabouts(self, target: np.ndarray, last: np.ndarray | None, situation: Situation) -> np.ndarray | None:
+    def _whereabouts(self, target: np.ndarray, last: np.ndarray | None, context: CheckContext) -> np.ndarray | None:
         names = self._robot.joint_names
-        if all(name in situation.measured for name in names):
-            return np.array([situation.measured[name] for name in names])
+        if all(name in context.measured for name in names):
+            return np.array([context.measured[name] for name in names])
         if self._config.start_from == "measured":
             return None
         return target if last is None else last
@@ -92,12 +91,12 @@ class FirstTarget:
             i = self._robot.joint_names.index(name)
             joint, position = self._robot.joints[i], float(there[i])
             outside = max(joint.lower - position, position - joint.upper)
-            if not outside <= MOST_OUTSIDE:
+            if not outside <= MAX_OUTSIDE:
                 return Violation(
                     "start",
                     f"joint '{name}'",
                     outside,
-                    MOST_OUTSIDE,
+                    MAX_OUTSIDE,
                     self._unit(i),
                     quantity="distance beyond its limits",
                 )

@@ -1,4 +1,4 @@
-"""The guard: takes a target, and decides what the robot is commanded to."""
+"""The guard: decides the command to the robot for each target."""
 
 import logging
 import math
@@ -9,28 +9,28 @@ import numpy as np
 
 from custom_ros_tools.errors import ConfigError, Problem
 
-from .check import Check, Inside, Situation, Violation
-from .commands.braking import Brake, Braking, BrakingCommands
-from .commands.detour import can_keep_bounds
-from .commands.nearest import Nearest
+from .braking import Brake, Braking, BrakingCommands
+from .check import Check, CheckContext, MarginViolation, Violation
+from .commands.command_qp import can_keep_bounds
+from .commands.escape import EscapeDirection, find_escape
 from .commands.pursuit import ROUNDING
+from .commands.safe_search import SafeCommandSearch
 from .commands.shaping import Shaper
-from .commands.way_out import WayOut, find_way_out
 from .config import GuardConfig
 from .first_target import FirstTarget
-from .limits import JointLimits
+from .limits import MotionLimits
 from .lookup import make_checks
-from .motion import Motion, State
+from .motion import CommandedMotion, State
 from .robot import GuardedRobot
 
 log = logging.getLogger(__name__)
 
-MENDED = ("joint_velocity", "joint_acceleration", "joint_jerk", "joint_position", "braking")
-"""What braking for a period may mend where a smoothed command, whose steps are finite, just misses it."""
+MENDED_BY_BRAKING = ("joint_velocity", "joint_acceleration", "joint_jerk", "joint_position", "braking")
+"""Checks that braking for a period may satisfy where a smoothed command, whose steps are finite, just fails."""
 
 
 class Decision(NamedTuple):
-    """What a guard answers to a target.
+    """Answer of a guard to a target.
 
     Attributes:
         command: n positions to be commanded [rad or m]; the target's own ones if it is safe, None: nothing is sent.
@@ -54,23 +54,23 @@ class _Safe(NamedTuple):
 
 
 class Guard:
-    """Lets targets pass that are safe.
+    """Passes safe targets.
 
-    A target is safe if every check says so of it and of the braking from it. So after every command the robot can be
-    brought to rest within all limits, and how is known: no state is entered from which there is no safe way to rest.
+    A target is safe if it and the braking from it pass every check. After every command the robot can therefore be
+    brought to rest within all limits, by a known braking: no state is entered without a safe way to rest.
 
-    The reference is what was commanded before, never what is measured. Every command counts as one period, whatever
-    stamps say, so that they cannot make the robot faster; that no command follows sooner is up to who sends them.
+    The reference is the command before, never a measurement. Every command counts as one period, whatever its stamp, so
+    that stamps cannot make the robot faster; the sender ensures that no command follows sooner.
 
-    With `shape`, what is judged is the command on the way to a target that joints cannot follow.
+    With `shape`, the command on the way to a target that joints cannot follow is checked instead of it.
 
     Args:
-        config: What to guard and how.
+        config: Configuration of the guard.
         robot: The robot.
         file: Where the configuration comes from, for messages.
 
     Attributes:
-        config: What it guards and how.
+        config: Its configuration.
         robot: The robot.
         joint_names: The n joints.
         limits: Their limits.
@@ -84,7 +84,7 @@ class Guard:
     def __init__(self, config: GuardConfig, robot: GuardedRobot, file: str = "~") -> None:
         self.config, self.robot = config, robot
         self.joint_names = robot.joint_names
-        self.limits = JointLimits.of(robot, config.limits, file)
+        self.limits = MotionLimits.of(robot, config.limits, file)
         self.checks = make_checks(config.checks, robot, self.limits, file)
         try:
             self._braking = Braking(self.limits.velocity, self.limits.acceleration, self.limits.jerk, config.period_s)
@@ -94,7 +94,7 @@ class Guard:
         self._shaper = None if config.shape is None else Shaper(config.shape, *shape)
         self._first_target = FirstTarget(config, robot, self.checks, file)
         self._watches = {check.name for check in self.checks if check.watches}
-        self._nearest = Nearest(self.limits, self._braking, self.checks, config.period_s)
+        self._nearest = SafeCommandSearch(self.limits, self._braking, self.checks, config.period_s)
         if config.policy == "limit" and not can_keep_bounds():
             log.warning("%s: policy limit tracks targets less closely without DAQP: run `./rpbi setup ik`", file)
         self.is_halted = True
@@ -123,11 +123,11 @@ class Guard:
         """The commands that bring the robot to rest from now on, k x n [rad or m], as they were found safe."""
         return self._stop.position.copy()
 
-    def way_out(self) -> WayOut | None:
+    def way_out(self) -> EscapeDirection | None:
         """Returns how the robot, where it was commanded to last, leaves the margins that it is in; None if in none."""
         if self._state is None or self._is_first:
             return None
-        return find_way_out(self._state.position, self.limits, self._inside)
+        return find_escape(self._state.position, self.limits, self._inside)
 
     def start(self) -> None:
         """Lets targets pass again; the first one has to be near where the robot is.
@@ -156,17 +156,17 @@ class Guard:
         """Returns what to command next after a halt, a period after the last command; None if the robot rests."""
         return self._brake_on() if self.is_braking else None
 
-    def decide(self, target: Sequence[float], situation: Situation) -> Decision:
-        """Returns what to command.
+    def decide(self, target: Sequence[float], context: CheckContext) -> Decision:
+        """Returns the command for a target.
 
         Args:
             target: n positions [rad or m].
-            situation: What else counts.
+            context: Everything else that the decision depends on.
         """
         if self.is_halted:
             return Decision(None, None, True)
         try:
-            decision = self._decide(tuple(target), situation)
+            decision = self._decide(tuple(target), context)
         except BaseException:
             self.halt()  # fails closed: who cannot judge does not let pass
             raise
@@ -183,13 +183,13 @@ class Guard:
             self.halt()
         return decision
 
-    def late(self, situation: Situation) -> Violation | None:
+    def check_watchdogs(self, context: CheckContext) -> Violation | None:
         """Returns what is wrong while no target comes; if anything is, it halts."""
         if self.is_halted or self._is_first or self._state is None:
             return None
-        motion = Motion(self.robot, self._state, self._state.position, self.config.period_s)
+        motion = CommandedMotion(self.robot, self._state, self._state.position, self.config.period_s)
         try:
-            found = (each.check(motion, situation) for each in self.checks if each.watches)
+            found = (each.check(motion, context) for each in self.checks if each.watches)
             violation = next(filter(None, found), None)
         except BaseException:
             self.halt()
@@ -198,11 +198,11 @@ class Guard:
             self.halt()
         return violation
 
-    def _decide(self, target: tuple[float, ...], situation: Situation) -> Decision:
+    def _decide(self, target: tuple[float, ...], context: CheckContext) -> Decision:
         if violation := self._input_problem(target):
             return self._refused(violation)
         is_first = self._is_first
-        if is_first and (violation := self._take_start(target, situation)):
+        if is_first and (violation := self._start_at(target, context)):
             return Decision(None, violation, math.isfinite(violation.value))  # for what is not known yet it waits
         assert self._state is not None
         wanted = target
@@ -212,16 +212,16 @@ class Guard:
                 if is_first
                 else self._shaper.shaped(target, self._state, self._way_to_rest)
             )
-        found = self._judged(wanted, situation, self.checks)
-        if isinstance(found, Violation) and wanted != target and found.check in MENDED:
+        found = self._evaluate(wanted, context, self.checks)
+        if isinstance(found, Violation) and wanted != target and found.check in MENDED_BY_BRAKING:
             wanted = tuple(self._way_to_rest[0].tolist())
-            found = self._judged(wanted, situation, self.checks)
+            found = self._evaluate(wanted, context, self.checks)
         before, self._target = self._target, target
         if isinstance(found, Violation):
-            return self._instead(target, found, situation)
+            return self._substitute(target, found, context)
         if violation := self._passes(target, before, found):
-            return self._instead(target, violation, situation)
-        return Decision(self._sent(found), is_shaped=wanted != target)
+            return self._substitute(target, violation, context)
+        return Decision(self._commit(found), is_shaped=wanted != target)
 
     def _passes(self, target: tuple[float, ...], before: tuple[float, ...] | None, safe: _Safe) -> Violation | None:
         """Returns which joint goes past its target though the target stands still; only for the policy `limit`."""
@@ -263,27 +263,27 @@ class Guard:
                 return Violation("input", f"joint '{name}'", position, math.inf, "rad or m", quantity="position")
         return None
 
-    def _take_start(self, target: tuple[float, ...], situation: Situation) -> Violation | None:
+    def _start_at(self, target: tuple[float, ...], context: CheckContext) -> Violation | None:
         """Puts the guard where the robot starts, if the first target allows it."""
         last = None if self._state is None else self._state.position
-        found = self._first_target.judged(np.array(target), last, situation)
+        found = self._first_target.judged(np.array(target), last, context)
         if isinstance(found, Violation):
             return found
         self._state, self._stop, self._is_first = found, BrakingCommands.none(len(target)), False
         return None
 
-    def _judged(
-        self, command: Sequence[float], situation: Situation, checks: Sequence[Check], is_trial: bool = False
+    def _evaluate(
+        self, command: Sequence[float], context: CheckContext, checks: Sequence[Check], is_trial: bool = False
     ) -> _Safe | Violation:
-        """Returns the command if it is safe, else what the first of some checks says that is not."""
+        """Returns the command if it is safe, else the violation of the first check that it fails."""
         assert self._state is not None
         period_s = self.config.period_s
         position = np.array(command)
         state = self._state.then(position, period_s)
         brake = self._brake(state)
-        motion = Motion(self.robot, self._state, position, period_s, brake, is_trial)
+        motion = CommandedMotion(self.robot, self._state, position, period_s, brake, is_trial)
         for check in checks:
-            if violation := check.check(motion, situation):
+            if violation := check.check(motion, context):
                 return violation
         if brake is None:
             return self._cannot_brake(state)
@@ -306,11 +306,11 @@ class Guard:
         unit = "rad/s^2" if self.robot.joints[i].is_revolute else "m/s^2"
         return Violation("braking", subject, float(abs(state.acceleration[i])), limit, unit, True, "acceleration")
 
-    def _sent(self, safe: _Safe) -> tuple[float, ...]:
+    def _commit(self, safe: _Safe) -> tuple[float, ...]:
         self._state, self._stop = safe.state, safe.stop
         return safe.command
 
-    def _instead(self, target: tuple[float, ...], violation: Violation, situation: Situation) -> Decision:
+    def _substitute(self, target: tuple[float, ...], violation: Violation, context: CheckContext) -> Decision:
         """Returns the nearest safe command that is found, or the next one of the braking that is known to be safe."""
         assert self._state is not None
         if self.config.policy == "reject" or violation.check in self._watches:  # no other command mends these
@@ -319,11 +319,11 @@ class Guard:
             np.array(target),
             self._state,
             self._way_to_rest,
-            lambda wanted, checks: self._judged(tuple(wanted.tolist()), situation, checks, is_trial=True),
+            lambda wanted, checks: self._evaluate(tuple(wanted.tolist()), context, checks, is_trial=True),
         )
-        return Decision(self._brake_on() if safe is None else self._sent(safe), violation)
+        return Decision(self._brake_on() if safe is None else self._commit(safe), violation)
 
-    def _inside(self, q: np.ndarray) -> list[Inside]:
+    def _inside(self, q: np.ndarray) -> list[MarginViolation]:
         return [each for check in self.checks for each in check.inside(q)]
 
     def _brake_on(self) -> tuple[float, ...]:

@@ -29,14 +29,14 @@ BY_JOINT = {
 AXES = {f"{prefix}_{axis}lim": axis for prefix in ("box", "link") for axis in "xyz"}
 LINKS = ("links", "safe_links")
 UNUSED = ("exotica_xml_filename", "stop_after_first_fail", "debug")
-"""What the release needed, and this guard does not."""
+"""Keys that the release needed, and that this guard ignores."""
 KEYS = (
     "checker", "joint_name_order", "safe_distance", *SWITCHES, *FACTORS, *BY_JOINT, *AXES, *LINKS, *UNUSED,
 )  # fmt: skip
 
 
 def translated(given: Mapping[str, Any], joint_names: list[str], file: str) -> dict[str, Any]:
-    """Returns the keys of `GuardConfig` that say the same as parameters of the release.
+    """Returns the keys of `GuardConfig` equivalent to parameters of the release.
 
     Args:
         given: The parameters; others than those of the release are left as they are.

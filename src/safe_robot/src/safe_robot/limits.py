@@ -29,7 +29,7 @@ class LimitsConfig(ConfigModel):
     jerk: PerJoint | None = Field(None, description="Largest jerk [rad/s^3 or m/s^3]; by default any.")
 
 
-class JointLimits(NamedTuple):
+class MotionLimits(NamedTuple):
     """Limits of n joints; inf where there is none.
 
     Attributes:
@@ -47,7 +47,7 @@ class JointLimits(NamedTuple):
     jerk: np.ndarray
 
     @classmethod
-    def of(cls, robot: GuardedRobot, config: LimitsConfig, file: str) -> "JointLimits":
+    def of(cls, robot: GuardedRobot, config: LimitsConfig, file: str) -> "MotionLimits":
         """Returns the limits of a robot.
 
         Raises:

@@ -1,38 +1,24 @@
-"""From a configuration to checks."""
+"""Makes the checks of a guard from its configuration."""
 
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import Any
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
-from custom_ros_tools.plugins import find_in_table
 
 from .check import Check
 from .checks import CHECKS
-from .limits import JointLimits
+from .limits import MotionLimits
 from .robot import GuardedRobot
 
 
-def check_class(name: str) -> type[Check]:
-    """Returns the class of a check.
-
-    Args:
-        name: A name of the table `CHECKS`, or `"their_package.module:Class"`.
-
-    Raises:
-        UnknownNameError: If the table does not have the name.
-        ValueError: If another package has no such class.
-    """
-    return cast(type[Check], find_in_table(name, Check, CHECKS, "check"))
-
-
 def make_checks(
-    options: Mapping[str, Mapping[str, Any]], robot: GuardedRobot, limits: JointLimits, file: str
+    options: Mapping[str, Mapping[str, Any]], robot: GuardedRobot, limits: MotionLimits, file: str
 ) -> list[Check]:
-    """Returns the checks of a guard: those that are on by default, and those that have options; switched off ones not.
+    """Returns the checks of a guard: those on by default and those with options, without those that are switched off.
 
     Args:
         options: Options by name of the check.
-        file: Where they come from, for messages.
+        file: Source of the options, for messages.
 
     Raises:
         ConfigError: If a check is not known, or its options are wrong.
@@ -40,7 +26,7 @@ def make_checks(
     checks = []
     for name in dict.fromkeys((*CHECKS, *options)):
         try:
-            each = check_class(name)
+            each: Any = CHECKS.find(name)
         except (InterfaceError, ValueError) as error:
             raise ConfigError([Problem(file, f"checks.{name}", str(error))]) from None
         if name in options or each.is_default:

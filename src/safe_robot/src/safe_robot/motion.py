@@ -1,15 +1,15 @@
-"""What is checked: a command, and the braking from it."""
+"""Motions that are checked: a command, and the braking from it."""
 
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from .commands.braking import Brake, BrakingCommands
+from .braking import Brake, BrakingCommands
 from .robot import GuardedRobot
 
 WAYPOINT_SPACING = 0.15
-"""Between two waypoints all joints together move no further [rad or m], if a period is not longer."""
+"""Largest motion of all joints together between two waypoints [rad or m], unless they move more in one period."""
 
 
 class State(NamedTuple):
@@ -41,7 +41,21 @@ class State(NamedTuple):
         return State(position, velocity, (velocity - self.velocity) / period_s)
 
 
-class Motion:
+class Bound(NamedTuple):
+    """A bound near one of k configurations: `gradient @ (q - configuration) >= -room`.
+
+    Attributes:
+        row: Number of the configuration.
+        gradient: n derivatives of the safety distance by the joints.
+        room: Remaining distance; negative beyond the bound.
+    """
+
+    row: int
+    gradient: np.ndarray
+    room: float
+
+
+class CommandedMotion:
     """A command to n joints in row 0, and the braking from it in the rows below: k rows, a period apart.
 
     Attributes:
@@ -88,7 +102,7 @@ class Motion:
 
     @cached_property
     def travelled(self) -> np.ndarray:
-        """How far each joint moves from row 0 to each row, there and back counted, k x n [rad or m]."""
+        """Length of the path of each joint from row 0 to each row, k x n [rad or m]."""
         travelled = np.zeros_like(self.position)
         np.cumsum(np.abs(self.position[1:] - self.position[:-1]), axis=0, out=travelled[1:])
         return travelled
@@ -108,12 +122,12 @@ class Motion:
 
     @property
     def path(self) -> np.ndarray:
-        """How far each of n joints moves after row 0, there and back counted [rad or m]."""
+        """Length of the path of each of n joints after row 0 [rad or m]."""
         path: np.ndarray = self.travelled[-1]
         return path
 
     def link_positions(self, link: str) -> np.ndarray:
         """Returns where the origin of a link is in the robot's root, in the command before and the k rows [m]."""
         if link not in self._link_positions:
-            self._link_positions[link] = self.robot.link_positions(self.with_start, link)
+            self._link_positions[link] = self.robot.frames.positions(self.with_start, link)
         return self._link_positions[link]

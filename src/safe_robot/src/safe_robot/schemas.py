@@ -6,20 +6,19 @@ from typing import Any
 from pydantic import Field, create_model
 
 from custom_ros_tools.schema import ConfigModel
-from custom_ros_tools.schema.json_schema import DEFINITIONS, Schema, explained, json_schema, schema_text, write_schemas
+from custom_ros_tools.schema.json_schema import DEFINITIONS, Schema, json_schema, schema_texts
 
 from .checks import CHECKS
 from .config import GuardConfig, NodeConfig
-from .lookup import check_class
 
 TITLE = "guard"
 _OWN_CHECK = r"^[\w.]+:\w+$"
 
 
 def schema() -> Schema:
-    """Returns what parameters of a guard and its node may be, with the options of all checks of the table."""
+    """Returns the schema of the parameters of a guard and its node, with the options of all checks of the table."""
     text = "Options of checks by name."
-    known: dict[str, Any] = {name: (check_class(name).Config, Field(default_factory=dict)) for name in CHECKS}
+    known: dict[str, Any] = {name: (config, Field(default_factory=dict)) for name, config in CHECKS.configs().items()}
     model = create_model("Checks", __base__=ConfigModel, __doc__=text, **known)
     checks: Any = model, Field(default_factory=dict, description=text)
     both = create_model("Guard", __base__=(GuardConfig, NodeConfig), __doc__=GuardConfig.__doc__, checks=checks)
@@ -29,14 +28,5 @@ def schema() -> Schema:
 
 
 def schema_files(root: Path) -> dict[Path, str]:
-    """Returns what the files should have.
-
-    Args:
-        root: The workspace.
-    """
-    return {root / f"src/safe_robot/schema/{TITLE}.schema.json": schema_text(explained(schema()))}
-
-
-def main() -> None:
-    """Runs the command that writes the schema anew."""
-    write_schemas(schema_files)
+    """Returns the text of each file of a workspace."""
+    return schema_texts(root / "src/safe_robot/schema", {TITLE: schema()})

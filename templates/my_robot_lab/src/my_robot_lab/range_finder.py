@@ -5,8 +5,9 @@ from typing import Annotated, NamedTuple
 from pydantic import AfterValidator, Field
 
 from custom_ros_tools.schema import Position, PositiveMetres, Vec3
+from robot_model.geometry import Vector, plus, scaled
 from rpbi.bodies import Body
-from rpbi.geometry import Pose, Vector, plus, scaled
+from rpbi.geometry import Pose
 from rpbi.sensors import BodySensor, SensorConfig
 
 

@@ -19,7 +19,7 @@ def start_child(command: Sequence[str], at_end: signal.Signals, **options: Any) 
     Args:
         command: The command line.
         at_end: The signal.
-        options: Of `subprocess.Popen`, but `stdin`.
+        options: Options of `subprocess.Popen`, except `stdin`.
 
     Raises:
         OSError: If it cannot be started.

@@ -1,1 +1,1 @@
-"""What needs ROS to run."""
+"""The part that needs ROS."""

@@ -5,17 +5,18 @@ import threading
 from collections import deque
 from typing import Any
 
-MOST_TOGETHER = 32
-"""How many messages are sent by one call of the system, and kept at most until the next flush."""
+MAX_TOGETHER = 32
+"""Largest number of messages that one system call sends, and that are buffered until the next flush."""
 
 
 class BufferedSocket:
-    """A connected socket whose `sendall` never waits: messages are kept until the next flush, and are sent in order.
+    """A connected socket whose `sendall` never waits: messages are buffered until the next flush, and sent in order.
 
-    What is flushed goes out at once: rospy's subscribers ask for no TCP_NODELAY unless they are told to, whatever the
-    publisher says, and then a message waits until the one before it is acknowledged, up to 40 ms.
+    A flush sends at once: rospy's subscribers request TCP_NODELAY only with an option, whatever the publisher's
+    setting. Without it, a message waits until the previous one is acknowledged, up to 40 ms.
 
-    Any thread may use it. What the other side does not take yet stays; beyond `limit` messages the oldest are dropped.
+    Any thread may use it. Messages that the other side does not accept yet stay buffered; beyond `limit` messages the
+    oldest are dropped.
     """
 
     def __init__(self, connection: socket.socket, limit: int) -> None:
@@ -24,9 +25,9 @@ class BufferedSocket:
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket = connection
         self._lock = threading.Lock()
-        self._begun = b""  # rest of messages of which a part was sent
+        self._begun = b""  # rest of a partly sent message
         self._kept: deque[bytes] = deque(maxlen=limit)
-        self._most_together = min(limit, MOST_TOGETHER)
+        self._most_together = min(limit, MAX_TOGETHER)
         self._error: OSError | None = None
         """Why the other side cannot be reached any more."""
 
@@ -34,10 +35,10 @@ class BufferedSocket:
         return getattr(self._socket, name)
 
     def sendall(self, data: bytes) -> None:
-        """Has a message sent by the next flush, or now if many are kept already.
+        """Buffers a message for the next flush; flushes now if many are buffered.
 
         Raises:
-            OSError: If the other side has gone, as was seen before.
+            OSError: If an earlier call found that the other side has gone.
         """
         with self._lock:
             if self._error is not None:
@@ -48,7 +49,8 @@ class BufferedSocket:
                 self._send_kept()
 
     def flush(self) -> None:
-        """Sends what is kept as far as the other side takes it; if that has gone, the next message is an error."""
+        """Sends buffered messages as far as the other side accepts them; if it has gone, the next message is an "
+        "error."""
         with self._lock:
             self._send_kept()
 
@@ -58,7 +60,7 @@ class BufferedSocket:
                 if not self._kept:
                     _unsent.pop(self, None)
                     return
-                count = min(len(self._kept), MOST_TOGETHER)
+                count = min(len(self._kept), MAX_TOGETHER)
                 self._begun = b"".join([self._kept.popleft() for _ in range(count)])
             try:
                 self._begun = self._begun[self._socket.send(self._begun) :]
@@ -70,7 +72,7 @@ class BufferedSocket:
 
 
 _unsent: dict[BufferedSocket, None] = {}
-"""Those that keep something, in the order in which they began to."""
+"""Sockets with buffered messages, in the order of their first one."""
 
 
 _at_once = threading.Event()
@@ -78,12 +80,12 @@ _at_once = threading.Event()
 
 
 def send_at_once() -> None:
-    """Sends what is kept, and from now on every message at once: for the end of a loop that has flushed."""
+    """Flushes, and sends every message at once from now on: for the end of a loop that has flushed."""
     _at_once.set()
     flush_buffered_sockets()
 
 
 def flush_buffered_sockets() -> None:
-    """Sends what is kept, as far as it is taken; for every pass of a loop."""
+    """Sends buffered messages as far as they are accepted; for every pass of a loop."""
     for each in tuple(_unsent):
         each.flush()

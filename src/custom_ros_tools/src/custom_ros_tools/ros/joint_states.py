@@ -1,4 +1,4 @@
-"""Joint states as messages: in the order that is asked for, published, kept."""
+"""Joint states as messages: reordered, published, stored."""
 
 from collections.abc import Callable, Iterable, Sequence
 
@@ -34,12 +34,12 @@ def joint_state(values: JointValues, header: Header) -> JointState:
 
 
 def resolve_joint_order(msg: JointState, joint_names: Sequence[str], ns: str = "") -> JointState:
-    """Returns a joint state with its joints in the order asked for; velocities or efforts it lacks stay empty.
+    """Returns a joint state with its joints in the requested order; velocities or efforts that it lacks stay empty.
 
     Args:
         msg: The joint state, in any order, perhaps with more joints.
-        joint_names: The joints asked for, which the result names like this.
-        ns: What their names in `msg` begin with, as `ns` in `ns/joint`; empty if they begin with nothing.
+        joint_names: The requested joints, under which the result lists them.
+        ns: Prefix of their names in `msg`, as `ns` in `ns/joint`; empty for none.
 
     Raises:
         MissingJointsError: If joints are missing; it names all of them.
@@ -57,14 +57,14 @@ def get_joint_state(
     """Waits for one message of a topic and returns it.
 
     Args:
-        timeout: How long to wait [s] of wall time; None is for ever.
-        joint_names: The joints asked for; None takes all as they come.
+        timeout: Longest time to wait [s] of wall time; None waits forever.
+        joint_names: The requested joints; None returns all in the order received.
         ns: As for `resolve_joint_order`.
 
     Raises:
-        rospy.ROSException: If none came in time.
+        rospy.ROSException: If none arrived in time.
         MissingJointsError: If the message lacks joints.
-        ValueError: If the message is faulty.
+        ValueError: If the message is invalid.
     """
     message = rospy.wait_for_message(topic, JointState, timeout)
     return message if joint_names is None else resolve_joint_order(message, joint_names, ns)
@@ -75,7 +75,7 @@ class JointStatePublisher(rospy.Publisher):
 
     Args:
         joint_names: The n joints.
-        queue_size: Messages kept for a slow subscriber.
+        queue_size: Number of messages that are buffered for a slow subscriber.
     """
 
     def __init__(self, topic_name: str, joint_names: Sequence[str], queue_size: int = 1) -> None:
@@ -103,13 +103,13 @@ class JointStatePublisher(rospy.Publisher):
 
 
 class JointStateSubscriber(rospy.Subscriber):
-    """Keeps the newest joint state of a topic, its joints in the order of a list.
+    """Stores the newest joint state of a topic, its joints in the order of a list.
 
-    Messages that lack joints or are faulty are refused and named now and then; the one before stays.
+    Messages that lack joints or are invalid are refused with a throttled warning; the previous one stays.
 
     Args:
         joint_names: The n joints.
-        ns: What their names in messages begin with, as `ns` in `ns/joint`.
+        ns: Prefix of their names in messages, as `ns` in `ns/joint`.
         callback: Called with each joint state, its joints in order.
     """
 
@@ -123,10 +123,10 @@ class JointStateSubscriber(rospy.Subscriber):
         self._names, self._ns, self._callback = tuple(joint_names), ns, callback
         self._topic, self._warn = rospy.resolve_name(topic_name), ThrottledWarning()
         self._newest: JointState | None = None
-        super().__init__(self._topic, JointState, self._take, queue_size=1, tcp_nodelay=True)
+        super().__init__(self._topic, JointState, self._on_message, queue_size=1, tcp_nodelay=True)
 
     def received(self) -> bool:
-        """Tells whether there is a joint state."""
+        """Returns whether there is a joint state."""
         return self._newest is not None
 
     recieved = received  # as the release spells it
@@ -151,7 +151,7 @@ class JointStateSubscriber(rospy.Subscriber):
         newest = self._newest
         return None if newest is None else np.array(getattr(newest, quantity), dtype=float)
 
-    def _take(self, message: JointState) -> None:
+    def _on_message(self, message: JointState) -> None:
         try:
             ordered = resolve_joint_order(message, self._names, self._ns)
         except (InterfaceError, ValueError) as error:

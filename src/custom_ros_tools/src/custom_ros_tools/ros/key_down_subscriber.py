@@ -8,7 +8,7 @@ from keyboard.msg import Key
 
 
 class KeyDownSubscriber(rospy.Subscriber):
-    """Calls functions when keys go down, as told on `keyboard/keydown`.
+    """Calls functions when keys go down, as published on `keyboard/keydown`.
 
     Args:
         key_action_map: Functions by key code, such as `{Key.KEY_a: start}`.
@@ -16,9 +16,9 @@ class KeyDownSubscriber(rospy.Subscriber):
 
     def __init__(self, key_action_map: Mapping[int, Callable[[], Any]]) -> None:
         self._actions = dict(key_action_map)
-        super().__init__("keyboard/keydown", Key, self._take, queue_size=100)
+        super().__init__("keyboard/keydown", Key, self._on_message, queue_size=100)
 
-    def _take(self, message: Key) -> None:
+    def _on_message(self, message: Key) -> None:
         action = self._actions.get(message.code)
         if action is not None:
             action()

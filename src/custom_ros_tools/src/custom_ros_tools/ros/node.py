@@ -1,32 +1,38 @@
-"""What the programs of nodes and commands call; it imports nothing that starts a thread."""
+"""Entry points of the programs of nodes and commands; importing it starts no thread."""
 
 import os
 import pkgutil
 import resource
 import signal
 import sys
+from collections.abc import Callable
+from typing import Any
 
-LEAST_MEMORY = 500_000_000
+MIN_MEMORY_BYTES = 500_000_000
 """Bytes of address space that NumPy and PyBullet need; with less, they end the process."""
 
 
 def run(main: str) -> None:
-    """Runs a node's `module:function` with Ctrl-C held back for `custom_ros_tools.ros.lifecycle.run_node`.
+    """Runs a node's `module:function` with SIGINT blocked for `custom_ros_tools.ros.lifecycle.run_node`.
 
-    A signal can be held back only before the process has its first thread, and libraries start theirs when they are
-    imported; so the function is imported here.
+    A signal can be blocked for all threads only before the process has its first one, and libraries start theirs when
+    they are imported; therefore the function is imported here.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     _prepare_for_numpy()
     pkgutil.resolve_name(main)()
 
 
-def run_command(main: str) -> None:
-    """Runs a command's `module:function` and exits with what it returns; Ctrl-C ends it without a traceback.
+def run_command(main: str, call: Callable[[Any], Any] = lambda function: function()) -> None:
+    """Runs a command's `module:function` and exits with its result; Ctrl-C ends it without a traceback.
 
-    Until the function is imported, Ctrl-C ends the process at once, from then on it is a KeyboardInterrupt. Who starts
-    the process with SIGINT blocked, as `env --block-signal=INT` does, leaves no moment before that either. In a process
-    that ignores SIGINT, as behind the `&` of a script, it stays ignored.
+    Until the function is imported, Ctrl-C ends the process at once, from then on it is a KeyboardInterrupt. A process
+    that starts with SIGINT blocked, as by `env --block-signal=INT`, is safe before that too. In a process that ignores
+    SIGINT, as behind the `&` of a script, it stays ignored.
+
+    Args:
+        main: The function.
+        call: Calls the function, and returns the exit code.
     """
     heeds = signal.getsignal(signal.SIGINT) != signal.SIG_IGN
     if heeds:
@@ -37,23 +43,23 @@ def run_command(main: str) -> None:
     try:
         if heeds:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        sys.exit(function())
+        sys.exit(call(function))
     except KeyboardInterrupt:
         sys.exit(130)
     finally:
-        if heeds:  # while Python is leaving, too
+        if heeds:  # while Python is ending, too
             signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _prepare_for_numpy() -> None:
-    """Has matrices computed in one thread, unless the environment says otherwise; before NumPy is imported.
+    """Limits matrix computations to one thread, unless the environment sets another number; before NumPy is imported.
 
-    Ours are small, so further threads would do little but wait for each other, which costs more the busier the machine
-    is, and under a limit of memory for ever. Where memory is limited to too little, the program ends with 1.
+    Our matrices are small. Further threads would mostly wait for each other, which costs more the busier the machine
+    is, and under a memory limit forever. With too little memory, the program ends with 1.
     """
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if limit != resource.RLIM_INFINITY and limit < LEAST_MEMORY:
+    if limit != resource.RLIM_INFINITY and limit < MIN_MEMORY_BYTES:
         sys.exit(
-            f"memory is limited to {limit / 1e6:.0f} MB (ulimit -v); expected at least {LEAST_MEMORY / 1e6:.0f} MB"
+            f"memory is limited to {limit / 1e6:.0f} MB (ulimit -v); expected at least {MIN_MEMORY_BYTES / 1e6:.0f} MB"
         )
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

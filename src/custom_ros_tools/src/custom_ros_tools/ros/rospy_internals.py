@@ -1,8 +1,8 @@
-"""The private parts of rospy that this workspace uses, all of them.
+"""All private parts of rospy that this workspace uses.
 
-rospy offers no way to send to many subscribers from one thread without waiting, nor to register again at a ROS master
-that has come back. Each use is tried when a node starts. Where rospy is built otherwise, one warning says what was
-expected, what is there and what is lost by that, and the node goes on without it.
+rospy offers no way to send to many subscribers from one thread without waiting, nor to register again with a restarted
+ROS master. Each use is tested when a node starts. If rospy has different internals, one warning reports what was
+expected, what was found and what is lost, and the node continues without it.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ T = TypeVar("T")
 
 
 def _expecting(expected: str, loss: str, use: Callable[[], T]) -> T | None:
-    """Returns the result of a use of private parts; None and a warning if they are not as expected.
+    """Returns the result of using private parts; None and a warning if they are not as expected.
 
-    Once rospy shuts down, its parts are as at no other time, which says nothing of how it is built.
+    While rospy shuts down, its parts are in another state, which is no evidence of different internals.
     """
     try:
         return use()
-    except Exception as error:  # whatever a rospy of other making raises, the node goes on
+    except Exception as error:  # whatever a different rospy raises, the node continues
         if not rospy.core.is_shutdown_requested():
             rospy.logwarn(
                 "this rospy is built otherwise: expected %s, got %s: %s; %s",
@@ -43,11 +43,11 @@ def _expecting(expected: str, loss: str, use: Callable[[], T]) -> T | None:
 
 
 class DirectSending:
-    """Has a publisher send in the thread that publishes, through sockets that keep all until `flush_buffered_sockets`.
+    """Makes a publisher send in the publishing thread, through sockets that buffer until `flush_buffered_sockets`.
 
-    With a queue size, rospy hands every message to a thread for each subscriber. At 1 kHz with a few subscribers the
-    threads' quarrel about Python's lock costs more than the simulation; without a queue size, one subscriber that does
-    not read stops everybody.
+    With a queue size, rospy hands every message to a thread for each subscriber. At 1 kHz with a few subscribers, the
+    contention of these threads for Python's lock costs more than the simulation. Without a queue size, one subscriber
+    that does not read blocks everybody.
     """
 
     _is_possible: bool | None = None
@@ -59,9 +59,9 @@ class DirectSending:
 
     @classmethod
     def of(cls, publisher: rospy.Publisher, limit: int) -> DirectSending | None:
-        """Returns that of a publisher, None if this rospy does not allow it; then the publisher stays as it is.
+        """Returns this sender for a publisher, None if rospy's internals differ; then the publisher stays unchanged.
 
-        At most `limit` messages are kept for each slow subscriber.
+        At most `limit` messages are buffered for each slow subscriber.
         """
         if cls._is_possible is None:
             cls._is_possible = bool(
@@ -74,8 +74,8 @@ class DirectSending:
         return cls(publisher, limit) if cls._is_possible else None
 
     def wrap_connections(self) -> None:
-        """Sees to it that sending waits for nobody, not for those either that have just come; before each message."""
-        connections = self._topic.connections  # rospy makes a new list whenever somebody comes or goes
+        """Replaces the sockets of new connections, so that sending never waits; called before each message."""
+        connections = self._topic.connections  # rospy makes a new list whenever a connection is opened or closed
         if connections is not self._connections:
             for connection in connections:
                 if isinstance(connection.socket, socket.socket):
@@ -84,10 +84,10 @@ class DirectSending:
 
     @classmethod
     def _try(cls, publisher: rospy.Publisher) -> bool:
-        """Does with a topic that nobody knows what is to be done with the others.
+        """Tests the replacement on a private topic.
 
         Raises:
-            Exception: If that is not possible.
+            Exception: If it is not possible.
         """
         tcpros = import_module("rospy.impl.tcpros_base")
         ours, theirs = socket.socketpair()
@@ -112,7 +112,7 @@ class DirectSending:
 
 
 class Registry:
-    """The topics and services that this node has by rospy."""
+    """The topics and services of this node, from rospy."""
 
     def __init__(self) -> None:
         registration = import_module("rospy.impl.registration")
@@ -123,7 +123,8 @@ class Registry:
         if (kinds.SUB, kinds.PUB, kinds.SRV) != ("sub", "pub", "srv"):
             raise TypeError("other kinds of registrations")
         with self.entries(), self._rospys.cond:
-            self._rospys.updates[:] = self._rospys.updates  # else it cannot be done either when it is needed
+            self._rospys.updates[:] = self._rospys.updates  # otherwise it would fail when it is needed
+        rospy.core.add_shutdown_hook(lambda _: self._wake())  # rospy waits for its thread, up to 0.5 s
 
     @contextmanager
     def entries(self) -> Iterator[list[tuple[str, str, str]]]:
@@ -136,27 +137,31 @@ class Registry:
             ]
 
     def connect(self, name: str, publishers: list[str]) -> None:
-        """Connects a subscription to publishers that the master named when it registered the subscription.
+        """Connects a subscription to the publishers that the master returned at its registration.
 
-        One that came right after is told by the master in another call, which may arrive before; rospy would connect to
-        those alone of whom it is told last. This comes before whatever waits to be done.
+        A publisher that registers right after it is reported by the master in another call, which may arrive earlier;
+        rospy would connect only to those of the last report. This runs before queued updates.
 
         Args:
             name: The topic.
-            publishers: Their URIs; whoever is connected already stays so.
+            publishers: Their URIs; existing connections stay.
         """
         with self._rospys.cond:
             self._rospys.updates.insert(0, (name, publishers))
             self._rospys.cond.notify_all()
 
+    def _wake(self) -> None:
+        with self._rospys.cond:
+            self._rospys.cond.notify_all()
+
     def hand_over(self, listener: Any) -> None:
-        """Has somebody else register what comes and goes, in the place of rospy, by `reg_added` and `reg_removed`."""
+        """Redirects registrations to another listener, instead of rospy, with `reg_added` and `reg_removed`."""
         with self._listeners.lock:
             self._listeners.listeners[self._listeners.listeners.index(self._rospys)] = listener
 
 
 def registry() -> Registry | None:
-    """Returns the registry of this node, None if this rospy has no such thing."""
+    """Returns the registry of this node, None if rospy's internals differ."""
     return _expecting(
         "rospy.impl.registration to have RegManager among its listeners",
         "a ROS master that comes back will not know this node: start it again then",
@@ -165,13 +170,13 @@ def registry() -> Registry | None:
 
 
 def close_poller_with(topic: rospy.topics.Topic) -> None:
-    """Has what polls a topic's connections, a file, closed with the topic.
+    """Closes the poller of a topic's connections, a file, with the topic.
 
-    It holds methods of its own, so that rospy leaves it to Python's garbage collector, which nothing hurries.
+    It references its own methods, so that rospy leaves it to Python's garbage collector, which may run late.
     """
     poller = getattr(
         getattr(topic, "impl", None), "connection_poll", None
-    )  # else nothing is lost but a file for a while
+    )  # otherwise nothing is lost but a file for a while
     for name, method in list(vars(poller).items()) if poller is not None else ():
         if getattr(method, "__self__", None) is poller:
             setattr(poller, name, partial(_call, WeakMethod(method)))
@@ -179,12 +184,12 @@ def close_poller_with(topic: rospy.topics.Topic) -> None:
 
 def _call(method: WeakMethod, *arguments: Any) -> Any:
     bound = method()
-    assert bound is not None  # the poller that is asked is there
+    assert bound is not None  # the poller under test is there
     return bound(*arguments)
 
 
 def keep_accepting() -> None:
-    """Has this process, before it is a node, go on accepting connections whatever others do; see `ServerSocket`."""
+    """Makes this process, before it is a node, accept connections whatever other clients do; see `ServerSocket`."""
 
     def wrap() -> None:
         server = import_module("rospy.impl.tcpros_base").TCPServer
@@ -199,7 +204,7 @@ def keep_accepting() -> None:
 
 
 def answer_cached(parameter: str, value: Any) -> None:
-    """Has `rospy.get_param_cached` answer without asking the master."""
+    """Makes `rospy.get_param_cached` answer without contacting the master."""
     _expecting(
         "rospy.impl.paramserver to have a cache",
         "who logs something waits for a master that hangs",

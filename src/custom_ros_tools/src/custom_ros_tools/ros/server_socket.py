@@ -1,4 +1,4 @@
-"""The socket at which a node listens: nobody who connects to it holds up others."""
+"""Listening socket of a node; no client can hold up others."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from typing import Any, NamedTuple
 log = logging.getLogger(__name__)
 
 HEADER_TIMEOUT_S = 60.0
-"""How long after it is made a connection may take to send its header [s]."""
-LARGEST_HEADER = 1 << 20
-"""The longest header [bytes]; the first four bytes of other protocols, taken for its length, say more."""
+"""Time within which a connection has to send its header [s]; it is closed after it."""
+MAX_HEADER_BYTES = 1 << 20
+"""Largest length of a header [bytes]; the first four bytes of other protocols, read as a length, exceed it."""
 PEEKED = 1 << 15
-"""Of a longer header so many bytes will do, since the kernel does not keep any number of them."""
+"""Number of bytes of a longer header that are sufficient, since the kernel's buffer is limited."""
 OUT_OF_HANDLES_S = 0.5
-"""How long a node that is out of file handles waits before it looks again [s]."""
+"""Time for which a node without free file handles waits before it accepts again [s]."""
 
 
 class _Pending(NamedTuple):
-    """A connection whose header has not come yet; until `end_s` of the monotonic clock it may."""
+    """A connection whose header is incomplete; it is closed at `end_s` of the monotonic clock."""
 
     connection: socket.socket
     address: Any
@@ -33,12 +33,12 @@ class _Pending(NamedTuple):
 
 
 class ServerSocket:
-    """A listening socket that returns connections whose TCPROS header is there, so that rospy need not wait for it.
+    """A listening socket that returns connections whose TCPROS header has arrived, so that rospy need not wait for it.
 
-    rospy reads the header of a connection in the only thread that accepts any. So one that sends none, be it of a
-    program that was stopped just then or of another protocol, would keep all others from the topics and services of
-    the node for ever. Here connections wait beside each other. A node that is out of file handles waits, where rospy
-    would never accept any again.
+    rospy reads the header of a connection in its only accepting thread. A client that sends none, for example a program
+    that was just stopped or one with another protocol, would keep all others from the topics and services of the node
+    forever. Here connections wait in parallel. A node without free file handles waits, where rospy would never accept a
+    connection again.
 
     Args:
         server: The socket.
@@ -55,12 +55,7 @@ class ServerSocket:
         return getattr(self._server, name)
 
     def accept(self) -> tuple[socket.socket, Any]:
-        """Waits for the next connection whose header has come, and returns it with its address.
-
-        Raises:
-            TimeoutError: If there are no file handles; one may ask again.
-            OSError: If the socket cannot accept any more.
-        """
+        """Waits for the next connection whose header has arrived, and returns it with its address."""
         while not self._ready:
             now_s = time.monotonic()
             for pending in [each for each in self._pending.values() if each.end_s <= now_s]:
@@ -87,7 +82,7 @@ class ServerSocket:
         self._poll.register(connection.fileno(), select.EPOLLIN | select.EPOLLRDHUP | select.EPOLLET)
 
     def _look_at(self, pending: _Pending) -> None:
-        """Moves a connection to those that are ready if its header has come, and closes it if none can come."""
+        """Marks a connection as ready if its header has arrived, and closes it if none can arrive."""
         try:
             peeked = pending.connection.recv(PEEKED, socket.MSG_PEEK | socket.MSG_DONTWAIT)
         except BlockingIOError:
@@ -99,7 +94,7 @@ class ServerSocket:
             pending.connection.close()
         elif len(peeked) >= 4:
             size = struct.unpack("<I", peeked[:4])[0]
-            if not 0 < size <= LARGEST_HEADER:
+            if not 0 < size <= MAX_HEADER_BYTES:
                 self._refuse(pending, f"it does not speak TCPROS: {peeked[:20]!r}")
             elif len(peeked) >= min(4 + size, PEEKED):
                 self._forget(pending)

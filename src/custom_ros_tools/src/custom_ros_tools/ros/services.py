@@ -1,4 +1,4 @@
-"""Services: one that switches on and off, and proxies that wait for theirs."""
+"""Services: a toggle, and proxies that wait for their service."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -9,17 +9,17 @@ from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 from custom_ros_tools.errors import InterfaceError
 
 PATIENCE_S = 5.0
-"""After how long of waiting it is said what is waited for [s]."""
+"""Time of waiting after which it is reported [s]."""
 
 
 def get_srv_handler(
     srv_name: str, srv_type: type, persistent: bool = False, headers: dict[str, str] | None = None
 ) -> rospy.ServiceProxy:
-    """Waits until a service is there, for ever if need be, and returns what calls it.
+    """Waits until a service is available, without a time limit, and returns its proxy.
 
     Args:
         persistent: Whether to keep one connection open, which is faster and ends with the server.
-        headers: What else to tell the server when connecting.
+        headers: Further headers of the connection.
 
     Raises:
         rospy.ROSInterruptException: If ROS shuts down meanwhile.
@@ -35,15 +35,15 @@ def get_srv_handler(
 
 
 def get_srv_handlers(srvs: Mapping[str, type], persistent: bool = False) -> dict[str, rospy.ServiceProxy]:
-    """Does the same for several services, whose types are given by name; returns what calls them, by name."""
+    """Does the same for several services, whose types are given by name; returns the proxies by name."""
     return {name: get_srv_handler(name, srv_type, persistent) for name, srv_type in srvs.items()}
 
 
 def call_service(name: str, srv_type: type, *arguments: object) -> Any:
-    """Calls a service when it is there, and returns its answer.
+    """Calls a service once it is available, and returns its answer.
 
     Raises:
-        InterfaceError: If it answers that it did not succeed.
+        InterfaceError: If the answer reports a failure.
     """
     answer = get_srv_handler(name, srv_type)(*arguments)
     if not answer.success:
@@ -59,9 +59,9 @@ class ToggleService(rospy.Service):
 
     Args:
         name: Its name.
-        enable_handler: Called on true; it returns success and a message, which are the answer.
+        enable_handler: Called on true; returns success and a message, which are the answer.
         disable_handler: The same on false.
-        options: Those of `rospy.Service`, such as `error_handler`.
+        options: Options of `rospy.Service`, such as `error_handler`.
     """
 
     def __init__(self, name: str, enable_handler: Handler, disable_handler: Handler, **options: Any) -> None:
@@ -69,6 +69,6 @@ class ToggleService(rospy.Service):
         super().__init__(name, SetBool, self.toggle, **options)
 
     def toggle(self, req: SetBoolRequest) -> SetBoolResponse:
-        """Answers a request, which may be one that did not come from ROS."""
+        """Answers a request, which may come from Python code, too."""
         success, message = self._enable() if req.data else self._disable()
         return SetBoolResponse(success, message)

@@ -1,4 +1,4 @@
-"""TF in one object: tell it, ask it, wait for it, convert it."""
+"""TF in one object: broadcast, look up, wait, convert."""
 
 import time
 
@@ -21,7 +21,7 @@ class TfInterface:
     """Broadcasts transforms and listens to them.
 
     A transform from parent to child is the pose of the child expressed in the parent: position [m] and quaternion
-    x, y, z, w. Make one object for a node, after `rospy.init_node`; what was sent before it is not known to it.
+    x, y, z, w. Create one object per node, after `rospy.init_node`; it does not have transforms that were sent earlier.
     """
 
     def __init__(self) -> None:
@@ -64,7 +64,7 @@ class TfInterface:
     ) -> TransformStamped | None:
         """Waits until there is a transform and returns the newest, None if there was none in time.
 
-        The timeout [s] is wall time; None is for ever.
+        The timeout [s] is wall time; None waits forever.
 
         Raises:
             rospy.ROSInterruptException: If ROS shuts down meanwhile.

@@ -1,4 +1,4 @@
-"""TF as it comes, without what tf2 cannot take."""
+"""TF listener that drops transforms which tf2 cannot handle."""
 
 import math
 from collections.abc import Callable
@@ -12,37 +12,36 @@ from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 
 QUEUE_SIZE = 100
 NORM_TOLERANCE = 0.01
-"""How far the square of a quaternion's length may be from 1, as for tf2."""
+"""Largest deviation of the square of a quaternion's length from 1, as in tf2; transforms beyond it are dropped."""
 END_OF_TIME_S = 2**31
-"""From this stamp on [s], tf2's C++ part reads where there is nothing, which ends the process."""
+"""Stamp from which on tf2's C++ part reads invalid memory, which ends the process [s]."""
 NS_PER_S = 1_000_000_000
 
 
 class TfListener:
-    """Puts what comes on /tf and /tf_static into a buffer; `tf2_ros.TransformListener` does so without looking at it.
+    """Stores transforms of /tf and /tf_static in a buffer; `tf2_ros.TransformListener` does so without checks.
 
-    tf2 refuses most of what is no transform, but prints two lines on the console each time, however often it comes; and
-    of some of it the process dies.
+    tf2 rejects most invalid transforms, but prints two lines on the console each time; some of them end the process.
 
     Args:
         buffer: The buffer.
-        noted: Called with the child frame of each transform that was put in.
+        noted: Called with the child frame of each stored transform.
     """
 
     def __init__(self, buffer: tf2_ros.Buffer, noted: Callable[[str], None] = lambda _: None) -> None:
         self._noted = noted
         self._warn = ThrottledWarning()
         self._subscribers = [
-            rospy.Subscriber(topic, TFMessage, self._take, store, queue_size=QUEUE_SIZE)
+            rospy.Subscriber(topic, TFMessage, self._on_message, store, queue_size=QUEUE_SIZE)
             for topic, store in (("/tf", buffer.set_transform), ("/tf_static", buffer.set_transform_static))
         ]
 
     def unregister(self) -> None:
-        """Listens no more."""
+        """Stops listening."""
         for subscriber in self._subscribers:
             subscriber.unregister()
 
-    def _take(self, message: TFMessage, store: Callable[[TransformStamped, str], None]) -> None:
+    def _on_message(self, message: TFMessage, store: Callable[[TransformStamped, str], None]) -> None:
         sender = message._connection_header.get("callerid", "")
         for transform in message.transforms:
             fault = fault_in(transform)
@@ -54,7 +53,7 @@ class TfListener:
 
 
 def fault_in(transform: TransformStamped) -> str | None:
-    """Returns what is wrong with a transform, None if nothing is."""
+    """Returns what is wrong with a transform, None if it is valid."""
     parent, child = transform.header.frame_id.strip("/"), transform.child_frame_id.strip("/")
     position, quat, stamp = transform.transform.translation, transform.transform.rotation, transform.header.stamp
     if not parent or not child or parent == child:

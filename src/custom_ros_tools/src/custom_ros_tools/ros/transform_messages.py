@@ -1,4 +1,4 @@
-"""Transforms as messages: from and to vectors, and repeated on /tf."""
+"""Transforms as messages: conversions from and to vectors, and a topic that repeats one on /tf."""
 
 import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion, Transform, TransformStamped, Vector3
@@ -36,7 +36,7 @@ def quat_in(transform: Transform) -> Array:
 
 
 def as_pose(transform: Transform) -> Pose:
-    """Returns the same as a pose message."""
+    """Returns the transform as a pose message."""
     v = transform.translation
     return Pose(Point(v.x, v.y, v.z), transform.rotation)
 
@@ -44,8 +44,8 @@ def as_pose(transform: Transform) -> Pose:
 class TransformTopic:
     """Sends the transform from one frame to another to /tf with the present stamp; nothing while neither has changed.
 
-    While simulated time stands still, the same stamp again would make each listener warn of a repeated one. Who comes
-    then gets the last one all the same, since the topic is latched.
+    While simulated time stands still, repeating the stamp would make each listener warn. New subscribers get the last
+    message all the same, since the topic is latched.
     """
 
     def __init__(self, parent: str, child: str) -> None:
@@ -54,7 +54,7 @@ class TransformTopic:
         self._publisher = rospy.Publisher("/tf", TFMessage, latch=True, queue_size=10)
 
     def send(self, transform: Transform) -> None:
-        """Sends the pose of the child in the parent, as it is now."""
+        """Sends the present pose of the child in the parent."""
         message = TransformStamped(child_frame_id=self._child, transform=transform)
         message.header.frame_id = self._parent
         message.header.stamp = rospy.Time.now()

@@ -1,4 +1,4 @@
-"""Strict configuration models: one base class, and the number and text types that YAML files are made of.
+"""Strict configuration models: one base class, and the number and text types of YAML files.
 
 A model states its keys, units and limits once; validation, error messages and the JSON Schema follow from it.
 """
@@ -38,12 +38,12 @@ class ConfigModel(BaseModel):
 
     @classmethod
     def parse(cls: type[Model], data: Mapping[str, Any], file: str, context: Mapping[str, Any] | None = None) -> Model:
-        """Validates what was read from a file.
+        """Validates the content of a file.
 
         Args:
-            data: The mapping; it is not changed and not kept.
+            data: The mapping; it is neither changed nor stored.
             file: Name of the file, for messages; `"~config"` when it came from the parameter server.
-            context: What validators find in `info.context` beside `file`, such as the folders to search.
+            context: Further entries of `info.context` for validators, beside `file`, such as the folders to search.
 
         Raises:
             ConfigError: With one `Problem` for each fault.
@@ -63,7 +63,7 @@ def _unit_quaternion(value: tuple[float, ...]) -> tuple[float, ...]:
     if norm < 1e-6:
         raise ValueError("a quaternion cannot be all zeros; no rotation is [0, 0, 0, 1]")
     if abs(norm - 1.0) < 1e-12:
-        return value  # so that what was normalised once stays as it is, to the last bit
+        return value  # normalising again must not change the last bit
     return tuple(v / norm for v in value)
 
 
@@ -89,8 +89,12 @@ def _frame_id(value: str) -> str:
     return value
 
 
+def _one_as_list(given: Any) -> Any:
+    return [given] if isinstance(given, (int, float)) and not isinstance(given, bool) else given
+
+
 def _within(largest: float, unit: str = "") -> AfterValidator:
-    """Returns what refuses numbers that no world stands."""
+    """Returns a validator that rejects numbers beyond a largest magnitude."""
 
     def check(value: Any) -> Any:
         for number in value if isinstance(value, tuple) else (value,):
@@ -101,28 +105,28 @@ def _within(largest: float, unit: str = "") -> AfterValidator:
     return AfterValidator(check)
 
 
-FARTHEST_M = 1e6
-"""Beyond this a body would not stay finite [m]."""
+MAX_COORDINATE_M = 1e6
+"""Largest coordinate [m]; beyond it a body would not stay finite."""
 HEAVIEST_KG = 1e9
-_LARGEST, _LARGEST_COUNT = 1e12, 2**31 - 1
+_MAX_NUMBER, _MAX_COUNT = 1e12, 2**31 - 1
 
-Positive = Annotated[float, Field(gt=0), _within(_LARGEST)]
-NonNegative = Annotated[float, Field(ge=0), _within(_LARGEST)]
+Positive = Annotated[float, Field(gt=0), _within(_MAX_NUMBER)]
+NonNegative = Annotated[float, Field(ge=0), _within(_MAX_NUMBER)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
-Count = Annotated[int, Field(ge=0), _within(_LARGEST_COUNT)]
+Count = Annotated[int, Field(ge=0), _within(_MAX_COUNT)]
 Hz = Annotated[float, Field(gt=0), Unit("Hz")]
 HzOrOff = Annotated[float, Field(ge=0), Unit("Hz")]
-"""A rate, where 0 switches off."""
+"""A rate; 0 switches off."""
 Seconds = Annotated[float, Field(gt=0), Unit("s")]
 Pixels = Annotated[int, Field(gt=0, le=8192), Unit("px")]
-Metres = Annotated[float, _within(FARTHEST_M, "m"), Unit("m")]
-NonNegativeMetres = Annotated[float, Field(ge=0), _within(FARTHEST_M, "m"), Unit("m")]
-PositiveMetres = Annotated[float, Field(gt=0), _within(FARTHEST_M, "m"), Unit("m")]
+Metres = Annotated[float, _within(MAX_COORDINATE_M, "m"), Unit("m")]
+NonNegativeMetres = Annotated[float, Field(ge=0), _within(MAX_COORDINATE_M, "m"), Unit("m")]
+PositiveMetres = Annotated[float, Field(gt=0), _within(MAX_COORDINATE_M, "m"), Unit("m")]
 Kilograms = Annotated[float, Field(ge=0), _within(HEAVIEST_KG, "kg"), Unit("kg")]
 PositiveKilograms = Annotated[float, Field(gt=0), _within(HEAVIEST_KG, "kg"), Unit("kg")]
 Degrees = Annotated[float, Unit("deg")]
 
-Vec3 = Annotated[tuple[float, float, float], Field(strict=False), _within(FARTHEST_M)]
+Vec3 = Annotated[tuple[float, float, float], Field(strict=False), _within(MAX_COORDINATE_M)]
 Position = Annotated[Vec3, Unit("m")]
 Direction = Annotated[Vec3, AfterValidator(_direction)]
 """A direction of any length but zero."""
@@ -132,6 +136,8 @@ Rgba = Annotated[tuple[Fraction, Fraction, Fraction, Fraction], Field(strict=Fal
 Rgb = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False)]
 ListOf = Annotated[tuple[Item, ...], Field(strict=False)]
 """A list of any length, kept as a tuple: `ListOf[float]`."""
+OneAsList = BeforeValidator(_one_as_list)
+"""Takes a number as a list of one."""
 
 Switch = Annotated[
     bool,

@@ -1,4 +1,4 @@
-"""What the fields of a configuration model may be annotated with, beside pydantic's own."""
+"""Annotations for the fields of a configuration model, beside pydantic's own."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from custom_ros_tools.errors import Problem
 
 
 def optional(description: str) -> Any:
-    """Returns the field of a key that may be left out and then is None."""
+    """Returns the field of an optional key, whose default is None."""
     return Field(None, description=description)
 
 
@@ -33,14 +33,14 @@ class Unit(_Keyword):
 
 
 class Expects(_Keyword):
-    """Says in words what a value has to be, where its type does not; of items of a list, what the list has to be."""
+    """Describes the expected value in words, where its type does not; for items of a list, the expected list."""
 
     keyword = "expects"
 
 
-@dataclass(frozen=True, eq=False)  # typing wants a hash, which a mapping has not
+@dataclass(frozen=True, eq=False)  # typing requires a hash, which a mapping has not
 class AlsoTakes:
-    """Annotation that states, by its JSON Schema, what a validator accepts beside the type itself."""
+    """Annotation that declares, by its JSON Schema, what a validator accepts beside the type itself."""
 
     schema: Mapping[str, Any]
 
@@ -50,14 +50,16 @@ class AlsoTakes:
 
 @dataclass(eq=False)
 class InnerProblemsError(ValueError):
-    """What a validator raises for a value that has a model of its own; the keys of the problems are inside of it."""
+    """Raised by a validator for a value that has a model of its own; the keys of the problems are relative to the
+    value.
+    """
 
     problems: Sequence[Problem]
 
 
 @dataclass(eq=False)
 class KeyedError(ValueError):
-    """What a validator of a whole model raises, to blame one of its keys, or a key path inside of it."""
+    """Raised by a validator of a whole model to report one of its keys, or a key path inside of it."""
 
     key: str
     message: str

@@ -1,4 +1,4 @@
-"""From pydantic's errors to `Problem`s that name the key, the unit and what to write instead."""
+"""Translation of pydantic's errors to `Problem`s that name the key, the unit and the expected value."""
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
@@ -13,8 +13,8 @@ from .annotations import InnerProblemsError, KeyedError
 from .json_schema import Schema, json_schema, mapping_in, resolved, unit_in
 from .type_names import TYPE_NAMES, number_advice, shown, type_name
 
-MOST_PROBLEMS = 100
-"""So many problems of one file are told; the search for the key that was meant takes its time."""
+MAX_PROBLEMS = 100
+"""Largest number of reported problems per file; the search for similar keys is slow."""
 _LENGTH_ERRORS = ("missing", "too_long", "too_short")
 _RULES = {
     "greater_than": "must be > {gt:g}",
@@ -31,23 +31,23 @@ _RULES = {
         ("dict_type", "model_type", "model_attributes_type", "mapping_type"), f"expected {TYPE_NAMES['object']}"
     ),
 }
-"""What a value has to be by the kind of pydantic's error, whose context has the bounds."""
+"""Description of the expected value by the kind of pydantic's error, whose context has the bounds."""
 
 
 def problems_of(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any], file: str) -> list[Problem]:
-    """Translates what pydantic raised when it validated the data of a file by a model."""
+    """Translates pydantic's errors for the data of a file and a model."""
     problems = []
     all_details = error.errors(include_url=False)
-    for details in all_details[:MOST_PROBLEMS]:
+    for details in all_details[:MAX_PROBLEMS]:
         loc = _real_location(details, data)
         raised = details.get("ctx", {}).get("error")
         if isinstance(raised, InnerProblemsError):
             problems += [Problem(file, _joined(key_path(loc), each.key), each.message) for each in raised.problems]
         else:
             problems.append(Problem(file, *_explain(details, loc, _schema_of(model))))
-    if len(all_details) > MOST_PROBLEMS:
-        problems.append(Problem(file, "", f"and {len(all_details) - MOST_PROBLEMS} more problems"))
-    return list(dict.fromkeys(problems))  # the same but for what pydantic adds to the location
+    if len(all_details) > MAX_PROBLEMS:
+        problems.append(Problem(file, "", f"and {len(all_details) - MAX_PROBLEMS} more problems"))
+    return list(dict.fromkeys(problems))  # the same but for pydantic's additions to the location
 
 
 def key_path(loc: Sequence[str | int]) -> str:
@@ -118,7 +118,7 @@ def _explain(details: ErrorDetails, loc: tuple[str | int, ...], root: Schema) ->
 
 
 def _expected(wanted: Schema | None, depth: int = 0) -> str:
-    """Says what a key wants, or at depth 1 what the items of its list have to be, and so on."""
+    """Describes the value of a key, or at depth 1 the items of its list, and so on."""
     if wanted is None:
         return "another value"
     for _ in range(depth):
@@ -127,6 +127,6 @@ def _expected(wanted: Schema | None, depth: int = 0) -> str:
 
 
 def _siblings(root: Schema, loc: Sequence[str | int]) -> list[str]:
-    """Returns the keys that are allowed where an unknown one was found."""
+    """Returns the keys that are allowed at the place of an unknown one."""
     mapping = mapping_in(_property_at(root, loc[:-1]) or root, root)
     return list(resolved(mapping, root)["properties"]) if mapping else []

@@ -1,14 +1,13 @@
-"""JSON Schemas of configuration models: editors check YAML by them, and error messages and reference pages follow.
+"""JSON Schemas of configuration models; editors check YAML by them, and error messages and reference pages use them.
 
-The dialect is draft-07, the newest that yaml-language-server understands. Beside what draft-07 has, `unit` states
-units, `kind` families of constants, and `expects` says in words what a value has to be. Models inside of models are
-references to `$defs`; a description beside a reference is that of the key. The first alternative of an `anyOf` is the
-usual one, the others are taken too.
+The dialect is draft-07, the newest that yaml-language-server understands. In addition, `unit` states units, `kind`
+families of constants, and `expects` describes the expected value in words. Models inside of models are references to
+`$defs`; a description beside a reference is that of the key. The first alternative of an `anyOf` is the usual one, the
+others are accepted, too.
 """
 
-import argparse
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,9 +25,9 @@ _FOR_ALL_TYPES = {"anyOf", "enum", "const", "$ref"}
 
 
 class EditorSchema(GenerateJsonSchema):
-    """pydantic's generator, in draft-07 and without what editors would show for nothing."""
+    """pydantic's generator, in draft-07 and without entries that are useless in editors."""
 
-    # What no schema can say is left to the model
+    # Constraints that no schema can express are left to the model
     ignored_warning_kinds = {"skipped-choice", "non-serializable-default"}
 
     def field_title_should_be_set(self, schema: Any) -> bool:
@@ -40,7 +39,7 @@ class EditorSchema(GenerateJsonSchema):
         return result
 
     def default_schema(self, schema: core_schema.WithDefaultSchema) -> Schema:
-        """Drops a default that says no more than that the key may be left out; editors would type it in."""
+        """Drops a default that only means that the key is optional; editors would insert it."""
         result = super().default_schema(schema)
         if result.get("default") is None or isinstance(result["default"], dict):
             result.pop("default", None)
@@ -71,7 +70,9 @@ class EditorSchema(GenerateJsonSchema):
 
 
 def json_schema(model: type[BaseModel], title: str) -> Schema:
-    """Returns the schema of a YAML file that is validated with a model; `title` says what it is, such as `"robot"`."""
+    """Returns the schema of a YAML file that is validated with a model; `title` names the kind of file, such as
+    `"robot"`.
+    """
     return json_schemas({title: model})[title]
 
 
@@ -101,7 +102,7 @@ def with_definitions(schema: Schema, definitions: Mapping[str, Schema]) -> Schem
 
 
 def references_in(value: Any) -> Iterator[str]:
-    """Yields the names of the definitions that are referred to anywhere in a schema."""
+    """Yields the names of the referenced definitions anywhere in a schema."""
     if isinstance(value, dict):
         if "$ref" in value:
             yield name_of(value)
@@ -147,9 +148,10 @@ def unit_in(schema: Schema) -> str | None:
 
 
 def explained(value: Any) -> Any:
-    """Returns a schema whose descriptions end with unit and default, since editors show nothing but these.
+    """Returns a schema whose descriptions end with unit and default, since editors show only descriptions.
 
-    The description of a key stands beside the reference among its alternatives too: else that of the mapping is shown.
+    The description of a key stands beside the reference among its alternatives, too; otherwise editors show that of the
+    mapping.
     """
     if isinstance(value, list):
         return [explained(each) for each in value]
@@ -167,7 +169,7 @@ def explained(value: Any) -> Any:
 
 
 def yaml_text(value: Any) -> str:
-    """Returns plain data as one would write it in a line of YAML."""
+    """Returns plain data as it would be written in a line of YAML."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float) and value.is_integer() and abs(value) < 1e6:
@@ -179,19 +181,11 @@ def yaml_text(value: Any) -> str:
     return str(value)
 
 
+def schema_texts(folder: Path, by_name: Mapping[str, Schema]) -> dict[Path, str]:
+    """Returns the text of the file of each schema by its path in a folder."""
+    return {folder / f"{name}.schema.json": schema_text(explained(schema)) for name, schema in by_name.items()}
+
+
 def schema_text(schema: Schema) -> str:
     """Returns a schema as JSON for a file."""
     return json.dumps(schema, ensure_ascii=False, indent=1) + "\n"
-
-
-def write_schemas(schema_files: Callable[[Path], Mapping[Path, str]]) -> None:
-    """Runs a command that writes schemas anew.
-
-    Args:
-        schema_files: Returns the text of each file, given the workspace.
-    """
-    parser = argparse.ArgumentParser(description="Writes schemas anew.")
-    parser.add_argument("root", type=Path, help="the workspace")
-    for path, text in schema_files(parser.parse_args().root).items():
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(text)

@@ -1,4 +1,4 @@
-"""Words for what a value has to be and for what it is."""
+"""Descriptions of expected and of given values in words."""
 
 import math
 import re
@@ -18,7 +18,7 @@ TYPE_NAMES = {
 }
 """Words for the types of JSON."""
 _REPR = reprlib.Repr()
-_REPR.maxlevel = 2  # aliases can make a short YAML text unfold without end
+_REPR.maxlevel = 2  # aliases can make a short YAML text expand without end
 
 
 def shown(value: Any) -> str:
@@ -39,11 +39,11 @@ def shown(value: Any) -> str:
 
 
 def type_name(schema: Schema, detailed: bool = False, plural: bool = False) -> str:
-    """Returns what a value has to be by its JSON Schema, such as `a list of 3 numbers`.
+    """Returns a description of the value that a JSON Schema expects, such as `a list of 3 numbers`.
 
     Args:
-        detailed: Whether bounds are told too, and what is taken beside the usual form.
-        plural: Whether it is said of several, as in `lists of 3 numbers`.
+        detailed: Whether to include bounds, and accepted forms beside the usual one.
+        plural: Whether it describes several, as in `lists of 3 numbers`.
     """
     if "expects" in schema:
         return str(schema["expects"])
@@ -99,7 +99,7 @@ def _bounds(schema: Schema) -> str:
 
 
 def number_advice(kind: str, value: Any) -> str:
-    """Says what to write where YAML took a number for text, as it does with 1e-3."""
+    """Returns advice where YAML read a number as text, as with 1e-3."""
     if kind not in ("float_type", "int_type") or not isinstance(value, str):
         return ""
     match = re.fullmatch(r"\s*([-+]?)(\d+|\d*\.\d*\d|\d+\.)[eE]([-+]?)(\d+)\s*", value)

@@ -1,4 +1,4 @@
-"""A chain of joints and its goal in the Orocos Kinematics and Dynamics Library, which takes a microsecond a call."""
+"""A chain of joints and its goal in the Orocos Kinematics and Dynamics Library."""
 
 import math
 from collections.abc import Sequence
@@ -7,11 +7,9 @@ import numpy as np
 import PyKDL
 
 from ik_ros.problem import IKProblem
-from rpbi.geometry import Pose
-from rpbi.kinematics.limits import Reach
-from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
-
-from .description import ChainDescription
+from robot_model.chain import Chain
+from robot_model.geometry import Pose
+from robot_model.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
 
 class KdlChain:
@@ -20,24 +18,17 @@ class KdlChain:
     Attributes:
         kdl: KDL's chain; its m joints are those that are not fixed.
         is_plain: Whether the m joints are the n variables, since none mimics another.
-        reach: How far they bring the tip.
     """
 
-    def __init__(self, description: ChainDescription) -> None:
-        self._drives = description.drives
+    def __init__(self, description: Chain) -> None:
+        self._to_moving = description.to_moving
         self.is_plain = not description.mimics
         self.kdl = _kdl_chain(description)
-        self._positions = PyKDL.JntArray(len(self._drives))
+        self._positions = PyKDL.JntArray(len(description.moving))
         self._frame = PyKDL.Frame()
-        self._jacobian = PyKDL.Jacobian(len(self._drives))
+        self._jacobian = PyKDL.Jacobian(len(description.moving))
         self._to_frame = PyKDL.ChainFkSolverPos_recursive(self.kdl)
         self._to_jacobian = PyKDL.ChainJntToJacSolver(self.kdl)
-        self._variables = np.zeros((len(self._drives), len(description.joint_names)))
-        for joint, drive in enumerate(self._drives):
-            self._variables[joint, drive.variable] = drive.multiplier
-        x, y, z = self.kdl.getSegment(0).getJoint().JointOrigin()
-        carried = description.joints[description.joints.index(description.moving[0]) + 1 :]
-        self.reach = Reach.of((x, y, z), [math.hypot(*joint.xyz) for joint in carried], description.moving)
 
     def frame(self, q: Sequence[float]) -> PyKDL.Frame:
         """Returns the pose of the tip in the base at n positions [rad or m], valid until the next call."""
@@ -55,18 +46,13 @@ class KdlChain:
         """Returns how the tip moves with the joints, in the base: 6 x n, 3 rows [m], 3 rows of a rotation [rad]."""
         self._set(q)
         self._to_jacobian.JntToJac(self._positions, self._jacobian)
-        joints = range(len(self._drives))
+        joints = range(self._jacobian.columns())
         jacobian = np.array([[self._jacobian[row, joint] for joint in joints] for row in range(6)])
-        return jacobian if self.is_plain else jacobian @ self._variables
+        return jacobian if self.is_plain else jacobian @ self._to_moving.factors
 
     def _set(self, q: Sequence[float]) -> None:
-        positions = self._positions
-        if self.is_plain:
-            for i, position in enumerate(q):
-                positions[i] = position
-        else:
-            for i, (variable, multiplier, offset) in enumerate(self._drives):
-                positions[i] = multiplier * q[variable] + offset
+        for i, position in enumerate(q if self.is_plain else self._to_moving(np.array(q)).tolist()):
+            self._positions[i] = position
 
 
 class Goal:
@@ -75,9 +61,9 @@ class Goal:
     Attributes:
         frame: The target in the base.
         inverse: The base in the target.
-        tolerance: How far off the link may be: 3 ways along the axes of the target [m], and 3 components of the
-            rotation vector from the target to the link, in the target [rad]; inf where any will do.
-        is_point: Whether the box is no larger than what counts as reached anyway.
+        tolerance: Largest errors of the link: 3 distances along the axes of the target [m], and 3 components of the
+            rotation vector from the target to the link, in the target [rad]; inf where free.
+        is_point: Whether the box is no larger than the tolerance of success.
 
     Raises:
         ValueError: If the problem has no target.
@@ -117,7 +103,7 @@ class Goal:
         return Residual(math.hypot(x, y, z), math.hypot(rx, ry, rz))
 
 
-def _kdl_chain(description: ChainDescription) -> PyKDL.Chain:
+def _kdl_chain(description: Chain) -> PyKDL.Chain:
     chain = PyKDL.Chain()
     fixed = PyKDL.Frame()  # of the joint's parent link in the link that the last moving joint moves
     for joint in description.joints:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rpbi.kinematics.limits import Limits
+from robot_model.limits import Limits
 
 from .kdl import Goal, KdlChain
 

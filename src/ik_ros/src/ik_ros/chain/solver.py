@@ -1,4 +1,4 @@
-"""What solvers of one link's pose have in common."""
+"""The common part of solvers of one link's pose."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.schema import ConfigModel, KeyedError, Text
 from ik_ros.problem import IKProblem, IKSolution
 from ik_ros.solver import Solver, StartLimits
-from rpbi.config.asset_files import ExistingFile
-from rpbi.kinematics.limits import Limits
-from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
+from robot_model.asset_files import ExistingFile
+from robot_model.chain import Chain
+from robot_model.limits import Limits
+from robot_model.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
-from .description import ChainDescription
 from .kdl import Goal, KdlChain
 
 
@@ -37,9 +37,9 @@ class ChainConfig(ConfigModel):
     tip_link: Text
 
     @cached_property
-    def chain(self) -> ChainDescription:
-        """What lies between the links."""
-        return ChainDescription(self.urdf_filename, self.base_link, self.tip_link)
+    def chain(self) -> Chain:
+        """The chain between the links."""
+        return Chain(self.urdf_filename, self.base_link, self.tip_link)
 
     @model_validator(mode="after")
     def _chain_can_be_solved_for(self) -> ChainConfig:
@@ -125,7 +125,7 @@ class ChainSolver(Solver):
         """Returns whether the target is farther away than the chain is long."""
         if problem.target is None:
             return False
-        return not self.chain.reach.covers(problem.target.position, math.hypot(*problem.position_tolerance))
+        return not self.description.reach.covers(problem.target.position, math.hypot(*problem.position_tolerance))
 
     def _start(self, given: Mapping[str, float]) -> list[float]:
         """Returns n positions within limits [rad or m]."""

@@ -1,1 +1,1 @@
-"""What a formulation of the solver `tasks` stands on."""
+"""Parts of the solver `tasks`: robot, tasks, Gauss-Newton steps."""

@@ -9,11 +9,11 @@ import pinocchio as pin
 
 from custom_ros_tools.schema import KeyedError, ListOf, Text
 from ik_ros.problem import IKProblem
-from rpbi.geometry import Pose, normalized
-from rpbi.kinematics.residual import Residual
+from robot_model.geometry import Pose, normalized
+from robot_model.residual import Residual
 
-from .robot import Robot, to_se3
-from .task import Linearization, Task, TaskConfig, blaming
+from .robot import PinocchioRobot, to_se3
+from .task import Linearization, Task, TaskConfig, keyed_errors
 
 Axis = Literal["x", "y", "z", "rx", "ry", "rz"]
 AXES: tuple[Axis, ...] = ("x", "y", "z", "rx", "ry", "rz")
@@ -47,16 +47,16 @@ class FrameTask(Task):
     """Axes that may be chosen."""
     goal_words: ClassVar[str] = "a pose (x, y, z, qx, qy, qz, qw)"
 
-    def __init__(self, config: FrameTaskConfig, robot: Robot) -> None:
+    def __init__(self, config: FrameTaskConfig, robot: PinocchioRobot) -> None:
         super().__init__(config, robot)
-        with blaming("frame"):
+        with keyed_errors("frame"):
             self.link_id = robot.link_id(config.frame)
         axes = config.axes if "axes" in config.model_fields_set else self.available
         if not set(axes) <= set(self.available):
             raise KeyedError("axes", f"expected some of {', '.join(self.available)}, got {', '.join(axes)}")
         self.is_complete = len(set(axes)) == len(AXES)
         self._counts = np.array([axis in axes for axis in AXES])
-        with blaming("goal"):
+        with keyed_errors("goal"):
             self._default = None if config.goal is None else self.pose_of(config.goal)
         self._set_goal(self._default or Pose())
 

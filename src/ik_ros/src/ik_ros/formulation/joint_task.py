@@ -7,10 +7,10 @@ import numpy as np
 
 from custom_ros_tools.schema import KeyedError
 from ik_ros.problem import IKProblem
-from rpbi.kinematics.residual import Residual
+from robot_model.residual import Residual
 
-from .robot import Robot
-from .task import Linearization, Task, TaskConfig, blaming
+from .robot import PinocchioRobot
+from .task import Linearization, Task, TaskConfig, keyed_errors
 
 
 class JointTask(Task):
@@ -25,9 +25,9 @@ class JointTask(Task):
         bounds: k lower and k upper bounds [rad or m]; infinite at first.
     """
 
-    def __init__(self, config: TaskConfig, robot: Robot, joints: Sequence[str], key: str) -> None:
+    def __init__(self, config: TaskConfig, robot: PinocchioRobot, joints: Sequence[str], key: str) -> None:
         super().__init__(config, robot)
-        with blaming(key):
+        with keyed_errors(key):
             self.indices = [robot.index(name) for name in joints]
         self._jacobian = robot.joint_rows(self.indices)
         self.keep_near(None, 0.0)

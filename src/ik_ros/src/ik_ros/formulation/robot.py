@@ -8,12 +8,11 @@ import pinocchio as pin
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from ik_ros.shape import ShapeConfig
-from rpbi.geometry import Pose
-from rpbi.kinematics.limits import Limits
-from rpbi.urdf.copies import with_limited_joints
-from rpbi.urdf.document import UrdfDocument
-from rpbi.urdf.elements import MOVING
-from rpbi.urdf.structure import check_structure
+from robot_model.geometry import Pose
+from robot_model.limits import Limits
+from robot_model.model import read_robot
+from robot_model.urdf.copies import with_limited_joints
+from robot_model.urdf.elements import MOVING
 
 from .clearance import RobotShape
 
@@ -29,13 +28,11 @@ def from_base(q: np.ndarray) -> Pose:
     return Pose((x, y, z), (qx, qy, qz, qw))
 
 
-MOST_JOINTS = 500
-"""Joints that move; the memory that Pinocchio takes grows with their square."""
 FREE = 6
 """Ways in which a floating base moves."""
 
 
-class Robot:
+class PinocchioRobot:
     """Joints, limits and kinematics of one robot, a tree of links whose root may float.
 
     A configuration q has one number for each joint, and before them 7 of the root if that floats: x, y, z [m] and a
@@ -68,15 +65,10 @@ class Robot:
     def __init__(
         self, urdf_path: str, floating: bool = False, joints: Sequence[str] = (), base: str | None = None
     ) -> None:
-        document = UrdfDocument(urdf_path)
-        check_structure(document)
+        document = read_robot(urdf_path)
         types = document.joint_types
-        moving = {name: kind for name, kind in types.items() if kind != "fixed"}
-        if len(moving) > MOST_JOINTS:
-            message = f"expected at most {MOST_JOINTS} joints that are not fixed, got {len(moving)}"
-            raise ConfigError([Problem(urdf_path, "", message)])
-        for name, kind in moving.items():
-            if kind not in MOVING:
+        for name, kind in types.items():
+            if kind not in (*MOVING, "fixed"):
                 raise ConfigError([Problem(urdf_path, name, f"expected a joint of one axis, got a {kind} one")])
         if base is not None:
             _known("link", base, document.links)
@@ -98,14 +90,11 @@ class Robot:
         in_v = [self.model.joints[i].idx_v for i in ids]
         self.free = np.array([*range(FREE if floating else 0), *in_v], dtype=int)
         self._all_free = self.free.tolist() == list(range(self.model.nv))
-        lower, upper = self.model.lowerPositionLimit[self._in_q], self.model.upperPositionLimit[self._in_q]
-        is_bounded = np.array([types[name] != "continuous" for name in self.joint_names], dtype=bool)
-        limited = (lower < upper) & is_bounded  # as in PyBullet
-        self.lower, self.upper = np.where(limited, lower, -np.inf), np.where(limited, upper, np.inf)
-        self.is_revolute = [types[name] != "prismatic" for name in self.joint_names]
-        self.limits = Limits(self.lower.tolist(), self.upper.tolist(), self.is_revolute)
-        speed = self.model.velocityLimit[in_v]
-        self.max_velocity = np.where(speed > 0.0, speed, np.inf)
+        joints_of_n = [document.joints[name] for name in self.joint_names]
+        self.limits = Limits.of_joints(joints_of_n)
+        self.lower, self.upper = np.array(self.limits.lower), np.array(self.limits.upper)
+        self.is_revolute = list(self.limits.is_revolute)
+        self.max_velocity = np.array([joint.max_velocity for joint in joints_of_n])
         self._shapes: dict[str, RobotShape] = {}
 
     def joint_id(self, name: str) -> int:

@@ -1,4 +1,4 @@
-"""What every task of a formulation is."""
+"""The interface of tasks."""
 
 import math
 from abc import ABC, abstractmethod
@@ -11,9 +11,9 @@ import numpy as np
 from custom_ros_tools.errors import UnknownNameError
 from custom_ros_tools.schema import ConfigModel, KeyedError, Positive, Switch, Text
 from ik_ros.problem import IKProblem
-from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
+from robot_model.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
-from .robot import Robot
+from .robot import PinocchioRobot
 
 
 class TaskConfig(ConfigModel):
@@ -37,8 +37,8 @@ class TaskConfig(ConfigModel):
 
 
 @contextmanager
-def blaming(key: str) -> Iterator[None]:
-    """Raises what is said of unknown names and wrong values as a `KeyedError` of an option, or of keys inside of it."""
+def keyed_errors(key: str) -> Iterator[None]:
+    """Turns errors of unknown names and wrong values into a `KeyedError` of an option, or of keys inside of it."""
     try:
         yield
     except KeyedError as error:
@@ -90,7 +90,7 @@ class Task(ABC):
 
     Config: ClassVar[type[TaskConfig]] = TaskConfig
 
-    def __init__(self, config: TaskConfig, robot: Robot) -> None:
+    def __init__(self, config: TaskConfig, robot: PinocchioRobot) -> None:
         self.config = config
         self.robot = robot
 

@@ -12,7 +12,7 @@ from ik_ros.msg import IKProblem as IKProblemMessage
 from ik_ros.msg import TaskGoal, TracIKProblem
 from ik_ros.msg import Waypoint as WaypointMessage
 from ik_ros.problem import IKProblem, JointPositions, SampledTrajectory, Waypoint
-from rpbi.geometry import Pose, Vector
+from robot_model.geometry import Pose, Vector
 
 
 def problem_in(message: IKProblemMessage) -> IKProblem:

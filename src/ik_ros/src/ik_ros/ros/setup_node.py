@@ -21,9 +21,9 @@ from custom_ros_tools.toggle import Toggle
 from ik_ros.msg import IKProblem as IKProblemMessage
 from ik_ros.node_configs import RobotIKConfig, SetupParameters, TargetParameters
 from ik_ros.problem import IKProblem, JointPositions
+from robot_model.geometry import Pose
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
 from ros_pybullet_interface.srv import RobotInfo
-from rpbi.geometry import Pose
 
 from .messages import positions_in, problem_message
 from .solver_name import run_for_solver, topics_of, trust_only_what_was_named
@@ -33,7 +33,7 @@ QUEUE_SIZE = 10
 START_TOPICS = ("qinit", "start_state", "currentPosition")
 """Names that the release's solvers have for the same."""
 START_PATIENCE_S = 2.0
-"""After so long without a start, it is said that problems wait for one [s]."""
+"""Time without a start after which the node reports that problems wait for one [s]."""
 PREVIOUS_TOPICS = ("previous_solutions", "previous_solution")
 TOLERANCES = ("bx", "by", "bz", "brx", "bry", "brz")
 NOT_IN_MESSAGES = {"robot_name", "parent_frame_id", "child_frame_id"}
@@ -50,8 +50,8 @@ def publish_problems(
         message_type: Type of the problems.
         hz: The rate, in wall time [Hz].
         start_on_init: Whether it is on from the start.
-        problem: Returns the next one; if there is none, nothing, or it raises an `InterfaceError` or `ValueError` that
-            says why.
+        problem: Returns the next one; without one it returns None, or raises an `InterfaceError` or `ValueError` with
+            the reason.
     """
     is_on, warn = threading.Event(), ThrottledWarning()
     publisher = rospy.Publisher("ik", message_type, queue_size=QUEUE_SIZE, tcp_nodelay=True)
@@ -105,39 +105,39 @@ class SetupNode:
 
     def _subscribe(self) -> None:
         for topic in START_TOPICS:
-            self._listen(topic, JointState, partial(self._take_start, topic))
+            self._listen(topic, JointState, partial(self._on_start, topic))
         for topic in PREVIOUS_TOPICS:
-            self._listen(topic, JointState, partial(self._take_previous, topic))
+            self._listen(topic, JointState, partial(self._on_previous, topic))
         for key in TOLERANCES:
-            self._listen(key, Float64, partial(self._take_tolerance, key))
+            self._listen(key, Float64, partial(self._on_tolerance, key))
         for task in self._goals:
             topic = f"task_map_goal/{task}"
-            self._listen(topic, Float64MultiArray, partial(self._take_goal, task))
+            self._listen(topic, Float64MultiArray, partial(self._on_goal, task))
 
-    def _listen(self, topic: str, message_type: type, take: Callable[[rospy.Message], None]) -> None:
+    def _listen(self, topic: str, message_type: type, on_message: Callable[[rospy.Message], None]) -> None:
         full_name = f"{self._topics}/{topic}"
 
         def checked(message: rospy.Message) -> None:
             try:
                 with self._lock:
-                    take(message)
+                    on_message(message)
             except ValueError as error:
                 self._warn(rospy.resolve_name(full_name), f"message refused: {error}")
 
         rospy.Subscriber(full_name, message_type, checked, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
-    def _take_start(self, topic: str, message: JointState) -> None:
+    def _on_start(self, topic: str, message: JointState) -> None:
         self._start = positions_in(topic, message)
 
-    def _take_previous(self, topic: str, message: JointState) -> None:
+    def _on_previous(self, topic: str, message: JointState) -> None:
         self._previous.append(positions_in(topic, message))
 
-    def _take_tolerance(self, key: str, message: Float64) -> None:
+    def _on_tolerance(self, key: str, message: Float64) -> None:
         changed = {**self._tolerances, key: message.data}
         IKProblem(**_fields(changed))  # which checks them
         self._tolerances = changed
 
-    def _take_goal(self, task: str, message: Float64MultiArray) -> None:
+    def _on_goal(self, task: str, message: Float64MultiArray) -> None:
         expected = len(self._config.goals[task])
         if len(message.data) != expected:
             raise ValueError(f"expected {expected} values, as the first goal has, got {len(message.data)}")
@@ -192,10 +192,10 @@ class RobotIKSetup:
         self._joints = _joints_of(config.robot_name)
         topics = topics_of("setup", "pybullet")
         self._topic = f"{topics}/currentPosition"
-        rospy.Subscriber(self._topic, JointState, self._take_current, queue_size=1)
+        rospy.Subscriber(self._topic, JointState, self._on_current, queue_size=1)
         publish_problems(topics, CalculateInverseKinematicsProblem, timing.hz, start_on_init, self._problem)
 
-    def _take_current(self, message: JointState) -> None:
+    def _on_current(self, message: JointState) -> None:
         try:
             values = JointValues.of(message.name, message.position).in_order(self._joints)
         except (InterfaceError, ValueError) as error:

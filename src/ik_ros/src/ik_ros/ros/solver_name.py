@@ -1,4 +1,4 @@
-"""What the name of a solver is in ROS: the argument of its nodes, and part of their names and topics."""
+"""The name of a solver in ROS: the argument of its nodes, and part of their names and topics."""
 
 import sys
 from collections.abc import Callable

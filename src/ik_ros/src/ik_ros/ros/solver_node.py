@@ -14,13 +14,13 @@ from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.ros.services import ToggleService
 from custom_ros_tools.toggle import Toggle
-from ik_ros.lookup import make_solver
 from ik_ros.msg import IKProblem as IKProblemMessage
 from ik_ros.msg import IKSolution as IKSolutionMessage
 from ik_ros.msg import TracIKProblem
 from ik_ros.node_configs import SolverNodeParameters
 from ik_ros.problem import IKProblem, IKSolution
 from ik_ros.problem_stream import JointRateLimiter, ProblemStream
+from ik_ros.solvers import SOLVERS
 from ik_ros.srv import (
     JointNames,
     JointNamesResponse,
@@ -41,7 +41,7 @@ PROBLEMS: dict[str, tuple[type[genpy.Message], Callable[[genpy.Message], IKProbl
     IKProblemMessage._type: (IKProblemMessage, problem_in),
     TracIKProblem._type: (TracIKProblem, problem_in_trac_ik),
 }
-"""What the topic `ik` may carry, and how it is read."""
+"""Message types of the topic `ik`, and their readers."""
 
 
 class SolverNode:
@@ -57,7 +57,7 @@ class SolverNode:
 
     def __init__(self, name: str) -> None:
         own, options = _parameters()
-        self._name, self._solver = name, make_solver(name, options, rospy.get_name())
+        self._name, self._solver = name, SOLVERS.make(name, options, rospy.get_name())
         trust_only_what_was_named()
         self._continuity = own.continuity
         self._new_stream()
@@ -66,6 +66,7 @@ class SolverNode:
         self._solving = threading.Lock()
         self._publishing = threading.Lock()
         self._stream: ProblemStream | None = None
+        self._is_received = False
         self._topic = rospy.resolve_name("ik")
         self._target = rospy.Publisher("joint_states/target", JointState, queue_size=QUEUE_SIZE, tcp_nodelay=True)
         self._solution = rospy.Publisher("ik/solution", IKSolutionMessage, queue_size=QUEUE_SIZE, tcp_nodelay=True)
@@ -94,7 +95,7 @@ class SolverNode:
         self._stream = self._new_stream()
         # The newest problem is the one that counts
         self._subscriber = rospy.Subscriber(
-            "ik", rospy.AnyMsg, self._take, callback_args=self._stream, queue_size=1, tcp_nodelay=True
+            "ik", rospy.AnyMsg, self._on_message, callback_args=self._stream, queue_size=1, tcp_nodelay=True
         )
 
     def _listen_no_more(self) -> None:
@@ -102,7 +103,7 @@ class SolverNode:
             self._stream = None
         self._subscriber.unregister()
 
-    def _take(self, raw: rospy.AnyMsg, stream: ProblemStream) -> None:
+    def _on_message(self, raw: rospy.AnyMsg, stream: ProblemStream) -> None:
         type_name = raw._connection_header["type"]
         if type_name not in PROBLEMS:
             self._warn(self._topic, f"expected {' or '.join(PROBLEMS)}, got {type_name}; refused")
@@ -112,6 +113,10 @@ class SolverNode:
         header, target = message.header, None
         try:
             with self._solving:
+                if self._continuity is not None:
+                    if not self._is_received:
+                        stream.restart()  # the robot is where it was: the first target that is received starts there
+                    self._is_received = any(each.get_num_connections() for each in (self._target, self._solution))
                 problem = self._base.with_poses_in_it(read(message), header.frame_id)
                 solution = stream.solve(problem, header.stamp.to_sec())
                 target = stream.target

@@ -1,4 +1,4 @@
-"""TF that is known to be up to date, and the frame that a solver takes poses in."""
+"""TF with a limited age, and the frame of a solver's poses."""
 
 import dataclasses
 import time
@@ -9,7 +9,7 @@ import tf2_ros
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.tf_listener import TfListener
 from ik_ros.problem import IKProblem, Waypoint
-from rpbi.geometry import Pose
+from robot_model.geometry import Pose
 
 from .messages import transform_in
 
@@ -68,7 +68,7 @@ class BaseFrame:
         """Returns a problem with its poses, which are in a TF frame, in the base; an empty `frame_id` is the base.
 
         Raises:
-            InterfaceError: If TF does not know how the two frames lie.
+            InterfaceError: If TF has no transform between the two frames.
         """
         frame_id = frame_id.strip("/")
         if not self._frame_id or frame_id in ("", self._frame_id):

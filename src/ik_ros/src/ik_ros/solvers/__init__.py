@@ -1,14 +1,18 @@
-"""The solvers; a new one is a class in a file of its own and a line here.
+"""The solvers; a new one is a class in a file of its own and a line here."""
 
-A user's own one needs no line: `"their_package.module:Class"` serves wherever a name does.
-"""
+from custom_ros_tools.plugins.table import PluginTable
+from ik_ros.solver import Solver
 
-SOLVERS: dict[str, str] = {
-    "kdl": "ik_ros.solvers.kdl:KdlSolver",
-    "pybullet": "ik_ros.solvers.pybullet_solver:PybulletSolver",
-    "trac_ik": "ik_ros.solvers.trac_ik:TracIkSolver",
-    "global": "ik_ros.solvers.global_search:GlobalSolver",
-    "tasks": "ik_ros.solvers.tasks:TasksSolver",
-    "trajectory": "ik_ros.solvers.trajectory:TrajectorySolver",
-}
-"""Class of each solver; imported when it is asked for, so that libraries that others lack do not matter."""
+SOLVERS: PluginTable[Solver] = PluginTable(
+    "solver",
+    "ik_ros.solver:Solver",
+    {
+        "kdl": "ik_ros.solvers.kdl:KdlSolver",
+        "pybullet": "ik_ros.solvers.pybullet_solver:PybulletSolver",
+        "trac_ik": "ik_ros.solvers.trac_ik:TracIkSolver",
+        "global": "ik_ros.solvers.global_search:GlobalSolver",
+        "tasks": "ik_ros.solvers.tasks:TasksSolver",
+        "trajectory": "ik_ros.solvers.trajectory:TrajectorySolver",
+    },
+)
+"""All solvers; each is imported when it is looked up, so a missing library matters to its own solver only."""

@@ -18,14 +18,14 @@ class GlobalConfig(KdlConfig):
     """Options of `global`.
 
     Attributes:
-        restarts: How many random starts follow the one that was given, also when a solution is found; fewer where they
-            are slow or of no use: 15 with tolerances or joints that mimic others, 3 beyond reach, and no more after
-            10 starts that do not even lead to the target outside limits.
-        rank_by: What makes a solution better: `distance_to_start`, the length of the way of all joints together
-            [rad or m, root of the sum of squares]; or `middle_of_limits`, how far the joint that is nearest to a
-            limit is from the middle, as a part of half its range.
+        restarts: Number of random starts after the given one, also when a solution is found; fewer where they are slow
+            or useless: 15 with tolerances or joints that mimic others, 3 beyond reach, and no more after 10 starts that
+            do not even lead to the target outside limits.
+        rank_by: Order of solutions: `distance_to_start`, the length of the way of all joints together [rad or m, root
+            of the sum of squares]; or `middle_of_limits`, how far the joint that is nearest to a limit is from the
+            middle, as a part of half its range.
         distinct: Two solutions are distinct if a joint differs by more than this [rad or m].
-        most: How many solutions to return at most, the best one included.
+        most: Largest number of solutions to return, the best one included.
     """
 
     restarts: Count = 100
@@ -37,7 +37,7 @@ class GlobalConfig(KdlConfig):
 class GlobalSolver(KdlSolver):
     """Random starts of `kdl`, and the distinct solutions that they lead to.
 
-    Where joints are to spare, solutions are not separate: then it takes samples that are `distinct`.
+    For redundant robots, solutions are not separate: it then returns samples that are `distinct`.
     """
 
     Config = GlobalConfig

@@ -18,28 +18,28 @@ ITERATIONS = 60
 THRESHOLD = 1e-5
 """Residual at which KDL stops [m]; it counts a radian as 0.01 m."""
 RESTARTS_BEYOND_REACH = 3
-"""How often to start again if the chain is not long enough: only the best of what there is can be found."""
+"""Number of further starts if the target is beyond reach, where only the nearest position can be found."""
 GIVE_UP_AFTER = 10
-"""If so many starts do not even lead to the target outside limits, none will: of 100 starts for a target within reach,
-85 do for an arm of 6 joints, and 96 and more for one of 7."""
-MOST_DESCENTS = 15
+"""Number of starts that may miss the target even without limits; then the search ends. Of 100 starts for a target
+within reach, 85 reach it with an arm of 6 joints, and 96 and more with one of 7."""
+MAX_DESCENTS = 15
 """Most random starts of the own descent, which takes ten times longer and ends within limits half of the time."""
 NEAR_M, NEAR_RAD = 0.3, 0.8
-"""So near its target, the tip should not get there by way of another posture."""
+"""Distance from its target below which the tip keeps its posture [m]."""
 
 
 class KdlConfig(ChainConfig):
     """Options of `kdl`.
 
     Attributes:
-        restarts: How many random starts follow the one that was given.
+        restarts: Number of random starts after the given one.
     """
 
     restarts: Count = 50
 
 
 class KdlSolver(ChainSolver):
-    """KDL's Levenberg-Marquardt, which knows neither limits nor tolerances, and around it what does.
+    """KDL's Levenberg-Marquardt, extended by limits and tolerances.
 
     It goes from the start to the nearest solution. Where that is outside limits, random starts follow, after an own
     descent within limits if the start is near the target. That descent does all where there are tolerances, or joints
@@ -70,7 +70,7 @@ class KdlSolver(ChainSolver):
     def candidates(self, problem: IKProblem, goal: Goal, start: list[float], restarts: int) -> Iterator[list[float]]:
         """Yields where each start leads, within limits: first the one that is given, then random ones [rad or m]."""
         if not (goal.is_point and self.chain.is_plain):
-            for first in self._starts(problem, start, min(restarts, MOST_DESCENTS)):
+            for first in self._starts(problem, start, min(restarts, MAX_DESCENTS)):
                 yield levenberg_marquardt(self.chain, goal, self.limits, first)
             return
         way = self.residual(goal, start)

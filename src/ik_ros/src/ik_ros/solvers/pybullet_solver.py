@@ -11,9 +11,9 @@ from custom_ros_tools.schema import Count, KeyedError, ListOf, NonNegative
 from ik_ros.chain.kdl import Goal
 from ik_ros.chain.solver import ChainConfig, ChainSolver, refuse_boxes, refuse_mimics
 from ik_ros.problem import IKProblem
+from robot_model.urdf.files import write_description
 from rpbi.kinematics import Kinematics
 from rpbi.kinematics.problem import PybulletProblem
-from rpbi.urdf.files import write_description
 
 
 class PybulletConfig(ChainConfig):
@@ -42,7 +42,7 @@ class PybulletConfig(ChainConfig):
 
     @property
     def options(self) -> dict[str, Any]:
-        """What is handed to PyBullet with each problem."""
+        """Options passed to PyBullet with each problem."""
         return self.model_dump(exclude=set(ChainConfig.model_fields))
 
 

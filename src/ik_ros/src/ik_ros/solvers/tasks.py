@@ -10,7 +10,7 @@ from custom_ros_tools.errors import MissingDependency, UnknownNameError
 from custom_ros_tools.schema import KeyedError
 from ik_ros.problem import IKProblem, IKSolution
 from ik_ros.solver import Solver, StartLimits
-from rpbi.kinematics.residual import Residual
+from robot_model.residual import Residual
 
 try:
     import daqp  # noqa: F401
@@ -18,20 +18,20 @@ try:
 except ImportError as error:
     raise MissingDependency(error.name or "pinocchio", "./rpbi setup ik") from None
 
-from ik_ros.formulation.formulation import Formulation, TaskSet
 from ik_ros.formulation.frame_task import FrameTask
-from ik_ros.formulation.gauss_newton import Candidate, GaussNewton, Iterate
 from ik_ros.formulation.robot import from_base, to_se3
+from ik_ros.task_solver.formulation import Formulation, TaskSet
+from ik_ros.task_solver.gauss_newton import Candidate, GaussNewton, Iterate
 
 AIM = 0.1
-"""What is required is aimed at with a tenth of the tolerance, so that solutions lie well within."""
+"""Share of the tolerances at which requirements are aimed, so that solutions lie well within."""
 PATIENCE, PATIENCE_OF_MANY = 5, 25
 """Over so many iterations what is required has to get nearer by half, or the search starts elsewhere: for one task, and
 for several, which have to make way for each other."""
 SETTLED = 1e-2
 """Costs are as low as they get here when in `PATIENCE` iterations they lose no more than this part."""
 STANDSTILL = 1e-6
-"""After a step this small, the search is at its end [rad or m]."""
+"""Step at which the search ends [rad or m]."""
 NEAR_RANGE = 0.5
 """Standard deviation of random starts of a robot with a floating base, every other time [rad or m]."""
 

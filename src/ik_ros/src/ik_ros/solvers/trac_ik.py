@@ -1,4 +1,4 @@
-"""TRAC-IK: two solvers race, one that knows limits from the start and one that gets unstuck (Beeson and Ames, 2015)."""
+"""TRAC-IK: a race of two solvers, one with limits from the start, one with restarts (Beeson and Ames, 2015)."""
 
 import math
 import random
@@ -29,11 +29,11 @@ class TracIkConfig(ChainConfig):
     """Options of `trac_ik`.
 
     Attributes:
-        timeout: How long to look for a solution from one start; other solve types than `Speed` always take it all.
-        epsilon: How exactly the target is to be met [m, rad].
-        solve_type: `Speed` takes the first solution, `Distance` the one nearest to the start, `Manip1` and `Manip2`
+        timeout: Longest search from one start [s]; other solve types than `Speed` always use all of it.
+        epsilon: Largest error of a solution [m, rad].
+        solve_type: `Speed` returns the first solution, `Distance` the one nearest to the start, `Manip1` and `Manip2`
             the one with the largest product and the best ratio of the Jacobian's singular values.
-        restarts: How many random starts follow the one that was given; each has the whole timeout.
+        restarts: Number of random starts after the given one; each has the whole timeout.
     """
 
     timeout: Annotated[float, Field(gt=0, le=60), Unit("s")] = 0.005

@@ -20,7 +20,7 @@ from ik_ros.chain.kdl import Goal
 from ik_ros.chain.solver import refuse_mimics
 from ik_ros.problem import IKProblem, IKSolution, SampledTrajectory, Waypoint
 from ik_ros.shape import ShapeConfig
-from rpbi.kinematics.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
+from robot_model.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, Residual
 
 from .kdl import KdlConfig, KdlSolver
 
@@ -33,15 +33,15 @@ from ik_ros.trajectory.program import Program
 from ik_ros.trajectory.spline import Spline
 from ik_ros.trajectory.symbolic import link_frames, sphere_distances
 
-MOST_INTERVALS = 128
+MAX_INTERVALS = 128
 """Waypoints that follow each other faster than two intervals of the finest spline can hardly all be passed."""
-MOST_WAYPOINTS = MOST_INTERVALS // 2
-"""So there cannot be more, whatever their times."""
-MOST_SAMPLES = 100_000
+MAX_WAYPOINTS = MAX_INTERVALS // 2
+"""Largest number of waypoints; more are refused, whatever their times."""
+MAX_SAMPLES = 100_000
 KEPT_PROGRAMS = 4
-"""For so many numbers of waypoints programs stay compiled, those that were used last."""
+"""Number of programs that stay compiled, one for each number of waypoints; the least recently used one goes."""
 CHECKS = 10
-"""At so many places in each interval the result is checked."""
+"""Number of places in each interval at which the result is checked."""
 AIM = 0.01
 """Waypoints are aimed at with this part of the tolerance, which the smoothest motion uses up; less costs no time."""
 SPARE = 1e-6
@@ -53,17 +53,17 @@ class TrajectoryConfig(KdlConfig):
 
     Attributes:
         duration_s: Time to the target, for problems with a target and no waypoints [s].
-        intervals: How many polynomials each joint's spline has at least.
+        intervals: Smallest number of polynomials of each joint's spline.
         sample_s: Time between the positions of the answer [s].
         velocity_limits: Largest speed of joints [rad/s or m/s]; joints that are left out have that of the URDF.
         acceleration_limits: Largest acceleration of joints [rad/s^2 or m/s^2].
         shapes: Spheres on links, and obstacles in the base.
-        clearance: How far all spheres stay away from all obstacles [m].
-        attempts: How often to look for another way, by other positions at the waypoints.
+        clearance: Smallest distance of all spheres from all obstacles [m].
+        attempts: Number of further tries, by other positions at the waypoints.
     """
 
     duration_s: Seconds = 2.0
-    intervals: Annotated[int, Field(ge=4, le=MOST_INTERVALS)] = 16
+    intervals: Annotated[int, Field(ge=4, le=MAX_INTERVALS)] = 16
     sample_s: Seconds = 0.02
     velocity_limits: dict[str, Positive] = Field(default_factory=dict)
     acceleration_limits: dict[str, Positive] = Field(default_factory=dict)
@@ -91,7 +91,7 @@ class TrajectoryConfig(KdlConfig):
 class TrajectorySolver(KdlSolver):
     """Finds the smoothest motion from rest to rest that passes waypoints in time.
 
-    KDL says which positions lead to the waypoints; from there on a nonlinear program shapes a spline for each joint.
+    KDL finds positions for the waypoints; a nonlinear program then shapes a spline for each joint.
     """
 
     Config = TrajectoryConfig
@@ -140,14 +140,14 @@ class TrajectorySolver(KdlSolver):
             if problem.target is None:
                 raise ValueError("waypoints: missing, and there is no target in their place")
             waypoints = (Waypoint(self._config.duration_s, problem.target),)
-        if len(waypoints) > MOST_WAYPOINTS:
-            raise ValueError(f"waypoints: expected {MOST_WAYPOINTS} at most, got {len(waypoints)}")
+        if len(waypoints) > MAX_WAYPOINTS:
+            raise ValueError(f"waypoints: expected {MAX_WAYPOINTS} at most, got {len(waypoints)}")
         last_s = 0.0
         for i, waypoint in enumerate(waypoints):
             if not waypoint.time_s > last_s:
                 raise ValueError(f"waypoints[{i}].time_s: must be after {last_s:g} s, got {waypoint.time_s:g}")
             last_s = waypoint.time_s
-        if last_s / self._config.sample_s > MOST_SAMPLES:
+        if last_s / self._config.sample_s > MAX_SAMPLES:
             raise ValueError(f"waypoints: {last_s:g} s in steps of {self._config.sample_s:g} s (sample_s) are too many")
         return waypoints
 
@@ -224,7 +224,7 @@ class TrajectorySolver(KdlSolver):
         """Returns the program of splines that are fine enough for the waypoints."""
         gap = float(np.diff(times_s).min() / times_s[-1])
         intervals = self._config.intervals
-        while gap * intervals < 2.0 and intervals < MOST_INTERVALS:
+        while gap * intervals < 2.0 and intervals < MAX_INTERVALS:
             intervals *= 2
         return self._compiled(intervals, len(times_s) - 1)
 

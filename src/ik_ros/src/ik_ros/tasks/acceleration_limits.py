@@ -1,4 +1,4 @@
-"""How fast the speed of joints may change from one solution to the next."""
+"""Largest accelerations of joints from one solution to the next."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ from pydantic import Field
 
 from custom_ros_tools.schema import Positive, Seconds
 from ik_ros.formulation.joint_task import JointTask
-from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.robot import PinocchioRobot
 from ik_ros.formulation.task import TaskConfig
 from ik_ros.problem import IKProblem
 
@@ -30,7 +30,7 @@ class AccelerationLimits(JointTask):
 
     Config = AccelerationLimitsConfig
 
-    def __init__(self, config: AccelerationLimitsConfig, robot: Robot) -> None:
+    def __init__(self, config: AccelerationLimitsConfig, robot: PinocchioRobot) -> None:
         super().__init__(config, robot, list(config.limits), "limits")
         self._way = np.array(list(config.limits.values())) * config.dt_s**2
 

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from custom_ros_tools.schema import ListOf, Position
-from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.robot import PinocchioRobot
 from ik_ros.formulation.task import Linearization, Task, TaskConfig
 from ik_ros.problem import IKProblem
 
@@ -15,8 +15,8 @@ class ComConfig(TaskConfig):
     """Options of this task.
 
     Attributes:
-        goal: Where it shall be, x, y, z in the base [m]; None: each problem says.
-        axes: Which axes of the base count.
+        goal: Its target, x, y, z in the base [m]; None: from each problem.
+        axes: Axes of the base that count.
     """
 
     goal: Position | None = None
@@ -28,7 +28,7 @@ class Com(Task):
 
     Config = ComConfig
 
-    def __init__(self, config: ComConfig, robot: Robot) -> None:
+    def __init__(self, config: ComConfig, robot: PinocchioRobot) -> None:
         super().__init__(config, robot)
         self._used = np.array([axis in config.axes for axis in "xyz"])
         self._default = config.goal

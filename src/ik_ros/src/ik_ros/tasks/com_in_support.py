@@ -6,8 +6,8 @@ import numpy as np
 from pydantic import Field
 
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Position
-from ik_ros.formulation.robot import Robot
-from ik_ros.formulation.task import Linearization, Task, TaskConfig, blaming
+from ik_ros.formulation.robot import PinocchioRobot
+from ik_ros.formulation.task import Linearization, Task, TaskConfig, keyed_errors
 
 
 class ComInSupportConfig(TaskConfig):
@@ -15,7 +15,7 @@ class ComInSupportConfig(TaskConfig):
 
     Attributes:
         support: Points of links that stand on the ground, in the link [m], such as the corners of both soles.
-        margin: How far inside the polygon around them the centre of mass stays [m].
+        margin: Smallest distance of the centre of mass from the edges of their polygon [m].
     """
 
     support: dict[str, ListOf[Position]] = Field(min_length=1)
@@ -31,16 +31,16 @@ class ComInSupport(Task):
 
     Config = ComInSupportConfig
 
-    def __init__(self, config: ComInSupportConfig, robot: Robot) -> None:
+    def __init__(self, config: ComInSupportConfig, robot: PinocchioRobot) -> None:
         super().__init__(config, robot)
         self._margin = config.margin
-        with blaming("support"):
+        with keyed_errors("support"):
             self._contacts = [(robot.link_id(link), np.array(points)) for link, points in config.support.items()]
         if sum(len(points) for _, points in self._contacts) < 3:
             raise KeyedError("support", "expected 3 points at least")
 
     def rows(self, q: np.ndarray) -> Linearization:
-        """See `Task`: how far the centre of mass is outside of each edge; negative inside [m]."""
+        """See `Task`: distance of the centre of mass outside of each edge; negative inside [m]."""
         com, jacobian = self.robot.com(q)
         corners = self.polygon()
         edges = np.roll(corners, -1, axis=0) - corners

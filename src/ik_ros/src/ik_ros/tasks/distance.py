@@ -1,15 +1,17 @@
 """Distance between links, and between links and obstacles."""
 
+from typing import Any
+
 import numpy as np
 from pydantic import Field
 
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Text
-from ik_ros.formulation.clearance import Placed, RobotShape, clearance
-from ik_ros.formulation.robot import Robot
-from ik_ros.formulation.task import Linearization, Task, TaskConfig, blaming
+from ik_ros.formulation.clearance import RobotShape, clearance
+from ik_ros.formulation.robot import PinocchioRobot
+from ik_ros.formulation.task import Linearization, Task, TaskConfig, keyed_errors
 
 NEAR_M = 0.3
-"""What is farther apart than asked by more than this is not looked at in this step [m]."""
+"""Distance beyond the required one up to which a pair counts in this step [m]."""
 
 
 class DistanceConfig(TaskConfig):
@@ -17,7 +19,7 @@ class DistanceConfig(TaskConfig):
 
     Attributes:
         pairs: Names of two shapes each.
-        at_least: How far they stay apart [m].
+        at_least: Smallest distance between them [m].
     """
 
     pairs: ListOf[ListOf[Text]] = Field(min_length=1)
@@ -25,11 +27,11 @@ class DistanceConfig(TaskConfig):
 
 
 class Distance(Task):
-    """Keeps shapes of the formulation apart, in pairs; one of each pair at most is a box, and one at least moves."""
+    """Keeps shapes of the formulation apart, in pairs, of which one at least moves."""
 
     Config = DistanceConfig
 
-    def __init__(self, config: DistanceConfig, robot: Robot) -> None:
+    def __init__(self, config: DistanceConfig, robot: PinocchioRobot) -> None:
         super().__init__(config, robot)
         self._at_least = config.at_least
         self._pairs: list[tuple[RobotShape, RobotShape]] = []
@@ -37,19 +39,17 @@ class Distance(Task):
             key = f"pairs[{i}]"
             if len(pair) != 2:
                 raise KeyedError(key, f"expected two shapes, got {len(pair)}")
-            with blaming(key):
+            with keyed_errors(key):
                 first, second = (robot.shape(name) for name in pair)
             if first.link_id == second.link_id:
                 raise KeyedError(key, f"'{pair[0]}' and '{pair[1]}' are at the same link, or both stand still")
-            if first.core.is_box and second.core.is_box:
-                raise KeyedError(key, "both are boxes; give one as a capsule or some spheres")
             self._pairs.append((first, second))
 
     def rows(self, q: np.ndarray) -> Linearization:
         """See `Task`: the distance of each pair that is near [m]."""
         values, rows = [], []
         for first, second in self._pairs:
-            found = clearance(self._placed(first), self._placed(second))
+            found = clearance(first.core, self._place(first), second.core, self._place(second))
             if found.distance < self._at_least + NEAR_M:
                 values.append(found.distance)
                 way = found.direction
@@ -58,11 +58,8 @@ class Distance(Task):
         jacobian = np.array(rows) if rows else np.zeros((0, len(self.robot.free)))
         return Linearization(np.array(values), jacobian, np.full(count, self._at_least), np.full(count, np.inf))
 
-    def _placed(self, shape: RobotShape) -> Placed:
-        placement = shape.placement
-        if shape.link_id is not None:
-            placement = self.robot.frame(shape.link_id) * placement
-        return Placed(shape.core, placement.rotation, placement.translation)
+    def _place(self, shape: RobotShape) -> Any:
+        return shape.placement if shape.link_id is None else self.robot.frame(shape.link_id) * shape.placement
 
     def _along(self, shape: RobotShape, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """Returns how a point of a shape moves along a direction, with what is free."""

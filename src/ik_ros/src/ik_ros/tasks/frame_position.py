@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from ik_ros.formulation.frame_task import FrameTask
-from rpbi.geometry import Pose
+from robot_model.geometry import Pose
 
 
 class FramePosition(FrameTask):

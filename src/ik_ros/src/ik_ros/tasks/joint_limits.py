@@ -4,8 +4,8 @@ from pydantic import Field
 
 from custom_ros_tools.schema import KeyedError, ListOf, NonNegative, Positive
 from ik_ros.formulation.joint_task import JointTask
-from ik_ros.formulation.robot import Robot
-from ik_ros.formulation.task import TaskConfig, blaming
+from ik_ros.formulation.robot import PinocchioRobot
+from ik_ros.formulation.task import TaskConfig, keyed_errors
 
 
 class JointLimitsConfig(TaskConfig):
@@ -13,7 +13,7 @@ class JointLimitsConfig(TaskConfig):
 
     Attributes:
         limits: Lower and upper limit of joints [rad or m].
-        margin: How far to stay off the URDF's limits, for all joints [rad or m].
+        margin: Smallest distance from the URDF's limits, for all joints [rad or m].
     """
 
     limits: dict[str, ListOf[float]] = Field(default_factory=dict)
@@ -26,11 +26,11 @@ class JointLimits(JointTask):
 
     Config = JointLimitsConfig
 
-    def __init__(self, config: JointLimitsConfig, robot: Robot) -> None:
+    def __init__(self, config: JointLimitsConfig, robot: PinocchioRobot) -> None:
         super().__init__(config, robot, robot.joint_names, "limits")
         lower, upper = robot.lower + config.margin, robot.upper - config.margin
         for name, limits in config.limits.items():
-            with blaming(f"limits.{name}"):
+            with keyed_errors(f"limits.{name}"):
                 i = robot.index(name)
                 if len(limits) != 2 or limits[0] > limits[1]:
                     raise ValueError(f"expected a lower and an upper limit, got {list(limits)}")

@@ -7,13 +7,13 @@ import numpy as np
 import pinocchio as pin
 
 from custom_ros_tools.schema import KeyedError, Position, Text, Vec3
-from ik_ros.formulation.robot import Robot
-from ik_ros.formulation.task import Linearization, Task, TaskConfig, blaming
+from ik_ros.formulation.robot import PinocchioRobot
+from ik_ros.formulation.task import Linearization, Task, TaskConfig, keyed_errors
 from ik_ros.problem import IKProblem
-from rpbi.kinematics.residual import Residual
+from robot_model.residual import Residual
 
 NEAREST_M = 1e-6
-"""What is nearer has no direction [m]."""
+"""Distance below which there is no direction [m]."""
 ZERO = np.zeros(2)
 
 
@@ -23,7 +23,7 @@ class LookAtConfig(TaskConfig):
     Attributes:
         frame: The link.
         axis: Its axis that is to point at something, in the link; any length but 0.
-        goal: The point, x, y, z in the base [m]; None: each problem says.
+        goal: The point, x, y, z in the base [m]; None: from each problem.
     """
 
     frame: Text
@@ -36,9 +36,9 @@ class LookAt(Task):
 
     Config = LookAtConfig
 
-    def __init__(self, config: LookAtConfig, robot: Robot) -> None:
+    def __init__(self, config: LookAtConfig, robot: PinocchioRobot) -> None:
         super().__init__(config, robot)
-        with blaming("frame"):
+        with keyed_errors("frame"):
             self._link_id = robot.link_id(config.frame)
         length = math.hypot(*config.axis)
         if length < 1e-6:

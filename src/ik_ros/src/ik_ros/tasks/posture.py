@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from ik_ros.formulation.joint_task import JointTask
-from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.robot import PinocchioRobot
 from ik_ros.formulation.task import TaskConfig
 from ik_ros.problem import IKProblem
 
@@ -26,7 +26,7 @@ class Posture(JointTask):
 
     Config = PostureConfig
 
-    def __init__(self, config: PostureConfig, robot: Robot) -> None:
+    def __init__(self, config: PostureConfig, robot: PinocchioRobot) -> None:
         super().__init__(config, robot, list(config.goal), "goal")
         self._default = np.array(list(config.goal.values()))
         self.bring_to(self._default)

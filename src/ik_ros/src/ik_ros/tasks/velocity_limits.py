@@ -1,4 +1,4 @@
-"""How fast joints may go from one solution to the next."""
+"""Largest speeds of joints from one solution to the next."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ from pydantic import Field
 
 from custom_ros_tools.schema import Positive, Seconds
 from ik_ros.formulation.joint_task import JointTask
-from ik_ros.formulation.robot import Robot
+from ik_ros.formulation.robot import PinocchioRobot
 from ik_ros.formulation.task import TaskConfig
 from ik_ros.problem import IKProblem
 
@@ -18,7 +18,7 @@ class VelocityLimitsConfig(TaskConfig):
     Attributes:
         dt_s: Time from the previous solution to this one [s].
         limits: Largest speed of joints [rad/s or m/s]; without any, all joints have those of the URDF.
-        factor: What the speeds are multiplied with.
+        factor: Factor on the speeds.
     """
 
     dt_s: Seconds
@@ -32,7 +32,7 @@ class VelocityLimits(JointTask):
 
     Config = VelocityLimitsConfig
 
-    def __init__(self, config: VelocityLimitsConfig, robot: Robot) -> None:
+    def __init__(self, config: VelocityLimitsConfig, robot: PinocchioRobot) -> None:
         super().__init__(config, robot, list(config.limits) or robot.joint_names, "limits")
         speeds = np.array(list(config.limits.values())) if config.limits else robot.max_velocity
         self._way = speeds * config.factor * config.dt_s

@@ -1,1 +1,1 @@
-"""What the solver `trajectory` is made of: a spline for each joint, and the nonlinear program that shapes them."""
+"""Parts of the solver `trajectory`: a spline for each joint, and the nonlinear program that shapes them."""

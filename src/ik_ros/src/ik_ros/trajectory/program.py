@@ -6,15 +6,15 @@ from typing import Any
 import casadi
 import numpy as np
 
-from ik_ros.chain.description import ChainDescription
 from ik_ros.shape import ShapeConfig
-from rpbi.kinematics.limits import Limits
+from robot_model.chain import Chain
+from robot_model.limits import Limits
 
 from .spline import Spline
 from .symbolic import link_frames, rotation_vector, sphere_distances
 
 SAMPLES = 2
-"""At so many places in each interval of the spline, obstacles are looked at."""
+"""Number of places in each interval of the spline at which obstacles count."""
 SAFETY_M = 5e-3
 """Spheres stay this much farther away there, since between two places they may come nearer [m]."""
 ITERATIONS = 100
@@ -39,14 +39,14 @@ class Program:
     Args:
         chain: The chain.
         shapes: Spheres on its links, and obstacles in the base that they have to stay away from.
-        intervals: How many polynomials each joint's spline has.
+        intervals: Number of polynomials of each joint's spline.
         waypoints: Number of waypoints.
 
     Attributes:
         spline: The splines.
     """
 
-    def __init__(self, chain: ChainDescription, shapes: Sequence[ShapeConfig], intervals: int, waypoints: int) -> None:
+    def __init__(self, chain: Chain, shapes: Sequence[ShapeConfig], intervals: int, waypoints: int) -> None:
         self.spline = spline = Spline(intervals)
         self._joints = joints = len(chain.joint_names)
         points = casadi.MX.sym("points", spline.count, joints)
@@ -97,18 +97,18 @@ class Program:
         """Solves it over the time from 0 to 1, for n joints, m control points and w waypoints.
 
         Args:
-            start: n positions where it begins, at rest [rad or m].
+            start: n start positions, at rest [rad or m].
             poses: Rotation (9 numbers, by columns) and position (3) of each waypoint, 12 x w.
-            basis: What each control point counts at each waypoint, w x m.
-            tolerance: How far off a waypoint the tip may be, along and about its axes: 6 numbers [m, rad].
+            basis: Weight of each control point at each waypoint, w x m.
+            tolerance: Largest errors of the tip at a waypoint, along and about its axes: 6 numbers [m, rad].
             limits: Limits of the n joints.
             max_velocity: n largest speeds, per unit of time.
             max_acceleration: n largest accelerations, per unit of time squared.
-            clearance: How far spheres stay away from obstacles [m].
+            clearance: Smallest distance of spheres from obstacles [m].
             guess: m x n control points to start from.
 
         Returns:
-            m x n control points within limits [rad or m], and how Ipopt says it went.
+            m x n control points within limits [rad or m], and Ipopt's status.
         """
         count = self.spline.count
         lower, upper = (np.tile(ends, (count, 1)) for ends in (limits.lower, limits.upper))

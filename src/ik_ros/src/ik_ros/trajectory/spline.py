@@ -14,11 +14,11 @@ class Spline:
     linear.
 
     Args:
-        intervals: How many polynomials follow each other.
+        intervals: Number of successive polynomials.
 
     Attributes:
         count: Number m of control points.
-        times: When each control point counts most, from 0 to 1: the means of their knots.
+        times: Time of the largest weight of each control point, from 0 to 1: the means of their knots.
         to_velocity: Control points of the velocity from those of the position, (m - 1) x m.
         to_acceleration: The same of the acceleration, (m - 2) x m.
     """

@@ -7,15 +7,15 @@ import casadi
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ik_ros.chain.description import ChainDescription
 from ik_ros.shape import ShapeConfig
-from rpbi.urdf.elements import UrdfJoint
+from robot_model.chain import Chain
+from robot_model.urdf.elements import UrdfJoint
 
 SMALL = 1e-12
 """Keeps roots smooth at 0 [m^2]."""
 
 
-def link_frames(chain: ChainDescription, q: Any) -> dict[str, tuple[Any, Any]]:
+def link_frames(chain: Chain, q: Any) -> dict[str, tuple[Any, Any]]:
     """Returns rotation (3 x 3) and position (3) [m] of each link of a chain in the base.
 
     Args:
@@ -54,7 +54,7 @@ def sphere_distances(shapes: Sequence[ShapeConfig], frames: Mapping[str, tuple[A
 
 
 def rotation_vector(rotation: Any) -> Any:
-    """Returns axis times angle of a rotation that CasADi knows [rad], smooth but at half a turn."""
+    """Returns axis times angle of a symbolic rotation [rad], smooth except at half a turn."""
     trace = rotation[0, 0] + rotation[1, 1] + rotation[2, 2]
     w = 0.5 * casadi.sqrt(casadi.fmax(1.0 + trace, 1e-9))
     difference = (rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1])

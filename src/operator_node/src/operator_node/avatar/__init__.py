@@ -1,1 +1,1 @@
-"""A person in the simulator: their body as URDF, and how it follows a motion capture suit."""
+"""A person in the simulator: the body as URDF, and its motion from a motion capture suit."""

@@ -3,21 +3,22 @@
 - Drillis and Contini (1966), as Winter prints them (Biomechanics and Motor Control of Human Movement, 4th ed. 2009,
   fig. 4.1): lengths of limbs as fractions of the height.
 - de Leva (1996), Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters, J. Biomechanics 29(9), table 4, men:
-  masses, centres of mass, radii of gyration, and where trunk and head divide.
+  masses, centres of mass, radii of gyration, and the division of trunk and head.
 - Dempster (1955), as in Winter's table 4.1: densities.
-- Bell, Pedersen and Brand (1990), J. Biomechanics 23(6): where the hip joints are between the iliac spines.
+- Bell, Pedersen and Brand (1990), J. Biomechanics 23(6): position of the hip joints between the iliac spines.
 
-What they do not say, and is our own choice: how a part of the tables is divided among several segments of `SEGMENTS`.
-Columns are x (forward), y (left) and z (up) of a person in the T-pose.
+The division of a part of the tables among several segments of `SEGMENTS` is our own choice. Columns are x (forward),
+y (left) and z (up) of a person in the T-pose.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from operator_node.mvn.segments import SEGMENTS, SegmentFrame
-from operator_node.mvn.skeleton import PARENTS
+from operator_node.mvn.skeleton import BONES
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,7 @@ SHOULDER_HALF_BREADTH, CHEST_BREADTH, HIP_BREADTH = 0.129, 0.174, 0.191
 FOOT_LENGTH, FOOT_BREADTH = 0.152, 0.055
 """Fractions of the height (Drillis and Contini)."""
 HEEL, BALL = 0.038, 0.073
-"""How far heel and ball of the foot are behind and before the ankle; a quarter and a half of the foot."""
+"""Distances of heel and ball of the foot behind and before the ankle; a quarter and a half of the foot."""
 HIP_HALF_WIDTH = 0.049
 """Half the distance of the hip joints: 0.72 of that of the iliac spines (Bell), which is some 0.24 m at 1.75 m."""
 
@@ -39,9 +40,9 @@ LOWER_TRUNK, MIDDLE_TRUNK, UPPER_TRUNK, HEAD_AND_NECK = (
 )
 """The same as fractions of the height, so that all of them reach from the hips to the crown."""
 PELVIS_SHARE, NECK_SHARE = 0.6, 0.37
-"""How much of the lower trunk's length is the pelvis, and of that of head and neck the neck."""
+"""Share of the pelvis in the length of the lower trunk, and of the neck in that of head and neck."""
 CLAVICLE_Y = 0.02
-"""How far from the middle the shoulder girdles begin."""
+"""Distance of the shoulder girdles' origins from the middle."""
 
 _SPINE_TO_SHOULDERS = SHOULDER_HEIGHT - HIP_HEIGHT - LOWER_TRUNK - MIDDLE_TRUNK
 _RIGHT_LIMBS: dict[str, tuple[float, float, float]] = {
@@ -105,14 +106,14 @@ DENSITY: dict[str, float] = {
     **dict.fromkeys(("Neck", "Head"), _HEAD_DENSITY),
     **{f"{side}{name}": density for side in ("Right", "Left") for name, density in _LIMB_DENSITIES.items()},
 }
-"""Of each segment [kg/m^3]; with mass and length it says how thick the segment is."""
+"""Density of each segment [kg/m^3]; with mass and length it determines the thickness."""
 
 
 class Gyration(NamedTuple):
-    """Where the mass of a limb is, as fractions of its length.
+    """Mass distribution of a limb, as fractions of its length.
 
     Attributes:
-        centre: How far the centre of mass is from the joint towards the body.
+        centre: Distance of the centre of mass from the joint towards the body.
         across: Radius of gyration about the axes across the limb; the mean of the table's two, which differ little.
         along: Radius of gyration about the axis along it.
     """
@@ -129,7 +130,7 @@ GYRATION: dict[str, Gyration] = {
     "UpperLeg": Gyration(0.4095, 0.329, 0.149),
     "LowerLeg": Gyration(0.4395, (0.251 + 0.246) / 2.0, 0.102),
 }
-"""Of the limbs that are a segment each, by the name without its side (de Leva)."""
+"""Mass distribution of the limbs that consist of one segment, by name without the side (de Leva)."""
 
 
 def segment_offsets(height_m: float) -> Array:
@@ -142,14 +143,11 @@ def segment_offsets(height_m: float) -> Array:
 
 
 def measured_offsets(frame: SegmentFrame) -> Array:
-    """Returns the same as a suit has them (23 x 3) [m], in whatever pose the person is."""
+    """Returns these origins as measured by a suit (23 x 3) [m], in any pose of the person."""
     offsets = np.zeros((len(SEGMENTS), 3))
-    for index, parent in enumerate(PARENTS):
-        if parent >= 0:
-            x, y, z, w = frame.quats_xyzw[parent]
-            way = frame.positions[index] - frame.positions[parent]
-            axis = np.array((x, y, z))
-            offsets[index] = way - 2.0 * np.cross(axis, w * way - np.cross(axis, way))
+    parents, children = BONES.T
+    ways = frame.positions[children] - frame.positions[parents]
+    offsets[children] = Rotation.from_quat(frame.quats_xyzw[parents]).inv().apply(ways)
     return offsets
 
 

@@ -1,23 +1,22 @@
-"""An avatar that never jumps."""
-
-import math
+"""Speed limits that keep an avatar from jumping."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from .anthropometry import Array
 from .retargeting import AvatarPose
 
-LONGEST_STEP_S = 0.1
-"""More time than that between two frames counts as so much [s]."""
+MAX_STEP_S = 0.1
+"""Longest time that counts between two frames [s]; the rest is dropped."""
 
 
 class Engagement:
-    """Takes the avatar to where it is to be at limited speeds: from where it was at the start, after a pause, always.
+    """Moves the avatar to its target pose at limited speeds, at the start, after a pause, and at any other time.
 
     Args:
-        max_joint_speed: Of each hinge [rad/s].
-        max_speed: Of the pelvis [m/s].
-        max_angular_speed: Of the pelvis [rad/s].
+        max_joint_speed: Largest speed of each hinge [rad/s].
+        max_speed: Largest speed of the pelvis [m/s].
+        max_angular_speed: Largest angular speed of the pelvis [rad/s].
     """
 
     def __init__(self, max_joint_speed: float, max_speed: float, max_angular_speed: float) -> None:
@@ -25,19 +24,19 @@ class Engagement:
         self._last: AvatarPose | None = None
 
     def begin(self, pose: AvatarPose) -> None:
-        """Says where the avatar is; the next step begins there."""
+        """Sets the present pose of the avatar, from which the next step starts."""
         self._last = pose
 
     def step(self, target: AvatarPose, dt: float) -> AvatarPose:
-        """Returns where the avatar is to be now.
+        """Returns the next pose of the avatar.
 
         Args:
-            target: Where it is to get to.
+            target: Its target pose.
             dt: Time since the last step [s].
         """
         if self._last is None:
             self._last = target
-        last, dt = self._last, min(dt, LONGEST_STEP_S)
+        last, dt = self._last, min(dt, MAX_STEP_S)
         hinge_step, way = self._joint_speed * dt, target.position - last.position
         distance = float(np.linalg.norm(way))
         position = last.position + way * min(1.0, self._speed * dt / max(distance, 1e-12))
@@ -48,13 +47,10 @@ class Engagement:
 
 
 def _turned(start: Array, end: Array, most_rad: float) -> Array:
-    """Returns a quaternion on the short way from one to another, at most an angle from the first [rad]."""
-    cosine = float(np.dot(start, end))
-    if cosine < 0.0:
-        end, cosine = -end, -cosine
-    half = math.acos(min(cosine, 1.0))
-    if 2.0 * half <= most_rad:
+    """Returns a quaternion on the shortest path between two, limited to an angle from the first [rad]."""
+    first = Rotation.from_quat(start)
+    way = (first.inv() * Rotation.from_quat(end)).as_rotvec()
+    angle = float(np.linalg.norm(way))
+    if angle <= most_rad:
         return end
-    share = most_rad / (2.0 * half)
-    quat = (math.sin((1.0 - share) * half) * start + math.sin(share * half) * end) / math.sin(half)
-    return np.asarray(quat / np.linalg.norm(quat))
+    return np.asarray((first * Rotation.from_rotvec(way * (most_rad / angle))).as_quat())

@@ -1,4 +1,4 @@
-"""From the base and the hinges of a person to their segments."""
+"""Forward kinematics of a person, from base and hinges to segments."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -11,7 +11,7 @@ from .joints import HINGES, JOINTS
 
 
 def segment_frame(offsets: Array, position: Array, quat_xyzw: Array, hinges: dict[str, float]) -> SegmentFrame:
-    """Returns the segments of a person whose pelvis and hinges are known.
+    """Returns the segments of a person for poses of pelvis and hinges.
 
     Args:
         offsets: Origin of each segment in its parent (23 x 3) [m].

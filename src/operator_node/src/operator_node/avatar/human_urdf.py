@@ -1,4 +1,4 @@
-"""The body of a person as URDF."""
+"""URDF of the body of a person."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -13,13 +13,14 @@ from .anthropometry import Array
 from .joints import JOINTS, HumanJoint
 
 HEIGHTS_M, MASSES_KG = (0.5, 2.5), (3.0, 300.0)
-"""People are within these."""
-SHORTEST_M = 1e-3
-"""A measured segment that is shorter is none."""
+"""Ranges of height and mass; other values are rejected."""
+MIN_LENGTH_M = 1e-3
+"""Least length of a measured segment; shorter ones are rejected."""
 HELPER_MASS_KG, HELPER_INERTIA = 0.01, 1e-4
-"""Of the links between the hinges of a joint [kg, kg m^2]; the mass is taken from the segment's."""
+"""Mass and inertia of the links between the hinges of a joint [kg, kg m^2]; the mass is subtracted from the segment's.
+"""
 MAX_SPEED = 20.0
-"""Of each hinge [rad/s]."""
+"""Largest speed of each hinge [rad/s]."""
 _SKIN, _CLOTHES, _SHOES = "0.87 0.72 0.60 1", "0.25 0.37 0.55 1", "0.20 0.20 0.22 1"
 _SKINNY = ("Neck", "Head", "Hand")
 _TIPS = {
@@ -30,23 +31,23 @@ _TIPS = {
     "LowerLeg": "Foot",
     "Neck": "Head",
 }
-"""The segment that each limb ends at, without its side."""
+"""The segment at the end of each limb, without the side."""
 
 
 def human_urdf(height_m: float, mass_kg: float, offsets: Array | None = None) -> str:
     """Returns the URDF of a person in the T-pose; links have the names of `SEGMENTS`, hinges those of `HINGES`.
 
-    The frame of a link is that of its segment. Each segment has a simple shape, both to be seen and to be touched, as
-    thick as its mass makes it at the density of its tissue.
+    The frame of a link is that of its segment. Each segment has a simple shape for display and collision, whose
+    thickness follows from the mass and the density of its tissue.
 
     Args:
         height_m: Height of the person [m].
         mass_kg: Their mass [kg].
-        offsets: Origin of each segment in its parent (23 x 3) [m], such as `measured_offsets` has them; without them,
-            those of the tables.
+        offsets: Origin of each segment in its parent (23 x 3) [m], such as from `measured_offsets`; without them, those
+            of the tables.
 
     Raises:
-        ValueError: If no person is so, or an offset makes no sense.
+        ValueError: If height or mass is out of range, or an offset is invalid.
     """
     for what, unit, value, (least, most) in (("height", "m", height_m, HEIGHTS_M), ("mass", "kg", mass_kg, MASSES_KG)):
         if not least <= value <= most:
@@ -70,9 +71,9 @@ def _checked(offsets: Array, height_m: float) -> Array:
         raise ValueError(f"offsets: expected {len(SEGMENTS)} x 3 finite numbers")
     lengths = np.linalg.norm(offsets, axis=1)
     for name, parent, length in zip(SEGMENTS, PARENTS, lengths):
-        if parent >= 0 and not SHORTEST_M <= length <= height_m:
+        if parent >= 0 and not MIN_LENGTH_M <= length <= height_m:
             between = f"from {SEGMENTS[parent]} to {name}"
-            raise ValueError(f"offsets: expected {SHORTEST_M:g} to {height_m:g} m {between}, got {length:g}")
+            raise ValueError(f"offsets: expected {MIN_LENGTH_M:g} to {height_m:g} m {between}, got {length:g}")
     return offsets
 
 
@@ -125,7 +126,7 @@ def _link(name: str, offsets: Array, height_m: float, mass_kg: float, helpers: i
 
 
 def _way(name: str, limb: str, offsets: Array, height_m: float) -> Array:
-    """Returns the way from a limb's origin to its tip [m]; a hand goes on where its forearm points."""
+    """Returns the vector from a limb's origin to its tip [m]; a hand continues the direction of its forearm."""
     if limb == "Hand":
         forearm = offsets[SEGMENTS.index(name)]
         return np.asarray(forearm * table.HAND * height_m / np.linalg.norm(forearm))
@@ -133,7 +134,7 @@ def _way(name: str, limb: str, offsets: Array, height_m: float) -> Array:
 
 
 def _limb_inertia(limb: str, mass: float, way: Array, radius: float) -> tuple[Array, Array]:
-    """Returns centre of mass and inertia about it; of a limb that the table lacks, those of a cylinder."""
+    """Returns centre of mass and inertia about it; a limb that is not in the table is a cylinder."""
     length = float(np.linalg.norm(way))
     along = np.outer(way, way) / length**2
     if limb in table.GYRATION:
@@ -145,7 +146,7 @@ def _limb_inertia(limb: str, mass: float, way: Array, radius: float) -> tuple[Ar
 
 
 def _box_of(name: str, limb: str, offsets: Array, height_m: float, volume: float) -> tuple[Array, Array]:
-    """Returns middle and size of a segment that is a box [m]: those of the trunk, and the feet."""
+    """Returns centre and size of a segment that is a box [m]: those of the trunk, and the feet."""
     sole, breadth = table.ANKLE_HEIGHT * height_m, table.FOOT_BREADTH * height_m
     if limb in ("Foot", "Toe"):
         toe = offsets[SEGMENTS.index(name.replace("Foot", "Toe"))]
@@ -182,7 +183,7 @@ def _sphere(radius: float, centre: Array) -> str:
 
 
 def _cylinder(radius: float, way: Array) -> str:
-    """A cylinder from the origin along a way; by itself it stands along z, about its middle."""
+    """Returns a cylinder from the origin along a vector."""
     length = float(np.linalg.norm(way))
     tilt, turn = math.acos(max(-1.0, min(1.0, way[2] / length))), math.atan2(way[1], way[0])
     origin = f'<origin xyz="{_text(way / 2.0)}" rpy="0 {_number(tilt)} {_number(turn)}"/>'
@@ -194,5 +195,5 @@ def _text(vector: Array) -> str:
 
 
 def _number(value: float) -> str:
-    text = f"{round(value, 6) + 0.0:.6f}"  # + 0.0: no negative zero
+    text = f"{round(value, 6) + 0.0:.6f}"  # + 0.0 turns negative zero into zero
     return text.rstrip("0").rstrip(".")

@@ -1,8 +1,8 @@
-"""The joints between the segments: their names, the order of their axes, and how far people can move them.
+"""The joints between the segments: names, order of axes, and ranges of motion.
 
-Each is three hinges one after the other, with small links between them. The middle axis is one about which the joint
-moves little, since three hinges cannot turn freely where the middle one is at 90 deg. Only shoulders get near that,
-with the arm held sideways and the forearm straight up or down.
+Each consists of three consecutive hinges with small links between them. The middle axis is one about which the joint
+moves little, since three hinges are singular where the middle one is at 90 deg. Only shoulders get near that, with the
+arm held sideways and the forearm straight up or down.
 """
 
 import math
@@ -20,10 +20,11 @@ class HumanJoint(NamedTuple):
     """Three hinges between a segment and its parent; all at 0 in the T-pose.
 
     Attributes:
-        name: Its name, as MVN has it.
-        parent: The segment that it is fixed to.
+        name: Its name, as in MVN.
+        parent: The segment that it is attached to.
         child: The segment that it moves.
-        order: Axes of the hinges from parent to child, such as "yxz": the child is turned by R_y R_x R_z in the parent.
+        order: Axes of the hinges from parent to child, such as "yxz": the child is rotated by R_y R_x R_z in the
+            parent.
         x: Lower and upper limit of the hinge about x (forward) [deg].
         y: Likewise about y (left).
         z: Likewise about z (up).
@@ -80,7 +81,7 @@ _RIGHT = (
 
 
 def _mirrored(joint: HumanJoint) -> HumanJoint:
-    """Returns the joint of the left side: rotations about x and z are the other way round."""
+    """Returns the joint of the left side: rotations about x and z are mirrored."""
     return joint._replace(
         name=joint.name.replace("Right", "Left"),
         parent=joint.parent.replace("Right", "Left"),
@@ -95,9 +96,10 @@ JOINTS: tuple[HumanJoint, ...] = tuple(_BY_CHILD[name] for name in SEGMENTS[1:])
 """The joint of each segment but the pelvis, in the order of `SEGMENTS`.
 
 Ranges are those of the American Academy of Orthopaedic Surgeons (Joint Motion: Method of Measuring and Recording, 1965)
-and some 10 deg more, since suits measure no better. Those of trunk and neck are divided evenly, and are half as wide
-again, since people divide them otherwise. The three angles of a shoulder depend on each other, so its ranges are wider.
-About axes that the tables do not name, joints give way a little. Efforts are of the order of what strong adults have.
+and some 10 deg more, to allow for errors of suits. Those of trunk and neck are divided evenly among their joints and
+enlarged by half, since people divide them otherwise. The three angles of a shoulder depend on each other, so its ranges
+are wider. About axes that are not in the tables, joints yield a little. Efforts are of the order of those of strong
+adults.
 """
 HINGES: tuple[str, ...] = tuple(hinge for joint in JOINTS for hinge in joint.hinges)
 """The 66 hinges: three for each joint, in the order of `JOINTS`."""

@@ -1,4 +1,4 @@
-"""What the nodes of the avatar take as parameters."""
+"""Parameters of the nodes of the avatar."""
 
 from typing import Annotated
 
@@ -13,18 +13,20 @@ class AvatarParameters(ConfigModel):
     """Private parameters of `avatar_node.py`."""
 
     robot_name: Name = Field("human", description="The avatar: a robot of the simulator with the joints of a person.")
-    parent_frame_id: FrameId = Field("rpbi/world", description="TF frame that the segments are in.")
+    parent_frame_id: FrameId = Field("rpbi/world", description="TF frame in which the segments are given.")
     base_frame_id: FrameId = Field("human/base", description="TF frame that the avatar's base follows.")
     place: Place3 | None = Field(
-        None, description="Where the avatar stands at first: x, y [m], yaw [rad]; else where the person does."
+        None, description="Initial place of the avatar: x, y [m], yaw [rad]; by default that of the person."
     )
-    input_timeout_s: Seconds = Field(0.5, description="Without segments for so long it is said that the avatar holds.")
-    max_joint_speed: Positive = Field(10.0, description="Of each hinge [rad/s].")
-    max_speed: Positive = Field(3.0, description="Of the pelvis [m/s].")
-    max_angular_speed: Positive = Field(6.0, description="Of the pelvis [rad/s].")
+    input_timeout_s: Seconds = Field(
+        0.5, description="Time without segments after which a warning reports that the avatar holds its pose."
+    )
+    max_joint_speed: Positive = Field(10.0, description="Largest speed of each hinge [rad/s].")
+    max_speed: Positive = Field(3.0, description="Largest speed of the pelvis [m/s].")
+    max_angular_speed: Positive = Field(6.0, description="Largest angular speed of the pelvis [rad/s].")
 
 
 class SegmentForcesParameters(ConfigModel):
     """Private parameters of `segment_forces_node.py`."""
 
-    robot_name: Name = Field("human", description="The avatar; its YAML has `contacts`.")
+    robot_name: Name = Field("human", description="The avatar; its YAML needs `contacts`.")

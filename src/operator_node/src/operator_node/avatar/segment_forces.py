@@ -1,4 +1,4 @@
-"""Forces on the segments of a person's body, and the largest that a robot may exert.
+"""Forces on the segments of a person's body, and the limits for robots.
 
 Source of the limits: ISO/TS 15066:2016, Annex A, table A.2, column of forces. They are limits for contact with
 industrial robots, from the onset of slight injury, not of comfort. The table has a factor of 2 for transient contact,
@@ -15,8 +15,8 @@ class ForceLimit(NamedTuple):
     """Largest forces on a region of the body.
 
     Attributes:
-        quasi_static_n: Of a contact that clamps the region, or that lasts [N].
-        transient_n: Of a contact from which the region can recoil [N]; 0 where none is allowed.
+        quasi_static_n: Limit for a contact that clamps the region, or that lasts [N].
+        transient_n: Limit for a contact from which the region can recoil [N]; 0 where none is allowed.
     """
 
     quasi_static_n: float
@@ -49,11 +49,11 @@ REGIONS: Mapping[str, str] = {
 
 
 class SegmentForce(NamedTuple):
-    """Forces on a segment of the body in one tick, as magnitudes: forces from either side do not cancel.
+    """Forces on a segment of the body in one tick, as magnitudes: forces from opposite sides do not cancel.
 
     Attributes:
         sum_n: Sum over all contacts [N].
-        largest_n: Of a single contact [N].
+        largest_n: Largest force of a single contact [N].
     """
 
     sum_n: float

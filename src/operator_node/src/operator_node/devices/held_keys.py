@@ -1,4 +1,4 @@
-"""Which keys are held, and what is told of them."""
+"""The keys that are held, and their events."""
 
 import math
 import time
@@ -20,7 +20,7 @@ MODIFIERS = {
 }
 """Bit of each modifier by the code of its key, see `keyboard/Key`."""
 NUM_LOCK, CAPS_LOCK = 4096, 8192
-"""Bits of modifiers that are on without being held."""
+"""Bits of the locks, modifiers that stay on without being held."""
 
 
 class KeyEvent(NamedTuple):
@@ -28,7 +28,7 @@ class KeyEvent(NamedTuple):
 
     Attributes:
         code: Its code, see `KEY_CODES`.
-        modifiers: Sum of the bits of the other keys that were held and change its meaning.
+        modifiers: Sum of the bits of the modifiers that were held or locked.
         is_down: Whether it went down.
     """
 
@@ -38,12 +38,12 @@ class KeyEvent(NamedTuple):
 
 
 class HeldKeys:
-    """Keeps which keys are held, and repeats the last one that went down.
+    """Tracks the keys that are held, and repeats the last one that went down.
 
     Args:
-        repeats: Whether it repeats.
-        delay_s: How long a key is held until it repeats [s].
-        interval_s: How often it then does [s].
+        repeats: Whether keys repeat.
+        delay_s: Time for which a key is held before it repeats [s].
+        interval_s: Period of the repetition [s].
     """
 
     def __init__(self, repeats: bool, delay_s: float, interval_s: float) -> None:
@@ -60,11 +60,11 @@ class HeldKeys:
 
     @property
     def repeat_at_s(self) -> float:
-        """When the next repetition is due, by `time.monotonic`; infinity if none is."""
+        """Time of the next repetition, by `time.monotonic`; infinity if none is due."""
         return self._repeat_at_s
 
     def press(self, code: int, locks: int = 0) -> None:
-        """Notes a key that went down; one that is held already is passed over."""
+        """Records that a key went down; ignores a key that is held already."""
         if code in self._held:
             return
         self._events.append(KeyEvent(code, self._modifiers(locks), True))
@@ -73,7 +73,7 @@ class HeldKeys:
             self._repeating, self._repeat_at_s = code, time.monotonic() + self._delay_s
 
     def release(self, code: int, locks: int = 0) -> None:
-        """Notes a key that went up."""
+        """Records that a key went up; ignores a key that is not held."""
         if code not in self._held:
             return
         del self._held[code]
@@ -82,12 +82,12 @@ class HeldKeys:
             self._repeat_at_s = math.inf
 
     def release_all(self) -> None:
-        """Notes that all keys went up, the last one first."""
+        """Records that all keys went up, the last one first."""
         for code in [*reversed(self._held)]:
             self.release(code)
 
-    def take_events(self) -> tuple[KeyEvent, ...]:
-        """Returns what happened since it was asked last, repetitions that are due with it."""
+    def drain_events(self) -> tuple[KeyEvent, ...]:
+        """Returns and clears the events since the last call, with the repetition if one is due."""
         now_s = time.monotonic()
         if now_s >= self._repeat_at_s:
             self._events.append(KeyEvent(self._repeating, self._modifiers(0), True))

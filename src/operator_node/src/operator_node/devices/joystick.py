@@ -15,11 +15,11 @@ from operator_node.device import Device, DeviceError, Reading
 from .sdl import pygame_with_joysticks, triggers_of
 
 RAW = 32768
-"""What pygame divides axes by."""
+"""Divisor that pygame applies to raw axes."""
 FULL = 32767
 UNPLUGGED = "it was unplugged"
 RUMBLE_MS = 200
-"""How long a force is felt unless it is repeated."""
+"""Time for which a force is rendered unless it is repeated [ms]."""
 
 
 def _numbered(path: str) -> str:
@@ -29,30 +29,30 @@ def _numbered(path: str) -> str:
 
 
 class JoystickConfig(ConfigModel):
-    """Which joystick, and how it is read; the names are those of `joy_node`."""
+    """Selection and reading of a joystick; the names are those of `joy_node`."""
 
     dev: Annotated[Text, AfterValidator(_numbered)] = Field(
-        "/dev/input/js0", description="The joystick of which number; the first one is 0."
+        "/dev/input/js0", description="Path whose number selects the joystick; the first one is 0."
     )
-    dev_name: Text | None = optional("The first joystick whose name has this in it, in place of `dev`.")
-    deadzone: float = Field(0.05, ge=0.0, lt=1.0, description="How far an axis goes before it counts, as a share.")
-    sticky_buttons: Switch = Field(False, description="Whether a button changes when it is pressed, and stays so.")
+    dev_name: Text | None = optional("Part of the name of the joystick; the first match is used instead of `dev`.")
+    deadzone: float = Field(0.05, ge=0.0, lt=1.0, description="Share of the range of an axis that counts as 0.")
+    sticky_buttons: Switch = Field(False, description="Whether a button changes its state each time it is pressed.")
     triggers: ListOf[Count] | None = optional(
         "Indices of the axes that rest at one end, at 1; by default those of a gamepad that SDL knows."
     )
     virtual: Switch = Field(
-        False, description="Whether to make a gamepad that is not there, which the topic `joy/virtual` moves."
+        False, description="Whether to create a virtual gamepad, which the topic `joy/virtual` moves."
     )
 
 
 class Joystick(Device):
     """A joystick or gamepad by SDL.
 
-    Axes are positive to the left and up, a trigger is 1 at rest and -1 when it is pressed; hats follow as two axes
-    each, as `joy_node` has it.
+    Axes are positive to the left and up; a trigger is 1 at rest and -1 when it is pressed. Each hat follows as two
+    axes, as in `joy_node`.
 
     Attributes:
-        is_virtual: Whether it is a gamepad that is not there.
+        is_virtual: Whether it is a virtual gamepad.
     """
 
     Config = JoystickConfig
@@ -74,16 +74,18 @@ class Joystick(Device):
     def open(self) -> None:
         self._pygame = pygame = pygame_with_joysticks()
         if self._config.virtual and self._virtual is None:
-            from operator_node.emulators.joystick import VirtualJoystick
+            from .virtual_joystick import VirtualJoystick
 
             self._virtual = VirtualJoystick()
         with contextlib.suppress(SystemError):  # see `_fetch`
-            pygame.event.get()  # by which it finds those that came
+            pygame.event.get()  # makes it detect new joysticks
         index = self._index()
         try:
             self._joystick = pygame.joystick.Joystick(index)
         except pygame.error as error:
-            raise DeviceError("joystick", f"it cannot be opened: {error}; may you read /dev/input?") from None
+            raise DeviceError(
+                "joystick", f"it cannot be opened: {error}; check the permissions of /dev/input"
+            ) from None
         given = self._config.triggers
         self._triggers = triggers_of(index) if given is None else frozenset(given)
         self._look_at_buttons()
@@ -95,7 +97,7 @@ class Joystick(Device):
         if self._joystick is None:
             raise DeviceError("joystick", "it is not open")
         self._fetch(timeout_s)
-        self._take_events()
+        self._apply_events()
         if not self._is_new:
             return None
         self._is_new = False
@@ -118,12 +120,12 @@ class Joystick(Device):
         self.rumble(strength, strength)
 
     def rumble(self, strong: float, weak: float) -> None:
-        """Rumbles for a moment with the strong and the weak motor, each from 0 to 1."""
+        """Rumbles for `RUMBLE_MS` with the strong and the weak motor, each from 0 to 1."""
         if self._joystick is not None:
             self._joystick.rumble(strong, weak, RUMBLE_MS)
 
     def move_virtual(self, axes: Sequence[float], buttons: Sequence[int]) -> None:
-        """Moves the gamepad that is not there, see `VirtualJoystick.move`."""
+        """Moves the virtual gamepad, see `VirtualJoystick.move`."""
         if self._virtual is not None:
             self._virtual.move(axes, buttons)
 
@@ -133,17 +135,20 @@ class Joystick(Device):
         if name is not None:
             found = [index for index, each in enumerate(names) if name in each]
             if not found:
-                raise DeviceError("joystick", f"none is called '{name}'; there are {', '.join(names) or 'none'}")
+                raise DeviceError("joystick", f"no joystick is called '{name}'; there are {', '.join(names) or 'none'}")
             return found[0]
         number = int(re.findall(r"\d+$", self._config.dev)[0])
         if number >= len(names):
-            raise DeviceError("joystick", f"there is no number {number}; there are {', '.join(names) or 'none'}")
+            raise DeviceError(
+                "joystick", f"there is no joystick number {number}; there are {', '.join(names) or 'none'}"
+            )
         return number
 
     def _fetch(self, timeout_s: float) -> None:
-        """Waits for events if none wait.
+        """Waits for events if none are queued.
 
-        pygame 2.1 loses what has come when a joystick goes that nobody has opened; then all is looked at anew.
+        pygame 2.1 loses the queued events when a joystick goes that was never opened; then the whole state is read
+        again.
         """
         event = self._pygame.event
         try:
@@ -162,8 +167,8 @@ class Joystick(Device):
         joystick = self._joystick
         self._pressed = [joystick.get_button(number) for number in range(joystick.get_numbuttons())]
 
-    def _take_events(self) -> None:
-        """Notes what has happened, up to the next button, so that the shortest tap is a reading."""
+    def _apply_events(self) -> None:
+        """Applies the queued events up to the next button, so that the shortest press results in a reading."""
         pygame, ours = self._pygame, self._joystick.get_instance_id()
         while self._events:
             event = self._events.popleft()
@@ -197,9 +202,9 @@ class Joystick(Device):
 
 
 def axis_of(raw: int, deadzone: float) -> float:
-    """Returns an axis in [-1, 1] from what the hardware says, from -32768 to 32767, which has the other sign.
+    """Returns an axis in [-1, 1] from its raw value, from -32768 to 32767, which has the opposite sign.
 
-    Within the dead zone, a share of the full way, it is 0; from there it rises to 1 at the end.
+    The axis is 0 within the dead zone, a share of the full range, and rises from there to 1 at the end.
     """
     beyond = max(0.0, abs(raw) - FULL * deadzone)
     return -math.copysign(min(1.0, beyond / (FULL * (1.0 - deadzone))), raw) if beyond else 0.0

@@ -1,4 +1,4 @@
-"""The keyboard by a terminal, which says when a key goes down, and not when it goes up."""
+"""The keyboard read through a terminal, which reports when a key goes down but not when it goes up."""
 
 import contextlib
 import os
@@ -30,13 +30,13 @@ SEQUENCES = {
     **{f"O{end}": f"F{number}" for number, end in enumerate("PQRS", 1)},
     **{f"[{code}~": f"F{number}" for number, code in enumerate((15, 17, 18, 19, 20, 21, 23, 24), 5)},
 }
-"""Names of keys by what follows an escape, as xterm and VT100 send it."""
+"""Names of keys by the characters that follow an escape, as xterm and VT100 send them."""
 CONTROLS = {"\x7f": "BACKSPACE", "\b": "BACKSPACE", "\t": "TAB", "\r": "RETURN", "\n": "RETURN", ESCAPE: "ESCAPE"}
-MOST_BYTES = 4096
+MAX_BYTES = 4096
 
 
 def codes_in(text: str) -> list[int]:
-    """Returns the codes of the keys that a terminal sent; 0 for those that have none."""
+    """Returns the codes of the keys that a terminal sent; 0 for keys without a code."""
     codes = []
     while text:
         length = next((n for n in (4, 3, 2) if text[0] == ESCAPE and text[1 : 1 + n] in SEQUENCES), 0)
@@ -48,16 +48,16 @@ def codes_in(text: str) -> list[int]:
 
 
 class KeyTerminal:
-    """Notes the keys that are typed at the terminal; each counts as held for a time after it came last.
+    """Records the keys that are typed in the terminal; each counts as held for a time after its last repetition.
 
-    A terminal repeats a key that is held, but begins so only after half a second: the time is to be longer.
+    A terminal starts to repeat a held key only after about half a second: `hold_s` should be longer.
 
     Args:
-        keys: Where it notes them.
-        hold_s: The time [s].
+        keys: Receives the keys.
+        hold_s: Time for which a key counts as held [s].
 
     Raises:
-        DeviceError: If there is no terminal.
+        DeviceError: If standard input is no terminal.
     """
 
     def __init__(self, keys: HeldKeys, hold_s: float) -> None:
@@ -71,7 +71,7 @@ class KeyTerminal:
             raise DeviceError("keyboard", f"its standard input is no terminal: {error}") from None
 
     def wait(self, timeout_s: float) -> None:
-        """Deals with what was typed, or waits for it.
+        """Processes typed keys, or waits for one.
 
         Raises:
             DeviceError: If the terminal has gone.
@@ -79,10 +79,12 @@ class KeyTerminal:
         due_s = min(self._until_s.values(), default=float("inf"))
         timeout_s = max(0.0, min(timeout_s, due_s - time.monotonic()))
         is_typed = select.select([self._file], [], [], timeout_s)[0]
-        now_s = time.monotonic()  # for both: what is typed now is held once at least, however long this takes
+        now_s = (
+            time.monotonic()
+        )  # one time for both: a key typed now is held for at least one call, however long this takes
         if is_typed:
             try:
-                typed = os.read(self._file, MOST_BYTES)
+                typed = os.read(self._file, MAX_BYTES)
             except OSError as error:
                 raise DeviceError("keyboard", f"its terminal has gone: {error}") from None
             if not typed:
@@ -96,6 +98,6 @@ class KeyTerminal:
                 self._keys.release(code)
 
     def close(self) -> None:
-        """Leaves the terminal as it was."""
+        """Restores the settings of the terminal."""
         with contextlib.suppress(termios.error):
-            termios.tcsetattr(self._file, termios.TCSANOW, self._settings)  # it does not wait for output
+            termios.tcsetattr(self._file, termios.TCSANOW, self._settings)  # TCSANOW does not wait for output

@@ -1,4 +1,4 @@
-"""A window that takes the keyboard."""
+"""A window that reads the keyboard."""
 
 import math
 import time
@@ -9,13 +9,14 @@ from typing import NamedTuple
 from operator_node.key_axes import KEY_CODES
 
 from .held_keys import CAPS_LOCK, NUM_LOCK, HeldKeys
-from .window import INK, Window
+from .window import INK, DeviceWindow
 
 WIDTH_PX, HEIGHT_PX = 420, 220
 LOCKS = {0x02: CAPS_LOCK, 0x10: NUM_LOCK}
-"""Bit of a lock by its bit in an event's state."""
+"""Modifier bit of each lock, by its bit in the state of an event."""
 REPEAT_GAP_S = 0.003
-"""X says of a key that is held that it goes up and in the same moment down again; so long the second is waited for."""
+"""Time to wait for the second half of a repetition [s]: X reports a held key as going up and, at the same time, down.
+"""
 NAMES = {
     "BackSpace": "BACKSPACE",
     "Tab": "TAB",
@@ -78,13 +79,13 @@ NAMES = {
     "EuroSign": "EURO",
     "Undo": "UNDO",
 }
-"""Names of keys by those that X gives to their symbols; all others are characters, whose codes are theirs."""
+"""Names of keys by the names of X symbols; all other symbols are characters, with their own codes."""
 CODES = frozenset(KEY_CODES.values())
-SHOWN = {code: name for name, code in KEY_CODES.items()}
+NAME_OF_CODE = {code: name for name, code in KEY_CODES.items()}
 
 
 def code_of(name: str, number: int) -> int:
-    """Returns the code of a symbol of X by its name and number; 0 if it has none."""
+    """Returns the code of an X symbol by its name and number; 0 if it has none."""
     if name in NAMES:
         return KEY_CODES[NAMES[name]]
     code = ord(chr(number).lower()) if ord("A") <= number <= ord("Z") else number
@@ -92,13 +93,13 @@ def code_of(name: str, number: int) -> int:
 
 
 class Rising(NamedTuple):
-    """A key that goes up, unless X says that it has gone down in the same moment.
+    """A key that goes up, unless X reports that it goes down at the same time.
 
     Attributes:
         place: Its place on the keyboard.
-        time: The moment, by X.
-        locks: The locks that were on.
-        due_s: When it has gone up, by `time.monotonic`.
+        time: Time of the event, by X.
+        locks: Bits of the locks that were on.
+        due_s: Time from which it counts as released, by `time.monotonic`.
     """
 
     place: int
@@ -108,24 +109,24 @@ class Rising(NamedTuple):
 
 
 class KeyWindow:
-    """Notes the keys that are pressed while its window has the keyboard, and shows those that are held.
+    """Records the keys that are pressed while its window has the focus, and shows those that are held.
 
     Args:
-        keys: Where it notes them.
+        keys: Receives the keys.
         explanation: Lines that the window shows.
 
     Raises:
-        DeviceError: If there is no screen.
+        DeviceError: If there is no display.
     """
 
     def __init__(self, keys: HeldKeys, explanation: Sequence[str]) -> None:
         self._keys, self._explanation = keys, explanation
         self._codes: dict[int, int] = {}
-        """Code of each key that is held by its place on the keyboard: its symbol depends on others."""
+        """Code of each held key by its place on the keyboard, since its symbol depends on modifiers."""
         self._rising: Rising | None = None
         self._has_focus = False
         self._drawn: object = None
-        self._window = window = Window("keyboard", "keyboard", WIDTH_PX, HEIGHT_PX)
+        self._window = window = DeviceWindow("keyboard", "keyboard", WIDTH_PX, HEIGHT_PX)
         window.bind("<KeyPress>", self._press)
         window.bind("<KeyRelease>", self._release)
         window.bind("<FocusIn>", lambda _: self._set_focus(True))
@@ -135,12 +136,12 @@ class KeyWindow:
         self._draw()
 
     def wait(self, timeout_s: float) -> None:
-        """Deals with what has happened, or happens next; see `Window.wait`."""
+        """Processes queued events, or waits for the next one; see `DeviceWindow.wait`."""
         now_s = time.monotonic()
         due_s = self._rising.due_s if self._rising else math.inf
         self._window.wait(max(0.0, min(timeout_s, due_s - now_s)))
         if self._is_due():
-            self._window.wait(0.0)  # on a busy machine it may be late, and what it waits for there already
+            self._window.wait(0.0)  # a busy machine may be late, and the awaited event be queued already
             if self._is_due():
                 self._let_rise()
         if self._drawn != (tuple(self._keys.codes), self._has_focus):
@@ -151,7 +152,7 @@ class KeyWindow:
         self._window.close()
 
     def _is_due(self) -> bool:
-        """Returns whether a key that X said goes up has gone up."""
+        """Returns whether a key that X reported as going up counts as released."""
         return self._rising is not None and time.monotonic() >= self._rising.due_s
 
     def _press(self, event: "Event[Misc]") -> None:
@@ -184,7 +185,7 @@ class KeyWindow:
         self._drawn = (tuple(self._keys.codes), self._has_focus)
         canvas = self._window.canvas
         canvas.delete("all")
-        held = "  ".join(SHOWN.get(code, "?") for code in self._keys.codes)
+        held = "  ".join(NAME_OF_CODE.get(code, "?") for code in self._keys.codes)
         if not self._has_focus:
             held = "click here to use the keyboard"
         canvas.create_text(16, 16, anchor="nw", text=held, fill="#1060c0", font=("TkFixedFont", 16))

@@ -19,26 +19,30 @@ Milliseconds = Annotated[Positive, Unit("ms")]
 
 
 class KeyboardConfig(ConfigModel):
-    """Which keys are axes and buttons, and how keys repeat."""
+    """Keys of axes and buttons, and the repetition of keys."""
 
-    axes: ListOf[KeyPair] = Field((), description="For each axis of `joy`, the negative and the positive key.")
-    buttons: ListOf[KeyName] = Field((), description="For each button of `joy`, its key.")
-    allow_repeat: Switch = Field(False, description="Whether a key that is held goes down again and again.")
-    repeat_delay: Milliseconds = Field(500.0, description="How long it is held until then.")
-    repeat_interval: Milliseconds = Field(30.0, description="How often it then does.")
-    terminal: Switch = Field(
-        False, description="Whether keys are read from the terminal, in place of a window; there, no key goes up."
+    axes: ListOf[KeyPair] = Field((), description="Negative and positive key of each axis of `joy`.")
+    buttons: ListOf[KeyName] = Field((), description="Key of each button of `joy`.")
+    allow_repeat: Switch = Field(
+        False, description="Whether a key that is held is reported as going down again and again."
     )
-    terminal_hold_s: Seconds = Field(0.6, description="How long a key of the terminal counts as held.")
+    repeat_delay: Milliseconds = Field(500.0, description="Time for which a key is held before it repeats.")
+    repeat_interval: Milliseconds = Field(30.0, description="Period of the repetition.")
+    terminal: Switch = Field(
+        False,
+        description="Whether keys are read from the terminal instead of a window; a terminal does not report when a "
+        "key goes up.",
+    )
+    terminal_hold_s: Seconds = Field(0.6, description="Time for which a key typed in the terminal counts as held.")
 
 
 class Keyboard(Device):
     """Keys that are pressed in a window of its own, or in the terminal.
 
-    Its events are each `KeyEvent`. When the window is not the one that is typed into, nothing is held.
+    Its events are of type `KeyEvent`. No key is held while the window does not have the focus.
 
     Raises:
-        ConfigError: If the terminal is asked for, and there is none.
+        ConfigError: If `terminal` is set and standard input is no terminal.
     """
 
     Config = KeyboardConfig
@@ -66,8 +70,9 @@ class Keyboard(Device):
     def read(self, timeout_s: float) -> Reading | None:
         if self._source is None:
             raise DeviceError("keyboard", "it is not open")
-        self._source.wait(max(0.0, min(timeout_s, self._keys.repeat_at_s - time.monotonic())))
-        events = self._keys.take_events()
+        if not (self._is_new and self._config.terminal):  # no key of a terminal can be held before it is typed there
+            self._source.wait(max(0.0, min(timeout_s, self._keys.repeat_at_s - time.monotonic())))
+        events = self._keys.drain_events()
         if not events and not self._is_new:
             return None
         self._is_new = False

@@ -9,31 +9,32 @@ from pydantic import Field
 from custom_ros_tools.schema import ConfigModel, Fraction, Seconds
 from operator_node.device import Device, DeviceError, Reading
 
-from .window import INK, Window
+from .window import INK, DeviceWindow
 
 SIZE_PX = 400
 RADIUS_PX = 12
 BUTTONS = {1: 0, 2: 1, 3: 2}
-"""Index of each button by its number in X."""
+"""Index of each button by its X number."""
 WHEEL_STEPS = {4: 1.0, 5: -1.0}
-"""Signs of the wheel, which X has as buttons."""
+"""Sign of each direction of the wheel, by its X button number."""
 DRAGGING = 0x100
-"""The bit of an event's state that says that the left button is held."""
-HELP = "drag: x, y    wheel: z    let go: stop"
+"""Bit of an event's state that is set while the left button is held."""
+HELP = "drag: x, y    wheel: z    release: stop"
 
 
 class MouseConfig(ConfigModel):
-    """How much a mouse does."""
+    """Scaling of the wheel."""
 
-    wheel_step: Fraction = Field(0.25, description="How far one notch of the wheel moves its axis.")
-    wheel_return_s: Seconds = Field(0.3, description="How long after the last notch that axis is 0 again.")
+    wheel_step: Fraction = Field(0.25, description="Distance that one notch of the wheel moves its axis.")
+    wheel_return_s: Seconds = Field(0.3, description="Time after the last notch at which that axis returns to 0.")
 
 
 class Mouse(Device):
     """A mouse that is dragged in a window of its own.
 
-    Axes are `x` to the right and `y` up, from where the left button went down, as a share of half the window; and
-    `wheel`, away from the person, which returns to 0 after a time. All are 0 when the button is let go.
+    Axes are `x` to the right and `y` up, measured from the point where the left button went down, as a share of half
+    the window; and `wheel`, positive away from the user, which returns to 0 after a time. `x` and `y` are 0 when the
+    button is released.
     """
 
     Config = MouseConfig
@@ -42,7 +43,7 @@ class Mouse(Device):
 
     def __init__(self, config: MouseConfig) -> None:
         self._config = config
-        self._window: Window | None = None
+        self._window: DeviceWindow | None = None
         self._origin: tuple[int, int] | None = None
         self._drag = (0.0, 0.0)
         self._held = [0, 0, 0]
@@ -51,7 +52,7 @@ class Mouse(Device):
 
     def open(self) -> None:
         self._reset()
-        self._window = window = Window("mouse", "mouse", SIZE_PX, SIZE_PX)
+        self._window = window = DeviceWindow("mouse", "mouse", SIZE_PX, SIZE_PX)
         window.bind("<ButtonPress>", self._press)
         window.bind("<ButtonRelease>", self._release)
         window.bind("<Motion>", self._move)
@@ -63,7 +64,7 @@ class Mouse(Device):
         if self._window is None:
             raise DeviceError("mouse", "it is not open")
         self._window.wait(max(0.0, min(timeout_s, self._wheel_over_s - time.monotonic())))
-        if not self._is_new and time.monotonic() >= self._wheel_over_s:  # each turn of the wheel is told before
+        if not self._is_new and time.monotonic() >= self._wheel_over_s:  # each motion of the wheel is reported first
             self._wheel, self._wheel_over_s, self._is_new = 0.0, math.inf, True
         if not self._is_new:
             return None
@@ -105,7 +106,7 @@ class Mouse(Device):
     def _move(self, event: "Event[Misc]") -> None:
         if self._origin is None or self._window is None:
             return
-        if not int(event.state) & DRAGGING:  # another program, such as a lock of the screen, has had the release
+        if not int(event.state) & DRAGGING:  # another program, such as a screen lock, has received the release
             self._reset()
             return
         half_width, half_height = self._half_size()
@@ -119,7 +120,7 @@ class Mouse(Device):
         return max(canvas.winfo_width(), 2) / 2, max(canvas.winfo_height(), 2) / 2
 
     def _draw(self) -> None:
-        """Shows the drag as an arrow from the middle, the wheel as a bar, and what to do."""
+        """Draws the drag as an arrow from the middle, the wheel as a bar, and the instructions."""
         if self._window is None:
             return
         canvas = self._window.canvas

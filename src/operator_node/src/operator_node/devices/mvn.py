@@ -14,12 +14,12 @@ logger = logging.getLogger(__name__)
 
 
 class Mvn(Device):
-    """People as MVN streams them.
+    """People as streamed by MVN.
 
-    Its axes are how far the right and the left hand of person 0 are forward, left and up from where they were in the
-    first frame, in lengths of the arm, seen from the pelvis. After silence they count anew from the next frame. Its
-    events are those of `Receiver.poll`. It is there as soon as it listens, whether anybody sends or not: a stream that
-    ceases is a `Silence` and a reading at rest, and goes on with the first frame that comes.
+    Its axes are the displacements of the right and the left hand of person 0 forward, left and up since the first
+    frame, in arm lengths, relative to the pelvis. After a silence they are measured from the next frame. Its events are
+    those of `Receiver.poll`. The device is open as soon as it listens, whether there is a sender or not. A stream that
+    ceases is reported as a `Silence` and a reading at rest; it resumes with the next frame.
     """
 
     Config = MvnConfig
@@ -34,24 +34,24 @@ class Mvn(Device):
 
     @property
     def counts(self) -> Counter[str]:
-        """What became of the datagrams, by what."""
+        """Number of datagrams by result."""
         return self.receiver.counts
 
     def open(self) -> None:
-        """Listens; whether anybody sends, only frames tell."""
+        """Starts to listen; only frames show whether there is a sender."""
         config = self.receiver.config
         self._release()
         try:
             self.receiver.open()
         except OSError as error:
-            in_use = "; does another program take the stream?" if error.errno == errno.EADDRINUSE else ""
+            in_use = "; does another program receive the stream?" if error.errno == errno.EADDRINUSE else ""
             raise DeviceError(
                 "mvn", f"cannot listen at {config.host}:{config.port}: {error.strerror}{in_use}"
             ) from None
         logger.info("mvn: listening at %s:%d", config.host, self.receiver.port)
 
     def read(self, timeout_s: float) -> Reading | None:
-        """Returns the hands at the newest frame, and all that came; zeros when the frames of person 0 cease."""
+        """Returns the hands at the newest frame, and all events; zeros once frames of person 0 have ceased."""
         if not self.receiver.port:
             raise DeviceError("mvn", "it is closed")
         try:
@@ -69,7 +69,7 @@ class Mvn(Device):
         return Reading(self._values, (), tuple(event for event in events if not isinstance(event, Refused)), refused)
 
     def close(self) -> None:
-        """Listens no more."""
+        """Stops listening."""
         self.receiver.close()
         self._release()
 

@@ -1,4 +1,4 @@
-"""SDL by pygame, without its windows and sounds."""
+"""SDL joysticks through pygame, without windows and sound."""
 
 import os
 from typing import Any
@@ -7,14 +7,14 @@ from custom_ros_tools.errors import MissingDependency
 
 SETTINGS = {
     "PYGAME_HIDE_SUPPORT_PROMPT": "1",
-    "SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS": "1",  # it would wait for a window of its own to be typed into
+    "SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS": "1",  # otherwise it only reads while a window of its own has the focus
     "SDL_NO_SIGNAL_HANDLERS": "1",
     "SDL_VIDEODRIVER": "dummy",
 }
 
 
 def pygame_with_joysticks() -> Any:
-    """Returns pygame with its joysticks switched on, which it finds from then on, and loses, with its events.
+    """Returns pygame with joysticks enabled; from then on its events report joysticks that come and go.
 
     Raises:
         MissingDependency: If pygame is not installed.
@@ -25,14 +25,14 @@ def pygame_with_joysticks() -> Any:
         from pygame._sdl2 import controller
     except ModuleNotFoundError as error:
         raise MissingDependency(str(error.name), "apt install python3-pygame") from None
-    pygame.display.init()  # which its events need
+    pygame.display.init()  # needed by its events
     pygame.joystick.init()
     controller.init()
     return pygame
 
 
 def triggers_of(index: int) -> frozenset[int]:
-    """Returns which axes of the joystick of an index rest at one end, by SDL's table of gamepads."""
+    """Returns the axes of a joystick, by its index, that rest at one end, according to SDL's table of gamepads."""
     from pygame._sdl2 import controller
 
     if not controller.is_controller(index):

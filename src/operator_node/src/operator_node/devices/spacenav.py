@@ -1,4 +1,4 @@
-"""A 6-D mouse, by the daemon spacenavd or another one that speaks its protocol."""
+"""A 6-D mouse, through spacenavd or another daemon that speaks its protocol."""
 
 import contextlib
 import math
@@ -20,48 +20,48 @@ SOCKET, SETTINGS = "/var/run/spnav.sock", "/etc/spnavrc"
 PACKET = struct.Struct("=8i")
 WORD = struct.Struct("=i")
 REQUEST = 0x7FAA0000
-"""What is added to the types of requests, and of the answers to them."""
+"""Offset that marks the types of requests and of their answers."""
 PROTOCOL_TAG = REQUEST | 0x5500
 PROTOCOL_MASK = 0x7FFFFF00
-"""All but the version in the word by which a version is agreed on."""
+"""All bits except the version in the word that negotiates the version."""
 SENSITIVITY = struct.pack("=f", 1.0)
 MOTION, PRESS, RELEASE, DEVICE, LAST_EVENT = 0, 1, 2, 3, 6
-"""Types of packets; those up to the last one are events."""
+"""Types of packets; all from 0 to LAST_EVENT are events."""
 GET_BUTTONS = REQUEST | 0x2003
 ANSWERS = range(REQUEST | 0x1000, REQUEST | 0x4000)
 ANSWER_TIMEOUT_S = 0.3
-LARGEST = 32767
-"""No 6-D mouse says more."""
-MOST_BUTTONS = 64
-MOST_REFUSED = 8
-"""After so many packets in a row that make no sense, it is another protocol."""
+MAX_VALUE = 32767
+"""Largest value of any 6-D mouse; larger ones are refused."""
+MAX_BUTTONS = 64
+MAX_REFUSED = 8
+"""Number of consecutive invalid packets after which the protocol counts as unknown."""
 POLL_S = 0.001
-"""What the count of quiet polls counts in."""
+"""Length of one poll of `static_count_threshold` [s]."""
 
 Scale = Annotated[float | Vec3, Field()]
 
 
 class SpacenavConfig(ConfigModel):
-    """Of a 6-D mouse; the names are those of `spacenav_node`."""
+    """A 6-D mouse; the names are those of `spacenav_node`."""
 
     socket: Text | None = optional(
-        f"Socket of the daemon; by default `$SPNAV_SOCKET`, then what `{SETTINGS}` says, then `{SOCKET}`."
+        f"Socket of the daemon; by default `$SPNAV_SOCKET`, then the one in `{SETTINGS}`, then `{SOCKET}`."
     )
-    full_scale: Positive = Field(512.0, description="What the device says at the end of an axis.")
+    full_scale: Positive = Field(512.0, description="Raw value of the device at the end of an axis.")
     linear_scale: Scale = Field(1.0, description="Factor of `spacenav/offset` and the twist, one or one for each axis.")
     angular_scale: Scale = Field(1.0, description="Factor of `spacenav/rot_offset` and the twist, likewise.")
-    zero_when_static: Switch = Field(True, description="Whether all is 0 when nothing has come for a time.")
-    static_count_threshold: Count = Field(30, description="How long that time is [ms].")
+    zero_when_static: Switch = Field(True, description="Whether all axes become 0 after a time without events.")
+    static_count_threshold: Count = Field(30, description="Length of that time [ms].")
     static_trans_deadband: NonNegative = Field(
-        0.1, description="Without `zero_when_static`: how large the axes x, y and z may be to be 0 then."
+        0.1, description="Without `zero_when_static`: x, y and z become 0 after that time if all are smaller than this."
     )
-    static_rot_deadband: NonNegative = Field(0.1, description="The same of the other three.")
+    static_rot_deadband: NonNegative = Field(0.1, description="The same for the other three axes.")
 
 
 class Spacenav(Device):
     """A 6-D mouse.
 
-    Axes are x forward, y left, z up and the turns about them, as shares of the full scale.
+    Axes are x forward, y left, z up and the rotations about them, as shares of the full scale.
     """
 
     Config = SpacenavConfig
@@ -103,13 +103,13 @@ class Spacenav(Device):
     def read(self, timeout_s: float) -> Reading | None:
         if self._socket is None:
             raise DeviceError("spacenav", "it is not open")
-        if self._refused_in_a_row >= MOST_REFUSED:
-            raise DeviceError("spacenav", "what it sends is not spacenavd's protocol")
+        if self._refused_in_a_row >= MAX_REFUSED:
+            raise DeviceError("spacenav", "the data received are not spacenavd's protocol")
         if not self._packets():
             self._receive(max(0.0, min(timeout_s, self._static_at_s - time.monotonic())))
         for packet in self._packets():
-            self._take(packet)
-            if packet[0] in (PRESS, RELEASE) or self._refused_in_a_row >= MOST_REFUSED:
+            self._process(packet)
+            if packet[0] in (PRESS, RELEASE) or self._refused_in_a_row >= MAX_REFUSED:
                 break
         if time.monotonic() >= self._static_at_s:
             self._come_to_rest()
@@ -136,7 +136,7 @@ class Spacenav(Device):
     # --- The connection.
 
     def _agree(self) -> int:
-        """Asks for protocol 1 and returns which one it is; daemons that know only 0 do not answer."""
+        """Requests protocol 1 and returns the one in use; daemons that only have 0 do not answer."""
         self._send(WORD.pack(PROTOCOL_TAG | 1))
         end_s = time.monotonic() + ANSWER_TIMEOUT_S
         while len(self._received) < WORD.size:
@@ -145,19 +145,19 @@ class Spacenav(Device):
                 return 0
         (answer,) = WORD.unpack_from(self._received)
         if answer & PROTOCOL_MASK != PROTOCOL_TAG:
-            return 0  # the beginning of an event
+            return 0  # the start of an event
         del self._received[: WORD.size]
         return 1
 
     def _ask(self, request: int) -> int | None:
-        """Returns the first number of the answer, None if it is a refusal; events that come first are taken."""
+        """Returns the first number of the answer, or None if the request was rejected; earlier events are processed."""
         self._send(PACKET.pack(request, *[0] * 7))
         end_s = time.monotonic() + ANSWER_TIMEOUT_S
         while time.monotonic() < end_s:
             for packet in self._packets():
                 if packet[0] == request:
                     return packet[1] if packet[7] == 0 else None
-                self._take(packet)
+                self._process(packet)
             self._receive(max(0.0, end_s - time.monotonic()))
         raise DeviceError("spacenav", "spacenavd does not answer")
 
@@ -169,7 +169,7 @@ class Spacenav(Device):
             raise DeviceError("spacenav", f"spacenavd has gone: {error.strerror or error}") from None
 
     def _receive(self, timeout_s: float) -> bool:
-        """Waits for bytes and returns whether some came."""
+        """Waits for bytes; returns whether some were received."""
         assert self._socket is not None
         if not select.select([self._socket], [], [], timeout_s)[0]:
             return False
@@ -185,9 +185,9 @@ class Spacenav(Device):
     def _packets(self) -> "_Packets":
         return _Packets(self._received)
 
-    # --- What it says.
+    # --- The packets.
 
-    def _take(self, packet: Sequence[int]) -> None:
+    def _process(self, packet: Sequence[int]) -> None:
         reason = self._problem_of(packet)
         if reason is not None:
             self._refused.append(reason)
@@ -211,23 +211,23 @@ class Spacenav(Device):
 
     def _problem_of(self, packet: Sequence[int]) -> str | None:
         kind = packet[0]
-        if kind == MOTION and not all(-LARGEST <= each <= LARGEST for each in packet[1:7]):
-            return f"a motion beyond {LARGEST}"
-        if kind in (PRESS, RELEASE) and not 0 <= packet[1] < MOST_BUTTONS:
-            return f"a button outside 0 to {MOST_BUTTONS - 1}"
+        if kind == MOTION and not all(-MAX_VALUE <= each <= MAX_VALUE for each in packet[1:7]):
+            return f"a motion beyond {MAX_VALUE}"
+        if kind in (PRESS, RELEASE) and not 0 <= packet[1] < MAX_BUTTONS:
+            return f"a button outside 0 to {MAX_BUTTONS - 1}"
         if not (0 <= kind <= LAST_EVENT or kind in ANSWERS):
             return "a packet of an unknown type"
         return None
 
     def _have_buttons(self, count: int) -> None:
-        """Has at least so many buttons; some devices say only with its event that one is there."""
-        missing = min(count, MOST_BUTTONS) - len(self._pressed)
+        """Extends the buttons to a number; some devices reveal a button only by its first event."""
+        missing = min(count, MAX_BUTTONS) - len(self._pressed)
         if missing > 0:
             self._pressed += [0] * missing
             self.buttons = [*map(str, range(len(self._pressed)))]
 
     def _come_to_rest(self) -> None:
-        """Sets to 0 what has not moved for a time."""
+        """Sets axes that have not moved for a time to 0."""
         config = self.config
         linear, angular = self._motion[:3], self._motion[3:]
         if config.zero_when_static or all(abs(each) < config.static_trans_deadband for each in linear):
@@ -240,7 +240,7 @@ class Spacenav(Device):
 
 
 class _Packets:
-    """Takes whole packets out of what was received."""
+    """Iterates over the complete packets of a receive buffer, and removes them."""
 
     def __init__(self, received: bytearray) -> None:
         self._received = received
@@ -260,7 +260,7 @@ class _Packets:
 
 
 def socket_path() -> str:
-    """Returns where the socket of the daemon is, as libspnav finds it."""
+    """Returns the path of the daemon's socket, determined like libspnav does."""
     given = os.environ.get("SPNAV_SOCKET")
     if given:
         return given

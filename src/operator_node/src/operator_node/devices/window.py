@@ -11,20 +11,20 @@ from operator_node.device import DeviceClosedError, DeviceError
 BACKGROUND, INK = "#fafafa", "#202020"
 
 
-class Window:
-    """A window with a drawing area in it.
+class DeviceWindow:
+    """A window with a drawing area.
 
     Args:
-        device: What the device is called in messages.
+        device: Name of the device in messages.
         title: Title of the window.
-        width: Columns of the drawing area at first [px].
-        height: Its rows at first [px].
+        width: Initial width of the drawing area [px].
+        height: Its initial height [px].
 
     Attributes:
-        canvas: The drawing area; it takes the whole window.
+        canvas: The drawing area; it fills the window.
 
     Raises:
-        DeviceError: If there is no screen.
+        DeviceError: If there is no display.
     """
 
     def __init__(self, device: str, title: str, width: int, height: int) -> None:
@@ -32,32 +32,32 @@ class Window:
         try:
             self._root = tkinter.Tk()
         except tkinter.TclError as error:
-            raise DeviceError(device, f"there is no screen for its window: {error}; set DISPLAY") from None
+            raise DeviceError(device, f"there is no display for its window: {error}; set DISPLAY") from None
         self._root.title(title)
         self._root.protocol("WM_DELETE_WINDOW", self._note_closed)
         self.canvas = tkinter.Canvas(self._root, width=width, height=height, background=BACKGROUND)
         self.canvas.configure(highlightthickness=0)
         self.canvas.pack(fill="both", expand=True)
 
-    def bind(self, sequence: str, take: Any) -> None:
-        """Has a function take events, named as tkinter names them, wherever in the window they are."""
-        self._root.bind(sequence, take)
+    def bind(self, sequence: str, callback: Any) -> None:
+        """Binds a function to events, by their tkinter names, anywhere in the window."""
+        self._root.bind(sequence, callback)
 
     def focus(self) -> None:
-        """Asks for the keyboard."""
+        """Requests the keyboard focus."""
         self._root.focus_force()
 
     def wait(self, timeout_s: float) -> None:
-        """Deals with the events that have come; if there are none, with the next one.
+        """Processes the queued events; if there are none, the next one.
 
         Args:
-            timeout_s: How long to wait for it [s]; 0 does not wait.
+            timeout_s: Longest time to wait for it [s]; 0 does not wait.
 
         Raises:
-            DeviceClosedError: If the person has closed the window.
-            DeviceError: If the window has gone otherwise.
+            DeviceClosedError: If the user has closed the window.
+            DeviceError: If the window has gone for another reason.
         """
-        # Errors that a caller keeps must keep no frame that knows the interpreter, see `close`.
+        # An error that a caller stores must not reference a frame that references the interpreter, see `close`.
         failure = self._failure_of_waiting(timeout_s)
         if failure:
             raise DeviceError(self._device, f"its window has gone: {failure}")
@@ -65,7 +65,7 @@ class Window:
             raise DeviceClosedError(self._device, "its window was closed")
 
     def _failure_of_waiting(self, timeout_s: float) -> str:
-        """Deals with events; returns why that cannot be, empty if it can."""
+        """Processes events; returns why this failed, or the empty string."""
         interpreter = self._root.tk
         try:
             is_over: list[bool] = []
@@ -81,11 +81,11 @@ class Window:
         return ""
 
     def close(self) -> None:
-        """Closes the window; once."""
+        """Closes the window; may be called once."""
         with contextlib.suppress(tkinter.TclError):  # it has gone already
             self._root.destroy()
         del self._root, self.canvas
-        gc.collect()  # here: Tcl aborts the process if another thread happens to free what it has
+        gc.collect()  # here: Tcl aborts the process if another thread happens to free its objects
 
     def _note_closed(self) -> None:
         self._is_closed = True

@@ -9,21 +9,21 @@ from operator_node.avatar.forward import segment_frame
 from operator_node.mvn.segments import SegmentFrame
 
 RAISING_S = 3.0
-"""Time in which the arm is lowered from the T-pose, swung forward and raised, a third of it each [s]."""
+"""Time of lowering the arm from the T-pose, swinging it forward and raising it, a third each [s]."""
 ARMS_DOWN_RAD = 1.3
 SWAY_RAD, SWAY_HZ = 0.02, 0.4
-"""Nobody holds an arm quite still."""
+"""Amplitude and frequency of the sway of a held arm."""
 LEVEL = np.array((0.0, 0.0, 0.0, 1.0))
 
 
 class ArmHeldOut:
-    """A person as a function of time, who looks along x; how they hold the arm is random.
+    """Motion of a person as a function of time, facing x; the pose of the held arm is random.
 
     Args:
         height_m: Body height [m].
-        seed: Of what is random.
-        start: Where the person stands, x and y [m].
-        t_pose_s: For how long the person stands in the T-pose first [s].
+        seed: Seed of the random pose.
+        start: Place of the person, x and y [m].
+        t_pose_s: Time that the person first stands in the T-pose [s].
     """
 
     def __init__(
@@ -35,13 +35,13 @@ class ArmHeldOut:
         self._held = np.radians((random.uniform(-8, 8), random.uniform(74, 86), random.uniform(5, 25)))
         self._phase = random.uniform(0.0, 2.0 * math.pi)
         self.t_pose: Array = segment_frame(self._offsets, self._hips, LEVEL, {}).positions
-        """Origins of the segments in the T-pose (23 x 3) [m]; all are turned as the world is."""
+        """Origins of the segments in the T-pose (23 x 3) [m]; all have the orientation of the world."""
 
     def frame(self, time_s: float) -> SegmentFrame:
         """Returns the segments at a time [s]."""
         since_s = time_s - self._t_pose_s
         thirds = 3.0 * since_s / RAISING_S
-        # forward before up: on a way to the side the hand would meet who stands there
+        # forward before up: on a path to the side, the hand would hit anybody who stands there
         lowered, forward, raised = (_smooth(thirds - begun) for begun in range(3))
         lowered = lowered if self._t_pose_s else 1.0
         up, ahead, elbow = self._held

@@ -1,4 +1,4 @@
-"""The service of a Haply Inverse3 with a hand on it, for those who have none: the same messages on the same port."""
+"""Emulated service of a Haply Inverse3 with a hand on it: the same messages on the same port."""
 
 from __future__ import annotations
 
@@ -15,30 +15,31 @@ from typing import Any
 from websockets.exceptions import ConnectionClosed
 from websockets.legacy.server import serve
 
-from operator_node.haptics.hand import Hand, Press
-from operator_node.haptics.vectors import ZERO
-from rpbi.geometry import Vector, plus
+from operator_node.haptics.hand import Hand, PressMotion
+from robot_model.geometry import ZERO, Vector, plus
 
 DEVICE_ID = "04BA"
 CONTINUED_S = 0.02
-"""A force is felt until the next message, at most for so long [s]."""
+"""Longest time for which a force acts without a further message [s]."""
 STEP_S = 0.001
 PATIENCE_S = 20.0
-"""Beginning and ending take so long at most [s]."""
+"""Longest duration of start and end [s]."""
 
 
 class HaplyEmulator:
-    """One state for each message of a client, after a full one when it connects; no force lasts longer than a message.
+    """Answers each message of a client with one state, after a full one at connection; a force acts until the next
+    message.
 
     Args:
-        wanted: Where the hand wants the handle over time, in the device's axes: x right, y forward, z up [m].
-        key: What it calls the vector of a force; others are ignored.
-        port: 0 for any that is free.
-        mangle: Changes what is sent, to try out clients.
+        wanted: Position to which the hand pulls the handle over time, in the device's axes: x right, y forward, z up
+            [m].
+        key: Key of a force's vector; other keys are ignored.
+        port: 0 for any free one.
+        mangle: Modifies sent messages, to test clients.
 
     Attributes:
-        port: Where it listens.
-        force: What the hand feels now [N].
+        port: The port in use.
+        force: Force on the hand now [N].
         hand: The hand.
     """
 
@@ -59,7 +60,7 @@ class HaplyEmulator:
         """Serves in a thread of its own, until `stop`.
 
         Raises:
-            OSError: If it cannot listen, for instance because another program does on that port.
+            OSError: If it cannot listen, for instance because another program uses the port.
         """
         ready: Future[None] = Future()
 
@@ -74,7 +75,7 @@ class HaplyEmulator:
         ready.result(PATIENCE_S)
 
     def stop(self) -> None:
-        """Hangs up, and serves no more."""
+        """Closes all connections and stops serving."""
         if self._loop is not None:
             self._loop.call_soon_threadsafe(self._ended.set)
             self._thread.join(PATIENCE_S)
@@ -98,7 +99,7 @@ class HaplyEmulator:
         self.force = ZERO
 
     def _obey(self, message: str | bytes) -> None:
-        """Lets the time since the last message pass, and takes the forces of this one, which add up."""
+        """Simulates the time since the last message, and applies the sum of the forces of this one."""
         self._pass_time()
         force = ZERO
         for device in json.loads(message).get("inverse3", []):
@@ -151,11 +152,11 @@ def _named(vector: Vector) -> dict[str, float]:
 
 def main() -> None:
     """Serves until it is interrupted; the hand presses down again and again."""
-    parser = argparse.ArgumentParser(description="Behaves as the service of a Haply Inverse3 with a hand on it.")
-    parser.add_argument("--port", type=int, default=10001, help="where to listen (10001)")
-    parser.add_argument("--key", default="vector", choices=("vector", "values"), help="what forces are called (vector)")
-    parser.add_argument("--depth", type=float, default=0.04, help="how far down the hand presses [m] (0.04)")
+    parser = argparse.ArgumentParser(description="Emulates the service of a Haply Inverse3 with a hand on it.")
+    parser.add_argument("--port", type=int, default=10001, help="port to listen at (10001)")
+    parser.add_argument("--key", default="vector", choices=("vector", "values"), help="key of forces (vector)")
+    parser.add_argument("--depth", type=float, default=0.04, help="depth of the press [m] (0.04)")
     arguments = parser.parse_args()
-    press = Press(arguments.depth)
+    press = PressMotion(arguments.depth)
     emulator = HaplyEmulator(lambda time_s: press.wanted(time_s % press.duration_s), arguments.key, arguments.port)
     asyncio.run(emulator.serve(lambda: print(f"ws://localhost:{emulator.port}", flush=True)))

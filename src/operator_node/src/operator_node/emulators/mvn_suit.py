@@ -22,24 +22,24 @@ from .walking_person import WalkingPerson
 KINDS = (1, 2, 12, 13, 20, 21, 22, 24, 25)
 """Types that it can send."""
 NOISE_RAD = 2e-4
-"""Standard deviation of orientations, which no sensor says twice alike [rad]."""
+"""Standard deviation of the sensor noise of orientations [rad]."""
 INFO_PERIOD = 60
-"""Types 12 and 13 are sent once in so many samples."""
+"""Period of types 12 and 13, in samples."""
 APART_M = 1.2
 _CM = 100.0
 
 
 class Suit:
-    """Makes the datagrams of one person, byte by byte as the protocol has them.
+    """Creates the datagrams of one person, byte for byte as in the protocol.
 
     Args:
         person: Number of the person, from 0.
-        moves: Where the person is at a time.
+        moves: Motion of the person over time.
         kinds: Types to send, of `KINDS`.
-        items: How many items a datagram has at most; with fewer than 23, a frame has several datagrams.
+        items: Largest number of items per datagram; with fewer than 23, a frame has several datagrams.
         noise_rad: Standard deviation of orientations [rad].
-        hz: Samples a second, by which types 21 and 22 get their velocities.
-        seed: Of the noise.
+        hz: Sample rate, for the velocities of types 21 and 22.
+        seed: Seed of the noise.
     """
 
     def __init__(
@@ -57,16 +57,16 @@ class Suit:
         self._name = f"Person{person}"
 
     def datagrams(self, sample: int, time_s: float) -> list[bytes]:
-        """Returns what is sent of a sample at a time [s]."""
+        """Returns the datagrams of a sample at a time [s]."""
         positions, quats = self.pose(time_s)
         return [datagram for kind in self._kinds for datagram in self._of_kind(kind, sample, time_s, positions, quats)]
 
     def frame(self, sample: int, time_s: float, positions: Array, quats: Array) -> list[bytes]:
-        """Returns the datagrams of type 02 of any poses: origins (23 x 3) [m], orientations (23 x 4), x, y, z, w."""
+        """Returns the datagrams of type 02 for given poses: origins (23 x 3) [m], orientations (23 x 4), x, y, z, w."""
         return self._split(2, sample, time_s, self._numbered(positions, quats[:, [3, 0, 1, 2]]))
 
     def pose(self, time_s: float) -> tuple[Array, Array]:
-        """Returns what its sensors say at a time [s]: origins [m] and orientations, x, y, z, w."""
+        """Returns the measurement of its sensors at a time [s]: origins [m] and orientations, x, y, z, w."""
         positions, quats = self._moves.pose(time_s)
         if self._noise_rad:
             noise = Rotation.from_rotvec(self._random.normal(0.0, self._noise_rad, (len(SEGMENTS), 3)))
@@ -136,7 +136,7 @@ class Suit:
 
 
 class Sent(NamedTuple):
-    """A datagram that goes out, and what was done to it: nothing, `duplicate` or `truncated`."""
+    """A datagram that is sent, and its fault: none, `duplicate` or `truncated`."""
 
     data: bytes
     fault: str = ""
@@ -146,7 +146,7 @@ class BadNetwork:
     """Loses, repeats, cuts and swaps datagrams, each with some probability, by a seed.
 
     Attributes:
-        done: How often it did what.
+        done: Number of datagrams by result.
     """
 
     def __init__(
@@ -157,8 +157,8 @@ class BadNetwork:
         self._random = random.Random(seed)
         self._held: Sent | None = None
 
-    def take(self, datagrams: Iterable[bytes]) -> Iterator[Sent]:
-        """Yields what goes out, for some datagrams; one that is swapped goes out after the next."""
+    def transmit(self, datagrams: Iterable[bytes]) -> Iterator[Sent]:
+        """Yields the datagrams that are sent for the given ones; a swapped one follows the next."""
         for data in datagrams:
             number, fault = self._random.random(), ""
             for name, chance in self._chances.items():
@@ -183,7 +183,7 @@ class BadNetwork:
 
 
 def stream(suits: Sequence[Suit], hz: float, first_sample: int = 0) -> Iterator[tuple[float, list[bytes]]]:
-    """Yields the datagrams of each sample of some people, with its time [s], for ever."""
+    """Yields the datagrams of each sample of some people, with its time [s], forever."""
     number = 0
     while True:
         time_s = number / hz
@@ -192,25 +192,27 @@ def stream(suits: Sequence[Suit], hz: float, first_sample: int = 0) -> Iterator[
 
 
 def main() -> int:
-    """Runs the command until Ctrl-C, or for as long as it is told; returns its exit code."""
+    """Runs the command until Ctrl-C or the end of `--seconds`; returns its exit code."""
     parser = sender_arguments("mvn_emulator.py", __doc__)
     parser.add_argument("--hz", type=float, default=60.0, help="samples a second, 1 to 240; by default 60")
-    parser.add_argument("--people", type=int, default=1, help="how many, 1 to 8")
-    parser.add_argument("--height", type=float, default=1.75, help="how tall the first one is [m], 1 to 2.5")
-    parser.add_argument("--speed", type=float, default=0.4, help="how fast they walk [heights/s], 0 to 0.6; 0 stands")
+    parser.add_argument("--people", type=int, default=1, help="number of people, 1 to 8")
+    parser.add_argument("--height", type=float, default=1.75, help="height of the first one [m], 1 to 2.5")
+    parser.add_argument("--speed", type=float, default=0.4, help="walking speed [heights/s], 0 to 0.6; 0 stands")
     parser.add_argument("--arm-held-out", action="store_true", help="they stand and hold out the right arm instead")
     parser.add_argument("--no-reach", action="store_true", help="arms do not reach")
+    parser.add_argument("--t-pose", type=float, default=3.0, metavar="S", help="time in a T-pose at the start [s]")
     parser.add_argument(
-        "--t-pose", type=float, default=3.0, metavar="S", help="for how long they stand in a T-pose first"
+        "--seconds", type=float, default=float("inf"), help="length of the stream [s]; by default forever"
     )
-    parser.add_argument("--seconds", type=float, default=float("inf"), help="how long it streams; by default for ever")
     parser.add_argument("--kinds", type=int, nargs="+", default=[2], choices=KINDS, metavar="N", help=f"types: {KINDS}")
-    parser.add_argument("--items", type=int, default=255, help="most items of a datagram; 23 or more is a whole frame")
+    parser.add_argument(
+        "--items", type=int, default=255, help="largest number of items per datagram; 23 or more is a whole frame"
+    )
     for fault in ("lost", "duplicate", "truncated", "reordered"):
         parser.add_argument(
             f"--{fault}", type=float, default=0.0, metavar="P", help="share of the datagrams, 0 to 0.25"
         )
-    parser.add_argument("--seed", type=int, default=0, help="of noise and faults")
+    parser.add_argument("--seed", type=int, default=0, help="seed of noise and faults")
     options = parser.parse_args(without_ros_arguments(sys.argv[1:]))
     faults = {name: getattr(options, name) for name in ("lost", "duplicate", "truncated", "reordered")}
     limits = {"hz": (1, 240), "people": (1, 8), "height": (1, 2.5), "speed": (0, 0.6), "t_pose": (0, 3600)}
@@ -233,7 +235,7 @@ def main() -> int:
     timed = (
         (time_s, sent.data)
         for time_s, datagrams in _until(options.seconds, stream(suits, options.hz))
-        for sent in network.take(datagrams)
+        for sent in network.transmit(datagrams)
     )
     where = f"{options.host}:{options.port}"
     print(f"streaming {options.people} of {options.height:g} m at {options.hz:g} Hz to {where}", flush=True)

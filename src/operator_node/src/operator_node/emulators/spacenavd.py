@@ -26,23 +26,23 @@ from operator_node.devices.spacenav import (
 )
 
 FULL = 350
-"""What most devices say at the end of an axis."""
+"""Value of most devices at the end of an axis."""
 SET_NAME, SET_SENSITIVITY, SET_MASK, GET_NAME, GET_AXES = (
     REQUEST | number for number in (0x1000, 0x1001, 0x1003, 0x2000, 0x2002)
 )
 EVENT_BITS = {MOTION: 1, PRESS: 2, RELEASE: 2, DEVICE: 4}
 MASK_AT_FIRST = {0: 3, 1: 7}
-"""Which events a client gets that has asked for none, by the version of its protocol."""
+"""Events sent to a client that has not selected any, by the version of its protocol."""
 NAME, CHUNK = b"emulated 6-D mouse", 24
 CONTINUED = 0x10000
 REFUSED = -1
 PERIOD_S = 0.01
 HOLD_S = 1.0
 PATIENCE_S = 5.0
-"""A client that has not read what it was sent for so long is dropped [s]."""
+"""Time without reading after which a client is disconnected [s]."""
 
 
-class Client:
+class SpacenavClient:
     """One client of the daemon."""
 
     def __init__(self, connection: socket.socket) -> None:
@@ -55,9 +55,9 @@ class SpacenavDaemon:
     """Serves a 6-D mouse to any number of clients, until it is closed.
 
     Args:
-        path: The socket; a file that is there is replaced.
-        protocol: Newest version of the protocol that it speaks, 0 or 1.
-        buttons: How many buttons the device has.
+        path: The socket; an existing file is replaced.
+        protocol: Newest supported version of the protocol, 0 or 1.
+        buttons: Number of buttons of the device.
 
     Attributes:
         path: The socket.
@@ -67,7 +67,7 @@ class SpacenavDaemon:
         self.path = Path(path)
         self._protocol, self._buttons = protocol, buttons
         self._is_plugged = True
-        self._clients: list[Client] = []
+        self._clients: list[SpacenavClient] = []
         self._lock = threading.RLock()
         self._wake_reader, self._wake_writer = os.pipe()
         self.path.unlink(missing_ok=True)
@@ -79,35 +79,35 @@ class SpacenavDaemon:
 
     @property
     def clients(self) -> int:
-        """How many clients it has."""
+        """Number of clients."""
         return len(self._clients)
 
     def move(self, x: int, y: int, z: int, rx: int = 0, ry: int = 0, rz: int = 0) -> None:
-        """Says where the cap is: x right, y up, z away from the person, and turns about them."""
-        self._tell(MOTION, x, y, z, rx, ry, rz, 0)
+        """Sends the position of the cap: x right, y up, z away from the user, and rotations about them."""
+        self._broadcast(MOTION, x, y, z, rx, ry, rz, 0)
 
     def press(self, button: int, is_down: bool = True) -> None:
-        """Presses a button, or lets go of it."""
-        self._tell(PRESS if is_down else RELEASE, button, int(is_down))
+        """Presses or releases a button."""
+        self._broadcast(PRESS if is_down else RELEASE, button, int(is_down))
 
     def unplug(self) -> None:
-        """Takes the device away."""
+        """Unplugs the device."""
         self._is_plugged = False
-        self._tell(DEVICE, 1, 0)
+        self._broadcast(DEVICE, 1, 0)
 
     def plug(self) -> None:
-        """Puts the device in."""
+        """Plugs the device in again."""
         self._is_plugged = True
-        self._tell(DEVICE, 0, 0)
+        self._broadcast(DEVICE, 0, 0)
 
     def send(self, data: bytes) -> None:
-        """Sends all clients whatever it is given."""
+        """Sends raw data to all clients."""
         with self._lock:
             for client in [*self._clients]:
                 self._send(client, data)
 
     def close(self) -> None:
-        """Ends all connections."""
+        """Closes all connections."""
         os.write(self._wake_writer, b".")
         self._thread.join(2.0 * PATIENCE_S)
         for client in self._clients:
@@ -126,13 +126,13 @@ class SpacenavDaemon:
             for number in ready:
                 with self._lock:
                     if number in clients:
-                        self._hear(clients[number])
+                        self._receive(clients[number])
                     else:
                         connection = self._listener.accept()[0]
                         connection.settimeout(PATIENCE_S)
-                        self._clients.append(Client(connection))
+                        self._clients.append(SpacenavClient(connection))
 
-    def _hear(self, client: Client) -> None:
+    def _receive(self, client: SpacenavClient) -> None:
         received = b""
         with contextlib.suppress(OSError):
             received = client.socket.recv(4096)
@@ -144,8 +144,8 @@ class SpacenavDaemon:
         while self._answer(client):
             pass
 
-    def _answer(self, client: Client) -> bool:
-        """Deals with one request and returns whether there was one."""
+    def _answer(self, client: SpacenavClient) -> bool:
+        """Processes one request; returns whether there was one."""
         if client.protocol == 1:
             if len(client.received) < PACKET.size:
                 return False
@@ -157,13 +157,13 @@ class SpacenavDaemon:
             return False
         (word,) = WORD.unpack_from(client.received)
         del client.received[: WORD.size]
-        if self._protocol == 1 and word & PROTOCOL_MASK == PROTOCOL_TAG:  # else it is a sensitivity
+        if self._protocol == 1 and word & PROTOCOL_MASK == PROTOCOL_TAG:  # otherwise it is a sensitivity
             client.protocol = min(word & 0xFF, self._protocol)
             client.mask = MASK_AT_FIRST[client.protocol]
             self._send(client, WORD.pack(PROTOCOL_TAG | client.protocol))
         return True
 
-    def _answer_request(self, client: Client, request: Sequence[int]) -> None:
+    def _answer_request(self, client: SpacenavClient, request: Sequence[int]) -> None:
         kind = request[0]
         if kind not in ANSWERS:
             return
@@ -179,33 +179,35 @@ class SpacenavDaemon:
         value = {GET_BUTTONS: self._buttons, GET_AXES: 6}.get(kind, request[1])
         self._send(client, PACKET.pack(kind, value, *[0] * 5, 0 if has_device else REFUSED))
 
-    def _tell(self, kind: int, *values: int) -> None:
+    def _broadcast(self, kind: int, *values: int) -> None:
         packet = PACKET.pack(kind, *values, *[0] * (7 - len(values)))
         with self._lock:
             for client in [*self._clients]:
                 if client.mask & EVENT_BITS[kind]:
                     self._send(client, packet)
 
-    def _send(self, client: Client, data: bytes) -> None:
+    def _send(self, client: SpacenavClient, data: bytes) -> None:
         try:
             client.socket.sendall(data)
         except OSError:
             self._drop(client)
 
-    def _drop(self, client: Client) -> None:
-        """Hangs up; the thread that serves, which may be waiting for the client, closes the connection then."""
+    def _drop(self, client: SpacenavClient) -> None:
+        """Shuts a connection down; the serving thread, which may be waiting for the client, closes it then."""
         with contextlib.suppress(OSError):
             client.socket.shutdown(socket.SHUT_RDWR)
 
 
 def main() -> None:
-    """Runs the daemon; its cap goes along each axis in turn, forth and back, until Ctrl-C."""
+    """Runs the daemon; its cap moves along each axis in turn, back and forth, until Ctrl-C."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--socket", default=socket_path(), help="by default where clients look for it")
-    parser.add_argument("--protocol", type=int, choices=(0, 1), default=1, help="newest version that it speaks")
+    parser.add_argument(
+        "--socket", default=socket_path(), help="path of the socket; by default where clients expect it"
+    )
+    parser.add_argument("--protocol", type=int, choices=(0, 1), default=1, help="newest supported version")
     arguments = parser.parse_args()
     daemon = SpacenavDaemon(arguments.socket, arguments.protocol)
-    print(f"serves a 6-D mouse at {daemon.path}, which goes along each axis in turn, until Ctrl-C", flush=True)
+    print(f"serves a 6-D mouse at {daemon.path}, which moves along each axis in turn, until Ctrl-C", flush=True)
     try:
         while True:
             for axis in range(6):
@@ -216,7 +218,7 @@ def main() -> None:
 
 
 def _hold(daemon: SpacenavDaemon, motion: Sequence[int]) -> None:
-    """Says the same for a time, as a cap that a hand holds does."""
+    """Repeats the same values for a time, like a cap that a hand holds."""
     end_s = time.monotonic() + HOLD_S
     while time.monotonic() < end_s:
         daemon.move(*motion)

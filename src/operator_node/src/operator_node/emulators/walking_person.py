@@ -26,29 +26,30 @@ T_POSE = {
 }
 """Origins of the segments of the trunk and the right side, in parts of the height. Lengths of arms and legs and heights
 of joints are those of Drillis and Contini (1966), as in Winter, Biomechanics and Motor Control of Human Movement;
-joints of the back are spread between them."""
+joints of the back are spread between them.
+"""
 STANCE = 0.62
-"""Part of a stride for which a foot stands."""
+"""Share of a stride during which a foot stands."""
 LIFT = 0.06
-"""How high it is lifted between [heights]."""
+"""Height to which a foot is lifted [heights]."""
 REACHING_S, REACH_PERIOD_S = 2.5, 5.0
-"""How long a reach takes, and after how long the next one begins, with the other hand [s]."""
+"""Duration of a reach, and time until the next one begins, with the other hand [s]."""
 SETTLING_S, CROUCHING_S = 1.5, 0.8
-"""How long the arms' way from the T-pose takes, and the knees' before the first step [s]."""
+"""Time in which the arms leave the T-pose, and the knees bend before the first step [s]."""
 STRIDE_S = 1.2
 BOB = 0.006
-"""How far the pelvis goes up and down [heights]."""
+"""Amplitude of the pelvis' vertical motion [heights]."""
 
 
 class WalkingPerson:
-    """A person as a function of time; feet do not slide, bones are rigid, and knees bend forward.
+    """Motion of a person as a function of time; feet do not slide, bones are rigid, and knees bend forward.
 
     Args:
         height_m: Body height [m].
-        speed: How fast the person walks [heights/s]; 0 stands.
+        speed: Walking speed [heights/s]; 0 stands.
         radius_m: Radius of the circle, to the left [m].
-        t_pose_s: For how long the person stands in the T-pose first [s].
-        start: Where that is, x and y [m].
+        t_pose_s: Time that the person first stands in the T-pose [s].
+        start: Place of the T-pose, x and y [m].
         reach: Whether the hands reach forward, in turns.
     """
 
@@ -64,11 +65,11 @@ class WalkingPerson:
         self._speed_m_s, self._radius_m, self._t_pose_s = speed * height_m, radius_m, t_pose_s
         self._start, self._reaches, self._height_m = np.array((*start, 0.0)), reach, height_m
         self.t_pose = height_m * np.array([_origin(name) for name in SEGMENTS])
-        """Origins of the segments in the T-pose (23 x 3) [m]; all are turned as the world is."""
+        """Origins of the segments in the T-pose (23 x 3) [m]; all have the orientation of the world."""
         self._offsets = np.array([self.t_pose[i] - self.t_pose[max(parent, 0)] for i, parent in enumerate(PARENTS)])
         leg = T_POSE["RightUpperLeg"][2] - T_POSE["RightFoot"][2]
         longest_step = 0.5 * STANCE * STRIDE_S * speed
-        """How far behind the hip a foot is at the end of its stance [heights]."""
+        """Distance of a foot behind the hip at the end of its stance [heights]."""
         self._crouch_m = height_m * (leg - (leg**2 - longest_step**2) ** 0.5 + BOB + 0.01)
 
     def pose(self, time_s: float) -> tuple[Array, Array]:
@@ -110,14 +111,14 @@ class WalkingPerson:
             turns[f"{side}{segment}"] = turn
 
     def _reach(self, walking_s: float, sign: float) -> float:
-        """Returns how far a hand has reached out, from 0 to 1."""
+        """Returns the extension of a hand, from 0 to 1."""
         number, since_s = divmod(walking_s - SETTLING_S, REACH_PERIOD_S)
         if not self._reaches or number < 0 or number % 2 != (sign > 0) or since_s > REACHING_S:
             return 0.0
         return float(np.sin(np.pi * since_s / REACHING_S) ** 2)
 
     def _way_m(self, walking_s: float) -> float:
-        """Returns how far the person has walked; speed grows smoothly [m]."""
+        """Returns the walked distance [m]; the speed grows smoothly."""
         walking_s = max(walking_s - CROUCHING_S, 0.0)
         return float(self._speed_m_s * (walking_s - SETTLING_S * -np.expm1(-walking_s / SETTLING_S)))
 
@@ -126,7 +127,7 @@ class WalkingPerson:
         return self._start + radius * np.array((np.sin(angle), 1.0 - np.cos(angle), 0.0))
 
     def _footprint(self, number: float, sign: float, offset: float) -> tuple[Array, float]:
-        """Returns where and in which direction a foot stands for one stride [m, rad]."""
+        """Returns position [m] and direction [rad] of a foot's stance in one stride."""
         way_m = self._way_m((number + offset + STANCE / 2.0) * STRIDE_S)
         angle = way_m / self._radius_m
         aside = -sign * self._height_m * T_POSE["RightUpperLeg"][1]
@@ -134,7 +135,7 @@ class WalkingPerson:
         return place + (0.0, 0.0, self._height_m * T_POSE["RightFoot"][2]), angle
 
     def _ankle(self, walking_s: float, sign: float, offset: float) -> tuple[Array, float]:
-        """Returns place and direction of an ankle [m, rad]."""
+        """Returns position [m] and direction [rad] of an ankle."""
         number, part = divmod(walking_s / STRIDE_S - offset, 1.0)
         here, direction = self._footprint(number, sign, offset)
         if part < STANCE:
@@ -149,7 +150,7 @@ class WalkingPerson:
     def _place_leg(
         self, positions: Array, quats: Array, side: str, hip: Array, ankle: Array, direction_rad: float
     ) -> None:
-        """Places thigh, shank and foot so that the ankle is where it should be: law of cosines, knee forward."""
+        """Places thigh, shank and foot for a position of the ankle: law of cosines, knee forward."""
         upper, lower, foot, toe = (INDEX[f"{side}{name}"] for name in ("UpperLeg", "LowerLeg", "Foot", "Toe"))
         thigh_m, shank_m = (float(np.linalg.norm(self._offsets[each])) for each in (lower, foot))
         reach = ankle - hip
@@ -172,7 +173,7 @@ class WalkingPerson:
         quats[[foot, toe]] = flat.as_quat()
 
     def _forward(self, pelvis: Array, turns: dict[str, Rotation]) -> tuple[Array, Array]:
-        """Returns all segments but those of the legs, by what they hang on."""
+        """Returns all segments but those of the legs, by forward kinematics."""
         positions, quats = np.zeros((len(SEGMENTS), 3)), np.zeros((len(SEGMENTS), 4))
         for index, (name, parent) in enumerate(zip(SEGMENTS, PARENTS)):
             if name in turns:
@@ -183,7 +184,7 @@ class WalkingPerson:
 
 
 def _origin(name: str) -> Array:
-    """Returns where a segment begins in the T-pose [heights]; left is as right."""
+    """Returns the origin of a segment in the T-pose [heights]; left mirrors right."""
     if name in T_POSE:
         return np.array(T_POSE[name])
     return np.array(T_POSE[name.replace("Left", "Right")]) * (1.0, -1.0, 1.0)

@@ -1,1 +1,1 @@
-"""Force feedback that cannot hurt: haptic devices, and the loop at 1 kHz between them and a tool."""
+"""Force feedback within safe limits: haptic devices, and the 1 kHz loop between them and a tool."""

@@ -1,21 +1,19 @@
-"""From the handle to the tool: relative, so that nothing jumps when a person takes hold of it."""
+"""Relative mapping from handle to tool, so that nothing jumps when a user engages."""
 
 from collections.abc import Sequence
 
-from rpbi.geometry import Vector, minus, plus, scaled
-
-from .vectors import ZERO, norm
+from robot_model.geometry import ZERO, Vector, minus, norm, plus, scaled
 
 
 class Clutch:
-    """Couples way to way: whatever handle and tool stood at before, they go on together from there.
+    """Couples displacements: after engaging, the tool moves with the handle, from wherever both were.
 
     Args:
-        button: Number of the button that has to be held; None couples all the time.
+        button: Index of the button that has to be held; None couples all the time.
 
     Attributes:
         engaged: Whether they are coupled.
-        deviation: Way of the handle since they were [m].
+        deviation: Displacement of the handle since it was engaged [m].
     """
 
     def __init__(self, button: int | None = None) -> None:
@@ -25,11 +23,11 @@ class Clutch:
 
     @property
     def way(self) -> Vector:
-        """Way of the tool since the start, in metres of the handle."""
+        """Displacement of the tool since the start, in metres of the handle."""
         return plus(self._kept, self.deviation)
 
     def update(self, position: Vector, buttons: Sequence[int]) -> bool:
-        """Takes where the handle is [m]; returns whether it was engaged just now."""
+        """Updates the position of the handle [m]; returns whether it was engaged just now."""
         wanted = self._button is None or (self._button < len(buttons) and bool(buttons[self._button]))
         if wanted and not self.engaged:
             self.engaged, self._reference, self.deviation = True, position, ZERO
@@ -41,22 +39,22 @@ class Clutch:
         return False
 
     def release(self) -> None:
-        """Lets go: the tool stays where it is; with a button held it is engaged again at the next update."""
+        """Disengages: the tool stays where it is. While the button is held, the next update engages again."""
         self._kept, self.deviation, self.engaged = self.way, ZERO, False
 
     def set_way(self, way: Vector) -> None:
-        """Has the tool be somewhere [m], and the handle go on from there."""
+        """Sets the displacement of the tool [m] and disengages; the handle continues from there."""
         self._kept, self.engaged, self.deviation = way, False, ZERO
 
 
-class Target:
-    """Where the tool is to go: it follows the handle no faster than a limit, and stays in a box.
+class TargetFollower:
+    """Target of the tool: it follows the handle up to a largest speed, and stays in a box.
 
     Args:
-        scale: Way of the tool for each metre of the handle, by axis; 0 holds an axis.
-        low: Least way from the start, by axis [m].
-        high: Most [m].
-        max_speed: [m/s].
+        scale: Displacement of the tool for each metre of the handle, by axis; 0 holds an axis.
+        low: Least displacement from the start, by axis [m].
+        high: Largest displacement from the start, by axis [m].
+        max_speed: Largest speed [m/s].
     """
 
     def __init__(self, scale: Vector, low: Vector, high: Vector, max_speed: float) -> None:
@@ -64,7 +62,7 @@ class Target:
         self.way: Vector = ZERO
 
     def follow(self, way: Vector, dt_s: float) -> Vector:
-        """Returns the tool's way from the start, in its own metres, some time after the last one."""
+        """Returns the displacement of the tool from the start [m], `dt_s` after the last call."""
         wanted = self.limited((way[0] * self._scale[0], way[1] * self._scale[1], way[2] * self._scale[2]))
         left = minus(wanted, self.way)
         far, most = norm(left), self._max_speed * dt_s
@@ -72,6 +70,6 @@ class Target:
         return self.way
 
     def limited(self, way: Vector) -> Vector:
-        """Returns a way within the box."""
+        """Returns a displacement clipped to the box."""
         (ax, ay, az), (bx, by, bz) = self._low, self._high
         return min(max(way[0], ax), bx), min(max(way[1], ay), by), min(max(way[2], az), bz)

@@ -1,4 +1,4 @@
-"""One tick of force feedback, by whatever clock: what is tested in virtual time is what people feel."""
+"""One tick of force feedback, for any clock: tests in virtual time run the code that users feel."""
 
 from __future__ import annotations
 
@@ -8,48 +8,61 @@ from typing import NamedTuple
 from pydantic import Field, model_validator
 
 from custom_ros_tools.schema import ConfigModel, Count, KeyedError, NonNegative, Positive, Vec3
-from rpbi.geometry import Vector, minus, plus, scaled
+from robot_model.geometry import ZERO, Vector, minus, plus, scaled, turned_about_z
 
-from .clutch import Clutch, Target
-from .coupling import Coupling, Mode, stiffest_n_per_m
+from .clutch import Clutch, TargetFollower
+from .coupling import Mode, VirtualCoupling, stiffest_n_per_m
 from .device import HapticConfig, HapticReading, ReadingError
 from .limiter import ForceLimiter
 from .passivity import PassivityController
 from .readings import ReadingCheck
-from .vectors import ZERO, turned
 
 SILENCE_S = 0.02
-"""So long after anybody falls silent there is no force any more [s]."""
+"""Time without input from the device after which it is engaged anew [s]."""
 SMOOTHING_S = 0.002
-"""Time constant of the velocity, where the device measures none [s]."""
+"""Time constant of the velocity filter for devices that do not measure velocity [s]."""
 
 
 class ForceFeedbackConfig(ConfigModel):
-    """How a person moves the tool, and what they feel of it."""
+    """Mapping of the handle to the tool, and the forces that are rendered."""
 
-    mode: Mode = Field("wrench", description="What is felt: the force on the tool, or a spring to where it is.")
-    stiffness: Positive = Field(200.0, description="Of the spring of `mode: coupling` [N/m].")
-    damping: NonNegative = Field(1.0, description="Of the damper [N s/m]; with `mode: wrench` one against the room.")
-    force_scale: NonNegative = Field(1.0, description="What forces of `mode: wrench` are multiplied by.")
-    force_axes: Vec3 = Field((1.0, 1.0, 1.0), description="1 for each axis that is felt, 0 for the others.")
-    slew_n_per_s: Positive = Field(1000.0, description="How fast a force may grow [N/s].")
+    mode: Mode = Field("wrench", description="Rendered force: the force on the tool, or a spring to its position.")
+    stiffness: Positive = Field(200.0, description="Stiffness of the spring of `mode: coupling` [N/m].")
+    damping: NonNegative = Field(
+        1.0, description="Damping between handle and tool; with `mode: wrench`, of the handle alone [N s/m]."
+    )
+    force_scale: NonNegative = Field(1.0, description="Factor of forces of `mode: wrench`.")
+    force_axes: Vec3 = Field((1.0, 1.0, 1.0), description="1 for each axis that is rendered, 0 for the others.")
+    slew_n_per_s: Positive = Field(1000.0, description="Largest rate at which a force may grow [N/s].")
     expiry_s: float = Field(
-        0.016, gt=0.0, le=0.018, description="How long what handle or tool said counts [s]; a tool says it more often."
+        0.016,
+        gt=0.0,
+        le=0.018,
+        description="Time for which a sample of handle or tool is valid [s]; the tool must be sampled more often.",
     )
     passivity: bool = Field(True, description="Whether the passivity controller changes forces.")
-    energy_reserve_j: NonNegative = Field(1.0, description="The largest energy that the observer remembers [J].")
+    energy_reserve_j: NonNegative = Field(1.0, description="Largest energy that the observer stores [J].")
     energy_allowance_j: float = Field(
-        0.0, ge=0.0, le=0.1, description="What may be given out once without having been put in; 0 is strictly passive."
+        0.0,
+        ge=0.0,
+        le=0.1,
+        description="Energy that may be given out once without having been put in; 0 is strictly passive.",
     )
     energy_refill_w: float = Field(
-        0.0, ge=0.0, le=0.1, description="How fast that comes back [W]; 0 is strictly passive."
+        0.0, ge=0.0, le=0.1, description="Power at which that allowance is restored [W]; 0 is strictly passive."
     )
-    clutch_button: Count | None = Field(None, description="Number of the button to hold; without it, always engaged.")
-    motion_scale: Vec3 = Field((1.0, 1.0, 1.0), description="Way of the tool for each metre of the handle; 0 holds.")
-    yaw_deg: float = Field(0.0, description="By how much the handle's axes are turned about z, seen from the tool's.")
-    way_low: Vec3 = Field((-1.0, -1.0, -1.0), description="Least way of the target from its start, in its axes [m].")
+    clutch_button: Count | None = Field(None, description="Index of the button to hold; without it, always engaged.")
+    motion_scale: Vec3 = Field(
+        (1.0, 1.0, 1.0), description="Displacement of the tool for each metre of the handle; 0 holds."
+    )
+    yaw_deg: float = Field(
+        0.0, description="Angle by which the handle's axes are rotated about z relative to the tool's."
+    )
+    way_low: Vec3 = Field(
+        (-1.0, -1.0, -1.0), description="Least displacement of the target from its start, in its axes [m]."
+    )
     way_high: Vec3 = Field((1.0, 1.0, 1.0), description="Most [m].")
-    max_target_speed: Positive = Field(0.5, description="How fast the target goes at most [m/s].")
+    max_target_speed: Positive = Field(0.5, description="Largest speed of the target [m/s].")
 
     @model_validator(mode="after")
     def _box_has_the_start(self) -> ForceFeedbackConfig:
@@ -60,16 +73,16 @@ class ForceFeedbackConfig(ConfigModel):
 
 
 class Snapshot(NamedTuple):
-    """What the last sample of the device led to.
+    """Result of the last sample of the device.
 
     Attributes:
         reading: The sample.
-        velocity: Of the handle [m/s].
-        deviation: Way of the handle since it was engaged [m]; 0 while it is not.
-        way: Way of the target since the start, in the axes of the tool [m].
-        force: What is sent to the device, in its axes [N].
+        velocity: Velocity of the handle [m/s].
+        deviation: Displacement of the handle since it was engaged [m]; 0 while it is not.
+        way: Displacement of the target since the start, in the axes of the tool [m].
+        force: Force that is sent to the device, in its axes [N].
         is_engaged: Whether handle and tool are coupled.
-        time_s: When the sample was read, by the monotonic clock [s].
+        time_s: Time of the sample, by the monotonic clock [s].
     """
 
     reading: HapticReading
@@ -82,27 +95,31 @@ class Snapshot(NamedTuple):
 
 
 class HapticController:
-    """Turns readings of the handle, and what the simulator says of the tool, into a target for it and a force.
+    """Computes a target for the tool and a force from readings of the handle and the state of the tool in the
+    simulator.
 
-    Forces pass: coupling, damper of the passivity controller, clamp and slew limit, last check of passivity.
+    Forces pass the coupling, the damper of the passivity controller, clamp and slew limit, and a last check of
+    passivity.
 
     Args:
-        config: What the person is to move and feel.
-        device: What is known of the device.
-        sample_hz: How often the device is read [Hz].
-        way: Where the target is, seen from its start, in the axes of the tool [m].
+        config: The mapping and the forces.
+        device: Properties of the device.
+        sample_hz: Rate at which the device is read [Hz].
+        way: Displacement of the target from its start, in the axes of the tool [m].
 
     Attributes:
-        force: What is sent to the device now [N].
-        fault: What was refused last; empty if readings are fine.
-        faults: How often readings were refused, by fault.
-        snapshot: What the last sample led to; None before the first.
-        stiffness_bound: Up to this stiffness a wall is passive by itself [N/m].
+        force: Force that is sent to the device now [N].
+        fault: Last fault of a refused reading; empty if readings are valid.
+        faults: Number of refused readings, by fault.
+        snapshot: Result of the last sample; None before the first.
+        stiffness_bound: Stiffness up to which a wall is passive by itself [N/m].
     """
 
     def __init__(self, config: ForceFeedbackConfig, device: HapticConfig, sample_hz: float, way: Vector = ZERO) -> None:
         self._config, self._max_force_n = config, device.max_force_n
-        self.coupling = Coupling(config.mode, config.stiffness, config.damping, config.force_scale, config.expiry_s)
+        self.coupling = VirtualCoupling(
+            config.mode, config.stiffness, config.damping, config.force_scale, config.expiry_s
+        )
         self.passivity = PassivityController(
             device.max_force_n,
             device.max_acceleration,
@@ -117,7 +134,7 @@ class HapticController:
         self._limiter = ForceLimiter(device.max_force_n, config.slew_n_per_s)
         self._check = ReadingCheck(device)
         self._clutch = Clutch(config.clutch_button)
-        self._target = Target(config.motion_scale, config.way_low, config.way_high, config.max_target_speed)
+        self._target = TargetFollower(config.motion_scale, config.way_low, config.way_high, config.max_target_speed)
         self._yaw = math.radians(config.yaw_deg)
         self._target.way = way
         self._clutch.set_way(self._handle_way(way))
@@ -132,23 +149,23 @@ class HapticController:
         self._tool_way: Vector | None = None
         self.awaits_reset = False
 
-    def take_wrench(self, force: Vector, now_s: float, delay_s: float = 0.0) -> None:
-        """Takes the force on the tool, in its axes [N], finite."""
+    def observe_wrench(self, force: Vector, now_s: float, delay_s: float = 0.0) -> None:
+        """Updates the force on the tool, in its axes [N], finite."""
         if self._config.mode == "wrench":
-            self.coupling.take(turned(force, -self._yaw), now_s, delay_s)
+            self.coupling.observe(turned_about_z(force, -self._yaw), now_s, delay_s)
 
-    def take_tool(self, way: Vector, now_s: float, delay_s: float = 0.0) -> None:
-        """Takes the way of the tool from where it was at the start, in its axes [m]."""
+    def observe_tool(self, way: Vector, now_s: float, delay_s: float = 0.0) -> None:
+        """Updates the displacement of the tool from its start, in its axes [m]."""
         if self._config.mode == "coupling":
             self._tool_way = self._handle_way(way)
-            self.coupling.take(self._tool_way, now_s, delay_s)
+            self.coupling.observe(self._tool_way, now_s, delay_s)
 
     def reset(self) -> None:
-        """Has the target go back to its start, and the handle go on from there."""
+        """Returns the target to its start; the handle continues from there."""
         self.awaits_reset = True
 
     def lose(self) -> None:
-        """Takes note that the device has gone."""
+        """Resets the state after the device has gone."""
         self._drop()
         self._clutch.release()
         self._check.forget()
@@ -159,11 +176,11 @@ class HapticController:
 
         Args:
             now_s: By the monotonic clock [s].
-            reading: What came from the device since the last tick, if anything did.
+            reading: The reading since the last tick, if there is one.
         """
         if reading is not None:
             try:
-                self._take(self._check.checked(reading, now_s), now_s)
+                self._process(self._check.checked(reading, now_s), now_s)
             except ReadingError as error:
                 self.refuse(error)
             else:
@@ -174,13 +191,13 @@ class HapticController:
         return self.force
 
     def refuse(self, error: ReadingError) -> None:
-        """Counts a reading that makes no sense."""
+        """Counts an invalid reading."""
         self.fault = f"{error.fault}: {error}"
         self.faults[error.fault] = self.faults.get(error.fault, 0) + 1
 
     @property
     def not_finite(self) -> int:
-        """How many forces were refused since a number was not finite."""
+        """Number of forces refused because a component was not finite."""
         return self._limiter.not_finite
 
     def _drop(self) -> None:
@@ -189,8 +206,8 @@ class HapticController:
             self._limiter.note(ZERO)
             self.force = ZERO
 
-    def _take(self, reading: HapticReading, now_s: float) -> None:
-        """Goes on by one sample."""
+    def _process(self, reading: HapticReading, now_s: float) -> None:
+        """Processes one sample."""
         position, dt_s = reading.position, now_s - self._seen_s
         was_away = self._position is None or self._check.has_moved or dt_s > SILENCE_S
         step = ZERO if self._position is None or self._check.has_moved else minus(position, self._position)
@@ -216,23 +233,23 @@ class HapticController:
             reading,
             self._velocity,
             self._clutch.deviation,
-            self._target.follow(turned(self._clutch.way, self._yaw), dt_s),
+            self._target.follow(turned_about_z(self._clutch.way, self._yaw), dt_s),
             self.force,
             self._clutch.engaged,
             now_s,
         )
 
     def _handle_way(self, way: Vector) -> Vector:
-        """Returns the way of the handle that leads to a way of the tool, 0 along axes that are held."""
+        """Returns the displacement of the handle for one of the tool, 0 along axes that are held."""
         x, y, z = (part / scale if scale else 0.0 for part, scale in zip(way, self._config.motion_scale))
-        return turned((x, y, z), -self._yaw)
+        return turned_about_z((x, y, z), -self._yaw)
 
     def _engage(self, position: Vector, buttons: tuple[int, ...], now_s: float) -> None:
         if self.awaits_reset:
             self.awaits_reset = False
             self._clutch.set_way(ZERO)
         if self.coupling.freshness(now_s) == 0.0 and self._config.mode == "coupling":
-            self._clutch.release()  # else the spring would be stretched when the tool is back
+            self._clutch.release()  # otherwise the spring would be stretched when the tool is back
         if self._clutch.update(position, buttons):
             self.passivity.reset()
             if self._tool_way is not None:

@@ -1,24 +1,22 @@
-"""A hand on a handle, as a mass on a spring: for devices that are only emulated, and for experiments."""
+"""A hand on a handle, modelled as a mass on a spring: for emulated devices and experiments."""
 
 from typing import NamedTuple
 
-from rpbi.geometry import Vector, minus, scaled
-
-from .vectors import ZERO, within
+from robot_model.geometry import ZERO, Vector, minus, scaled, shortened_to
 
 
 class Hand:
-    """A handle of some mass that a hand draws to where it wants it, while the device pushes.
+    """A handle with a mass that a hand pulls to a wanted position, while the device pushes.
 
     Args:
-        mass: Of handle and hand [kg].
-        stiffness: Of the hand's grip [N/m].
-        damping: Of grip and arm [N s/m].
-        max_force_n: The hand's largest force [N].
+        mass: Mass of handle and hand [kg].
+        stiffness: Stiffness of the hand's grip [N/m].
+        damping: Damping of grip and arm [N s/m].
+        max_force_n: Largest force of the hand [N].
 
     Attributes:
-        position: Of the handle [m].
-        velocity: [m/s].
+        position: Position of the handle [m].
+        velocity: Velocity of the handle [m/s].
     """
 
     def __init__(
@@ -29,18 +27,18 @@ class Hand:
 
     @property
     def max_acceleration(self) -> float:
-        """The hand's own largest acceleration [m/s^2]; that of the device's force comes on top."""
+        """Largest acceleration from the hand alone [m/s^2]; that from the device's force adds to it."""
         return self._max_force_n / self._mass
 
     def step(self, wanted: Vector, force: Vector, dt_s: float) -> None:
-        """Goes on in time (semi-implicit Euler).
+        """Integrates one step (semi-implicit Euler).
 
         Args:
-            wanted: Where the hand wants the handle [m].
-            force: What the device pushes with [N].
-            dt_s: For how long [s].
+            wanted: Position to which the hand pulls the handle [m].
+            force: Force of the device [N].
+            dt_s: Length of the step [s].
         """
-        pull = within(
+        pull = shortened_to(
             minus(scaled(self._stiffness, minus(wanted, self.position)), scaled(self._damping, self.velocity)),
             self._max_force_n,
         )
@@ -51,14 +49,14 @@ class Hand:
         self.position = p[0] + v[0] * dt_s, p[1] + v[1] * dt_s, p[2] + v[2] * dt_s
 
 
-class Press(NamedTuple):
-    """A hand that goes down along z, stays there for a while and comes back, smoothly and from rest to rest.
+class PressMotion(NamedTuple):
+    """A hand that moves down along z, stays there for a while and comes back, smoothly and from rest to rest.
 
     Attributes:
-        depth_m: How far down [m].
-        wait_s: How long it stays above at first, and again at the end [s].
-        move_s: How long each way takes [s].
-        hold_s: How long it stays below [s].
+        depth_m: Depth of the motion [m].
+        wait_s: Time that it stays above at first, and again at the end [s].
+        move_s: Duration of each motion [s].
+        hold_s: Time that it stays below [s].
     """
 
     depth_m: float
@@ -68,11 +66,11 @@ class Press(NamedTuple):
 
     @property
     def duration_s(self) -> float:
-        """How long all of it takes [s]."""
+        """Duration of the whole motion [s]."""
         return 2.0 * (self.wait_s + self.move_s) + self.hold_s
 
     def wanted(self, time_s: float) -> Vector:
-        """Returns where the hand wants the handle, some time after its start [m]."""
+        """Returns the position to which the hand pulls the handle, some time after its start [m]."""
         ahead_s = min(time_s - self.wait_s, self.duration_s - self.wait_s - time_s)
         s = min(max(ahead_s / self.move_s, 0.0), 1.0)
-        return 0.0, 0.0, -self.depth_m * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)  # least jerk
+        return 0.0, 0.0, -self.depth_m * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)  # minimum jerk

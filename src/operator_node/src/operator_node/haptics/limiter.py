@@ -1,23 +1,21 @@
-"""The last thing before the device: how large a force may be, and how fast it may grow."""
+"""Limits of force and of its growth; the last stage before the device."""
 
 import math
 
-from rpbi.geometry import Vector, dot, scaled
-
-from .vectors import ZERO, norm
+from robot_model.geometry import ZERO, Vector, dot, norm, scaled
 
 
 class ForceLimiter:
-    """Shortens forces, so that none is larger than a limit and none grows faster than a slew limit.
+    """Shortens forces to a largest force and a largest slew rate.
 
-    Directions are kept, so what brakes still brakes. A force may become smaller, or zero, at once: that never hurts.
+    Directions are kept, so that a braking force still brakes. A force may become smaller, or zero, at once.
 
     Args:
-        max_force_n: The largest force [N].
-        slew_n_per_s: How fast it may grow [N/s].
+        max_force_n: Largest force [N].
+        slew_n_per_s: Largest rate at which a force may grow [N/s].
 
     Attributes:
-        not_finite: How many forces were refused since a number was not finite.
+        not_finite: Number of forces refused because a component was not finite.
     """
 
     def __init__(self, max_force_n: float, slew_n_per_s: float) -> None:
@@ -26,7 +24,7 @@ class ForceLimiter:
         self.not_finite = 0
 
     def limited(self, force: Vector, dt_s: float) -> Vector:
-        """Returns what is left of a force [N] some time after the last one."""
+        """Returns the limited force [N], `dt_s` after the last one."""
         length = norm(force)
         if not math.isfinite(length):
             self.not_finite += 1
@@ -41,5 +39,5 @@ class ForceLimiter:
         return self._last
 
     def note(self, force: Vector) -> None:
-        """Takes what became of the force afterwards [N]; the next one grows from there."""
+        """Sets the force that was finally sent [N]; the next one grows from it."""
         self._last = force

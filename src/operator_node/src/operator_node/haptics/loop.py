@@ -1,7 +1,7 @@
-"""The loop between a haptic device and its controller, at 1 kHz, in a process that does nothing else.
+"""The 1 kHz loop between a haptic device and its controller, in a process of its own.
 
-Python runs one thread at a time: beside those of a ROS node a tick would wait for whichever of them has the lock, and
-on a busy machine for the moment when that one is given a processor.
+Python runs one thread at a time: in the process of a ROS node, a tick would wait for any thread that has the lock, and
+on a busy machine until that thread gets a processor.
 """
 
 import contextlib
@@ -12,35 +12,36 @@ from typing import Any
 
 from custom_ros_tools.errors import MissingDependency
 from operator_node.device import DeviceError
+from robot_model.geometry import ZERO
 
 from .controller import HapticController
 from .device import DeviceEnded, HapticDevice, ReadingError
+from .link import Link
+from .messages import LoopCommand, LoopReport
 from .node_config import HapticNodeConfig
-from .process.link import Link
-from .process.messages import Orders, Report
-from .vectors import ZERO
 
 _log = logging.getLogger(__name__)
 HZ = 1000.0
 RETRY_S = 1.0
-"""After so long a device that is not there is tried again [s]."""
+"""Period at which an absent device is tried again [s]."""
 NODE_SILENCE_S = 0.2
-"""After so long without a word from the node the handle moves nothing, and is engaged anew afterwards [s]. Forces end
-before that, since what the tool says comes from the node too."""
+"""Time without messages from the node after which the handle is disengaged [s]; it is engaged anew afterwards. Forces
+end earlier, since the samples of the tool come from the node, too.
+"""
 
 
 class HapticLoop:
-    """Reads the device, asks the controller, and sends the force, by absolute deadlines of the monotonic clock.
+    """Reads the device, runs the controller, and sends the force, at absolute deadlines of the monotonic clock.
 
-    A tick that is late leaves out those that it has missed. Whatever goes wrong, the device is sent zero, and is opened
-    again when it is back.
+    A late tick skips the ticks that it has missed. After any failure the device is sent zero force and is opened again
+    when it is back.
 
     Args:
         device: The device; it belongs to the loop from now on.
-        controller: What turns readings into forces.
-        config: How long a force counts when the loop falls silent, and how often is reported.
-        link: To the node.
-        orders: What the node wants so far.
+        controller: Computes forces from readings.
+        config: Expiry of forces when the loop falls silent, and the rate of reports.
+        link: Connection to the node.
+        orders: Initial command of the node.
     """
 
     def __init__(
@@ -49,16 +50,16 @@ class HapticLoop:
         controller: HapticController,
         config: HapticNodeConfig,
         link: Link,
-        orders: Orders = Orders(),  # noqa: B008 (a tuple)
+        orders: LoopCommand = LoopCommand(),  # noqa: B008 (a tuple)
     ) -> None:
         self._device, self._controller, self._link, self._orders = device, controller, link, orders
         self._expiry_s, self._report_s = config.expiry_s, 1.0 / config.hz
-        self._report = Report()
+        self._report = LoopReport()
         self._heard_s = self._reported_s = self._retry_at_s = time.monotonic()
         self._samples, self._lateness_s = 0, 0.0
 
     def run(self) -> None:
-        """Has the device open while the node wants it, until the node has gone."""
+        """Keeps the device open while the node requests it, until the node has gone."""
         _prefer_this_process()
         try:
             self._run()
@@ -70,8 +71,8 @@ class HapticLoop:
             self._listen()
             if self._orders.switched != self._report.obeyed:
                 self._retry_at_s = 0.0
-                self._tell(obeyed=self._orders.switched)
-            self._tell_when_due()
+                self._send_report(obeyed=self._orders.switched)
+            self._send_report_when_due()
             if self._orders.is_on and not self._report.has_ended and time.monotonic() >= self._retry_at_s:
                 self._use_device()
                 self._retry_at_s = time.monotonic() + RETRY_S
@@ -79,28 +80,28 @@ class HapticLoop:
                 self._link.wait(self._report_s)
 
     def _use_device(self) -> None:
-        """Has the device open until it goes, or the node wants otherwise."""
+        """Keeps the device open until it goes, or the node requests otherwise."""
         has_ended = False
         try:
             self._device.open()
-            self._tell(is_connected=True, trouble="")
+            self._send_report(is_connected=True, trouble="")
             self._exchange()
             trouble = "stopped"
         except (DeviceEnded, MissingDependency) as error:
             trouble, has_ended = str(error), True
         except DeviceError as error:
             trouble = str(error)
-        except Exception as error:  # of a device of somebody else's: people come before tracebacks
+        except Exception as error:  # devices of other packages may raise anything; the force must end first
             trouble = f"{type(error).__name__}: {error}"
             _log.exception("the device failed")
         self._controller.lose()
-        with contextlib.suppress(Exception):  # it may have gone, or never been there; closing comes next in any case
+        with contextlib.suppress(Exception):  # it may have gone, or never been there; it is closed next in any case
             self._device.send(ZERO, time.monotonic())
         self._device.close()
-        self._tell(is_connected=False, trouble=trouble, has_ended=has_ended)
+        self._send_report(is_connected=False, trouble=trouble, has_ended=has_ended)
 
     def _exchange(self) -> None:
-        """Ticks until the device goes, or the node wants otherwise."""
+        """Ticks until the device goes, or the node requests otherwise."""
         device, controller, period_s = self._device, self._controller, 1.0 / HZ
         due_s = time.monotonic()
         while self._orders.switched == self._report.obeyed and not self._link.is_closed:
@@ -116,7 +117,7 @@ class HapticLoop:
             if now_s - self._heard_s > NODE_SILENCE_S:
                 reading = None
             device.send(controller.tick(now_s, reading), now_s + self._expiry_s)
-            self._tell_when_due()
+            self._send_report_when_due()
             due_s += period_s
             left_s = due_s - time.monotonic()
             if left_s > 0.0:
@@ -127,7 +128,7 @@ class HapticLoop:
                 due_s -= left_s
 
     def _listen(self) -> None:
-        """Takes what the node has said since the last time."""
+        """Applies the newest command of the node."""
         orders, before, controller = self._link.newest(), self._orders, self._controller
         if orders is None:
             return
@@ -135,16 +136,16 @@ class HapticLoop:
         if orders.resets != before.resets:
             controller.reset()
         if orders.wrench is not None and orders.wrench != before.wrench:
-            controller.take_wrench(*orders.wrench)
+            controller.observe_wrench(*orders.wrench)
         if orders.tool is not None and orders.tool != before.tool:
-            controller.take_tool(*orders.tool)
+            controller.observe_tool(*orders.tool)
 
-    def _tell_when_due(self) -> None:
+    def _send_report_when_due(self) -> None:
         if time.monotonic() - self._reported_s >= self._report_s:
-            self._tell()
+            self._send_report()
 
-    def _tell(self, **changed: Any) -> None:
-        """Reports to the node how things are."""
+    def _send_report(self, **changed: Any) -> None:
+        """Sends a report to the node."""
         controller, now_s = self._controller, time.monotonic()
         faults = {**controller.faults, **self._device.faults}
         if controller.not_finite:
@@ -169,7 +170,7 @@ class HapticLoop:
 
 
 def _prefer_this_process() -> None:
-    """Asks for real-time scheduling; without the right to, it goes on as it is."""
+    """Requests real-time scheduling; without the permission, scheduling stays as it is."""
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
     except OSError:
@@ -177,10 +178,10 @@ def _prefer_this_process() -> None:
 
 
 def _prefer_no_longer() -> None:
-    """Lets all threads of this process be ordinary ones again.
+    """Restores ordinary scheduling for all threads of this process.
 
-    While ROS shuts down, a thread of rospy's spins until the process has ended; with a real-time priority it would keep
-    the thread that ends it from the only processor.
+    While ROS shuts down, a thread of rospy spins until the process has ended; with real-time priority it would starve
+    the thread that ends the process on a machine with one processor.
     """
     for thread in os.listdir("/proc/self/task"):
         with contextlib.suppress(OSError):  # it has just ended

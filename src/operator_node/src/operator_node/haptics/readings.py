@@ -1,39 +1,38 @@
-"""Which readings of a haptic device are believed."""
+"""Plausibility checks of readings of a haptic device."""
 
 import itertools
 import math
 
-from rpbi.geometry import Quaternion, Vector, minus, plus, scaled
+from robot_model.geometry import ZERO, Vector, angle_between, minus, norm, plus, scaled
 
 from .device import HapticConfig, HapticReading, ReadingError
-from .vectors import ZERO, norm
 
-FARTHEST = 3.0
-"""Readings beyond this many times the workspace are refused."""
+MAX_DISTANCE_RADII = 3.0
+"""Largest distance from the middle, in radii of the workspace; readings beyond it are refused."""
 SLACK_M = 0.01
-"""So far a reading may be from the last one at any speed [m]: noise, and readings that came late."""
+"""Distance by which a reading may differ from the last one at any speed [m]: noise and late readings."""
 TURN_SLACK = 0.3
-"""The same of its orientation [rad]..."""
+"""Angle by which an orientation may differ from the last one at any speed [rad]."""
 MAX_TURN = 30.0
-"""... and how fast no hand turns a handle [rad/s]."""
+"""Largest rate at which a hand rotates a handle [rad/s]."""
 MOVED_AFTER = 50
-"""After so many readings that lie together elsewhere, the device is there; it is engaged anew then."""
+"""Number of consistent readings elsewhere after which the device counts as moved; it is engaged anew then."""
 WINDOW_S = 0.1
-"""How long way and velocity are compared [s]."""
+"""Time span over which displacement and velocity are compared [s]."""
 GAP_S = 0.01
-"""Longer without a reading, they are not [s]."""
-LEAST_M = 0.005
-"""Below this way in that time they are not [m]."""
+"""Gap between readings beyond which the comparison restarts [s]."""
+MIN_WAY_M = 0.005
+"""Displacement in that time span below which they are not compared [m]."""
 
 
 class ReadingCheck:
-    """Refuses readings that cannot be, and says what is probably the matter.
+    """Refuses implausible readings, and reports the likely cause.
 
-    A velocity that the device measures itself is compared with its way: what is in millimetres, has its axes swapped or
-    is stuck shows that way.
+    A velocity that the device measures itself is compared with the displacement, which reveals millimetres, swapped
+    axes and a sensor that is stuck.
 
     Args:
-        config: What is known of the device.
+        config: Properties of the device.
     """
 
     def __init__(self, config: HapticConfig) -> None:
@@ -45,10 +44,10 @@ class ReadingCheck:
         self._moved = self._claimed = ZERO
         self._suspect: ReadingError | None = None
         self.has_moved = False
-        """Whether the reading checked last is that of another place than the one before."""
+        """Whether the last reading was accepted at a new place, without continuity to the one before."""
 
     def forget(self) -> None:
-        """Lets the next reading be anywhere."""
+        """Accepts the next reading at any place."""
         self._last = None
         self._elsewhere.clear()
 
@@ -56,7 +55,7 @@ class ReadingCheck:
         """Returns a reading with a unit quaternion.
 
         Raises:
-            ReadingError: If it is not to be believed.
+            ReadingError: If it is implausible.
         """
         self.has_moved = False
         reading = self._possible(reading)
@@ -74,7 +73,7 @@ class ReadingCheck:
         return reading
 
     def _possible(self, reading: HapticReading) -> HapticReading:
-        """Returns a reading with a unit quaternion; looks at it alone."""
+        """Returns a reading with a unit quaternion, after checks that need no other reading."""
         position, velocity, quat, _ = reading
         if not math.isfinite(sum(position) + sum(quat) + sum(velocity or ZERO)):
             raise ReadingError("not finite", f"position {position}, velocity {velocity}, quaternion {quat}")
@@ -83,8 +82,8 @@ class ReadingCheck:
             raise ReadingError("quaternion", f"expected a quaternion of length 1, got {quat}")
         workspace_m = self._config.workspace_m
         far = norm(position)
-        if far > FARTHEST * workspace_m:
-            if far <= FARTHEST * workspace_m * 1000.0:
+        if far > MAX_DISTANCE_RADII * workspace_m:
+            if far <= MAX_DISTANCE_RADII * workspace_m * 1000.0:
                 where = f"{far:g} m from the middle of a workspace of {workspace_m:g} m: are these millimetres?"
                 raise ReadingError("millimetres", where)
             raise ReadingError("far away", f"{far:g} m from the middle of a workspace of {workspace_m:g} m")
@@ -93,23 +92,23 @@ class ReadingCheck:
 
     def _check_way(self, last: HapticReading, reading: HapticReading, dt_s: float) -> None:
         way_m = norm(minus(reading.position, last.position))
-        turn = _angle(last.quat_xyzw, reading.quat_xyzw)
+        turn = angle_between(last.quat_xyzw, reading.quat_xyzw)
         if way_m > SLACK_M + self._config.max_speed * dt_s:
             error = ReadingError("jump", f"{way_m * 1e3:.0f} mm from the last one, {dt_s * 1e3:.0f} ms later")
         elif turn > TURN_SLACK + MAX_TURN * dt_s:
             x, y, z, w = reading.quat_xyzw
-            swapped = min(_angle(last.quat_xyzw, (w, x, y, z)), _angle(last.quat_xyzw, (y, z, w, x)))
+            swapped = min(angle_between(last.quat_xyzw, (w, x, y, z)), angle_between(last.quat_xyzw, (y, z, w, x)))
             if swapped < TURN_SLACK:
                 error = ReadingError("wxyz", "quaternions x, y, z, w and w, x, y, z by turns")
             else:
                 error = ReadingError("turn", f"{math.degrees(turn):.0f} deg from the last one")
         else:
             return
-        # The device may be there indeed, for instance after it was homed
+        # The device may really be there, for instance after it was homed
         near = self._elsewhere
         if near and norm(minus(reading.position, near[-1].position)) > SLACK_M + self._config.max_speed * dt_s:
             near.clear()
-        if near and _angle(near[-1].quat_xyzw, reading.quat_xyzw) > TURN_SLACK:
+        if near and angle_between(near[-1].quat_xyzw, reading.quat_xyzw) > TURN_SLACK:
             near.clear()
         near.append(reading)
         if len(near) <= MOVED_AFTER:
@@ -122,10 +121,10 @@ class ReadingCheck:
         self._moved = self._claimed = ZERO
 
     def _compare(self, way: Vector, velocity: Vector | None, dt_s: float) -> None:
-        """Compares the way of a window with the velocity that the device measured."""
+        """Compares the displacement over a window with the velocity that the device measured."""
         if velocity is None or self.has_moved:
             return
-        if dt_s > GAP_S:  # what it had in between is not known
+        if dt_s > GAP_S:  # its velocity in between is unknown
             self._begin_window()
             return
         self._window_s += dt_s
@@ -135,8 +134,8 @@ class ReadingCheck:
         moved, claimed = self._moved, self._claimed
         self._begin_window()
         moved_m, claimed_m = norm(moved), norm(claimed)
-        if max(moved_m, claimed_m) < LEAST_M:
-            return  # too little to tell, so what was found before still holds
+        if max(moved_m, claimed_m) < MIN_WAY_M:
+            return  # too little to decide, so the last result still holds
         self._suspect = None
         if norm(minus(moved, claimed)) < 0.5 * max(moved_m, claimed_m):
             return
@@ -145,7 +144,7 @@ class ReadingCheck:
 
 
 def _likely(moved: Vector, claimed: Vector) -> str:
-    """Returns the fault that explains best why way and velocity differ."""
+    """Returns the fault that best explains the difference of displacement and velocity."""
     moved_m, claimed_m = norm(moved), norm(claimed)
     if moved_m < 1e-9:
         return "stuck"
@@ -161,8 +160,3 @@ def _likely(moved: Vector, claimed: Vector) -> str:
 
 def _in_mm(way: Vector) -> str:
     return "({:.0f}, {:.0f}, {:.0f}) mm".format(*scaled(1e3, way))
-
-
-def _angle(a: Quaternion, b: Quaternion) -> float:
-    """Returns the angle between two orientations [rad]; q and -q are the same one."""
-    return 2.0 * math.acos(min(abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]), 1.0))

@@ -1,10 +1,15 @@
-"""The mappings; a new one is a class in a file of its own and a line here.
+"""The mappings; a new one is a class in a file of its own and a line here."""
 
-A user's own one needs no line: `"their_package.module:Class"` serves wherever a name does.
-"""
+from custom_ros_tools.plugins.table import PluginTable
 
-MAPPINGS: dict[str, str] = {
-    "scale": "operator_node.mappings.scale:ScaleMapping",
-    "isometric": "operator_node.mappings.isometric:IsometricMapping",
-}
-"""Class of each mapping; imported when it is asked for."""
+from .mapping import Mapping
+
+MAPPINGS: PluginTable[Mapping] = PluginTable(
+    "mapping",
+    "operator_node.mappings.mapping:Mapping",
+    {
+        "scale": "operator_node.mappings.scale:ScaleMapping",
+        "isometric": "operator_node.mappings.isometric:IsometricMapping",
+    },
+)
+"""All mappings."""

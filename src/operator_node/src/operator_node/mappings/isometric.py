@@ -1,4 +1,4 @@
-"""All axes together, no faster in a diagonal than along an axis."""
+"""All axes as one vector, so that diagonal motion is no faster than motion along an axis."""
 
 import math
 from collections.abc import Sequence
@@ -11,13 +11,13 @@ from .mapping import AxesConfig, Mapping
 
 
 class IsometricConfig(AxesConfig):
-    """Which axes become the signal, and how long it is at most."""
+    """The axes that make up the signal, and the largest length of the signal."""
 
-    scale: NonNegative = Field(1.0, description="Length of the signal when the device is moved as far as it goes.")
+    scale: NonNegative = Field(1.0, description="Length of the signal at full deflection.")
 
 
 class IsometricMapping(Mapping):
-    """A vector of the axes, at most `scale` long: `scale * min(n, 1) / n * a`, where n is the length of the axes a."""
+    """Scales the vector a of the axes to at most `scale`: `scale * min(n, 1) / n * a`, where n is the length of a."""
 
     Config = IsometricConfig
 

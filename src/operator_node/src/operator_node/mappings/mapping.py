@@ -1,4 +1,4 @@
-"""What every mapping is."""
+"""Interface of all mappings."""
 
 import math
 from abc import ABC, abstractmethod
@@ -11,18 +11,21 @@ from custom_ros_tools.schema import ConfigModel, Count, ListOf
 
 
 class AxesConfig(ConfigModel):
-    """Which axes of a device count."""
+    """Selection of axes of a device."""
 
     axes_idx: ListOf[Count] = Field(
-        min_length=1, description="Numbers of axes, from 0 on, in the order of the signal; one may come twice."
+        min_length=1, description="Indices of axes, from 0 on, in the order of the signal; one may occur twice."
     )
 
     dead_zone: float = Field(
-        0.0, ge=0.0, lt=1.0, description="How far an axis goes before it counts; from there it rises to 1 at its end."
+        0.0,
+        ge=0.0,
+        lt=1.0,
+        description="Share of the range of an axis that counts as 0; from there the axis rises to 1 at its end.",
     )
 
     def pick(self, axes: Sequence[float]) -> list[float]:
-        """Returns the axes that count, beyond their dead zone.
+        """Returns the selected axes after removal of their dead zone.
 
         Raises:
             ValueError: If there are too few.
@@ -38,13 +41,13 @@ class AxesConfig(ConfigModel):
 
 
 class Mapping(ABC):
-    """Turns the axes of a device into the operator's signal.
+    """Maps the axes of a device to the operator's signal.
 
-    Its options are its `Config`, which its constructor takes. It has no memory: equal axes have equal signals.
+    Its options are its `Config`, the argument of its constructor. It has no state: equal axes result in equal signals.
 
     Attributes:
         Config: Model of its options.
-        size: How many numbers its signal has.
+        size: Number of values of its signal.
     """
 
     Config: ClassVar[type[ConfigModel]]

@@ -1,30 +1,26 @@
-"""Each axis times a number."""
+"""Each axis multiplied by a factor."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
-from custom_ros_tools.schema import AlsoTakes, Expects, KeyedError, ListOf
+from custom_ros_tools.schema import AlsoTakes, Expects, KeyedError, ListOf, OneAsList
 
 from .mapping import AxesConfig, Mapping
 
 
-def _one_as_list(given: Any) -> Any:
-    return [given] if isinstance(given, (int, float)) and not isinstance(given, bool) else given
-
-
 class ScaleConfig(AxesConfig):
-    """Which axes become the signal, and times what."""
+    """The axes that make up the signal, and their factors."""
 
     scale: Annotated[
         ListOf[float],
-        BeforeValidator(_one_as_list),
+        OneAsList,
         AlsoTakes({"type": "number"}),
         Expects("a number or a list of numbers"),
-    ] = Field((1.0,), description="What to multiply by: one number for all axes, or one for each.")
+    ] = Field((1.0,), description="Factors: one number for all axes, or one for each.")
 
     @model_validator(mode="after")
     def _one_for_each(self) -> ScaleConfig:
@@ -35,7 +31,7 @@ class ScaleConfig(AxesConfig):
 
 
 class ScaleMapping(Mapping):
-    """Each axis by itself: `scale * axes[axes_idx]`."""
+    """Scales each axis independently: `scale * axes[axes_idx]`."""
 
     Config = ScaleConfig
 

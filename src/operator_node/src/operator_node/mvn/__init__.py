@@ -1,1 +1,1 @@
-"""Motion capture by Xsens MVN: its stream, the bodies that it shows, recordings."""
+"""Motion capture by Xsens MVN: its stream, the people in it, and recordings."""

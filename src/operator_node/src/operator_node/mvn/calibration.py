@@ -1,4 +1,4 @@
-"""Offsets of segments from a T-pose that somebody stands in."""
+"""Orientation offsets of segments, determined while a person stands in a T-pose."""
 
 import numpy as np
 
@@ -8,14 +8,15 @@ from custom_ros_tools.transforms import Array
 from .segments import SEGMENTS, SegmentFrame
 from .skeleton import about_z, heading_rad, inverse, multiply
 
-MOST_RAD = np.radians(45.0)
-"""Larger offsets mean that nobody stands in a T-pose."""
+MAX_OFFSET_RAD = np.radians(45.0)
+"""Largest offset of a segment; beyond it the pose is rejected as no T-pose."""
 
 
 class Calibration:
-    """Turns segments so that, in the pose it was made from, all are turned alike: upright, and ahead as the pelvis.
+    """Corrects orientations such that, in the calibrated pose, all segments are upright and face the heading of the
+    pelvis.
 
-    Positions are left as they are.
+    Positions stay unchanged.
     """
 
     def __init__(self) -> None:
@@ -23,11 +24,11 @@ class Calibration:
 
     @property
     def people(self) -> list[int]:
-        """Who is calibrated."""
+        """Numbers of the calibrated people."""
         return sorted(self._offsets)
 
     def fit(self, frame: SegmentFrame) -> str:
-        """Takes a frame, not calibrated itself, as the T-pose of its person; returns what it found, in words.
+        """Calibrates a person with a frame, which must be uncalibrated; returns a summary.
 
         Raises:
             InterfaceError: If it is no T-pose.
@@ -37,16 +38,16 @@ class Calibration:
         angles = 2.0 * np.arccos(np.clip(np.abs(offsets[:, 3]), 0.0, 1.0))
         worst = int(angles.argmax())
         found = f"{SEGMENTS[worst]} is {np.degrees(angles[worst]):.0f} deg off a T-pose"
-        if angles[worst] > MOST_RAD:
+        if angles[worst] > MAX_OFFSET_RAD:
             raise InterfaceError(f"person {frame.person}: {found}; stand upright with both arms out to the sides")
         self._offsets = {**self._offsets, frame.person: offsets}
         return f"person {frame.person}: at most, {found}"
 
     def clear(self) -> None:
-        """Forgets all offsets."""
+        """Removes all offsets."""
         self._offsets = {}
 
     def apply(self, frame: SegmentFrame) -> SegmentFrame:
-        """Returns a frame with the offsets of its person."""
+        """Returns a frame with the offsets of its person applied."""
         offsets = self._offsets.get(frame.person)
         return frame if offsets is None else frame._replace(quats_xyzw=multiply(frame.quats_xyzw, offsets))

@@ -1,4 +1,4 @@
-"""What is probably wrong with a stream whose datagrams are fine: units, axes, order, segments that stick or jump."""
+"""Diagnosis of streams whose datagrams are valid: wrong units, axes or order, and segments that stick or jump."""
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
@@ -11,14 +11,14 @@ from .segments import SEGMENTS, SegmentFrame
 from .skeleton import BONES, INDEX, inverse, rotate
 
 SHAPE_PERIOD_S = 0.25
-"""How often the shape of a person is looked at [s]; motion is at each frame."""
+"""Period of the checks of a person's shape [s]; motion is checked at each frame."""
 STUCK_S = 1.0
-FASTEST_M_S, LONGEST_STEP_M = 25.0, 0.25
-"""A segment jumps if it goes both faster and farther than this between two frames."""
-LARGEST_TURN_RAD, TURNING_S = np.radians(60.0), 0.1
-"""It jumps, too, if it turns more than this within that time."""
+MAX_SPEED_M_S, MAX_STEP_M = 25.0, 0.25
+"""Limits of motion between two frames; a segment that exceeds both the speed and the distance jumps."""
+MAX_TURN_RAD, TURNING_S = np.radians(60.0), 0.1
+"""Limit of rotation; a segment that exceeds it within that time jumps."""
 TRUNK_M = (0.15, 5.0)
-"""From pelvis to head, nobody is shorter or longer."""
+"""Range of the distance from pelvis to head; distances outside of it indicate a wrong unit."""
 LENGTH_CHANGE, LENGTH_TOLERANCE_M = 0.2, 0.03
 _STRAIGHT = {
     "L5": (0, 0, 1),
@@ -40,20 +40,21 @@ _STRAIGHT = {
     "LeftFoot": (0, 0, -1),
     "LeftToe": (0.9, 0, -0.4),
 }
-"""Where each segment's origin is from that of its parent, about, as the parent sees it: as in the T-pose, always."""
+"""Approximate direction from the origin of each segment's parent to its own, in the parent's frame, as in the T-pose.
+"""
 _ROWS = [row for row, (_, child) in enumerate(BONES) if SEGMENTS[child] in _STRAIGHT]
 _PARENTS, _CHILDREN = BONES[_ROWS].T
 _DIRECTIONS = np.array([_STRAIGHT[SEGMENTS[child]] for child in _CHILDREN], dtype=float)
 _DIRECTIONS /= np.linalg.norm(_DIRECTIONS, axis=1)[:, None]
 FITTING = np.cos(np.radians(50.0))
-"""Cosine of the angle from that direction up to which a bone fits."""
+"""Cosine of the largest angle between a bone and that direction."""
 _SWAPPED_SIDES = [INDEX[name.replace("Right", "*").replace("Left", "Right").replace("*", "Left")] for name in SEGMENTS]
 
 _Pose = tuple[Array, Array]
 
 
 class Finding(NamedTuple):
-    """Something that is probably wrong: about what, and what it is."""
+    """A probable fault: its subject and a message."""
 
     subject: str
     message: str
@@ -72,7 +73,7 @@ def _picked(columns: list[int]) -> Callable[[Array], Array]:
 
 
 def _explanations() -> Iterator[tuple[str, Callable[[Array, Array], _Pose]]]:
-    """Yields what may have happened to a stream, and what undoes it, the likelier first."""
+    """Yields possible faults of a stream and functions that undo them, the likelier first."""
     y_up = "the stream is Y-up: set y_up: true, or choose Z-up in MVN"
     yield "quaternions come as x, y, z, w instead of w, x, y, z", _with_quats(_picked([3, 0, 1, 2]))
     yield y_up, lambda positions, quats: (positions[:, [2, 0, 1]], quats[:, [2, 0, 1, 3]])
@@ -93,7 +94,7 @@ def _explanations() -> Iterator[tuple[str, Callable[[Array, Array], _Pose]]]:
 
 
 class FrameChecks:
-    """Looks at the frames of one person, one after the other; not at calibrated ones, which have other orientations."""
+    """Checks the frames of one person, one after the other; frames must be uncalibrated, to keep their orientations."""
 
     def __init__(self) -> None:
         self._before: SegmentFrame | None = None
@@ -102,12 +103,12 @@ class FrameChecks:
         self._shape_due_s = -np.inf
         self._lengths: Array | None = None
 
-    def take(self, frame: SegmentFrame, now_s: float) -> list[Finding]:
-        """Returns what is wrong, as far as this frame and those before it tell.
+    def check(self, frame: SegmentFrame, now_s: float) -> list[Finding]:
+        """Returns the faults that this frame and the earlier ones reveal.
 
         Args:
             frame: The frame.
-            now_s: When it came, by any steady clock [s].
+            now_s: Time of arrival, by any steady clock [s].
         """
         findings = [] if self._before is None else self._motion(self._before, frame, now_s)
         if self._before is None:
@@ -127,12 +128,12 @@ class FrameChecks:
             passed_s = now_s - self._before_s
         steps = frame.positions - before.positions
         steps_m = np.sqrt(np.einsum("ij,ij->i", steps, steps))
-        jumps = steps_m > max(LONGEST_STEP_M, FASTEST_M_S * passed_s)
+        jumps = steps_m > max(MAX_STEP_M, MAX_SPEED_M_S * passed_s)
         if jumps.any():
             who = "the whole person" if jumps.all() else SEGMENTS[int(steps_m.argmax())]
             findings.append(Finding("jump", f"{who} moved by {steps_m.max():.2f} m in {passed_s:.3f} s"))
         cosines = np.abs(np.einsum("ij,ij->i", frame.quats_xyzw, before.quats_xyzw))
-        if passed_s < TURNING_S and cosines.min() < np.cos(LARGEST_TURN_RAD / 2.0):
+        if passed_s < TURNING_S and cosines.min() < np.cos(MAX_TURN_RAD / 2.0):
             turn_deg = np.degrees(2.0 * np.arccos(np.clip(cosines, 0.0, 1.0)))
             which = SEGMENTS[int(turn_deg.argmax())]
             findings.append(Finding("jump", f"{which} turned by {turn_deg.max():.0f} deg in {passed_s:.3f} s"))
@@ -173,14 +174,16 @@ class FrameChecks:
 
 
 def _fits(positions: Array, quats: Array) -> Array:
-    """Returns the cosine of the angle between where bones are and where they should be, as their parents see it."""
+    """Returns the cosine of the angle between the actual and the expected direction of each bone, in its parent's
+    frame.
+    """
     bones = rotate(inverse(quats[_PARENTS]), positions[_CHILDREN] - positions[_PARENTS])
     lengths = np.maximum(np.linalg.norm(bones, axis=1), 1e-9)
     return np.asarray(np.einsum("ij,ij->i", bones, _DIRECTIONS) / lengths)
 
 
 def _explanation(frame: SegmentFrame) -> str | None:
-    """Returns what would make all bones fit best, if something does."""
+    """Returns the fault whose correction makes all bones fit best, or None."""
     best, best_fit = None, -1.0
     for words, undo in _explanations():
         fits = _fits(*undo(frame.positions, frame.quats_xyzw))
@@ -190,7 +193,7 @@ def _explanation(frame: SegmentFrame) -> str | None:
 
 
 def _unit(trunk_m: float) -> tuple[str, float] | None:
-    """Returns the unit in which a person may be so long, and what makes metres of it."""
+    """Returns the unit in which a person may have this length, and its factor to metres."""
     for name, scale in (("centimetres", 0.01), ("millimetres", 0.001), ("inches", 0.0254)):
         if 0.35 <= trunk_m * scale <= 1.1:
             return name, scale

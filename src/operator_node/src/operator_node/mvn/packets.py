@@ -1,6 +1,6 @@
-"""Datagrams of the MVN network streaming protocol (rev. N, 2018), checked and taken apart.
+"""Datagrams of the MVN network streaming protocol (rev. N, 2018), checked and parsed.
 
-Numbers are big-endian. What cannot be used raises a `PacketError`, whose reason is one of `REASONS`.
+Numbers are big-endian. Unusable datagrams raise a `PacketError`, whose reason is one of `REASONS`.
 """
 
 import re
@@ -18,11 +18,11 @@ DEFAULT_PORT = 9763
 HEADER = struct.Struct(">6sIBBIBBBBHH")
 """ID, sample counter, datagram counter, items, time code, person, segments, props, fingers, reserved, payload size."""
 LAST = 0x80
-"""Bit of the datagram counter that the last one of a message has."""
-MOST_PROPS, FINGERS = 4, 40
-MOST_ITEMS = len(SEGMENTS) + MOST_PROPS + FINGERS
-FARTHEST = 1e6
-"""No number of a stream is larger, whichever its unit."""
+"""Bit of the datagram counter that marks the last datagram of a message."""
+MAX_PROPS, FINGERS = 4, 40
+MAX_ITEMS = len(SEGMENTS) + MAX_PROPS + FINGERS
+MAX_MAGNITUDE = 1e6
+"""Largest magnitude of a number, in any unit; datagrams with larger ones are refused."""
 
 POSE_EULER, POSE_QUATERNION, UNITY = 1, 2, 5
 PERSON_INFO, SCALE = 12, 13
@@ -36,33 +36,33 @@ ITEMS: dict[int, tuple[int, tuple[int, ...]]] = {
     TRACKERS: (1, (10, 16)),
     CENTER_OF_MASS: (0, (3, 9)),
 }
-"""Of each type with items: how many ids an item begins with, and how many numbers may follow, 4 bytes each."""
+"""For each type with items: number of ids at the start of an item, and possible numbers of values, 4 bytes each."""
 TEXTS = (PERSON_INFO, SCALE, TIME_CODE)
-"""Types whose datagrams stand for themselves."""
+"""Types whose messages consist of a single datagram."""
 REASONS = {
     "too short": "shorter than a header",
     "not MVN": "does not begin with MXTP and two digits",
     "type 05": "Unity's format: left-handed, in another order and relative to parents; choose Position + Orientation "
     "(Quaternion), type 02, in MVN's network streamer",
-    "unknown type": "a type that is not read here",
-    "size": "its size is not that of what it says it has",
-    "counts": "its counts make no sense",
+    "unknown type": "a type that is not supported",
+    "size": "its size does not match its header",
+    "counts": "its counts are invalid",
     "segment ids": "the ids of the segments are not 1 to 23",
     "not finite": "it has numbers that are not finite",
     "zero quaternion": "a quaternion is zero",
-    "out of range": f"a number is larger than {FARTHEST:g}",
-    "text": "its text makes no sense",
+    "out of range": f"a number is larger than {MAX_MAGNITUDE:g}",
+    "text": "its text is invalid",
     "too many people": "more people than max_people",
 }
 _EXPONENT = 0x7F800000
-"""Bits that infinity and what is no number have."""
+"""Exponent bits of infinity and NaN."""
 _TIME_CODE = re.compile(rb"\d\d:\d\d:\d\d(\.\d{1,3})?")
-_SMALLEST_NORM = 1e-6
-_LONGEST_NAME = 64
+_MIN_NORM = 1e-6
+_MAX_NAME_BYTES = 64
 
 
 class PacketError(ValueError):
-    """A datagram cannot be used."""
+    """A datagram is unusable."""
 
     def __init__(self, reason: str, detail: str = "") -> None:
         self.reason = reason
@@ -74,14 +74,14 @@ class Datagram(NamedTuple):
 
     Attributes:
         kind: Its type.
-        sample: Sample counter, the same for all of a frame.
-        part: Which part of the message it is, from 0.
+        sample: Sample counter, the same for all datagrams of a frame.
+        part: Index of the part of the message, from 0.
         is_last: Whether it is the last part.
         time_ms: Time since the recording began [ms].
         person: Number of the person, from 0.
-        ids: Ids that the items begin with (n x 1 or 2), empty for texts.
+        ids: Ids at the start of the items (n x 1 or 2), empty for texts.
         values: The other numbers of the items (n x m), empty for texts.
-        text: What follows the header, of texts.
+        text: Payload after the header, for texts.
     """
 
     kind: int
@@ -99,10 +99,10 @@ _NOTHING = np.zeros((0, 0))
 
 
 def parse(data: bytes) -> Datagram:
-    """Takes a datagram apart.
+    """Parses a datagram.
 
     Raises:
-        PacketError: If it cannot be used.
+        PacketError: If it is unusable.
     """
     if len(data) < HEADER.size:
         raise PacketError("too short", f"{len(data)} bytes")
@@ -116,8 +116,8 @@ def parse(data: bytes) -> Datagram:
         raise PacketError("unknown type", f"{kind:02}")
     payload = data[HEADER.size :]
     if size not in (0, len(payload)):
-        raise PacketError("size", f"type {kind:02}, {size} bytes announced, {len(payload)} there")
-    if segments not in (0, len(SEGMENTS)) or props > MOST_PROPS or fingers not in (0, FINGERS):
+        raise PacketError("size", f"type {kind:02}, {size} bytes announced, {len(payload)} received")
+    if segments not in (0, len(SEGMENTS)) or props > MAX_PROPS or fingers not in (0, FINGERS):
         raise PacketError("counts", f"{segments} segments, {props} props, {fingers} fingers")
     part, is_last = counter & ~LAST, bool(counter & LAST)
     if kind in TEXTS:
@@ -128,26 +128,26 @@ def parse(data: bytes) -> Datagram:
 
 def _items(kind: int, count: int, payload: bytes) -> tuple[Array, Array]:
     id_count, lengths = ITEMS[kind]
-    if not 0 < count <= MOST_ITEMS:
+    if not 0 < count <= MAX_ITEMS:
         raise PacketError("counts", f"type {kind:02}, {count} items")
     length, rest = divmod(len(payload), 4 * count)
     if rest or length - id_count not in lengths:
         raise PacketError("size", f"type {kind:02}, {count} items in {len(payload)} bytes")
     ids = np.frombuffer(payload, ">i4").reshape(count, length)[:, :id_count]
     bits = np.frombuffer(payload, ">u4").reshape(count, length)[:, id_count:]
-    if ((bits & _EXPONENT) == _EXPONENT).any():  # numpy warns of some of them when they are converted
+    if ((bits & _EXPONENT) == _EXPONENT).any():  # numpy warns about some of them when they are converted
         raise PacketError("not finite", f"type {kind:02}")
     values = bits.view(">f4").astype(float)
-    if np.abs(values).max() > FARTHEST:
+    if np.abs(values).max() > MAX_MAGNITUDE:
         raise PacketError("out of range", f"type {kind:02}")
     return ids, values
 
 
 def body_rows(ids: Array) -> NDArray[np.intp]:
-    """Returns where the rows of the segments are, in their order (23); props and fingers follow those of the body.
+    """Returns the indices of the rows of the segments, in their order (23); props and fingers follow those of the body.
 
     Raises:
-        PacketError: If it is not the body, whole.
+        PacketError: If the body is incomplete.
     """
     body = ids[: len(SEGMENTS), 0]
     order = np.argsort(body, kind="stable")
@@ -160,28 +160,28 @@ _IDS = np.arange(1, len(SEGMENTS) + 1)
 
 
 def unit_quats(quats: Array) -> tuple[Array, float]:
-    """Returns quaternions (n x 4) normalised, and the length that is farthest from 1.
+    """Returns quaternions (n x 4) normalised, and the length that differs most from 1.
 
     Raises:
         PacketError: If one is zero.
     """
     norms = np.sqrt(np.einsum("ij,ij->i", quats, quats))
-    if norms.min() < _SMALLEST_NORM:
+    if norms.min() < _MIN_NORM:
         raise PacketError("zero quaternion", f"segment {SEGMENTS[int(norms.argmin())]}")
     return quats / norms[:, None], float(norms[np.abs(norms - 1.0).argmax()])
 
 
 def info_in(text: bytes) -> dict[str, str]:
-    """Returns what a datagram of type 12 says, by its keys, such as `name`."""
+    """Returns the fields of a datagram of type 12, by key, such as `name`."""
     lines = re.findall(r"([\w ]{1,64}):[ \t]*([^\n\r\0]{0,256})", text[:4096].decode("ascii", "replace"))
     return {key.strip(): value.strip() for key, value in lines[:64]}
 
 
 def time_code_in(text: bytes) -> str:
-    """Returns the time of day that a datagram of type 25 says, as HH:MM:SS.mmm.
+    """Returns the time of day in a datagram of type 25, as HH:MM:SS.mmm.
 
     Raises:
-        PacketError: If it is none.
+        PacketError: If it has none.
     """
     found = _TIME_CODE.search(text[:64])
     if found is None:
@@ -190,35 +190,35 @@ def time_code_in(text: bytes) -> str:
 
 
 def t_pose_in(text: bytes) -> dict[str, tuple[float, float, float]]:
-    """Returns where the origins of segments are in the T-pose [m], by their names, from a datagram of type 13.
+    """Returns the origins of segments in the T-pose [m], by name, from a datagram of type 13.
 
     Other datagrams of that type have points of the skin, and no segments.
 
     Raises:
-        PacketError: If its size is not that of what it says it has.
+        PacketError: If its size does not match its counts.
     """
-    reader = _Reader(text)
+    reader = _PayloadReader(text)
     origins = {}
-    for _ in range(reader.count(MOST_ITEMS)):
-        name = reader.take(reader.count(_LONGEST_NAME)).decode("ascii", "replace").replace(" ", "")
-        origin = struct.unpack(">3f", reader.take(12))
-        if not all(abs(value) <= FARTHEST for value in origin):
+    for _ in range(reader.count(MAX_ITEMS)):
+        name = reader.read(reader.count(_MAX_NAME_BYTES)).decode("ascii", "replace").replace(" ", "")
+        origin = struct.unpack(">3f", reader.read(12))
+        if not all(abs(value) <= MAX_MAGNITUDE for value in origin):
             raise PacketError("not finite", f"segment {name}")
         origins[name] = origin
     return origins
 
 
-class _Reader:
+class _PayloadReader:
     def __init__(self, data: bytes) -> None:
         self._data, self._at = data, 0
 
     def count(self, most: int) -> int:
-        (count,) = struct.unpack(">I", self.take(4))
+        (count,) = struct.unpack(">I", self.read(4))
         if count > most:
             raise PacketError("counts", f"{count}, at most {most} are possible")
         return int(count)
 
-    def take(self, size: int) -> bytes:
+    def read(self, size: int) -> bytes:
         part = self._data[self._at : self._at + size]
         if len(part) < size:
             raise PacketError("size", "it ends within a segment")

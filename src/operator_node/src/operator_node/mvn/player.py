@@ -10,19 +10,19 @@ from .recording import read_recording
 from .sender import send, sender_arguments, without_ros_arguments
 
 PAUSE_S = 0.02
-"""Pause before a recording begins again [s]."""
+"""Pause before a recording is repeated [s]."""
 
 
 def timed_datagrams(path: Path, speed: float = 1.0, loop: bool = False) -> Iterator[tuple[float, bytes]]:
-    """Yields the datagrams of a recording, each with when to send it [s].
+    """Yields the datagrams of a recording, each with the time at which to send it [s].
 
     Args:
         path: The recording.
-        speed: How many times as fast as it was recorded.
-        loop: Whether it begins again at its end, for ever.
+        speed: Factor of the speed of the recording.
+        loop: Whether it is repeated forever.
 
     Raises:
-        InterfaceError: If it cannot be read, or there is nothing in it.
+        InterfaceError: If it cannot be read, or is empty.
     """
     begin_s = time_s = 0.0
     count = 0
@@ -32,7 +32,7 @@ def timed_datagrams(path: Path, speed: float = 1.0, loop: bool = False) -> Itera
             yield time_s, data
             count += 1
         if not count:
-            raise InterfaceError(f"{path}: there is nothing in it")
+            raise InterfaceError(f"{path}: the recording is empty")
         if not loop:
             return
         begin_s = time_s + PAUSE_S
@@ -41,9 +41,9 @@ def timed_datagrams(path: Path, speed: float = 1.0, loop: bool = False) -> Itera
 def main() -> int:
     """Runs the command; returns its exit code."""
     parser = sender_arguments("mvn_player.py", __doc__)
-    parser.add_argument("file", type=Path, metavar="FILE", help="what mvn_node.py recorded")
-    parser.add_argument("--speed", type=float, default=1.0, help="how many times as fast as recorded")
-    parser.add_argument("--loop", action="store_true", help="begin again at the end, until Ctrl-C")
+    parser.add_argument("file", type=Path, metavar="FILE", help="recording of mvn_node.py")
+    parser.add_argument("--speed", type=float, default=1.0, help="factor of the recorded speed")
+    parser.add_argument("--loop", action="store_true", help="repeat until Ctrl-C")
     options = parser.parse_args(without_ros_arguments(sys.argv[1:]))
     if not 0.01 <= options.speed <= 100.0:
         parser.error(f"--speed: expected 0.01 to 100, got {options.speed:g}")

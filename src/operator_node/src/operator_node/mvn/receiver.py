@@ -17,30 +17,32 @@ from custom_ros_tools.schema import ConfigModel, Positive, Seconds, Switch, Text
 from .calibration import Calibration
 from .checks import Finding, FrameChecks
 from .packets import DEFAULT_PORT
-from .recording import Recording
+from .recording import DatagramRecording
 from .segments import SegmentFrame
 from .stream import StreamDecoder
 
-MOST_TOGETHER = 64
-"""How many datagrams are read at most before what they say is given on."""
-LARGEST_DATAGRAM = 65_535
+MAX_DATAGRAMS = 64
+"""Largest number of datagrams that are read before their events are returned."""
+MAX_DATAGRAM_BYTES = 65_535
 BUFFER_BYTES = 1 << 20
 REMARK_PERIOD_S = 1.0
 
 
 class MvnConfig(ConfigModel):
-    """Where MVN's stream comes from, and how it is to be read."""
+    """Source and interpretation of MVN's stream."""
 
-    host: Text = Field("127.0.0.1", description="Address that listens; 0.0.0.0 takes what comes from other computers.")
-    port: int = Field(DEFAULT_PORT, ge=0, le=65_535, description="UDP port; 0 is any that is free.")
-    position_scale: Positive = Field(1.0, description="What positions are multiplied by to be in metres; not type 01.")
-    y_up: Switch = Field(False, description="Whether MVN was told to send type 02 Y-up.")
-    max_people: int = Field(8, ge=1, le=256, description="From how many people at most frames are taken.")
-    timeout_s: Seconds = Field(0.5, description="After how long without a frame the stream counts as gone.")
+    host: Text = Field("127.0.0.1", description="Address to listen at; 0.0.0.0 also receives from other computers.")
+    port: int = Field(DEFAULT_PORT, ge=0, le=65_535, description="UDP port; 0 selects any free one.")
+    position_scale: Positive = Field(1.0, description="Factor of positions to metres; not applied to type 01.")
+    y_up: Switch = Field(False, description="Whether MVN sends type 02 with the y axis up.")
+    max_people: int = Field(
+        8, ge=1, le=256, description="Largest number of people; frames of further ones are refused."
+    )
+    timeout_s: Seconds = Field(0.5, description="Time without a frame after which the stream counts as gone.")
 
 
 class Silence(NamedTuple):
-    """No frame of a person has come for some time [s]; told once."""
+    """No frame of a person has arrived for some time [s]; reported once."""
 
     person: int
     seconds: float
@@ -53,7 +55,7 @@ class Refused(NamedTuple):
 
 
 class Receiver:
-    """A socket, and what is made of the datagrams that it receives.
+    """A socket, and the decoding of the datagrams that it receives.
 
     One thread opens, polls and closes it; others may calibrate and record meanwhile.
     """
@@ -64,37 +66,37 @@ class Receiver:
         self._decoder = StreamDecoder(config.position_scale, bool(config.y_up), config.max_people)
         self._checks: dict[int, FrameChecks] = {}
         self._newest: dict[int, tuple[float, SegmentFrame]] = {}
-        """When the newest frame of each person came, and what it was before calibration; of those who are there."""
+        """Arrival and uncalibrated value of the newest frame of each person who is present."""
         self._socket: socket.socket | None = None
         self._remarks_due_s = 0.0
         self._lock = threading.Lock()
-        self._recording: Recording | None = None
+        self._recording: DatagramRecording | None = None
 
     @property
     def counts(self) -> Counter[str]:
-        """What became of the datagrams, see `StreamDecoder`."""
+        """Number of datagrams by result, see `StreamDecoder`."""
         return self._decoder.counts
 
     @property
     def refusals(self) -> dict[str, str]:
-        """What was the matter with the newest datagram that was refused, by reason."""
+        """Details of the newest refused datagram, by reason."""
         return self._decoder.refusals
 
     @property
     def people(self) -> list[int]:
-        """Whose frames come."""
+        """Numbers of the people whose frames arrive."""
         return sorted(self._newest.copy())
 
     @property
     def port(self) -> int:
-        """The port that listens; 0 if none does."""
+        """The port in use; 0 while the socket is closed."""
         return int(self._socket.getsockname()[1]) if self._socket else 0
 
     def open(self) -> None:
-        """Listens from now on.
+        """Starts to listen.
 
         Raises:
-            OSError: If the address cannot be had.
+            OSError: If the address is not available.
         """
         self.close()
         receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -108,19 +110,19 @@ class Receiver:
         self._socket = receiver
 
     def close(self) -> None:
-        """Listens no more, forgets who was there, and ends a recording."""
+        """Stops listening, resets the stream, and ends a recording."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
-        with contextlib.suppress(InterfaceError):  # most often there is none
+        with contextlib.suppress(InterfaceError):  # usually none is running
             self.stop_recording()
         self._forget()
 
     def poll(self, timeout_s: float) -> list[Any]:
-        """Returns what has come: messages, `Finding`s, `Refused` and `Silence`; nothing after a time.
+        """Returns new events: messages, `Finding`s, `Refused` and `Silence`; an empty list after the timeout.
 
         Args:
-            timeout_s: How long to wait for it [s].
+            timeout_s: Longest time to wait [s].
         """
         assert self._socket is not None, "it is not open"
         end_s = time.monotonic() + timeout_s
@@ -137,18 +139,18 @@ class Receiver:
     def _drain(self) -> list[Any]:
         assert self._socket is not None
         events: list[Any] = []
-        for _ in range(MOST_TOGETHER):
+        for _ in range(MAX_DATAGRAMS):
             try:
-                data = self._socket.recv(LARGEST_DATAGRAM)
+                data = self._socket.recv(MAX_DATAGRAM_BYTES)
             except BlockingIOError:
                 break
             now_s = time.monotonic()
             events += self._record(now_s, data)
-            message = self._decoder.take(data)
+            message = self._decoder.decode(data)
             if isinstance(message, SegmentFrame):
                 self._newest[message.person] = now_s, message
                 checks = self._checks.setdefault(message.person, FrameChecks())
-                events += _of_person(message.person, checks.take(message, now_s))
+                events += _of_person(message.person, checks.check(message, now_s))
                 message = self.calibration.apply(message)
             if message is not None:
                 events.append(message)
@@ -180,13 +182,13 @@ class Receiver:
         self._decoder.remarks.clear()
         return found
 
-    # --- What other threads may call.
+    # --- For other threads.
 
     def calibrate(self) -> str:
-        """Takes the present pose of everybody as their T-pose; returns what was found, in words.
+        """Calibrates everybody with their present pose as the T-pose; returns a summary.
 
         Raises:
-            InterfaceError: If nobody is there, or somebody stands otherwise; then nothing is changed for them.
+            InterfaceError: If nobody is present, or a pose is no T-pose; that person's offsets stay unchanged then.
         """
         newest = self._newest.copy()
         if not newest:
@@ -194,21 +196,21 @@ class Receiver:
         return "; ".join(self.calibration.fit(frame) for _, frame in newest.values())
 
     def start_recording(self, path: Path) -> None:
-        """Records what comes from now on.
+        """Starts to record datagrams.
 
         Raises:
-            InterfaceError: If a recording is running, or the file cannot be made.
+            InterfaceError: If a recording is running, or the file cannot be created.
         """
         with self._lock:
             if self._recording is not None:
                 raise InterfaceError(f"{self._recording.path} is being recorded already")
-            self._recording = Recording(path)
+            self._recording = DatagramRecording(path)
 
     def stop_recording(self) -> tuple[Path, int]:
-        """Ends the recording; returns its path, and how many datagrams it has.
+        """Ends the recording; returns its path and its number of datagrams.
 
         Raises:
-            InterfaceError: If none is running, or what is left cannot be written.
+            InterfaceError: If none is running, or the remaining data cannot be written.
         """
         with self._lock:
             recording, self._recording = self._recording, None

@@ -1,7 +1,7 @@
-"""Recordings of a stream: each datagram as it came, with the time of its arrival.
+"""Recordings of a stream: each datagram as received, with its time of arrival.
 
-A file begins with the line `MVN datagrams 1`. Each record is an arrival since the first one [s] as a big-endian double,
-a length as a big-endian unsigned short, and so many bytes.
+A file begins with the line `MVN datagrams 1`. Each record consists of the arrival since the first one [s] as a
+big-endian double, the length as a big-endian unsigned short, and that number of bytes.
 """
 
 import struct
@@ -12,19 +12,19 @@ from typing import NamedTuple
 from custom_ros_tools.errors import InterfaceError
 
 MAGIC = b"MVN datagrams 1\n"
-LONGEST_PAUSE_S = 3600.0
+MAX_PAUSE_S = 3600.0
 _RECORD = struct.Struct(">dH")
 
 
 class Record(NamedTuple):
-    """A datagram and when it came, since the first one [s]."""
+    """A datagram and its arrival since the first one [s]."""
 
     time_s: float
     data: bytes
 
 
-class Recording:
-    """Writes datagrams into a file.
+class DatagramRecording:
+    """Writes datagrams to a file.
 
     Raises:
         InterfaceError: If the file exists, or cannot be written.
@@ -41,7 +41,7 @@ class Recording:
             raise _cannot_write(path, error) from None
 
     def write(self, now_s: float, data: bytes) -> None:
-        """Adds a datagram that came at a time of any steady clock [s].
+        """Appends a datagram with its arrival by any steady clock [s].
 
         Raises:
             InterfaceError: If it cannot be written, for instance because the disk is full.
@@ -55,10 +55,10 @@ class Recording:
         self.count += 1
 
     def close(self) -> None:
-        """Ends the file.
+        """Closes the file.
 
         Raises:
-            InterfaceError: If what is left cannot be written.
+            InterfaceError: If the remaining data cannot be written.
         """
         try:
             self._file.close()
@@ -71,10 +71,10 @@ def _cannot_write(path: Path, error: OSError) -> InterfaceError:
 
 
 def read_recording(path: Path) -> Iterator[Record]:
-    """Yields what was recorded; a record that was cut off at the end is left out.
+    """Yields the records; one that is cut off at the end of the file is dropped.
 
     Raises:
-        InterfaceError: If the file cannot be read, is no recording, or has times that make no sense.
+        InterfaceError: If the file cannot be read, is no recording, or has invalid times.
     """
     try:
         with open(path, "rb") as file:
@@ -84,7 +84,7 @@ def read_recording(path: Path) -> Iterator[Record]:
             while len(head := file.read(_RECORD.size)) == _RECORD.size:
                 at = file.tell()
                 time_s, length = _RECORD.unpack(head)
-                if not before_s <= time_s <= before_s + LONGEST_PAUSE_S:
+                if not before_s <= time_s <= before_s + MAX_PAUSE_S:
                     raise InterfaceError(f"{path}: byte {at}: expected a time after {before_s:g} s, got {time_s:g} s")
                 data = file.read(length)
                 if len(data) < length:

@@ -1,4 +1,4 @@
-"""A person as MVN measures them: 23 rigid segments, and what else it says of them."""
+"""Messages of MVN about a person: 23 rigid segments, joint angles and more."""
 
 from typing import NamedTuple
 
@@ -31,7 +31,7 @@ SEGMENTS = (
     "LeftFoot",
     "LeftToe",
 )
-"""Names of the segments in the order of the stream, whose ids begin at 1 (MVN network streaming protocol, rev. N)."""
+"""Names of the segments in the order of the stream, whose ids start at 1 (MVN network streaming protocol, rev. N)."""
 
 
 class SegmentFrame(NamedTuple):
@@ -81,7 +81,7 @@ class CenterOfMass(NamedTuple):
     position: Array
 
 
-class Motion(NamedTuple):
+class SegmentMotion(NamedTuple):
     """Motion of segments or trackers in MVN's own units (types 21, 22 and 23).
 
     Attributes:
@@ -90,7 +90,7 @@ class Motion(NamedTuple):
         kind: The type. 21: position, velocity, acceleration [m, m/s, m/s2]; 22: quaternion w, x, y, z, angular
             velocity, angular acceleration [deg/s, deg/s2]; 23: quaternion w, x, y, z, acceleration, magnetic field.
         ids: Ids of segments, from 1, or of trackers.
-        values: What the type has of each of them, in that order.
+        values: Values of each of them, in that order.
     """
 
     person: int
@@ -101,14 +101,14 @@ class Motion(NamedTuple):
 
 
 class PersonInfo(NamedTuple):
-    """What MVN says of a person, by its keys, such as `name` and `color` (type 12)."""
+    """Fields of a person, by key, such as `name` and `color` (type 12)."""
 
     person: int
     fields: dict[str, str]
 
 
 class TPose(NamedTuple):
-    """Where the origins of a person's segments are in the T-pose [m], by segment (type 13)."""
+    """Origins of a person's segments in the T-pose [m], by segment (type 13)."""
 
     person: int
     origins: dict[str, tuple[float, float, float]]
@@ -122,4 +122,4 @@ class TimeCode(NamedTuple):
     time: str
 
 
-Message = SegmentFrame | JointAngles | CenterOfMass | Motion | PersonInfo | TPose | TimeCode
+Message = SegmentFrame | JointAngles | CenterOfMass | SegmentMotion | PersonInfo | TPose | TimeCode

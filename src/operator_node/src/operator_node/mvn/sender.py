@@ -1,4 +1,4 @@
-"""Sends datagrams at their times."""
+"""Sends datagrams at given times."""
 
 import argparse
 import socket
@@ -11,9 +11,9 @@ LOOPBACK = "127.0.0.1"
 
 
 def send(timed: Iterable[tuple[float, bytes]], host: str, port: int) -> int:
-    """Sends datagrams by UDP, each at its time [s] since now; what is late goes at once. Returns how many were sent.
+    """Sends datagrams by UDP, each at its time [s] from now; late ones are sent at once. Returns their number.
 
-    That nobody listens is no error.
+    A missing receiver is no error.
     """
     count = 0
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
@@ -30,7 +30,7 @@ def send(timed: Iterable[tuple[float, bytes]], host: str, port: int) -> int:
 def sender_arguments(program: str, purpose: str | None) -> argparse.ArgumentParser:
     """Returns a parser with the options `--host` and `--port`."""
     parser = argparse.ArgumentParser(prog=program, description=purpose)
-    parser.add_argument("--host", default=LOOPBACK, help="who gets it; by default this computer")
+    parser.add_argument("--host", default=LOOPBACK, help="receiver; by default this computer")
     parser.add_argument("--port", type=int, default=DEFAULT_PORT, help=f"UDP port there; by default {DEFAULT_PORT}")
     return parser
 

@@ -1,6 +1,7 @@
-"""How the segments of a person hang together, and quaternions of all of them at once (n x 4, x, y, z, w)."""
+"""Hierarchy of the segments of a person, and operations on arrays of quaternions (n x 4, x, y, z, w)."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from custom_ros_tools.transforms import Array
 
@@ -17,23 +18,16 @@ PARENTS = tuple(
         *("Pelvis", "LeftUpperLeg", "LeftLowerLeg", "LeftFoot"),
     )
 )
-"""Index of the segment that each hangs on, -1 for the pelvis."""
+"""Index of each segment's parent, -1 for the pelvis."""
 BONES = np.array([(parent, child) for child, parent in enumerate(PARENTS) if parent >= 0])
-"""Each bone as the segments whose origins it joins, parent first (22 x 2); it is rigid, and turns with its parent."""
+"""Each bone as the pair of segments whose origins it connects, parent first (22 x 2); it is rigid, and rotates with its
+parent.
+"""
 
 
 def multiply(a: Array, b: Array) -> Array:
-    """Returns the rotations b, then a."""
-    ax, ay, az, aw = a.T
-    bx, by, bz, bw = b.T
-    return np.array(
-        [
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-            aw * bw - ax * bx - ay * by - az * bz,
-        ]
-    ).T
+    """Returns the products a b: rotation by b, then by a."""
+    return np.asarray((Rotation.from_quat(a) * Rotation.from_quat(b)).as_quat())
 
 
 def inverse(quats: Array) -> Array:
@@ -42,17 +36,15 @@ def inverse(quats: Array) -> Array:
 
 
 def rotate(quats: Array, vectors: Array) -> Array:
-    """Returns vectors (n x 3) turned by quaternions."""
-    u, w = quats[:, :3], quats[:, 3:]
-    t = 2.0 * np.cross(u, vectors)
-    return vectors + w * t + np.cross(u, t)
+    """Returns vectors (n x 3) rotated by quaternions."""
+    return np.asarray(Rotation.from_quat(quats).apply(vectors))
 
 
 def heading_rad(quat: Array) -> float:
-    """Returns how far a unit quaternion (4) turns about z, as the twist of swing and twist [rad]."""
+    """Returns the rotation of a unit quaternion (4) about z, as the twist of its swing-twist decomposition [rad]."""
     return float(2.0 * np.arctan2(quat[2], quat[3]))
 
 
 def about_z(angle_rad: float) -> Array:
-    """Returns a rotation about z (4)."""
+    """Returns a rotation about z, as a quaternion (4)."""
     return np.array((0.0, 0.0, np.sin(angle_rad / 2.0), np.cos(angle_rad / 2.0)))

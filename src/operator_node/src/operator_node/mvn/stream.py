@@ -1,4 +1,4 @@
-"""From datagrams of MVN to frames of people: grouped by person and sample, in metres, z up."""
+"""Decodes datagrams of MVN into frames of people: grouped by person and sample, in metres, z up."""
 
 from collections import Counter, deque
 from dataclasses import dataclass, field
@@ -10,15 +10,27 @@ from custom_ros_tools.transforms import Array
 
 from . import packets
 from .packets import Datagram, PacketError
-from .segments import SEGMENTS, CenterOfMass, JointAngles, Message, Motion, PersonInfo, SegmentFrame, TimeCode, TPose
+from .segments import (
+    SEGMENTS,
+    CenterOfMass,
+    JointAngles,
+    Message,
+    PersonInfo,
+    SegmentFrame,
+    SegmentMotion,
+    TimeCode,
+    TPose,
+)
 
-MOST_BEHIND = 100
-"""A datagram that is so many samples behind is late; further behind, the stream has begun anew."""
-MOST_LATE = 20
-"""So many late datagrams of a message type in a row, and the stream has begun anew too, as a short recording does."""
-MOST_REFUSED = 1000
+MAX_BEHIND = 100
+"""Number of samples by which a datagram may be behind and count as late; further behind, the stream has restarted."""
+MAX_LATE = 20
+"""Number of consecutive late datagrams of a message type after which the stream counts as restarted, as when a short
+recording is repeated.
+"""
+MAX_REFUSED = 1000
 LONG_GONE = 500
-"""After so many datagrams of others a person gives way to a new one, if there are too many."""
+"""Number of datagrams of others after which a person may be replaced by a new one, if there are too many."""
 LENGTH_TOLERANCE = 0.01
 _COUNTER_RANGE = 2**32
 _METRES_PER_CM = 0.01
@@ -36,39 +48,39 @@ class _Group:
 
 
 class StreamDecoder:
-    """Makes messages of datagrams, in whatever order they come; its memory is bounded, whatever comes.
+    """Assembles messages from datagrams, in whatever order they arrive; its memory is bounded for any input.
 
-    A message is given once all of its datagrams are there, and dropped when one of a newer sample comes first.
+    A message is returned once all of its datagrams have arrived, and dropped when one of a newer sample arrives first.
 
     Args:
-        position_scale: What positions of types 02, 21 and 24 are multiplied by to be metres.
-        y_up: Whether those types are Y-up, which MVN can be told to send; else they are Z-up. Type 01 always is Y-up
-            and in centimetres.
-        max_people: Of how many people at most it takes messages; others are refused.
+        position_scale: Factor of positions of types 02, 21 and 24 to metres.
+        y_up: Whether those types have the y axis up, an option of MVN; otherwise z is up. Type 01 always has y up and
+            is in centimetres.
+        max_people: Largest number of people; messages of further ones are refused.
 
     Attributes:
         counts: `received` is the number of datagrams; each of them is `used`, `late`, `duplicate`, `incomplete` (its
             message was dropped), `ignored` (type 01 beside type 02) or `refused: REASON`, or waits for the rest of its
-            message. Beside those, `frames` is how many `SegmentFrame`s were given, and `skipped` how many samples were
-            passed over by those; they were lost, came late, or MVN streams at a lower rate than it measures.
-        refused: Reason of each datagram that was refused, of `packets.REASONS`, the newest of them; may be emptied.
-        refusals: What was the matter with the newest one of each reason.
-        remarks: What is odd, by subject; may be emptied.
+            message. In addition, `frames` is the number of `SegmentFrame`s returned, and `skipped` the number of
+            samples missing between those: they were lost or late, or MVN streams at a lower rate than it measures.
+        refused: Reason of each refused datagram, of `packets.REASONS`, limited to the newest; may be emptied.
+        refusals: Details of the newest refusal for each reason.
+        remarks: Oddities, by subject; may be emptied.
     """
 
     def __init__(self, position_scale: float = 1.0, y_up: bool = False, max_people: int = 8) -> None:
         self.counts: Counter[str] = Counter()
-        self.refused: deque[str] = deque(maxlen=MOST_REFUSED)
+        self.refused: deque[str] = deque(maxlen=MAX_REFUSED)
         self.refusals: dict[str, str] = {}
         self.remarks: dict[str, str] = {}
         self._scale, self._y_up, self._max_people = position_scale, y_up, max_people
         self._groups: dict[tuple[int, int], _Group] = {}
         self._people: dict[int, int] = {}
-        """How many datagrams had been received when each person's last one was."""
+        """Value of `received` at the last datagram of each person."""
         self._frame_samples: dict[int, int] = {}
 
     def reset(self) -> None:
-        """Forgets whose stream it was, for instance after silence; counts go on."""
+        """Drops the state of the stream, for instance after a silence; counts continue."""
         for group in self._groups.values():
             self._drop(group)
         self._groups.clear()
@@ -77,11 +89,11 @@ class StreamDecoder:
 
     @property
     def waiting(self) -> int:
-        """How many datagrams wait for the rest of their messages."""
+        """Number of datagrams that wait for the rest of their messages."""
         return sum(len(group.parts) for group in self._groups.values())
 
-    def take(self, data: bytes) -> Message | None:
-        """Takes what came as one datagram; returns the message that is complete with it, if one is."""
+    def decode(self, data: bytes) -> Message | None:
+        """Decodes one datagram; returns the message that it completes, if any."""
         self.counts["received"] += 1
         try:
             datagram = packets.parse(data)
@@ -101,7 +113,7 @@ class StreamDecoder:
         self.refusals[error.reason] = str(error)
 
     def _admit(self, person: int) -> None:
-        """Makes room for a person, in the place of one of whom nothing has come for long, if need be."""
+        """Admits a person; if there are too many, one without datagrams for long is replaced."""
         received = self.counts["received"]
         if person not in self._people and len(self._people) >= self._max_people:
             oldest = min(self._people, key=self._people.__getitem__)
@@ -137,7 +149,7 @@ class StreamDecoder:
         return self._completed(parts)
 
     def _group_of(self, datagram: Datagram) -> _Group | None:
-        """Returns where a datagram belongs, None if that has gone by."""
+        """Returns the group of a datagram, or None if the datagram is late."""
         key = (datagram.person, datagram.kind)
         group = self._groups.get(key)
         if group is not None:
@@ -145,7 +157,7 @@ class StreamDecoder:
             if ahead == 0:
                 return group
             behind = _COUNTER_RANGE - ahead
-            if behind <= MOST_BEHIND and group.late_in_a_row < MOST_LATE:
+            if behind <= MAX_BEHIND and group.late_in_a_row < MAX_LATE:
                 group.late_in_a_row += 1
                 self.counts["late"] += 1
                 return None
@@ -161,7 +173,7 @@ class StreamDecoder:
         first = parts[0]
         ids = np.concatenate([part.ids for part in parts])
         try:
-            if len({part.values.shape[1] for part in parts}) > 1 or len(ids) > packets.MOST_ITEMS:
+            if len({part.values.shape[1] for part in parts}) > 1 or len(ids) > packets.MAX_ITEMS:
                 raise PacketError("counts", f"{len(ids)} items in {len(parts)} datagrams")
             message = self._message(first, ids, np.concatenate([part.values for part in parts]))
         except PacketError as error:
@@ -178,7 +190,7 @@ class StreamDecoder:
         self._frame_samples[frame.person] = frame.sample
         if before is not None:
             step = (frame.sample - before) % _COUNTER_RANGE
-            if 0 < step <= MOST_BEHIND:
+            if 0 < step <= MAX_BEHIND:
                 self.counts["skipped"] += step - 1
 
     def _message(self, first: Datagram, ids: Array, values: Array) -> Message | None:
@@ -194,7 +206,7 @@ class StreamDecoder:
         if kind == packets.CENTER_OF_MASS:
             position = self._scale * values[0, :3]
             return CenterOfMass(person, sample, position[_Z_UP] if self._y_up else position)
-        return Motion(person, sample, kind, tuple(ids[:, 0].tolist()), values)
+        return SegmentMotion(person, sample, kind, tuple(ids[:, 0].tolist()), values)
 
     def _poses(self, kind: int, values: Array) -> tuple[Array, Array]:
         """Returns positions [m] and quaternions x, y, z, w, z up."""
@@ -210,16 +222,18 @@ class StreamDecoder:
 
 
 _Z_UP = [2, 0, 1]
-"""Which parts of a Y-up vector are x, y and z of a Z-up one; there, a person looks along z, here along x."""
+"""Components of a y-up vector that are x, y and z of a z-up one; a person faces z there, and x here."""
 
 
 def _quats_of_euler(angles_deg: Array) -> Array:
-    """Returns quaternions x, y, z, w of turns about the fixed x, y and z axis in this order, as MVN's receiver does."""
+    """Returns quaternions x, y, z, w of rotations about the fixed x, y and z axis in this order, as MVN's receiver
+    does.
+    """
     return np.asarray(Rotation.from_euler("xyz", angles_deg, degrees=True).as_quat())
 
 
 def _segment_of_point(point: int) -> str:
-    """Returns the segment that a point is on."""
+    """Returns the segment of a point."""
     segment = point // 256
     if not 1 <= segment <= len(SEGMENTS):
         raise PacketError("segment ids", f"point {point}")

@@ -13,14 +13,14 @@ from custom_ros_tools.ros.transform_messages import TransformTopic, as_pose, tra
 from operator_node.node_configs import InteractiveTargetConfig
 
 NAMESPACE = "ik_target"
-"""RViz's display InteractiveMarkers takes `/ik_target/update`."""
+"""Namespace of the topics: RViz's display InteractiveMarkers expects `/ik_target/update`."""
 HALF_TURN = math.sqrt(0.5)
 AXES = {"x": (HALF_TURN, 0.0, 0.0), "y": (0.0, 0.0, HALF_TURN), "z": (0.0, HALF_TURN, 0.0)}
-"""For each axis, x, y, z of the quaternion that turns a handle's own x axis there; its w is that too."""
+"""For each axis, x, y, z of the quaternion that turns a handle's own x axis there; w equals HALF_TURN."""
 
 
 class InteractiveTarget:
-    """Shows handles and broadcasts the frame where they are.
+    """Shows handles and broadcasts the frame at their pose.
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -32,11 +32,11 @@ class InteractiveTarget:
         self._transform = transform_message(config.position, config.quat_xyzw)
         self._warn = ThrottledWarning()
         self._server = InteractiveMarkerServer(NAMESPACE)
-        self._server.insert(_marker(config), self._take)
+        self._server.insert(_marker(config), self._on_feedback)
         self._server.applyChanges()
         WallTimer(config.hz, lambda: self._topic.send(self._transform))
 
-    def _take(self, feedback: InteractiveMarkerFeedback) -> None:
+    def _on_feedback(self, feedback: InteractiveMarkerFeedback) -> None:
         p, q = feedback.pose.position, feedback.pose.orientation
         try:
             self._transform = transform_message((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
@@ -45,7 +45,7 @@ class InteractiveTarget:
 
 
 def _marker(config: InteractiveTargetConfig) -> InteractiveMarker:
-    """Returns handles to shift it along, and turn it about, each of its axes."""
+    """Returns handles that move the frame along, and rotate it about, each of its axes."""
     marker = InteractiveMarker(name=config.child_frame_id, scale=config.size_m)
     marker.header.frame_id = config.parent_frame_id
     marker.pose = as_pose(transform_message(config.position, config.quat_xyzw))

@@ -1,4 +1,4 @@
-"""`teleop_tf_node.py`: a TF frame that a person moves."""
+"""`teleop_tf_node.py`: a TF frame that a user moves."""
 
 import threading
 import time
@@ -27,7 +27,7 @@ NAME = "teleop_tf_node"
 
 
 class TeleopTf:
-    """Moves a frame by `operator_node/signal` while it is switched on; broadcasts it then, and with each reset.
+    """Moves a frame by `operator_node/signal` while it is switched on; broadcasts it meanwhile, and at each reset.
 
     Raises:
         ConfigError: If `~config` or a parameter is wrong.
@@ -48,7 +48,9 @@ class TeleopTf:
         teleop = Toggle("teleoperation", self._start, self._stop)
         if parameters.start_on_init:
             teleop.on()
-        self._input = WatchedInput("operator_node/signal", Float64MultiArray, self._take, parameters.input_timeout_s)
+        self._input = WatchedInput(
+            "operator_node/signal", Float64MultiArray, self._on_signal, parameters.input_timeout_s
+        )
         ToggleService("toggle_teleop_tf", teleop.on, teleop.off)
         rospy.Service("reset_teleop_transform", SetTransform, self._reset)
         rospy.Service("reset_teleop_transform_to_zero", Trigger, self._reset_to_zero)
@@ -64,7 +66,7 @@ class TeleopTf:
             self._teleop.stop()
             self._is_on = False
 
-    def _take(self, message: Float64MultiArray) -> None:
+    def _on_signal(self, message: Float64MultiArray) -> None:
         with self._lock:
             if not self._is_on:
                 return
@@ -75,7 +77,7 @@ class TeleopTf:
                 return
         if is_slowed:
             limits = f"max_speed {self._config.max_speed:g} m/s, max_turn_rate {self._config.max_turn_rate:g} rad/s"
-            self._warn(f"{self._input.topic} too fast", f"the signal is slowed to {limits}")
+            self._warn(f"{self._input.topic} too fast", f"the signal is reduced to {limits}")
 
     def _step(self) -> None:
         with self._lock:
@@ -89,7 +91,7 @@ class TeleopTf:
             self._broadcast_once_a_stamp()
 
     def _broadcast_once_a_stamp(self) -> None:
-        """Broadcasts unless time stands still: TF takes the first of two transforms with one stamp, and warns."""
+        """Broadcasts unless ROS time stands still: TF ignores a second transform with the same stamp, and warns."""
         now = rospy.Time.now()
         if now != self._broadcast_at:
             self._broadcast_at = now

@@ -1,4 +1,4 @@
-"""A topic of people's input, and whether more is to be expected."""
+"""A topic of user input that detects when its input has ceased."""
 
 import time
 from collections.abc import Callable
@@ -9,23 +9,25 @@ import rospy
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 
 QUEUE_SIZE = 10
-"""Old input is of no use to anybody."""
+"""Largest number of queued messages; older input is useless."""
 
 
 class WatchedInput:
-    """Subscribes to a topic, and knows when its input has ceased.
+    """Subscribes to a topic, and detects when its input has ceased.
 
-    It has when nobody publishes the topic any more, since nothing more can come, or when nothing has come for too long.
+    It has ceased when the topic has no publisher any more, or no message has arrived within the timeout.
 
     Args:
         topic: The topic.
         message_type: Its type.
-        take: Called with each message.
-        timeout_s: How long is too long [s]; 0 is never.
+        on_message: Called with each message.
+        timeout_s: The timeout [s]; 0 disables it.
     """
 
-    def __init__(self, topic: str, message_type: type, take: Callable[[Any], None], timeout_s: float = 0.0) -> None:
-        self._take, self._timeout_s = take, timeout_s
+    def __init__(
+        self, topic: str, message_type: type, on_message: Callable[[Any], None], timeout_s: float = 0.0
+    ) -> None:
+        self._on_message, self._timeout_s = on_message, timeout_s
         self._last_s: float | None = None
         self._warn = ThrottledWarning()
         self._subscriber = rospy.Subscriber(topic, message_type, self._note, queue_size=QUEUE_SIZE, tcp_nodelay=True)
@@ -36,13 +38,13 @@ class WatchedInput:
         return str(self._subscriber.resolved_name)
 
     def has_ceased(self, consequence: str) -> bool:
-        """Returns whether its input has ceased, which it has not before it began; if so, warns of a consequence."""
+        """Returns whether the input has ceased; False before its first message. If so, warns about the consequence."""
         if self._last_s is None:
             return False
         if self._subscriber.get_num_connections() == 0:
-            reason = "nobody publishes it any more"
+            reason = "it has no publisher any more"
         elif self._timeout_s and time.monotonic() - self._last_s > self._timeout_s:
-            reason = f"nothing has come for {self._timeout_s:g} s"
+            reason = f"no message for {self._timeout_s:g} s"
         else:
             return False
         self._warn(self.topic, f"{reason}: {consequence}")
@@ -50,4 +52,4 @@ class WatchedInput:
 
     def _note(self, message: Any) -> None:
         self._last_s = time.monotonic()
-        self._take(message)
+        self._on_message(message)

@@ -1,4 +1,4 @@
-"""What every body in the world has in common."""
+"""Base class of everything in the world."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ import pybullet
 
 from custom_ros_tools.errors import PhysicsError
 from custom_ros_tools.schema import ConfigModel
+from robot_model.geometry import cross, minus, plus
 from rpbi.config.pybullet_models import ObjectTf, ResetBaseVelocity
 from rpbi.control.external_wrenches import ExternalWrench, ExternalWrenches
 from rpbi.control.pose_follower import PoseFollower, TrackedBase
 from rpbi.engine.client import MAXIMAL_COORDINATES, Client
 from rpbi.engine.inputs import Input, PoseInput
-from rpbi.geometry import Pose, Twist, cross, minus, plus
+from rpbi.geometry import Pose, Twist
 from rpbi.samples import BodyState
 from rpbi.sensors.sensor import Sensor
 
@@ -75,11 +76,11 @@ class Body:
         self._base_pose_in_inertial = self.inertial_pose_in_base.inverse()
         self._inertial: Any = None
         self._base = Pose()
-        """What PyBullet told last of the base, and the pose that follows from it: most bodies rest most of the time."""
+        """PyBullet's last pose of the base, and the frame pose from it; cached since most bodies rest."""
         self.pose_follower: PoseFollower | None = None
-        """What moves its base, which is fixed, along the poses of `object_tf`; None if it is put there."""
+        """Moves a fixed base along the poses of `object_tf`; None if the base is set to them instead."""
         self.dynamics_changes = 0
-        """How often its dynamics were changed, for those who keep what they know of them."""
+        """Number of changes of its dynamics; caches of them compare it."""
 
     @cached_property
     def external_wrenches(self) -> ExternalWrenches:
@@ -102,10 +103,10 @@ class Body:
         return self._link_names[index]
 
     def dynamics_info(self, link: int) -> tuple[Any, ...]:
-        """Returns what PyBullet's `getDynamicsInfo` tells of a link, by index.
+        """Returns PyBullet's `getDynamicsInfo` of a link, by index.
 
-        Of a body in maximal coordinates PyBullet tells neither the inertial frame nor restitution nor stiffness and
-        damping of contacts, and leaves in their places what it last told of another: here is what the body was given.
+        For a body in maximal coordinates, PyBullet leaves the values of another body in place of the inertial frame,
+        restitution, stiffness and damping; they are replaced by the configured ones.
         """
         info: tuple[Any, ...] = self.pb.getDynamicsInfo(self.body_id, link)
         if info[10] != MAXIMAL_COORDINATES:
@@ -132,7 +133,7 @@ class Body:
     def _start_base(
         self, velocity: ResetBaseVelocity | None, object_tf: ObjectTf | None = None, is_fixed: bool = False
     ) -> None:
-        """Has a fixed base follow its TF frame, and gives any other its start velocity; warns of what has no effect."""
+        """Lets a fixed base follow its TF frame; sets the start velocity of others, and warns of ineffective keys."""
         if is_fixed:
             self._follow(object_tf)
             if velocity is not None:
@@ -144,9 +145,10 @@ class Body:
             log.warning("%s: object_tf: has no effect: physics moves a base that is not fixed", self.name)
 
     def _follow(self, object_tf: ObjectTf | None) -> None:
-        """Has a fixed base move along the poses of its TF frame, if there is one.
+        """Lets a fixed base move along the poses of its TF frame, if there is one.
 
-        What was loaded with `useMaximalCoordinates` is put there: PyBullet takes no velocity of such a base.
+        A body loaded with `useMaximalCoordinates` is set to the poses instead: PyBullet ignores the velocity of its
+        base.
         """
         self.object_tf = object_tf
         if object_tf is not None and self.pb.getDynamicsInfo(self.body_id, -1)[10] == MULTI_BODY:
@@ -182,7 +184,7 @@ class Body:
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
-        """Tells whether a YAML of its section is one of this type, where several types share a section."""
+        """Returns whether a YAML of its section is one of this type, where several types share a section."""
         return True
 
     def sensors(self) -> tuple[Sensor, ...]:
@@ -190,13 +192,12 @@ class Body:
         return ()
 
     def inputs(self) -> Mapping[str, Input]:
-        """Returns what the body takes while the world runs, by name.
-
-        It is the `pose` of the TF frame that it follows, and the `external_wrench` on what of it can move.
+        """Returns the inputs of the body by name: the `pose` of its TF frame, and the `external_wrench` on its movable
+        links.
         """
         inputs: dict[str, Input] = {}
         if self.object_tf is not None:
-            apply = self.set_base_pose if self.pose_follower is None else self.pose_follower.take
+            apply = self.set_base_pose if self.pose_follower is None else self.pose_follower.push
             is_tracked = isinstance(self.pose_follower, TrackedBase)
             inputs["pose"] = PoseInput.following(self.object_tf, apply, is_tracked)
         if self.has_physics and not self.is_soft and self.external_wrenches.can_act:
@@ -253,7 +254,7 @@ class Body:
         return tuple(index for index, kind in zip(self.joint_indices, types) if kind == pybullet.JOINT_SPHERICAL)
 
     def motion_state(self) -> tuple[float, ...]:
-        """Returns all that is known of where the body is and how it moves, for comparison to the last bit.
+        """Returns the complete state of motion, for bitwise comparison.
 
         Returns:
             Position and orientation of the base, its velocities, and positions and velocities of all joints.
@@ -264,5 +265,5 @@ class Body:
         return (*position, *quat, *linear, *angular, *(each for joint in joints for part in joint[:2] for each in part))
 
     def remove(self) -> None:
-        """Takes the body out of the world."""
+        """Removes the body from the world."""
         self.pb.removeBody(self.body_id)

@@ -1,4 +1,4 @@
-"""What YAML says of every body."""
+"""Keys of every body in YAML."""
 
 from typing import Annotated, Any, Self
 
@@ -6,14 +6,13 @@ from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from custom_ros_tools.schema import ConfigModel, Expects, KeyedError, ListOf, Name
 from rpbi.config.sensors import SensorConfig
-from rpbi.plugins import entry_config
-from rpbi.sensors import sensor_class
+from rpbi.sensors import SENSOR_TYPES
 
 
 def _sensor_config(entry: Any, info: ValidationInfo) -> SensorConfig:
     """Returns the configuration of a sensor, by the model of its class."""
     expected = "a mapping with 'type: module:Class', 'name' and 'hz'"
-    return entry_config(entry, info, SensorConfig, sensor_class, expected)
+    return SENSOR_TYPES.parse_entry(entry, info, SensorConfig, expected)
 
 
 SensorEntry = Annotated[

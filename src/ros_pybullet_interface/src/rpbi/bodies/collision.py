@@ -16,8 +16,8 @@ from .shape_object import Decomposition, MaximalCoordinates, ShapeObject
 class CollisionObjectConfig(BodyConfig):
     """A collision object: it is felt, and nothing but TF moves it."""
 
-    createVisualShape: CreateVisualShape = Field(description="What it looks like.")
-    createCollisionShape: CreateCollisionShape = Field(description="What it feels like.")
+    createVisualShape: CreateVisualShape = Field(description="Its visual shape.")
+    createCollisionShape: CreateCollisionShape = Field(description="Its collision shape.")
     changeDynamics: ChangeDynamics | None = Field(None, description="Friction, restitution and the like.")
     basePosition: Position = Field((0.0, 0.0, 0.0), description="Position, with object_tf until TF comes.")
     baseOrientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Orientation, x, y, z, w; likewise.")

@@ -25,8 +25,8 @@ from .shape_object import Decomposition, MaximalCoordinates, ShapeObject
 class DynamicObjectConfig(BodyConfig):
     """A dynamic object: physics moves it."""
 
-    createVisualShape: CreateVisualShape = Field(description="What it looks like.")
-    createCollisionShape: CreateCollisionShape = Field(description="What it feels like.")
+    createVisualShape: CreateVisualShape = Field(description="Its visual shape.")
+    createCollisionShape: CreateCollisionShape = Field(description="Its collision shape.")
     changeDynamics: ChangeDynamics | None = Field(None, description="Friction, restitution and the like.")
     baseMass: PositiveKilograms = Field(description="Mass.")
     basePosition: Position = Field((0.0, 0.0, 0.0), description="Start position.")

@@ -1,4 +1,4 @@
-"""How bodies and links behave in contact and motion: reading it, and changing it while the world runs."""
+"""Dynamics of bodies and links: reads them, and changes them while the world runs."""
 
 import math
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from .body import Body
 
 
 class LinkDynamics(NamedTuple):
-    """What PyBullet's `getDynamicsInfo` tells of a link, under the names of the message ObjectDynamics.
+    """Dynamics of a link, with the field names of the message ObjectDynamics.
 
     Attributes:
         mass: Mass [kg], 0 for what never moves.
@@ -126,17 +126,17 @@ def read_dynamics(body: Body, link: str) -> LinkDynamics:
 
 
 def change_dynamics(body: Body, link: str, change: ChangeDynamics) -> None:
-    """Changes how a link behaves; when it raises, nothing has changed.
+    """Changes the dynamics of a link; when it raises, nothing has changed.
 
-    With the mass, moments of inertia change in proportion, unless they are given: PyBullet's own way, those of the
-    collision shape, would forget the URDF's.
+    Moments of inertia change in proportion to the mass, unless they are set too: PyBullet would replace those of the
+    URDF by those of the collision shape.
 
     Args:
         link: Name of the link; empty for the root link.
 
     Raises:
         UnknownNameError: If the body has no such link.
-        ValueError: If it makes no sense for this link; it names all such keys.
+        ValueError: If keys are invalid for this link; it names all of them.
         PhysicsError: If PyBullet refuses.
     """
     index = link_index(body, link)
@@ -166,7 +166,7 @@ def _renew_contacts(body: Body, index: int) -> None:
 
 
 def _problems(body: Body, index: int, present: LinkDynamics, arguments: dict[str, Any]) -> list[str]:
-    """Returns what a link cannot be given."""
+    """Returns the problems of changes of a link."""
     what = body.name if index < 0 else f"{body.name}/{body.link_name(index)}"
     problems = []
     if not present.mass:

@@ -31,10 +31,10 @@ _PARTS: dict[str, type[PybulletModel]] = {
 
 
 def check_files(config: BodyConfig) -> None:
-    """Checks the meshes and the URDF of a body; those that this machine has not loaded before take a while.
+    """Checks the meshes and the URDF of a body; new ones take a while.
 
     Raises:
-        ConfigError: If one cannot be loaded; it has everything that is wrong.
+        ConfigError: If one cannot be loaded; it lists all problems.
     """
     parts = {key: getattr(config, key) for key in type(config).model_fields}
     problems = [Problem(config.name, key, message) for key, message in file_problems(parts)]
@@ -43,12 +43,12 @@ def check_files(config: BodyConfig) -> None:
 
 
 def parts_with_files(data: object, file: str, context: Mapping[str, Any]) -> dict[str, PybulletModel]:
-    """Returns the parts of an object that may name files, those that are right of one that is not right as a whole.
+    """Returns the parts of an object that may name files; of an invalid object, the valid ones.
 
     Args:
-        data: What its YAML says.
+        data: Its YAML.
         file: Name of the YAML file.
-        context: The same as of `load_object`.
+        context: As for `load_object`.
     """
     parts = {}
     for key, model in _PARTS.items():

@@ -21,7 +21,7 @@ MaximalCoordinates = Annotated[
 
 
 class ConvexDecomposition(PybulletModel):
-    """How V-HACD divides a concave mesh into convex parts, each of which collides as its hull."""
+    """V-HACD's division of a concave mesh into convex parts, each of which collides as its hull."""
 
     resolution: Annotated[int, Field(ge=10_000, le=64_000_000)] = Field(
         100_000, description="Voxels that the mesh is filled with: more take longer, and show finer parts."
@@ -51,8 +51,8 @@ class ShapeObject(Body):
 
     Args:
         collision: Collision shape, None for an object that nothing can touch.
-        decomposition: How its mesh is divided into convex parts, None for one hull.
-        multi_body: Other arguments of `createMultiBody`; without `baseMass` it stays whatever pushes it.
+        decomposition: Division of its mesh into convex parts, None for one hull.
+        multi_body: Other arguments of `createMultiBody`; without `baseMass`, the body is static.
 
     Raises:
         PhysicsError: If PyBullet refuses.

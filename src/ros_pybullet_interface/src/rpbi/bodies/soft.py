@@ -1,4 +1,4 @@
-"""Soft bodies: cloth and solids that give way."""
+"""Soft bodies: cloth and deformable solids."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, Problem
 from custom_ros_tools.schema import HzOrOff, KeyedError, ListOf
+from robot_model.urdf.document import UrdfDocument
 from rpbi.config.pybullet_models import AnchorEntry, ChangeVisualShape, CreateSoftBodyAnchor, LoadSoftBody, LoadURDF
 from rpbi.config.sensors import ContactsConfig
 from rpbi.engine.client import Client
@@ -20,7 +21,6 @@ from rpbi.samples import BodyState
 from rpbi.sensors.contacts.arrows import contact_sensors
 from rpbi.sensors.sensor import Sensor
 from rpbi.sensors.surface import SurfaceSensor
-from rpbi.urdf.document import UrdfDocument
 from rpbi.urdf.loading import load_urdf, prepared_urdf
 
 from .body import Body
@@ -52,8 +52,8 @@ class SoftObjectConfig(BodyConfig):
 class SoftObject(Body):
     """A body without a fixed shape, in a world that was set up for such.
 
-    Its base pose is the mean of its corners' places and their mean turn. It has no velocity of its own that PyBullet
-    would tell, and no part in what replays promise.
+    Its base pose is the mean position and rotation of its corners. PyBullet reports no velocity of it, and replays do
+    not reproduce it.
 
     Raises:
         ConfigError: If the mesh is broken, or the world is not one for soft bodies.
@@ -114,7 +114,7 @@ class SoftObject(Body):
         return surface + contact_sensors(self, self.config.contacts)
 
     def base_twist(self) -> Twist:
-        """Has nothing to return: what PyBullet tells is something else.
+        """Refuses: PyBullet reports another velocity.
 
         Raises:
             PhysicsError: Always.
@@ -132,7 +132,7 @@ class SoftObject(Body):
         return BodyState(self.name, position + quat, (), nodes)
 
     def remove(self) -> None:
-        """Takes it out of the world, its anchors first."""
+        """Removes it from the world, its anchors first."""
         self.detach()
         super().remove()
 

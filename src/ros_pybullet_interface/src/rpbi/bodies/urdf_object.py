@@ -5,15 +5,15 @@ from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import HzOrOff, Switch
+from robot_model.urdf.document import UrdfDocument, mimics_of
 from rpbi.config.pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity
 from rpbi.config.sensors import ContactsConfig
-from rpbi.constraints.couplings import couple
+from rpbi.control.couplings import couple
 from rpbi.engine.client import Client
 from rpbi.sensors.base_state import BaseStateSensor
 from rpbi.sensors.contacts.arrows import contact_sensors
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
-from rpbi.urdf.document import UrdfDocument, mimics_of
 from rpbi.urdf.joints import Joint, JointModel
 from rpbi.urdf.loading import load_urdf, prepared_urdf
 
@@ -86,7 +86,7 @@ class UrdfObject(Body):
         return (*sensors, *contact_sensors(self, config.contacts))
 
     def _couple(self) -> None:
-        """Has joints follow others as the URDF says.
+        """Couples the URDF's mimic joints.
 
         Raises:
             ConfigError: If one cannot.
@@ -100,10 +100,10 @@ class UrdfObject(Body):
         couple(self.pb, self.body_id, model.couplings)
 
     def _release(self, index: int) -> None:
-        """Leaves of the motor that PyBullet gives each joint what the URDF's friction is.
+        """Limits the motor that PyBullet adds to each joint to the URDF's friction.
 
-        PyBullet applies a URDF's damping itself, its friction not. A motor that brakes with the friction's force or
-        torque at most, and with what stops the joint if that is less, is Coulomb friction.
+        PyBullet applies a URDF's damping, but not its friction. A motor that holds velocity 0 with at most the
+        friction's force or torque is Coulomb friction.
         """
         info = self.pb.getJointInfo(self.body_id, index)
         kind, friction = info[2], info[7]

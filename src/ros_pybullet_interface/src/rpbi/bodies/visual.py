@@ -13,7 +13,7 @@ from .shape_object import ShapeObject
 class VisualObjectConfig(BodyConfig):
     """A visual object: it is seen and never felt."""
 
-    createVisualShape: CreateVisualShape = Field(description="What it looks like.")
+    createVisualShape: CreateVisualShape = Field(description="Its visual shape.")
     createCollisionShape: CreateCollisionShape | None = Field(
         None, description="Accepted and ignored, so that a collision object can be turned into a visual one."
     )

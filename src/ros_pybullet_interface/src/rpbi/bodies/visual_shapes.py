@@ -1,4 +1,4 @@
-"""What of bodies can be seen, and where."""
+"""Visible shapes of bodies, and their poses."""
 
 import enum
 import math
@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 
 import pybullet
 
+from robot_model.geometry import Quaternion, Vector
 from rpbi.control.pose_follower import TrackedBase
-from rpbi.geometry import Pose, Quaternion, Vector
+from rpbi.geometry import Pose
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
 
@@ -17,11 +18,11 @@ from .shape_object import ShapeObject
 
 PLANE_SIZE_M = 40.0
 PLANE_THICKNESS_M = 0.001
-"""What is shown of a plane, which has no end: so much of it, just below its surface."""
+"""Thickness of the box that shows an infinite plane, just below its surface [m]."""
 
 
 class ShapeKind(enum.Enum):
-    """What a shape is."""
+    """Kind of a shape."""
 
     BOX = enum.auto()
     SPHERE = enum.auto()
@@ -36,7 +37,7 @@ class BodyShape(NamedTuple):
     Attributes:
         link_index: PyBullet's index of the link, -1 for the root.
         link: Its name.
-        kind: What it is; a cylinder stands along z.
+        kind: Its kind; a cylinder stands along z.
         size: Extents along x, y and z [m]; factors on what MESH and TRIANGLES have.
         pose_in_link: Its pose in the link's URDF frame.
         rgba: Colour and opacity, each from 0 to 1.
@@ -59,8 +60,8 @@ class BodyShape(NamedTuple):
 def body_shapes(body: Body) -> list[BodyShape]:
     """Returns the visual shapes of a body; a capsule is a cylinder and two spheres, a soft body has none that stays.
 
-    PyBullet gives their poses in the URDF frames of the links, unlike those of the links themselves. Only the
-    simulation thread may ask.
+    PyBullet returns their poses in the URDF frames of the links, unlike those of the links themselves. Only the
+    simulation thread may call it.
     """
     if body.is_soft:
         return []  # it tells its surface itself
@@ -123,9 +124,9 @@ def turned_to(normal: Vector) -> Quaternion:
 
 
 def link_frame(body: Body, sensors: Iterable[Sensor], link: str) -> str | None:
-    """Returns the frame of ours, such as `rpbi/NAME/LINK`, that TF has of a link; None if it has none.
+    """Returns the TF frame of a link from this node, such as `rpbi/NAME/LINK`; None if there is none.
 
-    A robot of which the root link alone is told leaves the others to robot_state_publisher: they are taken to be there.
+    A robot with the root link alone on TF leaves the others to robot_state_publisher: they are assumed to exist.
     """
     for sensor in sensors:
         if isinstance(sensor, LinkPoseSensor):

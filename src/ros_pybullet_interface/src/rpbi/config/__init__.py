@@ -1,1 +1,1 @@
-"""What YAML says: files, models of their keys, and what they mean."""
+"""YAML files: reading, and models of their keys."""

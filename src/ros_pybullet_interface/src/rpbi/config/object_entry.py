@@ -24,7 +24,7 @@ class ObjectEntry(NamedTuple):
     overrides: Mapping[str, Any]
 
     def apply_overrides(self, data: Mapping[str, Any]) -> dict[str, Any]:
-        """Returns what the file says with the overrides in it; neither is altered."""
+        """Returns the file's content with the overrides applied; neither is altered."""
         return _merged(data, self.overrides)
 
 

@@ -1,4 +1,4 @@
-"""PyBullet's constants by name, as YAML files say them."""
+"""PyBullet's constants by name, as in YAML files."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -18,10 +18,10 @@ from custom_ros_tools.schema.type_names import shown, type_name
 class Constants:
     """A family of PyBullet constants that exclude each other, such as the shape types.
 
-    `Annotated[int, SHAPE_TYPES]` makes a field that takes a name or its number and holds the number.
+    `Annotated[int, SHAPE_TYPES]` makes a field that accepts a name or its number and holds the number.
 
     Attributes:
-        kind: What they are, for messages.
+        kind: Their kind, for messages.
         names: Their names in PyBullet.
         own: Numbers of names that PyBullet does not have.
     """
@@ -31,7 +31,7 @@ class Constants:
     own: Mapping[str, int] = field(default_factory=dict, hash=False)
 
     def parse(self, given: Any) -> int:
-        """Returns the number of one constant, given by its name or number.
+        """Returns the number of one constant from its name or number.
 
         Raises:
             ValueError: If it is not of this family.
@@ -54,7 +54,7 @@ class Constants:
         return self.schema()
 
     def schema(self) -> dict[str, Any]:
-        """Returns the JSON Schema of what is taken."""
+        """Returns the JSON Schema of accepted values."""
         return {"kind": self.kind, "enum": [*self.names, *sorted(set(map(self._named, self.names)))]}
 
     def one_or_several_schema(self) -> dict[str, Any]:

@@ -1,7 +1,7 @@
-"""What YAML may hand to PyBullet's functions about bodies, soft ones too; each model is named after the function.
+"""Arguments of PyBullet's functions for bodies, soft ones included, as YAML keys; each model is named after a function.
 
-The fields are the function's keyword arguments, less those that name the body. A test asks PyBullet whether
-it takes each of them, with values of that type.
+The fields are the function's keyword arguments, less those that name the body. A test checks that PyBullet accepts each
+of them, with values of that type.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Self
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from custom_ros_tools.schema import (
     AlsoTakes,
@@ -25,6 +25,7 @@ from custom_ros_tools.schema import (
     Metres,
     NonNegative,
     NonNegativeMetres,
+    OneAsList,
     Position,
     Positive,
     PositiveMetres,
@@ -39,8 +40,8 @@ from custom_ros_tools.schema import (
     optional,
 )
 from custom_ros_tools.schema.type_names import shown
+from robot_model.asset_files import ExistingFile, RobotFile
 
-from .asset_files import ExistingFile, RobotFile
 from .pybullet_args import (
     ACTIVATION_STATES,
     COLLISION_SHAPE_FLAGS,
@@ -53,14 +54,10 @@ from .pybullet_args import (
 HalfExtents = Annotated[tuple[PositiveMetres, PositiveMetres, PositiveMetres], Field(strict=False)]
 
 
-def _one_as_list(given: Any) -> Any:
-    return [given] if isinstance(given, (int, float)) and not isinstance(given, bool) else given
-
-
 Gains = Annotated[
     Annotated[ListOf[NonNegative], Tag("list")] | Annotated[dict[str, NonNegative], Tag("mapping")],
     Discriminator(lambda given: "mapping" if isinstance(given, Mapping) else "list"),
-    BeforeValidator(_one_as_list),
+    OneAsList,
     AlsoTakes({"type": "number", "minimum": 0}),
     Expects("a number, a list of numbers or a mapping of joints to numbers"),
 ]
@@ -90,7 +87,7 @@ class LoadURDF(PybulletModel):
 
 
 class _CreateShape(PybulletModel):
-    """What shapes to see and to feel have in common."""
+    """Keys of both visual and collision shapes."""
 
     shapeType: Annotated[int, SHAPE_TYPES] = Field(description="GEOM_... constant.")
     radius: PositiveMetres | None = optional("Radius of a sphere, capsule or cylinder.")
@@ -112,7 +109,7 @@ class _CreateShape(PybulletModel):
 
 
 class CreateVisualShape(_CreateShape):
-    """What an object looks like."""
+    """Visual shape of an object."""
 
     length: PositiveMetres | None = optional("Length of a capsule or cylinder.")
     flags: Annotated[int, VISUAL_SHAPE_FLAGS] | None = optional("VISUAL_SHAPE_... flags.")
@@ -134,7 +131,7 @@ class CreateVisualShape(_CreateShape):
 
 
 class CreateCollisionShape(_CreateShape):
-    """What an object feels like."""
+    """Collision shape of an object."""
 
     height: PositiveMetres | None = optional("Length of a capsule or cylinder.")
     flags: Annotated[int, COLLISION_SHAPE_FLAGS] | None = optional("GEOM_... flags.")
@@ -161,7 +158,7 @@ class CreateCollisionShape(_CreateShape):
 
 
 class ChangeDynamics(PybulletModel):
-    """How a body behaves in contact and motion."""
+    """Behaviour of a body in contact and motion."""
 
     mass: Kilograms | None = optional("Mass of the base link.")
     lateralFriction: NonNegative | None = optional("Coulomb friction coefficient.")
@@ -200,16 +197,16 @@ class ChangeDynamics(PybulletModel):
 
 
 class ResetBaseVelocity(PybulletModel):
-    """How a body moves at the start."""
+    """Velocity of a body at the start."""
 
     linearVelocity: Annotated[Vec3, Unit("m/s")] | None = optional("Velocity in the world.")
     angularVelocity: Annotated[Vec3, Unit("rad/s")] | None = optional("Rotation in the world.")
 
 
 class SetJointMotorControlArray(PybulletModel):
-    """How the motors of a robot follow their targets."""
+    """Control mode and gains of a robot's motors."""
 
-    controlMode: Annotated[int, CONTROL_MODES] = Field(description="What the targets are.")
+    controlMode: Annotated[int, CONTROL_MODES] = Field(description="Quantity of the targets.")
     positionGains: Gains | None = optional("Position gain: one, one of each driven joint, or by joint.")
     velocityGains: Gains | None = optional("Velocity gain: one, one of each driven joint, or by joint.")
 
@@ -218,7 +215,7 @@ class ObjectTf(ConfigModel):
     """A TF frame to follow."""
 
     tf_id: FrameId = Field(description="Name of the frame.")
-    hz: Hz = Field(30.0, description="How often to look.")
+    hz: Hz = Field(30.0, description="Rate of look-ups.")
     timeout_s: Seconds = Field(0.5, description="Without anything new for so long, it is reported as stale.")
 
     max_speed: Annotated[Positive, Field(le=100.0), Unit("m/s")] = Field(
@@ -305,7 +302,7 @@ AnchorEntry = Annotated[
 
 
 def _has_own_id(arguments: list[Any]) -> bool:
-    """Tells whether PyBullet's first argument, the id of the soft body itself, is in the list."""
+    """Returns whether PyBullet's first argument, the id of the soft body itself, is in the list."""
     texts = [index for index, each in enumerate(arguments) if isinstance(each, str)]
     if texts:
         return texts[0] == 2

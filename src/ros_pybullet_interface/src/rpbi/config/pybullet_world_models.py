@@ -1,4 +1,4 @@
-"""What YAML may hand to PyBullet's functions about the world; each model is named after the function."""
+"""Arguments of PyBullet's functions for the world, as YAML keys; each model is named after a function."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Iterations = Annotated[int, Field(ge=1, le=100_000)]
 
 
 class Connect(PybulletModel):
-    """How to reach PyBullet."""
+    """Connection to PyBullet."""
 
     connection_mode: Annotated[int, CONNECTION_MODES] = Field(
         pybullet.GUI,
@@ -57,7 +57,7 @@ class Connect(PybulletModel):
 
 
 class ResetSimulation(PybulletModel):
-    """What kind of world it is."""
+    """Kind of world: with or without soft bodies."""
 
     flags: Annotated[int, RESET_FLAGS] | None = optional("RESET_USE_... flags.")
 
@@ -75,7 +75,7 @@ class SetGravity(PybulletModel):
 
 
 class SetPhysicsEngineParameter(PybulletModel):
-    """How contacts and joints are solved; without `fixedTimeStep`, since `timeStep` says that."""
+    """Solver of contacts and joints; without `fixedTimeStep`, which is `timeStep`."""
 
     numSolverIterations: Iterations | None = optional("Most iterations of the solver.")
     useSplitImpulse: Switch | None = optional("Whether penetration is solved apart from velocity.")
@@ -95,7 +95,7 @@ class SetPhysicsEngineParameter(PybulletModel):
     deterministicOverlappingPairs: Switch | None = optional("Whether contacts are sorted.")
     allowedCcdPenetration: NonNegativeMetres | None = optional("Penetration allowed to continuous collision detection.")
     jointFeedbackMode: Annotated[int, JOINT_FEEDBACK_MODES] | None = optional(
-        "JOINT_FEEDBACK_... flags: where force and torque of a joint are told."
+        "JOINT_FEEDBACK_... flags: frame of the force and torque of a joint."
     )
     solverResidualThreshold: NonNegative | None = optional("Residual at which the solver stops.")
     contactSlop: NonNegativeMetres | None = optional("Penetration left alone.")
@@ -103,14 +103,14 @@ class SetPhysicsEngineParameter(PybulletModel):
     constraintSolverType: Annotated[int, SOLVER_TYPES] | None = optional("CONSTRAINT_SOLVER_LCP_... constant.")
     globalCFM: NonNegative | None = optional("Softness of all constraints.")
     minimumSolverIslandSize: Count | None = optional("Fewest constraints solved together.")
-    reportSolverAnalytics: Switch | None = optional("Whether the solver tells what it did.")
+    reportSolverAnalytics: Switch | None = optional("Whether the solver reports its steps.")
     warmStartingFactor: NonNegative | None = optional("Share of the last step's solution reused.")
     sparseSdfVoxelSize: PositiveMetres | None = optional("Voxel size for soft bodies.")
     numNonContactInnerIterations: Iterations | None = optional("Iterations on joints in each of the solver's.")
 
 
 PhysicsChange = SetGravity | SetPhysicsEngineParameter
-"""What can be changed of a world's physics while it runs."""
+"""Changes of a world's physics while it runs."""
 
 
 def _as_list(given: Any) -> Any:
@@ -121,7 +121,7 @@ def _as_list(given: Any) -> Any:
 
 
 class ConfigureDebugVisualizer(PybulletModel):
-    """What PyBullet's window shows."""
+    """Content of PyBullet's window."""
 
     flag: Annotated[
         ListOf[Annotated[int, VISUALIZER_FLAGS]],
@@ -154,7 +154,7 @@ class ResetDebugVisualizerCamera(PybulletModel):
     cameraDistance: PositiveMetres = Field(1.0, description="Distance from the target.")
     cameraYaw: Degrees = Field(0.0, description="Angle about the vertical.")
     cameraPitch: Degrees = Field(1.0, description="Angle above the horizontal, negative looks down.")
-    cameraTargetPosition: Position = Field((0.0, 0.0, 0.0), description="What it looks at.")
+    cameraTargetPosition: Position = Field((0.0, 0.0, 0.0), description="Point that it looks at.")
 
     def kwargs(self) -> dict[str, Any]:
         """Returns all four, as PyBullet wants them."""

@@ -1,4 +1,4 @@
-"""What YAML says of sensors."""
+"""Keys of sensors in YAML."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ class SensorConfig(ConfigModel):
 
     type: Text = Field(description="Its class, as `module:Class`.")
     name: Name = Field(description="Its name, by which its body has no other sensor; topics are named after it.")
-    hz: Hz = Field(description="How often it is read, in the world's time.")
+    hz: Hz = Field(description="Rate of its samples, in the world's time.")
 
 
 class ContactsConfig(ConfigModel):
-    """How a body's contacts are told."""
+    """Publication of a body's contacts."""
 
     hz: Hz = Field(50.0, description="Rate of `rpbi/NAME/contacts`.")
     average: Switch = Field(
@@ -72,7 +72,7 @@ class ForceTorqueConfig(ConfigModel):
     hz: Hz | None = optional("Rate of its samples; without it, that of the joint states.")
     frame_id: FrameId | None = optional("Other name of the frame of the joint's child link, in which the samples are.")
     acting: Literal["parent_on_child", "child_on_parent"] = Field(
-        "parent_on_child", description="Who acts on whom; it decides the sign."
+        "parent_on_child", description="Direction of action, which decides the sign."
     )
     low_pass_hz: Hz | None = optional("Frequency at which a first-order low-pass lets 71 % through.")
     noise_force_n: Annotated[Deviation, Unit("N")] = Field(
@@ -81,8 +81,8 @@ class ForceTorqueConfig(ConfigModel):
     noise_torque_nm: Annotated[Deviation, Unit("N m")] = Field(
         (0.0, 0.0, 0.0), description="Standard deviation of the moments' noise."
     )
-    bias_force_n: Annotated[Vec3, Unit("N")] = Field((0.0, 0.0, 0.0), description="What is added to the forces.")
-    bias_torque_nm: Annotated[Vec3, Unit("N m")] = Field((0.0, 0.0, 0.0), description="What is added to the moments.")
+    bias_force_n: Annotated[Vec3, Unit("N")] = Field((0.0, 0.0, 0.0), description="Offset of the forces.")
+    bias_torque_nm: Annotated[Vec3, Unit("N m")] = Field((0.0, 0.0, 0.0), description="Offset of the moments.")
     seed: Count | None = optional("Seed of the noise; without it, one that follows from the names.")
 
 
@@ -97,13 +97,13 @@ ForceTorqueEntry = Annotated[
 
 
 FIRST_TOPIC_NAME = "camera"
-"""What the first camera is called in topics, whatever its name."""
+"""Name of the first camera in topics, whatever its own."""
 
 ImageSide = Annotated[int, Field(gt=0, le=8192, json_schema_extra={"unit": "px"})]
 
 
 class IntrinsicsConfig(ConfigModel):
-    """What the camera sees of the space before it."""
+    """Size and field of view of the images."""
 
     width: ImageSide = Field(640, description="Columns of the images.")
     height: ImageSide = Field(480, description="Rows of the images.")
@@ -129,7 +129,7 @@ class RgbdSensorConfig(ConfigModel):
     synchronous: Switch = Field(False, description="Whether the simulation waits for every image.")
     depth_noise_m: NonNegativeMetres = Field(0.0, description="Standard deviation of the depths' noise.")
     depth_noise_growth_per_m: Annotated[NonNegative, Unit("1/m")] = Field(
-        0.0, description="What the squared depth adds to that deviation; about 0.0014 for a structured-light camera."
+        0.0, description="Growth of that deviation with the squared depth; about 0.0014 for a structured-light camera."
     )
     seed: Count | None = optional("Seed of the noise; without it, one that follows from the name.")
     intrinsics: IntrinsicsConfig = Field(IntrinsicsConfig(), description="Image size, field of view and range.")

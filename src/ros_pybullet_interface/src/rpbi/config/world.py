@@ -1,4 +1,4 @@
-"""What the main YAML file may say."""
+"""Keys of the main YAML file."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from custom_ros_tools.schema import (
     optional,
 )
 from custom_ros_tools.transforms import quat_of
-from rpbi.constraints.attachment_config import AttachmentConfig
+from robot_model.asset_files import find_folder
 from rpbi.geometry import Pose
 
-from .asset_files import find_folder
+from .attachments import AttachmentConfig
 from .object_entry import FileOrOverrides
 from .pybullet_world_models import (
     ConfigureDebugVisualizer,
@@ -75,7 +75,7 @@ WORLD_FRAME = "rpbi/world"
 """The TF frame that all poses are in."""
 
 
-class FramePose(ConfigModel):
+class StaticFrame(ConfigModel):
     """A TF frame that nobody else publishes, and where it is; the interface puts it on TF as a static one."""
 
     tf_id: FrameId = Field(description="Name of the frame.")
@@ -101,26 +101,32 @@ class FramePose(ConfigModel):
         return Pose(self.position, (x, y, z, w))
 
 
+class ControlsConfig(ConfigModel):
+    """The window with buttons, see docs/controls.md."""
+
+    robot_name: Text | None = optional("Robot whose joints it shows first; without it, the first one.")
+
+
 class WorldConfig(ConfigModel):
     """The main YAML file, but for the lists of files of objects, see `main_file_model`; here they are ignored."""
 
     model_config = ConfigDict(extra="ignore")
 
-    connect: Connect = Field(Connect(), description="How to reach PyBullet.")
+    connect: Connect = Field(Connect(), description="Connection to PyBullet.")
     setAdditionalSearchPath: Folders = Field(
         (), description="Folders to look for files in; `pybullet_data_path` is that of PyBullet's data."
     )
-    resetSimulation: ResetSimulation = Field(ResetSimulation(), description="What kind of world it is.")
+    resetSimulation: ResetSimulation = Field(ResetSimulation(), description="Kind of world.")
     setGravity: SetGravity = Field(SetGravity(), description="Gravity; there is none unless given.")
     timeStep: Annotated[Seconds, AfterValidator(_whole_nanoseconds)] = Field(0.02, description="Length of a step.")
     setPhysicsEngineParameter: SetPhysicsEngineParameter = Field(
-        SetPhysicsEngineParameter(), description="How contacts and joints are solved."
+        SetPhysicsEngineParameter(), description="Solver of contacts and joints."
     )
     real_time_factor: NonNegative = Field(
         1.0, description="Simulated seconds in a second of wall time; 0 is as fast as it goes."
     )
     clock_hz: Hz | None = optional("Most /clock messages in a second of wall time.")
-    tf_prefix: FrameId | None = optional("What to put before all TF frames, so that two worlds can share one TF tree.")
+    tf_prefix: FrameId | None = optional("Prefix of all TF frames, so that two worlds can share one TF tree.")
     step_pybullet_manually: Switch = Field(
         False, description="Accepted without effect: the interface does every step itself."
     )
@@ -133,7 +139,7 @@ class WorldConfig(ConfigModel):
         1.0, description="Rate of the hashes in `rpbi/state`, in the world's time, by which recordings are replayed."
     )
     configureDebugVisualizer: ConfigureDebugVisualizer = Field(
-        ConfigureDebugVisualizer(), description="What PyBullet's window shows."
+        ConfigureDebugVisualizer(), description="Content of PyBullet's window."
     )
     resetDebugVisualizerCamera: ResetDebugVisualizerCamera = Field(
         ResetDebugVisualizerCamera(), description="Where PyBullet's window looks from."
@@ -149,9 +155,10 @@ class WorldConfig(ConfigModel):
     )
     visualizer_image_width: Pixels = Field(640, description="Columns of that image.")
     visualizer_image_height: Pixels = Field(480, description="Its rows.")
-    markers_hz: HzOrOff = Field(10.0, description="How often `rpbi/markers` is looked after, in wall time; 0 is off.")
-    poses: ListOf[FramePose] = Field((), description="Where TF frames are that nobody else publishes.")
-    attachments: ListOf[AttachmentConfig] = Field((), description="What holds what from the start on.")
+    markers_hz: HzOrOff = Field(10.0, description="Rate of updates of `rpbi/markers`, in wall time; 0 is off.")
+    controls: ControlsConfig | None = optional("The window with buttons that `./rpbi launch WORLD.yaml` opens.")
+    poses: ListOf[StaticFrame] = Field((), description="Poses of TF frames that no other node publishes.")
+    attachments: ListOf[AttachmentConfig] = Field((), description="Attachments from the start on.")
     objects: ListOf[FileOrOverrides] = Field(
         (), description="Files of objects of your own types, see docs/extending.md."
     )
@@ -180,7 +187,7 @@ class WorldConfig(ConfigModel):
         return self
 
     def pose_of(self, frame: str) -> Pose | None:
-        """Returns where a TF frame is in the world, as far as `poses` says that; None if it does not."""
+        """Returns the pose of a TF frame in the world from `poses`; None if it is not there."""
         poses = {each.tf_id: each for each in self.poses}
         pose = Pose()
         while (frame := self.without_prefix(frame)) != WORLD_FRAME:
@@ -196,13 +203,13 @@ class WorldConfig(ConfigModel):
 
     @classmethod
     def from_main_file(cls, content: WorldConfig) -> WorldConfig:
-        """Returns what a main file that has been validated says, but for its lists."""
+        """Returns the keys of a validated main file, without its lists."""
         values = {key: getattr(content, key) for key in cls.model_fields}
         return cls.model_construct(content.model_fields_set & cls.model_fields.keys(), **values)
 
 
 def main_file_model(sections: Mapping[str, type[ConfigModel]]) -> type[WorldConfig]:
-    """Returns the model of a main file that has these lists of files; it refuses keys that it does not know."""
+    """Returns the model of a main file with these lists of files; it refuses unknown keys."""
     return _main_file_model(tuple(sections.items()))
 
 

@@ -9,12 +9,13 @@ from typing import Any, NamedTuple
 import pybullet
 
 from custom_ros_tools.errors import UnknownNameError
-from rpbi.geometry import Load, Pose, Vector, plus, rotated
+from robot_model.geometry import Vector, plus
+from robot_model.limits import MAX_MAGNITUDE
+from rpbi.geometry import LinkWrench, Pose, rotated
 from rpbi.plain_values import as_tuple
-from rpbi.urdf.joints import LARGEST
 
 TIMEOUT_S = 0.5
-"""How long a wrench lasts that comes by topic and is not renewed [s] of the world's time."""
+"""Duration of a wrench received by topic [s] of the world's time; it ends then unless renewed."""
 
 
 class ExternalWrench(NamedTuple):
@@ -38,14 +39,14 @@ class ExternalWrench(NamedTuple):
 
 
 class ExternalWrenches:
-    """What acts on one body from outside; a link has one wrench, and a newer one replaces it.
+    """External wrenches on one body; a link has one, and a newer one replaces it.
 
     Args:
         body: The body; it is not kept.
 
     Attributes:
         can_act: Whether one of its links can move.
-        loads: What acted in the last step.
+        loads: Wrenches that acted in the last step.
     """
 
     def __init__(self, body: Any) -> None:
@@ -53,7 +54,7 @@ class ExternalWrenches:
         self._dt_s: float = self._pb.getPhysicsEngineParameters()["fixedTimeStep"]
         self._acting: dict[int, tuple[ExternalWrench, float]] = {}
         """By PyBullet's index of the link: the wrench, and for how many more ticks."""
-        self.loads: list[Load] = []
+        self.loads: list[LinkWrench] = []
         static = self._pb.getDynamicsInfo(body.body_id, -1)[0] == 0.0
         links = [body.root_link, *map(body.link_name, body.link_indices)]
         indices = {body.link_name(index): index for index in (-1, *body.joint_indices)}
@@ -83,8 +84,8 @@ class ExternalWrenches:
         for name, values in (("force", wrench.force), ("torque", wrench.torque), ("point", wrench.point)):
             if not all(map(math.isfinite, values)):
                 raise ValueError(f"{name} must be finite, got {tuple(values)}")
-            if max(map(abs, values)) > LARGEST:
-                raise ValueError(f"{name} must be within +-{LARGEST:g}, got {tuple(values)}")
+            if max(map(abs, values)) > MAX_MAGNITUDE:
+                raise ValueError(f"{name} must be within +-{MAX_MAGNITUDE:g}, got {tuple(values)}")
         duration_s = wrench.duration_s
         if duration_s is not None and not (math.isfinite(duration_s) and duration_s > 0.0):
             raise ValueError(f"duration must be > 0 [s], got {duration_s:g}")
@@ -116,8 +117,8 @@ class ExternalWrenches:
         self._acting = {index: (wrench, left - 1) for index, (wrench, left) in self._acting.items() if left > 1}
 
 
-def _load(index: int, wrench: ExternalWrench, pose: Pose) -> Load:
+def _load(index: int, wrench: ExternalWrench, pose: Pose) -> LinkWrench:
     force, torque = wrench.force, wrench.torque
     if wrench.in_link_axes:
         force, torque = rotated(pose.quat_xyzw, force), rotated(pose.quat_xyzw, torque)
-    return Load(index, force, torque, plus(pose.position, rotated(pose.quat_xyzw, wrench.point)))
+    return LinkWrench(index, force, torque, plus(pose.position, rotated(pose.quat_xyzw, wrench.point)))

@@ -8,16 +8,16 @@ from rpbi.engine.client import Client
 from rpbi.urdf.joints import JointModel
 
 from .motion import JointMotion, Motion
-from .motors import POSITION_MODES, Command, Motors
-from .target_stream import TargetStreams
+from .motors import POSITION_MODES, Motors, ResolvedCommand
+from .streams.target_stream import TargetStreams
 
 
 class JointDrive:
     """Follows targets, and runs at most one motion of a robot at a time; a newer one replaces it.
 
     Args:
-        interpolation: What moves joints from one position target of a stream to the next: `hold`, `linear` or `smooth`.
-        buffer_s: Longest delay of targets to even out how late they come [s].
+        interpolation: Interpolation between position targets of a stream: `hold`, `linear` or `smooth`.
+        buffer_s: Longest delay of targets by the jitter buffer [s].
 
     Attributes:
         dt_s: Length of a tick [s].
@@ -46,7 +46,7 @@ class JointDrive:
         self._interpolates = interpolation != "hold"
         self._streams = TargetStreams(motors, self.dt_s, interpolation == "smooth", buffer_s)
 
-    def follow(self, commands: Iterable[Command]) -> None:
+    def follow(self, commands: Iterable[ResolvedCommand]) -> None:
         """Follows targets from now on, unless the control mode has changed since they were checked."""
         if self._interpolates and self.motors.mode in POSITION_MODES:
             self._streams.follow(commands)

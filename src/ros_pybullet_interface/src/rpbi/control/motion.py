@@ -1,4 +1,4 @@
-"""Motions: what drives some joints of a robot from tick to tick until it ends."""
+"""Motions, which drive some joints of a robot tick by tick until they end."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -10,11 +10,11 @@ JointMotion = Mapping[int, tuple[float, float]]
 
 
 class MotionResult(NamedTuple):
-    """How a motion ended.
+    """Outcome of a motion.
 
     Attributes:
-        success: Whether it reached what it was to reach.
-        message: What was reached, and why it ended.
+        success: Whether it reached its goal.
+        message: Description of the outcome, with the reason.
     """
 
     success: bool
@@ -28,11 +28,11 @@ class Motion(ABC):
         joints: Indices of the joints that it drives.
 
     Attributes:
-        result: What others wait for. It is set when the motion ends, whatever the reason.
+        result: Future of the outcome, set when the motion ends for any reason.
     """
 
     can_wait: ClassVar[bool] = False
-    """Whether it goes on where it was when a world that was stopped runs again; others are broken off."""
+    """Whether it continues after the world was stopped; others are aborted by a stop."""
 
     def __init__(self, joints: frozenset[int]) -> None:
         self.joints = joints
@@ -61,7 +61,7 @@ class Motion(ABC):
         """
 
     def halt(self, reason: str, measured: JointMotion) -> None:
-        """Ends before the goal for a reason from outside, such as `the simulation was stopped`; the result tells it."""
+        """Ends before the goal for a reason from outside, such as `the simulation was stopped`."""
         self.end(False, reason)
 
     def end(self, success: bool, message: str) -> None:

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 import pybullet
 
 from rpbi.config.pybullet_args import CONTROL_MODES, IMPEDANCE_CONTROL
+from rpbi.control.joint_command import JointCommand
 from rpbi.engine.client import Client
-from rpbi.urdf.joints import Joint, JointModel, JointTarget
+from rpbi.urdf.joints import Joint, JointModel
 
 log = logging.getLogger(__name__)
 
@@ -21,15 +22,15 @@ PERIOD_S = 5.0
 
 
 class LimitReports:
-    """Reports when a joint goes beyond its limits, once until it has come back, and once in `PERIOD_S` at most."""
+    """Logs when a joint exceeds its limits, once until it is back, and at most once in `PERIOD_S`."""
 
     def __init__(self, robot_name: str) -> None:
         self._robot_name = robot_name
         self._beyond: set[int] = set()
         self._reported_s: dict[int, float] = {}
 
-    def take(self, joint: Joint, position: float, what: str) -> None:
-        """Looks at a position [rad or m]; `what` tells what becomes of it, such as `is shown so`."""
+    def observe(self, joint: Joint, position: float, what: str) -> None:
+        """Checks a position [rad or m]; `what` is the consequence for the log line, such as `it goes to the limit`."""
         if joint.allows(position):
             self._beyond.discard(joint.index)
             return
@@ -47,22 +48,22 @@ QUANTITIES = {
     pybullet.TORQUE_CONTROL: "effort",
     IMPEDANCE_CONTROL: "position",
 }
-"""What a target is in each control mode."""
-MOST_WAITING = 100
-"""Targets that wait for one tick."""
+"""Quantity of a target in each control mode."""
+MAX_WAITING_TARGETS = 100
+"""Largest number of targets that wait for one tick; beyond it, the last ones are merged."""
 MODE_NAMES = {CONTROL_MODES.parse(name): name for name in CONTROL_MODES.names}
 POSITION_MODES = (pybullet.POSITION_CONTROL, IMPEDANCE_CONTROL)
-"""Modes in which targets are positions, which hold."""
+"""Modes in which targets are positions, which never expire."""
 
 
-class Command(NamedTuple):
-    """A target that was checked, with the control mode that it was checked for.
+class ResolvedCommand(NamedTuple):
+    """A target checked for a control mode.
 
     Attributes:
         mode: The control mode.
         values: Positions, velocities or efforts by joint index.
-        velocities: With positions, the velocities to have there, for the same joints; empty if they are not given.
-        stamp_ns: When it was sent, by the sender's clock [ns], 0 if that is not known.
+        velocities: With positions, the velocities there, for the same joints; may be empty.
+        stamp_ns: Time of sending by the sender's clock [ns], 0 if unknown.
     """
 
     mode: int
@@ -70,14 +71,14 @@ class Command(NamedTuple):
     velocities: Mapping[int, float] = {}
     stamp_ns: int = 0
 
-    def merged(self, newer: Command) -> Command:
+    def merged(self, newer: ResolvedCommand) -> ResolvedCommand:
         """Returns both as one: the newer one wins joint by joint, or as a whole if the mode changed between them."""
         return newer._replace(values=self.values | newer.values, velocities={}) if self.mode == newer.mode else newer
 
 
-def joined(older: tuple[Command, ...], newer: tuple[Command, ...]) -> tuple[Command, ...]:
+def coalesce(older: tuple[ResolvedCommand, ...], newer: tuple[ResolvedCommand, ...]) -> tuple[ResolvedCommand, ...]:
     """Returns the commands of both, the last ones merged if there are too many."""
-    if len(older) < MOST_WAITING:
+    if len(older) < MAX_WAITING_TARGETS:
         return older + newer
     return (*older[:-1], older[-1].merged(*newer))
 
@@ -100,7 +101,7 @@ class Motors:
     """Drives the joints of one robot within the efforts and velocities of its URDF.
 
     Positions hold until the next target. Velocities and efforts that are not renewed go back to 0 after a while of
-    simulated time, so that whoever stops sending stops the robot.
+    simulated time: a sender that stops stops the robot.
 
     Args:
         gains: PyBullet's `positionGain` and `velocityGain` by joint index, where they are not PyBullet's own.
@@ -108,11 +109,11 @@ class Motors:
         timeout_s: Age at which velocity and effort targets expire [s] of the world's time.
 
     Attributes:
-        targets: What the motors are set to by joint index: positions, velocities or efforts, as the control mode says.
-        leads: Position [rad or m] and velocity that springs are to hold at the coming tick, by joint index, where they
-            are not those of the targets.
-        applied_efforts: Efforts [N m or N] applied in the last tick, by joint index, where not PyBullet's motors but
-            torque targets, springs or a controller made them; PyBullet tells them not.
+        targets: Set points of the motors by joint index: positions, velocities or efforts, by the control mode.
+        impedance_setpoints: Position [rad or m] and velocity for springs to hold at the coming tick, by joint index,
+            where they differ from the targets.
+        applied_efforts: Efforts [N m or N] by joint index that torque targets, springs or a controller applied in the
+            last tick; PyBullet does not report them.
     """
 
     def __init__(
@@ -146,12 +147,12 @@ class Motors:
         self.switch(mode)
 
     def switch(self, mode: int) -> None:
-        """Changes the control mode: the robot holds still, or under torque control is left to itself."""
+        """Changes the control mode: the robot holds its position, or under torque control moves freely."""
         self.mode = mode
         self._expiry.clear()
         self._renewed.clear()
         self.applied_efforts: dict[int, float] = {}
-        self.leads: dict[int, tuple[float, float]] = {}
+        self.impedance_setpoints: dict[int, tuple[float, float]] = {}
         states = self._pb.getJointStates(self._body_id, self._indices) if self._indices else ()
         is_held = mode in POSITION_MODES
         self.targets = {index: state[0] if is_held else 0.0 for index, state in zip(self._indices, states)}
@@ -179,7 +180,7 @@ class Motors:
                 self._velocity_arguments[index]["velocityGain"] = arguments["velocityGain"]
             self._drive(index, self.targets[index])
 
-    def check(self, target: JointTarget) -> Command:
+    def check(self, target: JointCommand) -> ResolvedCommand:
         """Checks a target against the present control mode; any thread may call it.
 
         Raises:
@@ -195,9 +196,9 @@ class Motors:
             if (given := getattr(target, quantity)) or given is values
         }
         velocities = resolved.get("velocity", {}) if mode in POSITION_MODES else {}
-        return Command(mode, resolved[QUANTITIES[mode]], velocities, target.stamp_ns)
+        return ResolvedCommand(mode, resolved[QUANTITIES[mode]], velocities, target.stamp_ns)
 
-    def follow(self, command: Command) -> None:
+    def follow(self, command: ResolvedCommand) -> None:
         """Follows a target from now on, unless the control mode has changed since it was checked."""
         if command.mode != self.mode:
             return
@@ -217,12 +218,11 @@ class Motors:
     def track(self, index: int, position: float, velocity: float) -> None:
         """Sets a joint's position [rad or m] and velocity [rad/s or m/s] at the coming tick, in any control mode.
 
-        PyBullet's position motor moves by the velocity, and beyond that takes away a share, its gain, of the difference
-        to the position before the tick. So this is the position before it, and the velocity the one that leads to
-        where the joint is to be after it.
+        PyBullet's position motor moves by the velocity, plus its gain times the difference to the position before the
+        tick. `position` is therefore the one before the tick; `velocity` leads to the desired one after it.
         """
         if self.mode == IMPEDANCE_CONTROL:
-            self.leads[index] = position, velocity
+            self.impedance_setpoints[index] = position, velocity
         else:
             self._pb.setJointMotorControl2(
                 self._body_id,
@@ -236,35 +236,35 @@ class Motors:
             self.targets[index] = position + velocity * self._dt_s
 
     def release(self, indices: Iterable[int]) -> None:
-        """Gives joints that were tracked back: they hold their last position, or stand still under velocity control."""
+        """Ends tracking: joints hold their last position, or stand still under velocity control."""
         for index in indices:
             if self.mode == pybullet.VELOCITY_CONTROL:
                 self.targets[index] = 0.0
             self._drive(index, self.targets[index])
 
-    def rest(self, positions: Mapping[int, float]) -> None:
-        """Takes joints by index as put at positions [rad or m]: there they are held, or driven by nothing any more."""
+    def reset_setpoints(self, positions: Mapping[int, float]) -> None:
+        """Resets set points after joints were put at positions [rad or m], by index: held there, or not driven."""
         for index, position in positions.items():
             self._expiry.pop(index, None)
             self._renewed.discard(index)
             self.targets[index] = position if self.mode in POSITION_MODES else 0.0
             self._drive(index, self.targets[index])
 
-    def seize(self, indices: Iterable[int]) -> None:
-        """Holds joints by index, which something else has driven, where they are."""
+    def hold_measured(self, indices: Iterable[int]) -> None:
+        """Holds joints by index at their measured positions, after a controller has driven them."""
         states = {index: self._pb.getJointState(self._body_id, index)[0] for index in indices}
         for index in states:
             self.applied_efforts.pop(index, None)
-        self.rest(states)
+        self.reset_setpoints(states)
 
-    def let_go(self, indices: Iterable[int]) -> None:
-        """Leaves joints by index to who will `push` them."""
+    def disable(self, indices: Iterable[int]) -> None:
+        """Switches PyBullet's motors of joints off, by index, for `apply_efforts`."""
         for index in indices:
             self._expiry.pop(index, None)
             self._renewed.discard(index)
             self._release(index)
 
-    def push(self, efforts: Mapping[int, float]) -> None:
+    def apply_efforts(self, efforts: Mapping[int, float]) -> None:
         """Applies efforts [N m or N] by joint index for one tick, within the joints' own."""
         limits = self._effort_limits
         limited = {index: min(max(effort, -limits[index]), limits[index]) for index, effort in efforts.items()}
@@ -287,7 +287,7 @@ class Motors:
             self._expire(tick)
         if self.mode == pybullet.TORQUE_CONTROL and self._indices:
             driven = [index for index in self._indices if index not in driven_by_others]
-            self.push({index: self.targets[index] + feed_forward.get(index, 0.0) for index in driven})
+            self.apply_efforts({index: self.targets[index] + feed_forward.get(index, 0.0) for index in driven})
 
     def _expire(self, tick: int) -> None:
         for index in [index for index, expiry in self._expiry.items() if tick >= expiry]:
@@ -297,10 +297,10 @@ class Motors:
                 self._drive(index, 0.0)
 
     def limited(self, index: int, value: float) -> float:
-        """Returns a position, velocity or effort within what the joint can do."""
+        """Returns a position, velocity or effort clipped to the limits of the joint."""
         joint = self._model.joints[index]
         if self.mode in POSITION_MODES:
-            self._limit_reports.take(joint, value, "it goes to the limit")
+            self._limit_reports.observe(joint, value, "it goes to the limit")
             return self.nearest_allowed(index, value)
         if self.mode == pybullet.VELOCITY_CONTROL:
             return min(max(value, -joint.max_velocity), joint.max_velocity)
@@ -325,7 +325,7 @@ class Motors:
         self._pb.setJointMotorControl2(self._body_id, index, pybullet.VELOCITY_CONTROL, force=0.0)
 
     def _arguments(self, joint: Joint, gains: Mapping[int, Mapping[str, float]]) -> dict[str, Any]:
-        """Returns what PyBullet's position motor of a joint is told beside its set point."""
+        """Returns the arguments of PyBullet's position motor of a joint beside its set point."""
         arguments: dict[str, Any] = dict(gains.get(joint.index, {}))
         effort = self._model.effort_limit(joint)
         if self._enforce_effort_limits and math.isfinite(effort):

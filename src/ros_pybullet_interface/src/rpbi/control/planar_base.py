@@ -11,12 +11,12 @@ from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.schema import ConfigModel, Positive, Seconds, Unit
+from robot_model.urdf.document import UrdfDocument
+from robot_model.urdf.elements import Element, UrdfJoint
 from rpbi.engine.client import Client
 from rpbi.geometry import Pose, Twist
 from rpbi.plain_values import as_tuple
 from rpbi.urdf.copies import Files, for_pybullet, mounted_on
-from rpbi.urdf.document import UrdfDocument
-from rpbi.urdf.elements import Element, UrdfJoint
 
 PLANAR_JOINTS = (0, 1, 2)
 """PyBullet's indices of the joints along x and y [m] and about z [rad], and of the links behind them."""
@@ -28,7 +28,7 @@ class PlanarVelocity(NamedTuple):
     """Velocity of a base in its plane.
 
     Attributes:
-        x: Forwards [m/s], in the base frame unless said otherwise.
+        x: Forwards [m/s], in the base frame unless noted otherwise.
         y: To the left [m/s].
         yaw: Counter-clockwise [rad/s].
     """
@@ -69,13 +69,13 @@ class PlanarVelocity(NamedTuple):
         return PlanarVelocity(self.x * share, self.y * share, min(max(self.yaw, -angular), angular))
 
     def towards(self, goal: PlanarVelocity, linear: float, angular: float) -> PlanarVelocity:
-        """Returns it after a change to a goal by at most so much [m/s and rad/s]."""
+        """Returns the velocity after a change towards a goal by at most `linear` [m/s] and `angular` [rad/s]."""
         change = PlanarVelocity(goal.x - self.x, goal.y - self.y, goal.yaw - self.yaw).limited(linear, angular)
         return PlanarVelocity(self.x + change.x, self.y + change.y, self.yaw + change.yaw)
 
 
 class PlanarBaseConfig(ConfigModel):
-    """How a base drives over the ground; all in the base frame."""
+    """Limits of a base that drives over the ground, in the base frame."""
 
     max_linear_velocity: Annotated[Positive, Unit("m/s")] = Field(1.0, description="Largest speed in any direction.")
     max_angular_velocity: Annotated[Positive, Unit("rad/s")] = Field(1.5, description="Fastest rotation.")
@@ -97,18 +97,18 @@ class PlanarBaseConfig(ConfigModel):
 
 
 GRAVITY = 9.81
-"""What the default force limits count with [m/s^2], whatever the world's gravity is."""
+"""Gravity for the default force limits [m/s^2], whatever the world's is."""
 POSITION_GAIN = 0.1
 """Share of its lag that the base makes up for in a tick."""
 CATCH_UP_SPEED = (0.5, 0.5, 1.0)
-"""How fast the base may make up for its lag [m/s, m/s, rad/s]; a greater lag is given up: something is in the way."""
+"""Largest speed to make up for lag [m/s, m/s, rad/s]; lag beyond it is dropped, since an obstacle blocks the base."""
 
 
 def with_planar_joints(document: UrdfDocument, files: Files) -> Element:
     """Puts a massless chain of joints along x, along y and about z between the world and the root link of a URDF.
 
     Returns:
-        What PyBullet reads of it, with the chain; its root is the fixed end of the chain.
+        The parts that PyBullet reads, with the chain, whose fixed end is the root.
 
     Raises:
         ConfigError: If the file is not a tree of links.
@@ -127,8 +127,8 @@ def with_planar_joints(document: UrdfDocument, files: Files) -> Element:
 class PlanarBase:
     """Drives the planar joints of a robot by velocity, with limited force.
 
-    The motors follow a set point that moves with the limited velocity, so nothing drifts. What needs more force than
-    there is holds the base up or pushes it away; the set point then stays near the base, as wheels slip.
+    The motors follow a set point that moves with the limited velocity, so nothing drifts. An obstacle that needs more
+    force stops or pushes the base; the set point then stays near it, as wheels slip.
 
     Args:
         body_id: PyBullet's id of the robot, which was loaded with planar joints.
@@ -150,7 +150,7 @@ class PlanarBase:
         self._expiry = None
 
     def rest(self) -> None:
-        """Takes the base as standing where its joints are."""
+        """Resets the set point to the present joint positions, at rest."""
         self._velocity = PlanarVelocity()
         self._set_point = [state[0] for state in self._joint_states()]
 

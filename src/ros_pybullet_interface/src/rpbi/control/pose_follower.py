@@ -1,4 +1,4 @@
-"""Bodies that follow a stream of poses with a velocity, which what they touch feels."""
+"""Bodies that follow a stream of poses with a velocity, so that contacts are right."""
 
 from __future__ import annotations
 
@@ -9,23 +9,24 @@ from collections import deque
 import numpy as np
 import numpy.typing as npt
 
+from robot_model.geometry import Vector, cross, dot, minus, normalized, rotation_between, scaled
 from rpbi.config.pybullet_models import ObjectTf
 from rpbi.engine.client import Client
-from rpbi.geometry import Pose, Vector, cross, dot, minus, normalized, rotation_between, scaled
+from rpbi.geometry import Pose
 
 log = logging.getLogger(__name__)
 
 INTERVALS = 5
-"""How many intervals between poses tell how far apart they come."""
+"""Number of last intervals between poses whose longest is the stream's period."""
 LONGEST_GROWTH = 2
-"""How many times as long as the longest before it an interval may count; a longer one is a pause."""
+"""Largest growth of the longest interval by a new one; a longer interval is a pause, and clipped to it."""
 JUMP_S = 0.1
-"""What takes longer than this at the largest speeds is a jump [s], and longer than two periods of the stream."""
+"""Longest motion to a pose at the largest speeds [s], two periods if that is longer; beyond it, the pose is a jump."""
 QUIET_S = 5.0
-"""How long no further jump is told of [s] of the world's time."""
+"""Time after a warning of a jump without another [s] of the world's time."""
 
-MOST_TICKS = 10_000
-"""Over so many ticks a path is smoothed at most."""
+MAX_TICKS = 10_000
+"""Largest number of ticks over which a path is smoothed."""
 
 _Numbers = npt.NDArray[np.float64]
 
@@ -33,13 +34,13 @@ _Numbers = npt.NDArray[np.float64]
 class PosePath:
     """Smooths a stream of poses that are held until the next one comes; all by ticks.
 
-    From each pose on it goes straight there, in the longest of the last few intervals between poses, or longer if the
-    speeds ask for it. The path is the mean of that line over a number of ticks: the velocity changes evenly, and what
-    lies between the poses is never left, so nothing overshoots. Quaternions are averaged as vectors, signs aligned.
+    The line goes straight to each pose, in the longest of the last few intervals between poses, or longer at the
+    largest speeds. The path is the mean of that line over a number of ticks: the velocity changes evenly, and nothing
+    overshoots. Quaternions are averaged as vectors, signs aligned.
 
     Args:
-        start: Where it begins, at rest.
-        ticks: In how many ticks poses are expected to follow each other; the mean is over as many.
+        start: Pose at the beginning, at rest.
+        ticks: Expected interval between poses [ticks], over which the mean is taken.
         max_step: Longest way in a tick [m].
         max_turn: Largest turn in a tick [rad].
     """
@@ -55,21 +56,21 @@ class PosePath:
         self._window = deque([self._line] * ticks)
         self._sum = self._line * ticks
         self.ticks_left = 0
-        """In how many ticks it is at its goal, at rest."""
+        """Ticks until it rests at its goal."""
 
     @property
     def period(self) -> int:
-        """In how many ticks poses follow each other at most."""
+        """Longest recent interval between poses [ticks]."""
         return max(self._intervals)
 
     def ticks_to(self, pose: Pose) -> float:
-        """Returns in how many ticks the largest speeds lead from the end of the line to a pose."""
+        """Returns the ticks from the end of the line to a pose at the largest speeds."""
         way = _numbers(pose, self._line) - self._line
         turn = 4.0 * math.tan(math.asin(np.linalg.norm(way[3:]) / 2.0))  # at the speed in the middle of the line
         return max(float(np.linalg.norm(way[:3])) / self._max_step, turn / self._max_turn)
 
-    def take(self, pose: Pose, tick: int) -> None:
-        """Goes to a pose that has come before a tick."""
+    def push(self, pose: Pose, tick: int) -> None:
+        """Sets the goal to a pose received before a tick."""
         if self._taken_at is not None:
             self._intervals.append(min(tick - self._taken_at, LONGEST_GROWTH * self.period))
         self._taken_at = tick
@@ -80,7 +81,7 @@ class PosePath:
         self.ticks_left = self._line_ticks + len(self._window) - 1
 
     def next(self) -> Pose:
-        """Goes on by a tick, and returns where it is then."""
+        """Advances by a tick, and returns the pose after it."""
         if self._line_ticks:
             self._line_ticks -= 1
             self._line = self._line + self._step
@@ -104,10 +105,9 @@ def _numbers(pose: Pose, near: _Numbers | None = None) -> _Numbers:
 class PoseFollower:
     """Moves a fixed base of one PyBullet body along a stream of poses.
 
-    A base without mass moves at the velocity that it is set to, and contacts are solved with that velocity: what lies
-    on it is carried, what is before it pushed, what it slides along rubbed, and nothing holds it up. So it gets, before
-    each tick, the velocity that leads to where it is to be after it. The first pose, and any beyond a jump, is where it
-    is put at once, at rest.
+    A base without mass moves at its set velocity, and contacts are solved with it: it carries, pushes and rubs other
+    bodies, and nothing stops it. Before each tick its velocity is set to reach the path's next pose. The first pose,
+    and any beyond a jump, is set at once, at rest.
 
     Args:
         name: The body, for messages.
@@ -123,10 +123,10 @@ class PoseFollower:
         self._waiting: Pose | None = None
         self._is_moving = False
         self._quiet_until = 0
-        """Tick from which on a jump is told of again."""
+        """Tick from which a jump is logged again."""
 
-    def take(self, pose: Pose) -> None:
-        """Goes to a pose from the next tick on, the first time at once."""
+    def push(self, pose: Pose) -> None:
+        """Sets the goal from the next tick on; the first pose is set at once."""
         if self._path is None:
             self.put(pose)
         else:
@@ -138,7 +138,7 @@ class PoseFollower:
         self._begin(pose @ self._centre)
 
     def before_step(self, tick: int) -> None:
-        """Gives the base the velocity of the coming tick."""
+        """Sets the velocity of the base for the coming tick."""
         path = self._path
         if path is None:
             return
@@ -150,10 +150,10 @@ class PoseFollower:
             self._rest_at(path.goal)
 
     def _aim(self, path: PosePath, pose: Pose, tick: int) -> PosePath:
-        """Has the path lead to a pose; beyond a jump it begins anew there."""
+        """Extends the path to a pose; beyond a jump it restarts there."""
         self._waiting = None
         if path.ticks_to(pose) <= max(JUMP_S / self._dt_s, 2 * path.period):
-            path.take(pose, tick)
+            path.push(pose, tick)
             return path
         if tick >= self._quiet_until:
             self._quiet_until = tick + round(QUIET_S / self._dt_s)
@@ -170,7 +170,7 @@ class PoseFollower:
 
     def _path_from(self, pose: Pose) -> PosePath:
         tf, dt_s = self._object_tf, self._dt_s
-        ticks = min(max(1, round(1.0 / (tf.hz * dt_s))), MOST_TICKS)
+        ticks = min(max(1, round(1.0 / (tf.hz * dt_s))), MAX_TICKS)
         return PosePath(pose, ticks, tf.max_speed * dt_s, tf.max_angular_speed * dt_s)
 
     def _rest_at(self, pose: Pose) -> None:
@@ -181,7 +181,7 @@ class PoseFollower:
         """Sets the velocity that leads to a pose in a tick."""
         position, quat = self._pb.getBasePositionAndOrientation(self._body_id)
         way, turn = minus(pose.position, position), rotation_between(quat, pose.quat_xyzw)
-        # PyBullet moves a base that turns by way + turn x way, so it is told less: the inverse of that
+        # PyBullet moves a base that turns by way + turn x way, so its velocity is the inverse of that
         across = cross(turn, way)
         told = minus(way, scaled(1.0 / (1.0 + dot(turn, turn)), minus(across, cross(turn, across))))
         linear, angular = scaled(1.0 / self._dt_s, told), scaled(1.0 / self._dt_s, turn)
@@ -196,9 +196,9 @@ class PoseFollower:
 class TrackedBase(PoseFollower):
     """Moves the base of a dynamic body along a stream of poses while they come; in between, physics moves it.
 
-    Before each tick it gets the velocity that leads along the path, less what gravity adds in that tick: contacts are
-    solved with that velocity and the body's own mass. When nothing has come for `timeout_s` of the world's time it goes
-    on with the velocity that it has. Poses that come again lead there from where physics has brought it.
+    Before each tick its velocity is set along the path, less the change by gravity in that tick: contacts are solved
+    with that velocity and the body's own mass. Without a pose for `timeout_s` of the world's time it moves freely;
+    later poses lead on from its present pose.
     """
 
     def __init__(self, pb: Client, name: str, body_id: int, centre: Pose, object_tf: ObjectTf) -> None:
@@ -208,8 +208,8 @@ class TrackedBase(PoseFollower):
         """Tick before which the last pose came."""
         self._timeout_ticks = math.ceil(object_tf.timeout_s / self._dt_s)
 
-    def take(self, pose: Pose) -> None:
-        """Goes to a pose from the next tick on; the first one is where it is put."""
+    def push(self, pose: Pose) -> None:
+        """Sets the goal from the next tick on; the first pose is set at once."""
         self._waiting = pose @ self._centre
 
     def put(self, pose: Pose) -> None:
@@ -217,7 +217,7 @@ class TrackedBase(PoseFollower):
         self._path = self._waiting = None
 
     def before_step(self, tick: int) -> None:
-        """Gives the base the velocity of the coming tick, if it is tracked."""
+        """Sets the velocity of the base for the coming tick, if it is tracked."""
         if self._waiting is not None:
             self._taken_at = tick
             if self._path is None:

@@ -8,15 +8,15 @@ from rpbi.urdf.joints import JointModel
 from .motion import JointMotion, Motion
 
 TOLERANCES = {"rad": 0.01, "m": 0.001}
-"""How far a joint may be from its goal at the end of a motion that succeeded, by unit."""
+"""Largest error of a joint at the end by unit; beyond it, the motion fails."""
 REST = {"rad": 0.05, "m": 0.005}
 """Speed below which a joint counts as having come to rest there, by unit and second."""
 SETTLING_S = 1.0
-"""How long after the last set point the joints may take to come to rest at the goal [s] of the world's time."""
+"""Longest time after the last set point until joints rest at the goal [s] of the world's time; then it fails."""
 LONGEST_S = 1e6
 """Longest motion [s]; what is longer was not meant."""
 SHORTEST_S = 0.04
-"""A motion takes at least this long [s], as in the first release."""
+"""Shortest duration of a motion [s], as in the first release; shorter ones are extended to it."""
 PEAK = 15.0 / 8.0
 """Largest velocity of a minimum-jerk motion over its mean one: 30 s^2 (1 - s)^2 at s = 1/2 (Flash and Hogan, 1985)."""
 
@@ -29,7 +29,7 @@ class TimedMotion(Motion):
 
     Args:
         goal: Positions [rad or m] by joint index.
-        duration_s: How long it shall take [s].
+        duration_s: Duration [s].
 
     Raises:
         ValueError: If the goal is empty, or the duration is negative or not finite.
@@ -78,7 +78,7 @@ class TimedMotion(Motion):
         }
 
     def halt(self, reason: str, measured: JointMotion) -> None:
-        """Ends before the goal; the message tells the state reached."""
+        """Ends before the goal; the message includes the state reached."""
         self.end(False, f"{reason} before the goal: {self._residuals(measured)}; {self._reached(measured)}")
 
     def _missed(self, measured: JointMotion) -> list[int]:
@@ -89,7 +89,7 @@ class TimedMotion(Motion):
         return all(abs(measured[index][1]) <= REST[self._model.joints[index].unit] for index in self._goal)
 
     def _residuals(self, measured: JointMotion, indices: list[int] | None = None) -> str:
-        """Tells how far joints are from their goals: of each kind the farthest, or all of those given."""
+        """Returns the errors of joints as text: the largest of each unit, or all of `indices`."""
         errors = {index: abs(measured[index][0] - goal) for index, goal in self._goal.items()}
         joints = self._model.joints
         if indices is None:

@@ -1,1 +1,1 @@
-"""What makes a world run: its clock, the pace, what comes in and what is logged."""
+"""Parts that run a world: clock, pacer, mailbox, inputs."""

@@ -12,7 +12,7 @@ from typing import Any
 import pybullet
 
 from custom_ros_tools.errors import PhysicsError
-from rpbi.geometry import Vector
+from robot_model.geometry import Vector
 
 WINDOWS = frozenset((pybullet.GUI, pybullet.GUI_SERVER, pybullet.GUI_MAIN_THREAD))
 """Modes in which PyBullet opens a window of its own; in others it is the server's, if there is one."""
@@ -34,8 +34,8 @@ class _Printed:
     """The lines that PyBullet prints while a call lasts, on their way to the log.
 
     It prints by C's `printf` and `fprintf`, to the streams that C's variables `stdout` and `stderr` name. These
-    variables are changed, not the file descriptors 1 and 2: Python's own output, that of other threads too, goes where
-    it always goes.
+    variables are changed, not the file descriptors 1 and 2: Python's own output, that of other threads too, is not
+    affected.
     """
 
     def __init__(self) -> None:
@@ -64,7 +64,7 @@ class _Printed:
                 self._depth -= 1
                 if not self._depth:
                     self._name(self._originals)
-                lines = self._take()
+                lines = self._drain()
             for line in lines[:MAX_LINES]:
                 log.info("%s", line)
             if len(lines) > MAX_LINES:
@@ -74,7 +74,7 @@ class _Printed:
         for variable, stream in zip(self._streams, streams):
             variable.value = stream
 
-    def _take(self) -> list[str]:
+    def _drain(self) -> list[str]:
         size = os.fstat(self._file).st_size
         if not size:
             return []
@@ -99,11 +99,11 @@ def _logged(function: Callable[..., Any]) -> Callable[..., Any]:
 class Client:
     """PyBullet's functions and constants as attributes, bound to one connection.
 
-    The binding is made once per function: at a thousand ticks a second, making it at every call would show.
+    The binding is made once per function, since at a thousand ticks a second its cost would matter.
 
     Args:
         mode: PyBullet's connection mode, such as `pybullet.DIRECT`.
-        options: Further arguments of `pybullet.connect`, for other modes than DIRECT, which takes none.
+        options: Further arguments of `pybullet.connect`, for other modes than DIRECT, which has none.
 
     Raises:
         PhysicsError: If PyBullet does not connect, or a window is asked for and no screen answers.
@@ -119,11 +119,11 @@ class Client:
         self._window_prints = ExitStack()
         """The log of what PyBullet's window prints between calls, in a thread of its own."""
         self.is_deformable = False
-        """Whether soft bodies can be in its world, as told when that was set up."""
+        """Whether its world was set up for soft bodies."""
         self.gravity: Vector = (0.0, 0.0, 0.0)
-        """Gravity of its world [m/s^2], as told when that was set."""
+        """Gravity of its world, as last set [m/s^2]."""
         self.sub_steps = 0
-        """Parts that each step of its world is divided into, as told when that was set; 0 is one."""
+        """Sub-steps of each step of its world, as last set; 0 is one."""
         if self.client_id < 0:
             raise PhysicsError("PyBullet did not connect")
         if mode in WINDOWS:
@@ -149,9 +149,9 @@ class Client:
 
 @contextmanager
 def _screen() -> Iterator[None]:
-    """Holds a connection to the screen: without one, PyBullet would end the process, with words of its own alone.
+    """Holds a connection to the screen: without a screen, PyBullet would end the process.
 
-    It is held until PyBullet has its own, for a virtual screen starts anew when the last connection goes.
+    It is held until PyBullet has its own, since a virtual screen restarts when the last connection closes.
 
     Raises:
         PhysicsError: If no screen answers.

@@ -11,7 +11,7 @@ class Clock:
     """Counts ticks and gives each its stamp.
 
     Stamps never repeat and never go back while the clock lives. Simulated stamps are exact: tick `n` is stamped
-    `(n + 1) * dt`, so the initial state has the stamp dt, since ROS takes a stamp of 0 for "no time yet". Ticks are the
+    `(n + 1) * dt`, so the initial state has the stamp dt, since a stamp of 0 means "no time yet" in ROS. Ticks are the
     world's: they begin at 0 again when it is reset, while the stamps go on.
 
     Args:
@@ -41,7 +41,7 @@ class Clock:
         return self.tick * self.dt_ns / NS_PER_S
 
     def advance(self) -> None:
-        """Goes on to the next tick."""
+        """Advances to the next tick."""
         self.tick += 1
         if self.simulated:
             self._on_time_ns += self.dt_ns
@@ -59,7 +59,7 @@ class Clock:
         if not self.simulated:
             self.stamp_ns = max(self.stamp_ns + 1, time.time_ns())
 
-    def tell_apart(self) -> None:
+    def bump_stamp(self) -> None:
         """Has what comes from now on another stamp than what was before, in any case; the coming ticks keep theirs."""
         self.stamp_ns += 1
 
@@ -81,7 +81,7 @@ class Schedule:
         self._numerator, self._denominator = min(wanted, Fraction(1)).as_integer_ratio()
 
     def is_due(self, tick: int, since: int | None = None) -> bool:
-        """Tells whether it is due at `tick`, or was at any tick after `since`; at tick 0 it always is."""
+        """Returns whether it is due at `tick`, or was at any tick after `since`; at tick 0 it always is."""
         return self._count(tick) > self._count(tick - 1 if since is None else since)
 
     def next_due(self, tick: int) -> int:

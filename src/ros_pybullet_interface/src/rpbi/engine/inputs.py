@@ -1,4 +1,4 @@
-"""What bodies and sensors take from outside while the world runs."""
+"""Inputs of bodies and sensors while the world runs."""
 
 from __future__ import annotations
 
@@ -7,23 +7,25 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from custom_ros_tools.schema import FARTHEST_M
+from custom_ros_tools.schema import MAX_COORDINATE_M
+from robot_model import geometry
+from robot_model.geometry import normalized
 from rpbi.config.pybullet_models import ObjectTf
-from rpbi.geometry import Pose, normalized
+from rpbi.geometry import Pose
 from rpbi.plain_values import as_tuple
 
 
 @dataclass(frozen=True)
 class Input:
-    """Something that a body or sensor takes from outside.
+    """An input of a body or sensor.
 
     Attributes:
-        check: Turns what came into what `apply` takes, in the thread it came in; it touches no PyBullet.
-            It raises ValueError or an InterfaceError for what must be refused.
+        check: Converts a received value for `apply`, in the receiving thread, without PyBullet. It raises ValueError or
+            an InterfaceError to refuse the value.
         apply: Acts on the newest value, on the simulation thread, before the tick.
-        merge: Joins a value that still waits with a newer one; without it the newer one replaces it.
-        ros_topic: Where to find the topic of an input from another package, a Topic, as `module:NAME`.
-        owner: What stands for `{name}` in the topic's name; the body or sensor if it is empty.
+        merge: Combines a waiting value with a newer one; without it, the newer one replaces it.
+        ros_topic: Place of the Topic of an input from another package, as `module:NAME`.
+        owner: Value of `{name}` in the topic's name; the body or sensor if empty.
     """
 
     check: Callable[[Any], Any]
@@ -39,8 +41,8 @@ class PoseInput(Input):
 
     Attributes:
         tf_id: The frame to follow.
-        hz: How often to look [Hz], in wall time.
-        timeout_s: Without anything new for so long, it is stale [s].
+        hz: Rate of TF look-ups [Hz], in wall time.
+        timeout_s: Time without a new pose after which it is stale [s].
         is_tracked: Whether physics moves the body while it is stale; then a new stamp with the same pose is news too.
     """
 
@@ -56,7 +58,7 @@ class PoseInput(Input):
         return cls(check_pose, apply, tf_id=tf.tf_id, hz=tf.hz, timeout_s=tf.timeout_s, is_tracked=is_tracked)
 
 
-def check_pose(given: Pose | Mapping[str, Any]) -> Pose:
+def check_pose(given: geometry.Pose | Mapping[str, Any]) -> Pose:
     """Returns a pose, or that of a mapping of its fields, with its quaternion normalised.
 
     Raises:
@@ -65,8 +67,8 @@ def check_pose(given: Pose | Mapping[str, Any]) -> Pose:
     position, quat = as_tuple(Pose, given)
     if not all(map(math.isfinite, (*position, *quat))):
         raise ValueError(f"pose must be finite, got {position}, {quat}")
-    if max(map(abs, position)) > FARTHEST_M:
-        raise ValueError(f"position must be within +-{FARTHEST_M:g} m, got {position}")
+    if max(map(abs, position)) > MAX_COORDINATE_M:
+        raise ValueError(f"position must be within +-{MAX_COORDINATE_M:g} m, got {position}")
     if math.hypot(*quat) < 1e-6:
         raise ValueError(f"quaternion must not be zero, got {quat}")
     return Pose((position[0], position[1], position[2]), normalized(quat))

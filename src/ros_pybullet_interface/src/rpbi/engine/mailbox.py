@@ -1,4 +1,4 @@
-"""Notes from other threads to the one thread that owns PyBullet."""
+"""Values and calls from other threads to the one thread that owns PyBullet."""
 
 import threading
 from collections import deque
@@ -12,14 +12,14 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class ClosedError(RuntimeError):
-    """The simulation has ended and takes no more requests."""
+    """The simulation has ended and accepts no more requests."""
 
 
 class Mailbox:
     """Latest-wins slots for streams, and a queue of calls with futures for requests.
 
-    Any thread may `put` and `request`; only the simulation thread calls `take` and `run_requests`. Its lock is the
-    only one between them, and nobody holds it for longer than it takes to swap a reference.
+    Any thread may `put` and `request`; only the simulation thread calls `drain` and `run_requests`. Its lock is the
+    only one between them, and held only to swap a reference.
     """
 
     def __init__(self) -> None:
@@ -33,9 +33,9 @@ class Mailbox:
     def put(
         self, slot: str, value: Any, merge: Callable[[Any, Any], Any] | None = None, generation: int | None = None
     ) -> None:
-        """Leaves a value in a slot; one that was not taken yet is replaced, or merged with it.
+        """Puts a value into a slot; one that still waits is replaced, or merged with it.
 
-        A value of a `generation` that is not the present one is dropped.
+        A value of another `generation` than the present one is dropped.
         """
         with self._lock:
             if generation not in (None, self.generation):
@@ -44,7 +44,7 @@ class Mailbox:
                 value = merge(self._slots[slot], value)
             self._slots[slot] = value
 
-    def take(self) -> Mapping[str, Any]:
+    def drain(self) -> Mapping[str, Any]:
         """Empties all slots and returns what was in them, by slot name."""
         if not self._slots:  # the usual case, and the one that must cost nothing
             return NOTHING  # not the slots themselves: other threads may put something there while the caller reads

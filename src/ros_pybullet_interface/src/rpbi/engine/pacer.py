@@ -6,24 +6,24 @@ import time
 from typing import NamedTuple
 
 MAX_DEBT_S = 0.25
-"""How late a tick may be and still be caught up with; of one that is later, all the lateness is given up [s]."""
+"""Largest lateness of a tick that is caught up with [s]; beyond it, all of it is dropped and counted as lost."""
 
 LEAST_SHARE = 0.8
-"""Share of a processor below which the lack of it is what slows a simulation down."""
+"""Smallest share of a processor that suffices; below it, the lack of it is reported as the cause."""
 
 MAX_SLEEP_S = 0.005
-"""Longest sleep between two looks at requests, however slow the motion [s]."""
+"""Longest sleep between two looks at requests [s]."""
 
 
 class Pacer:
-    """Tells when the next tick is due by the wall clock, and counts what came late.
+    """Determines when the next tick is due by the wall clock, and counts late ticks.
 
     Deadlines are absolute, so lateness does not add up: after a late tick the next ones follow at once until the debt
-    is paid; one beyond MAX_DEBT_S is given up whole.
+    is paid; one beyond MAX_DEBT_S is dropped.
 
     Args:
         dt_s: Length of a tick [s] of simulated time.
-        real_time_factor: Simulated seconds per wall second; 0 is as fast as it goes.
+        real_time_factor: Simulated seconds per wall second; 0 is as fast as possible.
 
     Attributes:
         real_time_factor: The same, as it was set last.
@@ -34,23 +34,23 @@ class Pacer:
         self.overruns = 0
         """Ticks that began more than one period late."""
         self.lost_s = 0.0
-        """Wall time that was given up because it could not be caught up with [s]."""
+        """Wall time that could not be caught up with [s]."""
         self.set_factor(real_time_factor)
 
     def set_factor(self, real_time_factor: float) -> None:
-        """Changes the pace, and begins afresh."""
+        """Changes the pace, and restarts."""
         self.real_time_factor = real_time_factor
         self._period_s = self._dt_s / real_time_factor if real_time_factor else 0.0
         self.restart()
 
     def restart(self) -> None:
-        """Begins afresh, with a tick due now; for a start after a stop."""
+        """Restarts with a tick due now, as after a stop."""
         self._deadline_s = time.monotonic()
         self._window_start_s = self._deadline_s
         self._window_ticks = 0
 
     def is_due(self) -> bool:
-        """Tells whether the next tick is due, and if so takes it as begun."""
+        """Returns whether the next tick is due; if so, counts it as begun."""
         if not self._period_s:
             self._window_ticks += 1
             return True
@@ -82,13 +82,13 @@ class Pacer:
 
 
 class Load(NamedTuple):
-    """Time that was spent until now [s].
+    """Time spent until now [s].
 
     Attributes:
-        wall_s: Of the wall clock.
-        loop_s: Of the processor, in the thread that runs the world.
-        process_s: Of the processor, in all threads of the process.
-        physics_s: In PyBullet's steps, by the wall clock.
+        wall_s: By the wall clock.
+        loop_s: Processor time of the thread that runs the world.
+        process_s: Processor time of all threads of the process.
+        physics_s: Wall time in PyBullet's steps.
         ticks: Ticks that were made.
     """
 
@@ -100,11 +100,11 @@ class Load(NamedTuple):
 
     @classmethod
     def now(cls, physics_s: float, ticks: int) -> Load:
-        """Returns that of this process; called in the thread that runs the world."""
+        """Returns the time of this process; called in the thread that runs the world."""
         return cls(time.monotonic(), time.thread_time(), time.process_time(), physics_s, ticks)
 
     def since(self, before: Load) -> Load:
-        """Returns what was spent since an earlier time."""
+        """Returns the time since an earlier one."""
         wall_s, loop_s, process_s, physics_s = (now - then for now, then in zip(self[:4], before[:4]))
         return Load(wall_s, loop_s, process_s, physics_s, self.ticks - before.ticks)
 

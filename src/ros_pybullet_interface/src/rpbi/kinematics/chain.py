@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from robot_model.geometry import Quaternion, rotation_between
+from robot_model.reach import Reach
+from robot_model.residual import Residual
+from robot_model.urdf.files import write_description
 from rpbi.engine.client import Client
-from rpbi.geometry import Pose, Quaternion, rotation_between
-from rpbi.urdf.files import write_description
+from rpbi.geometry import Pose
 from rpbi.urdf.joints import Joint
-
-from .limits import Reach
-from .residual import Residual
 
 
 class Target(NamedTuple):
@@ -27,17 +27,17 @@ class Target(NamedTuple):
     quat_xyzw: Quaternion | None
 
 
-class Chain:
-    """A link and the m joints that move it, as a body of its own: PyBullet takes its time for joints that do not.
+class BulletChain:
+    """A link and the m joints that move it, as a body of its own, since further joints would cost time.
 
     Args:
-        urdf: What is between the root and the link, see `UrdfDocument.bare`.
+        urdf: The part between the root and the link, see `UrdfDocument.bare`.
         scaling: PyBullet's `globalScaling`.
         joint_names: The n joints of the robot that a motor can move.
 
     Attributes:
-        members: Where the m joints are among the n.
-        reach: How far they bring the link.
+        members: Indices of the m joints among the n.
+        reach: Largest distance of the link from the root [m].
     """
 
     def __init__(self, pb: Client, urdf: str, scaling: float, link_name: str, joint_names: Sequence[str]) -> None:

@@ -10,18 +10,19 @@ import numpy as np
 import pybullet
 
 from custom_ros_tools.errors import PhysicsError, UnknownNameError
+from robot_model.geometry import normalized
+from robot_model.limits import Limits
+from robot_model.urdf.copies import without_shapes
+from robot_model.urdf.document import UrdfDocument
+from robot_model.urdf.elements import MOVING
+from robot_model.urdf.files import write_description
+from robot_model.urdf.structure import check_structure
 from rpbi.engine.client import Client
-from rpbi.geometry import Pose, normalized
-from rpbi.urdf.copies import without_shapes
-from rpbi.urdf.document import UrdfDocument
-from rpbi.urdf.elements import MOVING
-from rpbi.urdf.files import write_description
+from rpbi.geometry import Pose
 from rpbi.urdf.joints import Joint
 from rpbi.urdf.loading import check_joints, flags_for
-from rpbi.urdf.structure import check_structure
 
-from .chain import Chain, Target
-from .limits import Limits
+from .chain import BulletChain, Target
 from .problem import PybulletProblem, PybulletSolution
 from .search import Search
 
@@ -62,12 +63,11 @@ class Kinematics:
         self._links = [joint.link for joint in joints]
         driven = [joint for joint in joints if joint.is_driven]
         self.joint_names = tuple(joint.name for joint in driven)
-        lower, upper = [joint.lower for joint in driven], [joint.upper for joint in driven]
-        self.limits = Limits(lower, upper, [joint.is_revolute for joint in driven])
-        self._chains: dict[str, Chain] = {}
+        self.limits = Limits.of_joints(driven)
+        self._chains: dict[str, BulletChain] = {}
 
     def close(self) -> None:
-        """Disconnects the client; whoever comes later gets a PhysicsError."""
+        """Disconnects the client; later calls raise a PhysicsError."""
         with self._lock:
             self._disconnect()
 
@@ -92,11 +92,10 @@ class Kinematics:
             return chain.pose()
 
     def solve(self, problem: PybulletProblem) -> PybulletSolution:
-        """Looks for joint positions that bring a link to a target; the same problem has the same answer.
+        """Searches joint positions that bring a link to a target; the same problem has the same answer.
 
-        It takes the first solution that it finds, from the start that was given or else from random ones, and gives up
-        after a fixed number of iterations. With a rest posture it starts there, and slides from the solution to the
-        one nearest to the posture.
+        It returns the first solution from the given start, then from random ones, and stops after a fixed number of
+        iterations. With a rest posture it starts there, and moves from the solution to the one nearest to the posture.
 
         Raises:
             UnknownNameError: If there is no such link.
@@ -147,7 +146,7 @@ class Kinematics:
         pb.removeBody(body_id)
         return joints
 
-    def _chain(self, link_name: str) -> Chain:
+    def _chain(self, link_name: str) -> BulletChain:
         """Returns what moves a link.
 
         Raises:
@@ -166,5 +165,5 @@ class Kinematics:
                     raise ValueError(f"link_name: '{link_name}' hangs on '{joint}', a {kind} joint; {only}")
                 links.append(parent)
             urdf = without_shapes(self._document, links)
-            self._chains[link_name] = Chain(self._pb, urdf, self._scaling, link_name, self.joint_names)
+            self._chains[link_name] = BulletChain(self._pb, urdf, self._scaling, link_name, self.joint_names)
         return self._chains[link_name]

@@ -1,4 +1,4 @@
-"""Methods that say where to go from a configuration: to the target, near it, or along its solutions to a posture."""
+"""Steps from a configuration: to the target, near it, or along its solutions to a posture."""
 
 import math
 import time
@@ -7,14 +7,15 @@ from collections.abc import Callable
 import numpy as np
 import pybullet
 
-from .chain import Chain, Target
-from .limits import Limits
-from .residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
+from robot_model.limits import Limits
+from robot_model.residual import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M
+
+from .chain import BulletChain, Target
 
 Step = Callable[[np.ndarray, np.ndarray, int], np.ndarray]
 """A method that brings a link nearer to its target; limits are not considered.
 
-It takes m positions to start at [rad or m], which joints to leave where they are, and most iterations, and returns m
+Its arguments are m start positions [rad or m], the joints to hold, and the largest number of iterations; it returns m
 positions.
 """
 BREAK_S = 5e-5
@@ -22,7 +23,7 @@ BREAK_S = 5e-5
 FROZEN = 1e6
 """Damping that keeps a joint where it is."""
 DAMPING = 1e-3
-"""Damping of the most willing joint. With PyBullet's own 0.5, it takes some hundred iterations rather than ten."""
+"""Damping of the joint with the least weight; PyBullet's own 0.5 needs some hundred iterations rather than ten."""
 JOINT_ITERATIONS_A_CALL = 140
 """Iterations in one call of PyBullet, times the number of joints: it holds Python's lock meanwhile, some 0.1 ms."""
 
@@ -32,10 +33,10 @@ class DampedLeastSquares:
 
     Args:
         threshold_m: Distance at which to stop [m].
-        damping: How unwilling each of the m joints is to move; the least is 1.
+        damping: Weight of the motion of each of the m joints; the least is 1.
     """
 
-    def __init__(self, chain: Chain, target: Target, threshold_m: float, damping: np.ndarray) -> None:
+    def __init__(self, chain: BulletChain, target: Target, threshold_m: float, damping: np.ndarray) -> None:
         self._chain = chain
         self._damping = DAMPING * damping
         self._arguments = {"targetPosition": target.position, "residualThreshold": threshold_m}
@@ -75,7 +76,7 @@ class SelectivelyDampedLeastSquares:
     The arguments are those of `DampedLeastSquares`.
     """
 
-    def __init__(self, chain: Chain, target: Target, threshold_m: float, damping: np.ndarray) -> None:
+    def __init__(self, chain: BulletChain, target: Target, threshold_m: float, damping: np.ndarray) -> None:
         self._chain, self._target, self._threshold_m = chain, target, threshold_m
         self._willingness = 1.0 / np.sqrt(damping)
 
@@ -120,15 +121,15 @@ POSTURE_DAMPING = 1e-6
 
 
 def towards_posture(
-    chain: Chain, target: Target, limits: Limits, rest: np.ndarray, ranges: np.ndarray, q: np.ndarray, size: float
+    chain: BulletChain, target: Target, limits: Limits, rest: np.ndarray, ranges: np.ndarray, q: np.ndarray, size: float
 ) -> np.ndarray:
     """Slides along all solutions of a problem to the one nearest to a rest posture.
 
-    A gradient projection: each step goes towards the posture as far as it leaves the link alone, and mends what the
-    last one spoiled (Liegeois, IEEE Transactions on Systems, Man, and Cybernetics 7(12), 1977).
+    A gradient projection: each step moves towards the posture in the null space of the link, and corrects the error of
+    the last one (Liegeois, IEEE Transactions on Systems, Man, and Cybernetics 7(12), 1977).
 
     Args:
-        target: Where the link is and shall stay.
+        target: Pose of the link, to be held.
         limits: Limits of its m joints.
         rest: m positions of the posture [rad or m].
         ranges: m weights, 1 at most: a joint may be as far from its rest as its range is wide.
@@ -179,14 +180,14 @@ def _step(
     return step
 
 
-def go_near(chain: Chain, target: Target, limits: Limits, q: np.ndarray, steps: int) -> tuple[np.ndarray, float]:
-    """Goes downhill from a configuration to where the link is nearest to a target that it need not reach.
+def go_near(chain: BulletChain, target: Target, limits: Limits, q: np.ndarray, steps: int) -> tuple[np.ndarray, float]:
+    """Minimises the distance of the link from a target that it need not reach.
 
     By L-BFGS-B (Byrd, Lu, Nocedal and Zhu, SIAM Journal on Scientific Computing 16(5), 1995).
 
     Returns:
-        m positions [rad or m], and how far the link is from the target: the norm of distance and angle, each divided
-        by its tolerance.
+        m positions [rad or m], and the distance from the target: the norm of distance and angle, each divided by its
+        tolerance.
     """
     from scipy.optimize import minimize  # slow to load, and seldom asked for
 

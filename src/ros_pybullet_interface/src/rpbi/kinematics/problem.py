@@ -6,20 +6,18 @@ from dataclasses import dataclass
 
 import pybullet
 
-from .limits import Limits
+from robot_model.limits import MAX_MAGNITUDE, Limits
 
-LARGEST = 1e9
-"""Largest number that is taken, whatever it means; squares of larger ones are soon beyond what a float can hold."""
 _NULL_SPACE = ("lowerLimits", "upperLimits", "jointRanges", "resetPoses")
 _PER_JOINT = (*_NULL_SPACE, "jointDamping", "currentPosition")
 
 
 @dataclass(frozen=True)
 class PybulletProblem:
-    """Where a link of a robot shall be, and how to get it there.
+    """Target pose of a link of a robot, and parameters of the search for it.
 
-    The fields are those of the message `CalculateInverseKinematicsProblem`, but for the frame. "Each joint" is each
-    joint that a motor can move, in the robot's order; what is empty or 0 is up to the solver.
+    The fields are those of the message `CalculateInverseKinematicsProblem`, without the frame. "Each joint" is each
+    joint that a motor can move, in the robot's order; the solver chooses values that are empty or 0.
 
     Attributes:
         link_name: The link, by its name in the URDF; not the root.
@@ -27,16 +25,16 @@ class PybulletProblem:
         targetOrientation: Its quaternion x, y, z, w in the same frame, of any length but 0; empty: any orientation.
         lowerLimits: Lower limit of each joint [rad or m]. They narrow those of the URDF and never widen them.
         upperLimits: Upper limit of each joint [rad or m].
-        jointRanges: How far each joint may be from its rest posture in proportion to the others [rad or m].
+        jointRanges: Range of each joint about its rest posture, relative to the others [rad or m].
         resetPoses: Rest posture of each joint, to be near as the target allows [rad or m]. These four go together.
-        jointDamping: How unwilling each joint is to move in proportion to the others.
+        jointDamping: Weight of the motion of each joint, relative to the others.
         solver: 0 damped least squares, 1 selectively damped least squares.
-        currentPosition: Where the search starts, for each joint [rad or m]; joints that do not move the link stay.
+        currentPosition: Start of the search, for each joint [rad or m]; joints that do not move the link stay.
         maxNumIterations: Most iterations from one start.
         residualThreshold: Distance at which the search stops [m], 1 mm at most; as angle [rad], it counts ten times.
 
     Raises:
-        ValueError: If a field does not make sense; it names the field.
+        ValueError: If a field is invalid; it names the field.
     """
 
     link_name: str
@@ -55,8 +53,8 @@ class PybulletProblem:
     def __post_init__(self) -> None:
         for field in ("targetPosition", "targetOrientation", *_PER_JOINT):
             values = tuple(map(float, getattr(self, field)))
-            if not all(abs(value) <= LARGEST for value in values):
-                raise ValueError(f"{field}: values must be finite, {LARGEST:g} at most; got {_shown(values)}")
+            if not all(abs(value) <= MAX_MAGNITUDE for value in values):
+                raise ValueError(f"{field}: values must be finite, {MAX_MAGNITUDE:g} at most; got {_shown(values)}")
             object.__setattr__(self, field, values)  # arrays and lists become tuples
         if len(self.targetPosition) != 3:
             raise ValueError(f"targetPosition: expected 3 values, got {len(self.targetPosition)}")
@@ -114,11 +112,11 @@ def _shown(values: Sequence[float]) -> str:
 
 @dataclass(frozen=True)
 class PybulletSolution:
-    """Where inverse kinematics got to.
+    """Result of inverse kinematics.
 
     Attributes:
         success: Whether the link is within 1 mm and, if an orientation was asked for, 0.01 rad of its target.
-        message: How far off it is, in words.
+        message: Description of the error.
         joint_names: n joints that a motor can move, in the robot's order.
         positions: n positions [rad or m]; without success, the best that were found.
         chain: Those of the joints that move the link, within their limits; the others are where they were.

@@ -8,28 +8,29 @@ from functools import partial
 import numpy as np
 import pybullet
 
-from .chain import Chain, Target
-from .limits import TURN, Limits
+from robot_model.limits import TURN, Limits
+from robot_model.residual import POSITION_TOLERANCE_M, Residual
+
+from .chain import BulletChain, Target
 from .methods import BREAK_S, DampedLeastSquares, SelectivelyDampedLeastSquares, Step, go_near, towards_posture
 from .problem import PybulletProblem
-from .residual import POSITION_TOLERANCE_M, Residual
 
 RANDOM_STARTS = 50
-"""How many random starts follow those that the problem names."""
+"""Number of random starts after those of the problem."""
 RANDOM_STARTS_BEYOND_REACH = 5
-"""How many, if the arm stretched out could not be long enough: only the best of what there is can be found."""
+"""The same number for a target beyond reach, where only the nearest posture can be found."""
 ITERATIONS_A_STAGE = 20
-"""After so many iterations, positions are brought into limits and the way that was gained is looked at."""
+"""Iterations after which positions are brought into limits and progress is checked."""
 ITERATIONS_A_START = 120
-"""Most iterations from one start, unless the problem says otherwise."""
+"""Largest number of iterations from one start, unless the problem sets it."""
 JOINT_ITERATIONS = 14_000
 """Most iterations for one problem, times the number of joints: 2,000 for 7 joints, some 20 ms."""
 THRESHOLD = 0.1
-"""Residual at which the search stops, unless the problem says otherwise, see `Residual.size`."""
+"""Residual at which the search stops, unless the problem sets it, see `Residual.size`."""
 SEED = 0
-"""Of the random starts."""
+"""Seed of the random starts."""
 MUCH_NEARER = 0.8
-"""Out of reach, the robot leaves the posture that it has for one that is off the target by so much less, as a part."""
+"""Share of the present error below which a posture is preferred to the present one, out of reach."""
 LEAST_WEIGHT = 1e-3
 """Least damping and least range of a joint, as a part of the largest."""
 
@@ -39,14 +40,14 @@ class Search:
 
     Args:
         chain: The link to move, and the m joints that do.
-        target: Where it shall be.
+        target: Its target pose.
         limits: Limits of the m joints.
-        problem: What else is asked for; it fits the robot.
-        current: m positions where the robot is [rad or m].
+        problem: The problem, checked against the robot.
+        current: m present positions [rad or m].
     """
 
     def __init__(
-        self, chain: Chain, target: Target, limits: Limits, problem: PybulletProblem, current: Sequence[float]
+        self, chain: BulletChain, target: Target, limits: Limits, problem: PybulletProblem, current: Sequence[float]
     ) -> None:
         self._chain, self._target, self._limits, self._problem = chain, target, limits, problem
         self._current, _ = limits.wrap_to_limits(current, current)
@@ -112,9 +113,9 @@ class Search:
             yield (self._fast_step if i else self._asked_step), start
 
     def _descent(self, step: Step, q: np.ndarray) -> Iterator[tuple[np.ndarray, Residual]]:
-        """Goes from a start towards the target, and yields each stage on the way.
+        """Yields each stage on the way from a start towards the target.
 
-        A joint that ran into a limit is left there for one stage, so that the others make up for it.
+        A joint at a limit is held there for one stage, so that the others compensate.
         """
         last = math.inf
         frozen = stuck = np.equal(self._limits.lower, self._limits.upper)

@@ -1,7 +1,7 @@
 """Entry point of the process in which meshes are tried: `python -m rpbi.meshes FD USE FILE ...`.
 
-It writes a line to the file descriptor for each mesh that it got through: empty, or why PyBullet does not take it. It
-may well crash, which is what it is for.
+It writes a line to the file descriptor for each mesh: empty, or PyBullet's reason to refuse it. A broken mesh may crash
+this process instead of the caller's.
 """
 
 import ctypes
@@ -19,15 +19,15 @@ import pybullet
 from custom_ros_tools.config import read_file
 
 from .checks import check_obj
-from .trial import MOST_CPU_S, Use, limit_resources
+from .trial import MAX_CPU_S, Use, limit_resources
 
 GETS_NOTHING = b"cannot extract anything useful"
-"""What PyBullet says of a mesh that it leaves out; nothing else tells it of a visual one."""
+"""Output of PyBullet for a mesh that it leaves out; the only sign for a visual one."""
 
 
 def main() -> None:
     """Tries all meshes that the arguments name."""
-    limit_resources(MOST_CPU_S)
+    limit_resources(MAX_CPU_S)
     report, *meshes = sys.argv[1:]
     said = tempfile.TemporaryFile()
     os.dup2(said.fileno(), 1)
@@ -62,7 +62,7 @@ def _refuse_nonsense(file: str) -> None:
 
 
 def _says(said: IO[bytes], words: bytes) -> bool:
-    """Returns whether PyBullet, which prints by C, has said something since the last time."""
+    """Returns whether PyBullet, which prints by C, has printed something since the last call."""
     ctypes.CDLL(None).fflush(None)
     found = words in os.pread(said.fileno(), 1 << 20, 0)
     os.ftruncate(said.fileno(), 0)

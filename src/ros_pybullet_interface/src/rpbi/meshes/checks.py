@@ -1,4 +1,4 @@
-"""What is wrong with meshes that PyBullet would take without a word."""
+"""Errors in meshes that PyBullet would load without a message."""
 
 import math
 import os
@@ -13,7 +13,7 @@ SOFT_MESH_FORMATS = (".obj", ".vtk")
 
 
 def mesh_problems(shape: CreateVisualShape | CreateCollisionShape) -> list[tuple[str, str]]:
-    """Returns key and message of each fault in what a shape says about its mesh."""
+    """Returns key and message of each fault in the mesh of a shape."""
     problems = []
     if shape.fileName is not None and (problem := mesh_file_problem(shape.fileName)):
         problems.append(("fileName", f"{problem}: {shape.fileName}"))

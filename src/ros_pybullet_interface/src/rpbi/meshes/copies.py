@@ -13,9 +13,9 @@ from pathlib import Path
 from custom_ros_tools.config import read_file
 from custom_ros_tools.errors import shortened
 
-MOST_FILE_BYTES = 1_000_000_000
+MAX_FILE_BYTES = 1_000_000_000
 """Length of a file."""
-MOST_FILES = 100
+MAX_FILES = 100
 """Files that a mesh consists of, with its materials and textures."""
 
 
@@ -37,10 +37,10 @@ def content_hash(file: str, *parameters: object) -> str:
         if path in seen:
             continue
         seen.add(path)
-        if len(seen) > MOST_FILES:
-            raise OSError(errno.EMFILE, f"names more than {MOST_FILES} files")
+        if len(seen) > MAX_FILES:
+            raise OSError(errno.EMFILE, f"names more than {MAX_FILES} files")
         try:
-            data = read_file(path, MOST_FILE_BYTES)
+            data = read_file(path, MAX_FILE_BYTES)
         except OSError as error:
             if len(seen) > 1 and os.path.exists(path):  # it may name what is not there
                 raise OSError(error.errno, f"names '{shortened(path.name)}', which {error.strerror}") from None

@@ -1,7 +1,8 @@
 """Concave meshes as convex parts, by PyBullet's V-HACD.
 
-V-HACD takes seconds, and trusts what it reads: it runs in a process of its own, `python -m rpbi.meshes.decomposition
-MESH PARTS PARAMETERS`. The parts are kept in the cache by the content of the mesh and by the parameters.
+V-HACD needs seconds, and does not check its input: it runs in a process of its own, `python -m
+rpbi.meshes.decomposition MESH PARTS PARAMETERS`. The parts are kept in the cache by the content of the mesh and by the
+parameters.
 """
 
 import json
@@ -12,16 +13,16 @@ from pathlib import Path
 
 import pybullet
 
-from rpbi.temporary import temporary_folder
+from custom_ros_tools.processes.temporary import temporary_folder
 
 from .copies import content_hash, kept
 from .trial import limit_resources
 from .triangles import read_triangles
 
 MAX_CPU_S = 600
-"""Time that V-HACD may take [s] of the processor."""
+"""Longest processor time of V-HACD [s]; beyond it, the process is ended."""
 MAX_WALL_S = 900.0
-"""Time that V-HACD may take [s] of wall time."""
+"""Longest wall time of V-HACD [s]; beyond it, the process is ended."""
 _PARTS = "parts.obj"
 _without_cache: dict[str, Path] = {}
 """Folders of this process with the parts of meshes, where the cache cannot be written."""

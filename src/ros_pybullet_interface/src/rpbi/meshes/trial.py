@@ -1,7 +1,7 @@
 """Meshes that this machine has not loaded before are loaded in a process of their own first.
 
-PyBullet's loaders of OBJ, STL and COLLADA trust what a file says of itself: a broken one may end the process. What went
-well is remembered by its content, in the user's cache folder, so that every mesh is tried once.
+PyBullet's loaders of OBJ, STL and COLLADA do not check files: a broken one may end the process. The hash of each good
+mesh is kept in the user's cache folder, so that every mesh is tried once.
 """
 
 import enum
@@ -22,20 +22,20 @@ from .copies import cache_folder, content_hash
 
 TRIAL = 3
 """Number of the present kind of trial; meshes that went well in another are tried again."""
-MOST_BYTES = 2 * 2**30
-"""Memory that a trial may take."""
-MOST_CPU_S = 20
-"""Time that a trial may take [s] of the processor."""
+MAX_BYTES = 2 * 2**30
+"""Largest memory of a trial [bytes]; beyond it, its allocations fail."""
+MAX_CPU_S = 20
+"""Longest processor time of a trial [s]; beyond it, the mesh is refused."""
 LONGEST_TRIAL_S = 45.0
-"""Time that a trial may take [s] of wall time."""
-MOST_TOGETHER = 100
+"""Longest wall time of a trial [s]; beyond it, the mesh is refused."""
+MAX_BATCH = 100
 """Meshes that one process tries, as long as it lives."""
 
 log = logging.getLogger(__name__)
 
 
 class Use(enum.Enum):
-    """What a mesh is for; PyBullet reads it in another way for each."""
+    """Use of a mesh; PyBullet has a loader for each."""
 
     VISUAL = "visual"
     COLLISION = "collision"
@@ -57,8 +57,8 @@ _tried: set[tuple[Mesh, int, int]] = set()
 
 
 def limit_resources(cpu_s: int) -> None:
-    """Limits what this process may take: memory, time of the processor [s], and no core dump."""
-    for limit, most in ((resource.RLIMIT_AS, MOST_BYTES), (resource.RLIMIT_CPU, cpu_s), (resource.RLIMIT_CORE, 0)):
+    """Limits memory and processor time [s] of this process, and disables core dumps."""
+    for limit, most in ((resource.RLIMIT_AS, MAX_BYTES), (resource.RLIMIT_CPU, cpu_s), (resource.RLIMIT_CORE, 0)):
         already = resource.getrlimit(limit)[0]
         most = most if already == resource.RLIM_INFINITY else min(already, most)
         resource.setrlimit(limit, (most, most))
@@ -92,7 +92,7 @@ def _try(meshes: Sequence[Mesh]) -> Iterator[str]:
     """Yields for each mesh what is wrong with it, or an empty text."""
     done = 0
     while done < len(meshes):
-        batch = meshes[done : done + MOST_TOGETHER]
+        batch = meshes[done : done + MAX_BATCH]
         lines, end = _run(batch)
         yield from lines
         done += len(lines)
@@ -102,7 +102,7 @@ def _try(meshes: Sequence[Mesh]) -> Iterator[str]:
 
 
 def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
-    """Returns what a process says of the meshes that it got through, and what ended it early."""
+    """Returns a process's lines for the meshes that it finished, and the reason of an early end."""
     reading, writing = os.pipe()
     command = [sys.executable, "-P", "-m", __name__.rpartition(".")[0], str(writing)]
     with open(reading, "rb") as report:
@@ -133,7 +133,7 @@ def _run(meshes: Sequence[Mesh]) -> tuple[list[str], str]:
 def _words(returncode: int) -> str:
     """Returns what the end of the process means."""
     if returncode == -signal.SIGXCPU or returncode == -signal.SIGKILL:
-        return f"PyBullet takes more than {MOST_CPU_S} s to load it"
+        return f"PyBullet takes more than {MAX_CPU_S} s to load it"
     if returncode < 0:
         return f"PyBullet crashes when it loads it ({signal.Signals(-returncode).name})"
     return f"PyBullet cannot load it (exit code {returncode})" if returncode else ""

@@ -5,15 +5,15 @@ from typing import Any, NamedTuple
 
 from custom_ros_tools.schema.json_schema import Schema, mapping_in, name_of, resolved, unit_in, yaml_text
 from custom_ros_tools.schema.type_names import constants_in, type_name
-from rpbi.config.legacy import MAIN, old_keys
 from rpbi.config.object_entry import FILES
-from rpbi.config.schemas import WORLD, kind_of, sections
+from rpbi.world.legacy import MAIN, old_keys
+from rpbi.world.schemas import WORLD, kind_of, sections
 
 from .markdown import WRITTEN_BY, block, code, link, page, table
 
 INTRODUCTION = """\
-Every YAML file of a world and every key in it. How to write worlds is told in [worlds.md](worlds.md), what they then
-have in ROS in [topics_and_services.md](topics_and_services.md).
+Every YAML file of a world and every key in it. For worlds see [worlds.md](worlds.md), for their topics and services
+[topics_and_services.md](topics_and_services.md).
 
 - Keys that are not listed here are errors.
 - A key may be left out unless it is required. Where the default is empty, the meaning says what holds without it, or
@@ -25,7 +25,7 @@ have in ROS in [topics_and_services.md](topics_and_services.md).
 - Files are looked for beside the file that names them, in `setAdditionalSearchPath` and in PyBullet's data;
   `{package}/path` and `package://package/path` work everywhere.
 - Editors complete, explain and check these keys, see [worlds.md](worlds.md#in-an-editor)."""
-NODES = "What nodes read from `~config`; what they do is told in [custom_ros_tools.md](custom_ros_tools.md)."
+NODES = "Keys of nodes in `~config`; for the nodes see [custom_ros_tools.md](custom_ros_tools.md)."
 GUIDES = {
     "world": "worlds.md",
     "robot": "robots.md",
@@ -44,12 +44,12 @@ GUIDES = {
     "changeDynamics": "dynamics.md",
     "sensors": "extending.md",
 }
-"""Page that tells how to use what is under a heading."""
+"""Page that explains the keys under a heading."""
 HEAD = ("key", "type", "default", "meaning")
 
 
 class Place(NamedTuple):
-    """Where a mapping inside of files is told.
+    """Place of a mapping on the page.
 
     Attributes:
         heading: The heading: its path in the first file that has it.
@@ -106,7 +106,7 @@ def config_page(files: Mapping[str, Schema], nodes: Mapping[str, Schema], exampl
 
 
 def _places(files: Mapping[str, Schema]) -> Places:
-    """Gives each mapping inside of the files a heading."""
+    """Assigns a heading to each mapping inside of the files."""
     places: Places = {}
     for kind, root in files.items():
         for path, reference in _inside(root, root, "", files):
@@ -151,7 +151,7 @@ def _keys(mapping: Schema, root: Schema, places: Places) -> str:
         meaning = resolved(value, root)["description"] if "description" not in value else value["description"]
         rows.append((code(key), _type(key, value, root, places), _default(key, mapping), meaning))
     if mapping.get("additionalProperties") is True:
-        rows.append(("others", "", "", "What its class reads."))
+        rows.append(("others", "", "", "Keys of its class."))
     return table(HEAD, rows)
 
 

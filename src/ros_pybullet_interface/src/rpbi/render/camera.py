@@ -1,4 +1,4 @@
-"""Pinhole cameras: the matrices that a renderer takes, the K that ROS wants, and depth in metres.
+"""Pinhole cameras: the matrices for a renderer, K for ROS, and depth in metres.
 
 Frames and pixels. The optical frame has x to the right, y down and z forward, as in ROS; the renderer's eye
 frame (OpenGL) has y up and looks along -z. Pixel coordinates are those of ROS and OpenCV: (u, v) = (0, 0) is
@@ -16,6 +16,7 @@ import numpy.typing as npt
 import pybullet
 
 from custom_ros_tools.transforms import finite_vector, pose_of
+from robot_model import geometry
 from rpbi.geometry import Pose
 
 Array = npt.NDArray[np.floating[Any]]
@@ -32,7 +33,7 @@ class Intrinsics:
         height_px: Rows of the image.
         fov_deg: Vertical opening, from the upper edge of the first row to the lower edge of the last [deg].
         near_m: Nearest depth that is drawn, along the optical axis [m].
-        far_m: Farthest depth [m], which is also what pixels that see nothing tell.
+        far_m: Farthest depth [m], which is also the value of empty pixels.
     """
 
     width_px: int = 640
@@ -104,7 +105,7 @@ def looking_at(position: Sequence[float], target: Sequence[float]) -> Pose:
     return Pose(tuple(eye.tolist()), tuple(quat))
 
 
-def view_matrix(camera: Pose) -> Array:
+def view_matrix(camera: geometry.Pose) -> Array:
     """Returns the 4x4 matrix from the world to the eye frame, of the pose of an optical frame in the world."""
     rotation = np.reshape(pybullet.getMatrixFromQuaternion(camera.quat_xyzw), (3, 3))
     optical_from_world = np.eye(4)
@@ -116,8 +117,7 @@ def view_matrix(camera: Pose) -> Array:
 def depth_in_metres(buffer: npt.NDArray[np.float32], intrinsics: Intrinsics) -> npt.NDArray[np.float32]:
     """Turns a depth buffer into distances along the optical axis.
 
-    Of the equal ways to write it this one keeps single precision: `1 - buffer` is exact where depths are
-    large.
+    This form keeps single precision: `1 - buffer` is exact for large depths.
 
     Args:
         buffer: Depths as the renderer stores them, 0 at the near and 1 at the far plane, any shape.

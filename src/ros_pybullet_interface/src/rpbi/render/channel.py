@@ -13,8 +13,7 @@ _CHUNK = 1 << 18
 class Channel:
     """Sends and receives picklable objects over a connected stream socket, each with its length before it.
 
-    What the other side does not take yet waits here, so whoever sends has to see to it that this stays
-    bounded. It is for one thread.
+    Data that the other side has not received yet waits here; the sender has to bound it. It is for one thread.
     """
 
     def __init__(self, connection: socket.socket) -> None:
@@ -26,14 +25,14 @@ class Channel:
         """Whether the other side has gone."""
 
     def send(self, item: Any) -> None:
-        """Sends an object as soon as the other side takes it."""
+        """Sends an object, now or by a later `flush`."""
         data = pickle.dumps(item, protocol=pickle.HIGHEST_PROTOCOL)
         self._outgoing += _LENGTH.pack(len(data))
         self._outgoing += data
         self.flush()
 
     def flush(self) -> None:
-        """Hands on what still waits, as far as the other side takes it now."""
+        """Sends waiting data as far as the socket accepts it now."""
         try:
             while self._outgoing and not self.closed:
                 del self._outgoing[: self._socket.send(self._outgoing)]
@@ -53,19 +52,19 @@ class Channel:
             pass
         except OSError:
             self.closed = True
-        return self._take_complete() if self._incoming else []
+        return self._pop_complete() if self._incoming else []
 
     def wait(self, timeout_s: float | None) -> None:
-        """Waits until there is something to receive, or to send on, for at most so long [s]."""
+        """Waits until there is something to receive, or to send on, up to a time [s]."""
         if not self.closed:
             select.select([self._socket], [self._socket] if self._outgoing else [], [], timeout_s)
 
     def close(self) -> None:
-        """Ends the connection; the other side is told."""
+        """Ends the connection; the other side sees it."""
         self.closed = True
         self._socket.close()
 
-    def _take_complete(self) -> list[Any]:
+    def _pop_complete(self) -> list[Any]:
         items = []
         begin = 0
         while len(self._incoming) - begin >= _LENGTH.size:

@@ -10,8 +10,8 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from rpbi.engine.load_log import LoadLogReader, LogEntry
 from rpbi.samples import SceneSample
+from rpbi.world.load_log import LoadLogReader, LogEntry
 
 from .channel import Channel
 from .frame import NO_DEMAND, Camera, Demand
@@ -19,14 +19,14 @@ from .messages import (
     CameraAdded,
     CameraRemoved,
     Demanded,
-    GaveWay,
     Ready,
     Report,
     Scene,
+    SceneAccepted,
     SetUp,
     Shown,
-    Taken,
     WorldChanged,
+    Yielded,
 )
 from .priority import raise_from_idle
 
@@ -36,20 +36,20 @@ LONGEST_PAUSE_S = 30.0
 STABLE_AFTER_S = 10.0
 STOP_TIMEOUT_S = 5.0
 STARVED_AFTER_S = 3.0
-"""After so long without a word that is awaited, the renderer is taken for starved at idle priority [s]."""
+"""Longest wait for an answer of the renderer at idle priority [s]; beyond it, its priority is raised."""
 
 
 class RenderClient:
     """Keeps a renderer process alive and fed, without waiting for it unless it is asked to.
 
     All methods are for the simulation thread. At most one scene per camera is under way; as long as the
-    renderer has not taken it, newer ones replace each other here. There is no process before there is a camera.
+    renderer has not accepted it, newer ones replace each other here. The process starts with the first camera.
 
     Args:
         cameras: The cameras that there are from the start.
         load_log: The world's load log, which may grow at any time; the process gets all of it.
         body_ids: Returns PyBullet's body ids by name.
-        sink: `module:factory` of what takes the frames in the other process (see `frame.Sink`).
+        sink: `module:factory` of the receiver of frames in the other process (see `frame.Sink`).
         arguments: Further arguments of the process, for the sink.
         use_egl: Whether to try the fast renderer at all.
     """
@@ -66,7 +66,7 @@ class RenderClient:
         self.wanted: frozenset[str] = frozenset()
         """Names of the cameras that somebody looks at."""
         self.renderer = ""
-        """What draws, once it does."""
+        """Name of the renderer, empty until it is ready."""
         self._cameras = {camera.name: camera for camera in cameras}
         self._log = load_log
         self._body_ids = body_ids
@@ -82,11 +82,11 @@ class RenderClient:
         self._last: dict[str, Scene] = {}
         self._forget()
         self._do: dict[type, Callable[[Any], None]] = {
-            Ready: self._take_ready,
-            GaveWay: self._take_gave_way,
-            Taken: self._take_taken,
-            Shown: self._take_shown,
-            Demanded: self._take_demands,
+            Ready: self._on_ready,
+            Yielded: self._on_yielded,
+            SceneAccepted: self._on_scene_accepted,
+            Shown: self._on_shown,
+            Demanded: self._on_demanded,
             Report: lambda report: log.log(report.level, "camera: %s", report.text),
         }
 
@@ -117,13 +117,13 @@ class RenderClient:
             self._forget()
 
     def add(self, camera: Camera) -> None:
-        """Takes a camera up."""
+        """Adds a camera."""
         self._cameras[camera.name] = camera
         if self._channel is not None:
             self._channel.send(CameraAdded(camera))
 
     def remove(self, name: str) -> None:
-        """Gives a camera up."""
+        """Removes a camera."""
         del self._cameras[name]
         for known in (self._demands, self._waiting, self._last, self._served, self._shown_ns):
             known.pop(name, None)
@@ -133,20 +133,20 @@ class RenderClient:
             self._channel.send(CameraRemoved(name))
 
     def knows_demand(self, name: str) -> bool:
-        """Tells whether it is known who looks at a camera; that is not so before the process is up."""
+        """Returns whether the demand for a camera is known, which it is not before the process is up."""
         return name in self._demands
 
     def has_shown(self, name: str, stamp_ns: int) -> bool:
-        """Tells whether the scene of that stamp, the last of a synchronous camera, was drawn and handed on."""
+        """Returns whether the frame of that stamp, the last of a synchronous camera, was passed on."""
         return self._shown_ns.get(name) == stamp_ns
 
     @property
     def is_up(self) -> bool:
-        """Whether there is a process, as far as is known."""
+        """Whether a process runs."""
         return self._channel is not None
 
     def wait(self, timeout_s: float) -> None:
-        """Waits until the process says something, for at most so long [s]."""
+        """Waits for a message of the process up to a time [s]."""
         if self._channel is None:
             time.sleep(min(timeout_s, 0.01))
         else:
@@ -170,7 +170,7 @@ class RenderClient:
         self._last.clear()
 
     def forget_body(self, name: str) -> None:
-        """Takes a body out of these scenes: the next of its name may be quite different."""
+        """Removes a body from waiting scenes: the next of its name may be different."""
         for scenes in (self._waiting, self._last):
             for camera, scene in scenes.items():
                 bodies = tuple(body for body in scene.sample.bodies if body.name != name)
@@ -214,11 +214,11 @@ class RenderClient:
         self._send_log()
 
     def _is_awaited(self) -> bool:
-        """Tells whether the process is up and owes an answer: that it draws a scene, or who looks at a camera."""
+        """Returns whether the process is up and owes an answer: an accepted scene, or the demand for a camera."""
         return bool(self._under_way) or (bool(self.renderer) and self._demands.keys() != self._cameras.keys())
 
     def _end_starvation(self) -> None:
-        """Gives the process a share of the processor: at idle priority, busy others leave it next to nothing."""
+        """Raises the priority of the process: at idle priority on a busy machine it hardly runs."""
         assert self._process is not None
         self._may_starve = False
         raise_from_idle(self._process.pid)
@@ -256,7 +256,7 @@ class RenderClient:
         self._shown_ns: dict[str, int] = {}
 
     def _send_log(self) -> None:
-        if self._channel is not None and (entries := self._unread.take()):
+        if self._channel is not None and (entries := self._unread.drain()):
             self._channel.send(WorldChanged(entries))
 
     def _send_waiting(self, name: str) -> None:
@@ -269,20 +269,20 @@ class RenderClient:
         self._last[name] = scene
         self._served[name] = self._demands.get(name, NO_DEMAND).seen
 
-    def _take_ready(self, message: Ready) -> None:
+    def _on_ready(self, message: Ready) -> None:
         self.renderer = message.renderer
         log.info("camera: images are drawn by %s", message.renderer)
 
-    def _take_gave_way(self, message: GaveWay) -> None:
+    def _on_yielded(self, message: Yielded) -> None:
         self._may_starve = True
 
-    def _take_taken(self, message: Taken) -> None:
+    def _on_scene_accepted(self, message: SceneAccepted) -> None:
         self._under_way.discard(message.camera)
         self._send_waiting(message.camera)
 
-    def _take_shown(self, message: Shown) -> None:
+    def _on_shown(self, message: Shown) -> None:
         self._shown_ns[message.camera] = message.stamp_ns
 
-    def _take_demands(self, message: Demanded) -> None:
+    def _on_demanded(self, message: Demanded) -> None:
         self._demands = {name: demand for name, demand in message.demands.items() if name in self._cameras}
         self.wanted = frozenset(name for name, demand in self._demands.items() if demand.streams)

@@ -1,4 +1,4 @@
-"""What becomes of depth images: noise and point clouds."""
+"""Noise of depth images, and point clouds."""
 
 from typing import NamedTuple
 
@@ -29,10 +29,10 @@ class DepthNoise(NamedTuple):
         """Adds the noise of a tick to depths, in place.
 
         Args:
-            depth_m: Depths [m], any shape; those where nothing is, which tell `far_m`, stay as they are.
+            depth_m: Depths [m], any shape; those of empty pixels, `far_m`, stay as they are.
             tick: The tick.
-            near_m: Nearest depth that the camera tells [m].
-            far_m: Farthest depth that it tells [m].
+            near_m: Nearest depth of the camera [m].
+            far_m: Farthest depth of the camera [m].
         """
         generator = np.random.Generator(np.random.SFC64((self.seed, tick)))
         noise = generator.standard_normal(depth_m.shape, np.float32)

@@ -1,10 +1,9 @@
 """A better depth buffer for PyBullet's EGL renderer.
 
-The plugin asks EGL for a depth buffer of 8 bits or more, and Mesa answers with the smallest it has, 16 bits:
-with a near plane at 1 cm a wall at 2 m is then off by up to 3 mm. So we put a context with 24 bits in the
-place of the plugin's own, right after the plugin was loaded and before it has any shapes. The new context
-shares the shaders and textures that the plugin has already made, and whatever is drawn or read from now on in
-this thread goes to its surface.
+The plugin asks EGL for a depth buffer of 8 bits or more, and Mesa answers with the smallest it has, 16 bits: with a
+near plane at 1 cm a wall at 2 m is then off by up to 3 mm. This module therefore replaces the plugin's context by one
+with 24 bits, right after the plugin was loaded and before it has any shapes. The new context shares the plugin's
+shaders and textures, and everything drawn or read from now on in this thread uses its surface.
 """
 
 import ctypes
@@ -29,7 +28,7 @@ _GL_RENDERER, _GL_DEPTH_COMPONENT, _GL_FLOAT = 0x1F01, 0x1902, 0x1406
 
 
 class EglError(RuntimeError):
-    """EGL said no."""
+    """A call of EGL failed."""
 
 
 class Egl:

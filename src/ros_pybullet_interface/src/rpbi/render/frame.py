@@ -1,4 +1,4 @@
-"""What the renderer process makes, and for whom."""
+"""Frames of the renderer process, and the demand for them."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .depth import DepthNoise
 
 
 class Camera(NamedTuple):
-    """A camera, as the renderer knows it.
+    """A camera for the renderer.
 
     Attributes:
         name: Its unique name.
         frame_id: TF frame of its optical frame.
-        intrinsics: What it sees of the space before it.
+        intrinsics: Its intrinsics.
         topic_name: Its name in topics, which need not be its own.
         pointcloud: Whether point clouds may be asked for.
         synchronous: Whether the simulation waits for its frames, so that none may be dropped.
@@ -56,7 +56,7 @@ class Camera(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """What a camera saw at one tick; images that nobody asked for are None.
+    """Images of a camera at one tick; None for those without demand.
 
     Attributes:
         camera: The camera.
@@ -77,12 +77,12 @@ class Frame(NamedTuple):
 
 
 class Demand(NamedTuple):
-    """Who looks at a camera.
+    """Demand for the images of a camera.
 
     Attributes:
-        streams: What is looked at, out of `colour`, `jpeg` (which takes colour), `depth`, `segmentation`, `points`
-            (which take colour and depth) and `info`.
-        seen: How many viewers have ever come; a larger number than before means that somebody is new.
+        streams: Streams with viewers, out of `colour`, `jpeg` (which needs colour), `depth`, `segmentation`, `points`
+            (which need colour and depth) and `info`.
+        seen: Number of viewers so far; when it grows, one is new.
     """
 
     streams: frozenset[str] = frozenset()
@@ -93,7 +93,7 @@ NO_DEMAND = Demand()
 
 
 class Sink(Protocol):
-    """Takes the frames, in the renderer process.
+    """Receives the frames, in the renderer process.
 
     A sink is made by a factory: `--sink module:factory`.
     """
@@ -105,10 +105,10 @@ class Sink(Protocol):
         """Forgets a camera."""
 
     def demands(self) -> Mapping[str, Demand]:
-        """Returns who looks at which camera, by its name; cameras left out are not looked at."""
+        """Returns the demands by camera name; cameras left out have none."""
 
     def write(self, frame: Frame) -> None:
-        """Takes a frame; it must not wait for anybody, unless the camera is synchronous."""
+        """Receives a frame; it must not block, unless the camera is synchronous."""
 
     def close(self) -> None:
         """Ends it."""

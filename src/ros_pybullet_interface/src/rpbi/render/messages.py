@@ -1,10 +1,10 @@
-"""What simulator and renderer process tell each other."""
+"""Messages between simulator and renderer process."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from rpbi.engine.load_log import LogEntry
 from rpbi.samples import SceneSample
+from rpbi.world.load_log import LogEntry
 
 from .frame import Camera, Demand
 
@@ -29,7 +29,7 @@ class CameraRemoved(NamedTuple):
 
 
 class WorldChanged(NamedTuple):
-    """To the renderer: what was done to the world since the last time."""
+    """To the renderer: changes of the world since the last message."""
 
     entries: tuple[LogEntry, ...]
 
@@ -39,7 +39,7 @@ class Scene(NamedTuple):
 
     Attributes:
         sample: Where everything is.
-        body_ids: PyBullet's ids in the simulator, by name: what the segmentation tells.
+        body_ids: PyBullet's ids in the simulator by name, for the segmentation.
     """
 
     sample: SceneSample
@@ -47,16 +47,16 @@ class Scene(NamedTuple):
 
 
 class Ready(NamedTuple):
-    """To the simulator: what draws, `EGL` or `TinyRenderer` with what is known of it."""
+    """To the simulator: name of the renderer, `EGL` or `TinyRenderer`, with details."""
 
     renderer: str
 
 
-class GaveWay(NamedTuple):
+class Yielded(NamedTuple):
     """To the simulator: from now on the renderer runs at idle priority."""
 
 
-class Taken(NamedTuple):
+class SceneAccepted(NamedTuple):
     """To the simulator: the scene of this camera is being drawn, the next one may come."""
 
     camera: str
@@ -70,7 +70,7 @@ class Shown(NamedTuple):
 
 
 class Demanded(NamedTuple):
-    """To the simulator: who looks at which camera."""
+    """To the simulator: demands by camera."""
 
     demands: Mapping[str, Demand]
 

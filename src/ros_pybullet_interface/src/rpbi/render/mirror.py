@@ -9,11 +9,11 @@ import numpy.typing as npt
 
 from rpbi.bodies import Body
 from rpbi.engine.client import Client
-from rpbi.engine.load_log import LogEntry, apply
 from rpbi.render.shapes.soft_shapes import SoftShapes
 from rpbi.render.shapes.tessellation import FineShapes
 from rpbi.render.shapes.transparency import Transparency, TransparentShape
 from rpbi.samples import BodyState
+from rpbi.world.load_log import LogEntry, apply
 
 from .camera import depth_in_metres
 from .frame import Camera, Frame
@@ -85,13 +85,13 @@ class Mirror:
                 self.pose(state)
 
     def frame(self, renderer: Renderer, scene: Scene, camera: Camera, streams: Collection[str]) -> Frame:
-        """Returns what a camera sees of a scene.
+        """Returns the frame of a camera for a scene.
 
         Args:
-            renderer: Draws what is in the client of this world.
-            scene: Where everything is.
+            renderer: Renderer of this world's client.
+            scene: Poses of everything.
             camera: The camera.
-            streams: What is asked for, see `Demand`.
+            streams: Streams to draw, see `Demand`.
         """
         sample, intrinsics = scene.sample, camera.intrinsics
         frame = Frame(camera, sample.tick, sample.stamp_ns)

@@ -1,11 +1,11 @@
-"""When the renderer gets the processor."""
+"""Scheduling of the renderer process."""
 
 import contextlib
 import os
 
 
-def give_way() -> None:
-    """Lets physics go before all threads of this process: what is idle gets only what nobody else needs."""
+def run_when_idle() -> None:
+    """Sets all threads of this process to idle priority, so that physics runs first."""
     for thread_id in _threads(os.getpid()):
         with contextlib.suppress(ProcessLookupError):
             try:
@@ -14,15 +14,15 @@ def give_way() -> None:
                 os.setpriority(os.PRIO_PROCESS, thread_id, 19)
 
 
-def take_part(process_id: int) -> None:
-    """Lets an idle process, which may be this one, run as others do, because somebody waits for it."""
+def run_normally(process_id: int) -> None:
+    """Sets an idle process, which may be this one, to normal priority."""
     for thread_id in _threads(process_id):
         with contextlib.suppress(OSError):  # it may be gone, or this not allowed
             os.sched_setscheduler(thread_id, os.SCHED_OTHER, os.sched_param(0))
 
 
 def raise_from_idle(process_id: int) -> None:
-    """Gives an idle process that gets nothing at all the least share that is one: normal scheduling at nice 19."""
+    """Raises an idle process that does not run at all to normal scheduling at nice 19."""
     for thread_id in _threads(process_id):
         with contextlib.suppress(OSError):  # it may be gone, or this not allowed
             os.setpriority(os.PRIO_PROCESS, thread_id, 19)

@@ -1,4 +1,4 @@
-"""The renderer process: takes scenes from the simulator, draws them and hands the frames to a sink."""
+"""The renderer process: receives scenes from the simulator, draws them and passes frames to a sink."""
 
 import faulthandler
 import logging
@@ -14,31 +14,30 @@ from .messages import (
     CameraAdded,
     CameraRemoved,
     Demanded,
-    GaveWay,
     Ready,
     Report,
     Scene,
+    SceneAccepted,
     SetUp,
     Shown,
-    Taken,
     WorldChanged,
+    Yielded,
 )
 from .mirror import Mirror
-from .priority import give_way, take_part
+from .priority import run_normally, run_when_idle
 from .renderers import Renderer, open_renderer
 
 log = logging.getLogger(__name__)
 
 DEMAND_PERIOD_S = 0.05
-"""How often to look who looks at the images [s]."""
+"""Period of checks for viewers of the images [s]."""
 
 STUCK_AFTER_S = 300.0
-"""After so long in one go something hangs, in a driver perhaps, and the process ends itself [s].
-At idle priority on a busy machine a lot may take long."""
+"""Longest pass of the loop [s]; beyond it, a driver perhaps hangs, and the process ends itself."""
 
 
 class RenderProcess:
-    """Does what the simulator tells until the simulator has gone; once it is up, it gives way to others if told so."""
+    """Serves the simulator until that has gone; at idle priority once it is up, if requested."""
 
     def __init__(self, channel: Channel, make_sink: Callable[[], Sink], gives_way: bool) -> None:
         self._channel = channel
@@ -66,8 +65,8 @@ class RenderProcess:
                 faulthandler.dump_traceback_later(STUCK_AFTER_S, exit=True)
                 messages = self._channel.receive()
                 if self._gives_way and self._sink is not None and not self._channel.closed:
-                    self._channel.send(GaveWay())
-                    give_way()  # not before it is up: on a busy machine that would take minutes
+                    self._channel.send(Yielded())
+                    run_when_idle()  # not before it is up: on a busy machine that would take minutes
                     self._gives_way = False
                 for message in messages:
                     self._do[type(message)](message)
@@ -92,7 +91,7 @@ class RenderProcess:
         assert self._renderer is not None and self._sink is not None
         if camera.synchronous:  # physics waits for it, so it has nobody to give way to
             self._gives_way = False
-            take_part(os.getpid())
+            run_normally(os.getpid())
         try:
             self._renderer.make_room(camera.intrinsics)
         except EglError as error:
@@ -113,7 +112,7 @@ class RenderProcess:
     def _show(self, scene: Scene) -> None:
         """Draws a scene, as far as anybody looks at it."""
         sample = scene.sample
-        self._channel.send(Taken(sample.name))
+        self._channel.send(SceneAccepted(sample.name))
         assert self._sink is not None
         camera = self._cameras.get(sample.name)
         streams = self._sink.demands().get(sample.name, NO_DEMAND).streams

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from robot_model.geometry import Pose
 from rpbi.engine.client import Client
-from rpbi.geometry import Pose
 from rpbi.render.shapes.transparency import TransparentShape
 
 from .camera import Intrinsics, view_matrix
@@ -21,11 +21,11 @@ log = logging.getLogger(__name__)
 Shapes = Sequence[TransparentShape]
 """Shapes that can be seen through."""
 _LINK_SHIFT = 24
-"""PyBullet tells a body and a link by one number: `body + ((link + 1) << 24)`."""
+"""Shift of the link in PyBullet's number of a body and a link: `body + ((link + 1) << 24)`."""
 
 
 class Drawing(NamedTuple):
-    """What PyBullet drew.
+    """Buffers that PyBullet drew.
 
     Attributes:
         rgba: Shape (height, width, 4), uint8.
@@ -39,13 +39,13 @@ class Drawing(NamedTuple):
 
 
 class Renderer(Protocol):
-    """Draws what is in its client.
+    """Draws the bodies of its client.
 
-    A transparent shape tints what is behind it in the colours; depth and segmentation tell of the shape itself, so that
+    A transparent shape tints what is behind it in the colours; depth and segmentation are of the shape itself, so that
     all images of a frame show the same bodies.
 
     Attributes:
-        name: What it is, for people.
+        name: Its name, for people.
         pb: The client, empty at first.
     """
 
@@ -58,13 +58,13 @@ class Renderer(Protocol):
     def draw(
         self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, transparent: Shapes = ()
     ) -> Drawing:
-        """Draws what a camera sees.
+        """Draws the image of a camera.
 
         Args:
             intrinsics: The camera.
             camera: Pose of its optical frame in the world.
-            segmentation: Whether to tell bodies apart, which costs a second pass.
-            transparent: The shapes that can be seen through; they cost a second pass too.
+            segmentation: Whether to draw body ids, in a second pass.
+            transparent: The transparent shapes, which need a second pass too.
         """
 
 
@@ -72,7 +72,7 @@ class TinyRenderer:
     """PyBullet's software renderer.
 
     It samples each pixel at its upper left corner, not at its centre, and the rows a pixel lower, so its
-    image would be half a pixel to the right and up of what K says. The projection is shifted by as much the
+    image would be half a pixel to the right and up of that by K. The projection is shifted by as much the
     other way.
     """
 
@@ -158,7 +158,7 @@ class EglRenderer:
     def draw(
         self, intrinsics: Intrinsics, camera: Pose, segmentation: bool = True, transparent: Shapes = ()
     ) -> Drawing:
-        """Draws what a camera sees.
+        """Draws the image of a camera.
 
         The colours' pass leaves transparent shapes out of the depth buffer, that of the segmentation does not, and what
         it leaves there can be read.

@@ -26,11 +26,11 @@ def to_text(value: Any) -> str:
 
 
 def from_text(text: str) -> Any:
-    """Returns the value that `to_text` was given; lists come back as tuples.
+    """Returns the value of a text of `to_text`, with tuples for lists.
 
     Raises:
         ValueError: If the text is none that `to_text` writes, or names a class that is not there or not trusted.
-        ConfigError: If a configuration in it does not hold here, for instance because a file is missing.
+        ConfigError: If a configuration in it is not valid here, for instance because a file is missing.
     """
     try:
         return _value(json.loads(text))
@@ -73,6 +73,18 @@ def _value(plain: Any) -> Any:
     return made(*map(_value, content))
 
 
+FORMER_NAMES = {
+    "rpbi.constraints.attachment_config:AttachmentConfig": "rpbi.config.attachments:AttachmentConfig",
+    "rpbi.control.controllers.force:ForceConfig": "rpbi.control.controllers.force:ForceControllerConfig",
+    "rpbi.control.controllers.manager:NewGains": "rpbi.control.controllers.manager:ControllerUpdate",
+    "rpbi.control.motors:Command": "rpbi.control.motors:ResolvedCommand",
+    "rpbi.engine.actions:RecordedTrajectory": "rpbi.world.actions:RecordedTrajectory",
+    "rpbi.engine.actions:TimedGoal": "rpbi.world.actions:TimedGoal",
+    "rpbi.urdf.joints:JointTarget": "rpbi.control.joint_command:JointCommand",
+}
+"""Names of classes in older recordings, and their present ones."""
+
+
 def _class_name(value: Any) -> str:
     return f"{type(value).__module__}:{type(value).__qualname__}"
 
@@ -81,7 +93,7 @@ def _class_of(name: str) -> type:
     """Returns a class of values; no other can be named, so that a file cannot have just anything called."""
     try:
         check_trusted(name)
-        found = find(name)
+        found = find(FORMER_NAMES.get(name, name))
     except UntrustedError:
         raise
     except ValueError as error:

@@ -21,12 +21,12 @@ class RecordedCommand(NamedTuple):
 
 
 class Checkpoint(NamedTuple):
-    """A state that was recorded, in their order.
+    """A recorded state; checkpoints sort by time.
 
     Attributes:
-        resets: How often the world had been reset.
+        resets: Number of resets of the world before.
         tick: The world's tick.
-        commands: How many commands had entered the world since the reset.
+        commands: Number of commands since the reset.
         state_hash: The hash.
     """
 
@@ -41,10 +41,10 @@ class Checkpoint(NamedTuple):
 
 @dataclass
 class Recording:
-    """What is known of a session.
+    """A recorded session.
 
     Attributes:
-        description: What the world was built from.
+        description: Description of the world.
         commands: By number of resets and index the commands.
         checkpoints: The states, in any order.
     """
@@ -55,11 +55,11 @@ class Recording:
 
 
 class Difference(NamedTuple):
-    """A state that is not as recorded.
+    """A state that differs from the recorded one.
 
     Attributes:
-        checkpoint: What was recorded.
-        state_hash: What it is now.
+        checkpoint: The recorded state.
+        state_hash: Its hash in the replay.
         last_agreement: The last state that agreed, None if there was none since the world was built or reset.
     """
 
@@ -69,13 +69,13 @@ class Difference(NamedTuple):
 
 
 class ReplayResult(NamedTuple):
-    """How a replay ended.
+    """Outcome of a replay.
 
     Attributes:
-        agreed: How many states agreed.
-        ticks: How many ticks were replayed.
+        agreed: Number of states that agreed.
+        ticks: Number of ticks replayed.
         difference: The first state that differs, if one does; the replay ends there.
-        left_out: What could not be replayed, and why.
+        left_out: Commands that could not be replayed, with reasons.
     """
 
     agreed: int
@@ -89,7 +89,7 @@ class Replay:
 
     Args:
         recording: The recording.
-        progress: Is told the ticks done since the last time.
+        progress: Called with the number of ticks since the last call.
 
     Raises:
         ConfigError: If the world cannot be built here.
@@ -119,7 +119,7 @@ class Replay:
         return ReplayResult(self._agreed, self._ticks, difference, tuple(self._left_out))
 
     def _live(self, checkpoints: list[Checkpoint], commands: Mapping[int, RecordedCommand]) -> Difference | None:
-        """Goes from a start of the world to its last recorded state; returns the first that differs."""
+        """Runs from a start of the world to its last recorded state; returns the first that differs."""
         done = 0
         agreement: Checkpoint | None = None
         for checkpoint in checkpoints:
@@ -160,7 +160,7 @@ class Replay:
 
 
 _CHANGES: dict[str, Callable[[World, str, Any], Any]] = {
-    "input": World.take_input,
+    "input": World.apply_input,
     "add": lambda world, _, arguments: world.add(*arguments),
     "remove": lambda world, name, _: world.remove(name),
     "dynamics": World.change_dynamics,
@@ -171,15 +171,15 @@ _CHANGES: dict[str, Callable[[World, str, Any], Any]] = {
     "halt": lambda world, _, reason: world.halt(reason),
     "pause": lambda world, _, reason: world.pause(reason),
 }
-"""What can happen to a world beside the actions on its bodies."""
+"""Commands to a world other than actions on its bodies."""
 
 
 def apply_command(world: World, command: RecordedCommand) -> None:
-    """Does to a world what was done when a command was recorded.
+    """Applies a recorded command to a world.
 
     Raises:
         InterfaceError: If the world refuses.
-        ValueError: If the command cannot be read, or is none that this world knows.
+        ValueError: If the command cannot be read, or is unknown.
     """
     name, what, value = command.name, command.what, from_text(command.data)
     try:

@@ -14,11 +14,11 @@ from custom_ros_tools.errors import ConfigError, Problem, shortened
 from custom_ros_tools.plugins import full_name
 from custom_ros_tools.schema import ConfigModel
 from custom_ros_tools.schema.type_names import shown
+from robot_model.asset_files import LONGEST_PATH
+from robot_model.urdf.files import is_temporary, write_description
 from rpbi.bodies import BodyConfig
-from rpbi.config.asset_files import LONGEST_PATH
-from rpbi.config.loading import LoadedWorld, ObjectConfig, WorldConfig
-from rpbi.urdf.files import is_temporary, write_description
 from rpbi.world import World
+from rpbi.world.loading import LoadedWorld, ObjectConfig, WorldConfig
 
 from .recorded_values import from_text, to_text
 
@@ -58,7 +58,7 @@ class _Object(ConfigModel):
 
 
 class _Description(ConfigModel):
-    """What `describe` writes, but for the format."""
+    """Content that `describe` writes, without the format."""
 
     pybullet: str
     file: str
@@ -73,14 +73,14 @@ class WorldDescription:
     """A description that was read.
 
     Args:
-        text: What `describe` returned.
+        text: Result of `describe`.
 
     Attributes:
         start_hash: Hash of the state at the start.
-        warnings: What differs here from where it was written.
+        warnings: Differences of this machine from the recording one.
 
     Raises:
-        ValueError: If it is none, or one of another version of this package.
+        ValueError: If the text is no description, or one of another version of this package.
     """
 
     def __init__(self, text: str) -> None:

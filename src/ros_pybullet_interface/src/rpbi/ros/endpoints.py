@@ -11,13 +11,14 @@ from custom_ros_tools.plugins import find, full_name
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.ros.rospy_internals import close_poller_with
 from rpbi.bodies import Body
+from rpbi.samples import LinkPoseSample
 
 Owners = Callable[[Body], Sequence[str]]
 """Returns what stands for `{name}` in the names of what a body has by a row; nothing if it has it not."""
 
 
 class Answer(NamedTuple):
-    """What most services answer; their types have the two fields in different orders."""
+    """Answer of most services, whose types have the two fields in different orders."""
 
     success: bool
     message: str
@@ -34,11 +35,12 @@ class Topic(NamedTuple):
     Attributes:
         name: Its name, with `{name}` for the body, sensor or camera.
         message_type: Its ROS type.
-        handler: Of samples: returns the message of a sample and its stamp [ns]. Of an input: returns what the input
-            takes of a message. Of a body: acts on the body's context and a message. None if something else publishes.
-        meaning: What it says, or what a message does, in a sentence; with the key that sets its rate.
+        handler: For samples: returns the message of a sample and its stamp [ns]. For an input: returns its value from a
+            message. For a body: acts on the body's context and a message. None if something else publishes.
+        meaning: Its content, or the effect of a message, in a sentence; with the key that sets its rate.
         key: Key of the main file that opens it or sets its rate, where 0 is off; empty if it is there in any case.
-        owners: Which bodies have it, if they subscribe to it.
+        owners: Bodies that subscribe to it.
+        on_tf: For samples: returns poses for TF and their stamp [ns]. None if there are none.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Topic(NamedTuple):
     meaning: str = ""
     key: str = ""
     owners: Owners = of(Body)
+    on_tf: Callable[[Any, int], tuple[LinkPoseSample, int]] | None = None
 
 
 class Service(NamedTuple):
@@ -55,10 +58,10 @@ class Service(NamedTuple):
     Attributes:
         name: Its name, with `{name}` for the body or sensor.
         service_type: Its ROS type.
-        handler: Returns the answer to a context and a request: an Answer, or the response or its fields. What it raises
-            for a request that must be refused (InterfaceError or ValueError) becomes `success=False` and its message,
-            or an error of the call where the response has no `success`. None where something else serves it.
-        owners: Which bodies have it, if bodies have it.
+        handler: Returns the answer to a context and a request: an Answer, or the response or its fields. An
+            InterfaceError or ValueError refuses the request: `success=False` and its message, or an error of the call
+            where the response has no `success`. None where something else serves it.
+        owners: Bodies that have it.
     """
 
     name: str
@@ -68,27 +71,27 @@ class Service(NamedTuple):
 
     @property
     def meaning(self) -> str:
-        """What it does: the first paragraph of its handler's docstring."""
+        """Its purpose: the first paragraph of its handler's docstring."""
         return " ".join((inspect.getdoc(self.handler) or "").split("\n\n")[0].split()) if self.handler else ""
 
 
-MOST_BYTES = 2_000_000
-"""Length of YAML in a request, or in a file that it names: reading takes time that the simulation wants."""
+MAX_BYTES = 2_000_000
+"""Largest size of YAML in a request, or in a file that it names [bytes]; larger ones would delay the simulation."""
 _warn = ThrottledWarning()
 
 
 def subscribe(topic: Topic, context: Any, owner: str = "") -> rospy.Subscriber:
-    """Subscribes to a topic whose handler acts on a context; what is refused is named now and then."""
+    """Subscribes to a topic whose handler acts on a context; refused messages are logged at a limited rate."""
     name, handler = rospy.resolve_name(topic.name.format(name=owner)), topic.handler
     assert handler is not None  # rows of topics to subscribe to have one
 
-    def take(message: Any) -> None:
+    def on_message(message: Any) -> None:
         try:
             handler(context, message)
         except (InterfaceError, ValueError) as error:
             _warn(name, f"message refused: {bounded(str(error))}")
 
-    subscriber = rospy.Subscriber(name, topic.message_type, take, queue_size=1, tcp_nodelay=True)
+    subscriber = rospy.Subscriber(name, topic.message_type, on_message, queue_size=1, tcp_nodelay=True)
     close_poller_with(subscriber)
     return subscriber
 

@@ -26,7 +26,7 @@ def use_prefix(prefix: str | None) -> None:
 
 
 def use_own_frames(frames: Container[str]) -> None:
-    """Takes these frames, without prefix, for those of this node's world wherever YAML names them."""
+    """Resolves these frames, without prefix, to those of this node's world wherever YAML names them."""
     global _own_frames
     _own_frames = frames
 

@@ -7,14 +7,14 @@ import rospy
 from sensor_msgs.msg import JointState
 
 from custom_ros_tools.errors import ConfigError, Problem
+from robot_model.urdf.document import UrdfDocument
 from rpbi.bodies import BodyConfig
 from rpbi.bodies.robots.robot_config import RobotConfig
-from rpbi.config.loading import LoadedWorld
-from rpbi.urdf.document import UrdfDocument
+from rpbi.world.loading import LoadedWorld
 
 
 def start_where_robots_are(loaded: LoadedWorld) -> LoadedWorld:
-    """Returns a world whose robots start where the joint states that they ask for say.
+    """Returns a world whose robots start at the joint states that their configurations name.
 
     Raises:
         ConfigError: If such joint states do not come or do not fit; it names all topics.
@@ -32,9 +32,9 @@ def start_where_robots_are(loaded: LoadedWorld) -> LoadedWorld:
 
 
 def with_initial_state(config: BodyConfig, file: str) -> BodyConfig:
-    """Returns the configuration of a body; that of a robot that asks for it with the joint positions of a topic.
+    """Returns the configuration of a body, for a robot with the joint positions of its topic of joint states.
 
-    Joints that the topic does not name start where the configuration says; joints that the robot lacks are left out.
+    Joints that the topic does not name start as configured; joints that the robot lacks are left out.
 
     Raises:
         ConfigError: If no joint states come in time, or they have nothing for the robot.

@@ -13,9 +13,9 @@ from custom_ros_tools.plugins import full_name
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.ros.rospy_internals import close_poller_with
 from rpbi.control.external_wrenches import TIMEOUT_S, ExternalWrench
+from rpbi.control.joint_command import JointCommand, WrongQuantityError
 from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Twist
-from rpbi.urdf.joints import JointTarget, WrongQuantityError
 from rpbi.world import World
 
 from .endpoints import Topic, find_topic
@@ -23,9 +23,11 @@ from .headers import prefixed
 from .tf_follower import TfFollower, refusal
 
 
-def _joint_target(message: JointState) -> JointTarget:
+def _joint_target(message: JointState) -> JointCommand:
     """Returns all that a message has; which of it counts is up to the robot's control mode."""
-    return JointTarget(message.name, message.position, message.velocity, message.effort, message.header.stamp.to_nsec())
+    return JointCommand(
+        message.name, message.position, message.velocity, message.effort, message.header.stamp.to_nsec()
+    )
 
 
 def _twist(message: geometry_msgs.msg.Twist) -> Twist:
@@ -85,7 +87,7 @@ def topic_input(key: str, taken: Input) -> Topic:
 
 
 class Inputs:
-    """Subscribes to what the world takes; refused messages change nothing and are named now and then.
+    """Subscribes to the inputs of the world; refused messages are logged at a limited rate.
 
     Args:
         world: The world; only its `put` and the time of its clock are used.
@@ -122,7 +124,7 @@ class Inputs:
         topic, slot, value = rospy.resolve_name(row.name.format(name=taken.owner or name)), f"{name}/{key}", row.handler
         assert value is not None  # rows of inputs have one
 
-        def take(message: Any) -> None:
+        def on_message(message: Any) -> None:
             try:
                 self._world.put(slot, value(message))
             except WrongQuantityError as error:
@@ -130,6 +132,6 @@ class Inputs:
             except Exception as error:
                 self._warn(topic, f"message refused: {refusal(slot, taken, error)}")
 
-        subscriber = rospy.Subscriber(topic, row.message_type, take, queue_size=100, tcp_nodelay=True)
+        subscriber = rospy.Subscriber(topic, row.message_type, on_message, queue_size=100, tcp_nodelay=True)
         close_poller_with(subscriber)
         return subscriber

@@ -16,8 +16,8 @@ from custom_ros_tools.plugins import trust_only
 from custom_ros_tools.ros.buffered_socket import send_at_once
 from custom_ros_tools.ros.lifecycle.parameters import kept_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from rpbi.config.asset_files import ROBOT_DESCRIPTION
-from rpbi.config.loading import LoadedWorld, load_world, load_world_dict
+from robot_model.asset_files import ROBOT_DESCRIPTION
+from robot_model.urdf.files import write_description
 from rpbi.ros.publishers.attachments import AttachmentPublisher
 from rpbi.ros.publishers.sample_publishers import SamplePublishers
 from rpbi.ros.publishers.static_frames import StaticFrames
@@ -25,26 +25,26 @@ from rpbi.ros.publishers.world_markers import WorldMarkers
 from rpbi.ros.reference.interface_table import endpoints
 from rpbi.ros.services.node_services import NODE_SERVICES, NodeContext
 from rpbi.ros.window.topics import WindowTopics
-from rpbi.urdf.files import write_description
 from rpbi.world import World
+from rpbi.world.loading import LoadedWorld, load_world, load_world_dict
 from rpbi.world_warnings import world_warnings
 
 from .endpoints import serve
 from .headers import use_own_frames, use_prefix
 from .initial_state import start_where_robots_are
-from .object_lifecycle import ObjectLifecycle
 from .requests import Requests
+from .services.object_lifecycle import ObjectLifecycle
 from .simulation import Simulation
 
 
 def configured_world(robot_description: str | None) -> LoadedWorld:
-    """Reads the world that `~config_file` names, with what `~config` says in its place, or that of `~config` alone.
+    """Reads the world of `~config_file` with the overrides of `~config`, or that of `~config` alone.
 
     Args:
         robot_description: File that the word `robot_description` stands for.
 
     Raises:
-        ConfigError: If there is none, or with all that is wrong with it.
+        ConfigError: If there is none, or with all of its problems.
     """
     file, config = (rospy.get_param(name, None) for name in ("~config_file", "~config"))
     if file is None and config is None:
@@ -75,11 +75,10 @@ def parameter_above(name: str) -> Any:
 log = logging.getLogger(__name__)
 
 LONGEST_END_S = 10.0
-"""How long ROS waits for the loop and the renderer before it shuts down without them [s]."""
+"""Longest wait for the loop and the renderer at shutdown [s]; beyond it, ROS ends without them."""
 
-# A thread that waits for Python's lock gets it after this long at most [s]; Python's own 5 ms are five ticks at 1 kHz.
-sys.setswitchinterval(0.0005)
-
+SWITCH_S = 0.0005
+"""Longest wait of a thread for Python's lock [s]; Python's default, 5 ms, is five ticks at 1 kHz."""
 
 MAX_WARNINGS = 20
 """Warnings of a world that are logged at its start; of more, the rest is counted."""
@@ -109,7 +108,7 @@ class SimulatorNode:
         simulated = bool(parameter_above("use_sim_time"))
         if config.real_time_factor != 1 and not simulated:
             log.warning(
-                "real_time_factor is %g but /use_sim_time is not true: stamps are wall time and tell nothing of it",
+                "real_time_factor is %g but /use_sim_time is not true: stamps are wall time and do not show it",
                 config.real_time_factor,
             )
         self._world = World(loaded, simulated)
@@ -169,5 +168,6 @@ class SimulatorNode:
 
 def main() -> None:
     """Runs the node; exits with 1 if it cannot start, with 0 when it is interrupted."""
+    sys.setswitchinterval(SWITCH_S)
     # Without ROS time: the simulator is the source of /clock and must never wait for it.
     run_node("ros_pybullet_interface", SimulatorNode, SimulatorNode.run, ros_time=False)

@@ -8,16 +8,16 @@ from rpbi.ros.publishers.status import CLOCK, DIAGNOSTICS, STATE, STATUS
 from rpbi.ros.publishers.world_markers import MARKERS
 
 NODE_TOPICS = (STATUS, STATE, ATTACHMENTS, COMMANDS, DESCRIPTION, MARKERS, DIAGNOSTICS, CLOCK)
-"""What it publishes."""
+"""Topics that the node publishes."""
 
 
-class Parameter(NamedTuple):
+class NodeParameter(NamedTuple):
     """A parameter of the node.
 
     Attributes:
         name: Its name, with `NAME` for a robot.
         is_set: Whether the node sets it, else it reads it.
-        meaning: What it says, in a sentence.
+        meaning: Its purpose, in a sentence.
     """
 
     name: str
@@ -26,20 +26,20 @@ class Parameter(NamedTuple):
 
 
 PARAMETERS = (
-    Parameter("~config_file", False, "The main YAML file; a relative path is looked for in `~working_directory`."),
-    Parameter("~working_directory", False, "Folder that a relative `~config_file` is in."),
-    Parameter(
+    NodeParameter("~config_file", False, "The main YAML file; a relative path is looked for in `~working_directory`."),
+    NodeParameter("~working_directory", False, "Folder that a relative `~config_file` is in."),
+    NodeParameter(
         "~config",
         False,
         "The main YAML file as a mapping, or with `~config_file` the keys that differ; one of both is required.",
     ),
-    Parameter(
+    NodeParameter(
         "use_sim_time", False, "Whether stamps are the world's time, else wall time; from here or a namespace above."
     ),
-    Parameter(
+    NodeParameter(
         "robot_description",
         False,
         "URDF of robots whose `fileName` is `robot_description`; from here or a namespace above.",
     ),
-    Parameter("rpbi/NAME/robot_description", True, "URDF of a robot, for RViz and robot_state_publisher."),
+    NodeParameter("rpbi/NAME/robot_description", True, "URDF of a robot, for RViz and robot_state_publisher."),
 )

@@ -15,7 +15,7 @@ from .simulation import Simulation
 T = TypeVar("T")
 
 GIVE_UP_AFTER_S = 30.0
-"""After this long without a pass of the loop a request is given up [s] of wall time."""
+"""Longest wait of a request for a pass of the loop [s] of wall time; beyond it, the request fails."""
 
 
 class Requests:

@@ -14,7 +14,7 @@ class RosNode:
     The simulator does not use it: it must never wait for ROS time, and this does.
 
     Args:
-        name: The node's name unless it is given another one.
+        name: The node's name unless remapped.
         options: Those of `rospy.init_node`, such as `anonymous` and `log_level`. With `disable_signals` the script sees
             to Ctrl-C itself.
 

@@ -20,11 +20,11 @@ log = logging.getLogger(__name__)
 IDLE_PERIOD_S = 0.001
 """Shortest time between two looks at requests while stopped [s]."""
 BURST_S = 0.005
-"""How long ticks that are due follow each other before the loop sends what they had, and looks at requests [s]."""
+"""Longest run of due ticks before the loop sends messages and looks at requests [s]."""
 
 
-class StepBurst:
-    """Counts the ticks of one request; whoever asked waits for `done`."""
+class StepRequest:
+    """A request for ticks, and the number left; the caller waits for `done`."""
 
     def __init__(self, steps: int) -> None:
         self.done: Future[tuple[int, int]] = Future()
@@ -56,11 +56,11 @@ class Simulation:
         self.world = world
         self.running = False
         self._failure: str | None = None
-        """Why it has broken off, until somebody starts or steps it again."""
-        self._burst: StepBurst | None = None
+        """Error that stopped it, until the next start or step."""
+        self._request: StepRequest | None = None
         self._thread: int | None = None
         self.passes = 0
-        """Grows as long as the loop is alive."""
+        """Number of passes of the loop; grows as long as it is alive."""
         idle_ticks = max(1, round(IDLE_PERIOD_S / world.clock.dt_s))
         self._publishers = TickPublisher(world, publishers, idle_ticks)
         self._helpers = helpers
@@ -99,8 +99,8 @@ class Simulation:
         Returns:
             False if it stands still already.
         """
-        if self._burst is not None:
-            self._break_burst(InterfaceError(f"stopped {self._burst}"))
+        if self._request is not None:
+            self._abort_request(InterfaceError(f"stopped {self._request}"))
             return True
         if not self.running:
             return False
@@ -108,7 +108,7 @@ class Simulation:
         return True
 
     def step(self) -> tuple[int, int]:
-        """Goes one tick on; when it returns, everything of that tick has been handed to every subscriber.
+        """Advances by a tick; when it returns, everything of that tick has been passed to every subscriber.
 
         Returns:
             The new tick and its stamp [ns].
@@ -120,41 +120,41 @@ class Simulation:
         self._refuse_while_moving()
         self._failure = None
         self._status.publish(True)
-        self._take_tick(is_last=True)
+        self._run_tick(is_last=True)
         self._status.publish(False)
         return self.world.clock.tick, self.world.clock.stamp_ns
 
     def step_n(self, steps: int) -> Future[tuple[int, int]]:
-        """Goes some ticks on, as fast as it goes; other requests are served meanwhile, a stop ends it.
+        """Advances by ticks as fast as possible; other requests are served meanwhile, a stop ends it.
 
         Returns:
-            The last tick and its stamp [ns], once everything of it has been handed to every subscriber.
+            The last tick and its stamp [ns], once everything of it has been passed to every subscriber.
 
         Raises:
             InterfaceError: If the world runs, or is about the ticks of another request.
         """
         self._refuse_while_moving()
-        burst = StepBurst(steps)
+        request = StepRequest(steps)
         if not steps:
-            burst.finish(self.world.clock.tick, self.world.clock.stamp_ns)
-            return burst.done
+            request.finish(self.world.clock.tick, self.world.clock.stamp_ns)
+            return request.done
         self._failure = None
-        self._burst, self._state.is_stepping = burst, True
+        self._request, self._state.is_stepping = request, True
         self._status.publish(True)
-        return burst.done
+        return request.done
 
     def reset(self, refill: Callable[[], None] = lambda: None) -> None:
-        """Makes the world what it was when it was built; it goes on running or standing still, and so does its time.
+        """Resets the world to its state when built; it keeps running or standing still, and its time continues.
 
         Args:
-            refill: Puts inputs that the world is to have at its new start.
+            refill: Puts the inputs of the new start.
 
         Raises:
             InterfaceError: If something cannot be loaded any more; then it stands still.
         """
-        if self._burst is not None:
-            burst = self._end_burst()
-            burst.fail(InterfaceError(f"the world was reset {burst}"))
+        if self._request is not None:
+            request = self._end_request()
+            request.fail(InterfaceError(f"the world was reset {request}"))
         try:
             self.world.reset()
         except InterfaceError as error:
@@ -162,14 +162,14 @@ class Simulation:
             raise
         self._failure = None
         refill()
-        self.world.take_inputs()
+        self.world.apply_inputs()
         self._pacer.restart()
         self._publishers.restart()
         self._state.restart()
 
     @property
     def real_time_factor(self) -> float:
-        """How fast the world is to run: simulated seconds per second; 0 is as fast as it goes."""
+        """Requested simulated seconds per second; 0 is as fast as possible."""
         return self._pacer.real_time_factor
 
     def set_real_time_factor(self, factor: float) -> None:
@@ -197,63 +197,63 @@ class Simulation:
                     if not self.world.is_connected:  # the loop is over, and that is why
                         break
                     self._break_off(error)
-            if self._burst is None:
+            if self._request is None:
                 (self._pacer if self.running else self._idle_pacer).wait()
 
     def _move(self) -> None:
-        if self._burst is not None:
-            self._advance_burst(self._burst)
+        if self._request is not None:
+            self._advance_request(self._request)
         elif not self.running:
             self._idle()
         else:
-            self._take_due_ticks()
+            self._run_due_ticks()
 
     def _publish(self) -> None:
-        self._status.spin(self.running, self._burst is not None)
-        self._state.spin(self.running or self._burst is not None)
+        self._status.spin(self.running, self._request is not None)
+        self._state.spin(self.running or self._request is not None)
         self._commands.spin()
         flush_buffered_sockets()
 
-    def _take_due_ticks(self) -> None:
+    def _run_due_ticks(self) -> None:
         end_s = time.monotonic() + BURST_S
         while self._pacer.is_due():
-            self._take_tick()
+            self._run_tick()
             if time.monotonic() > end_s:
                 break
         self._publishers.publish_time()
 
-    def _take_tick(self, is_last: bool = False) -> None:
-        """Goes one tick on; of the last one before standing still everything is published, whatever is due."""
+    def _run_tick(self, is_last: bool = False) -> None:
+        """Advances by a tick; of the last one before standing still everything is published, due or not."""
         self._before_tick()
         publish = self._publishers.publish_all if is_last else self._publishers.publish_tick
         publish(self.world.step())
-        self._state.take_tick()
+        self._state.publish_due_hash()
         if is_last:
             flush_buffered_sockets()  # before whoever asked for the tick gets an answer
 
-    def _advance_burst(self, burst: StepBurst) -> None:
+    def _advance_request(self, request: StepRequest) -> None:
         end_s = time.monotonic() + BURST_S
-        while burst.left > 1 and time.monotonic() < end_s:
-            self._take_tick()
-            burst.left -= 1
+        while request.left > 1 and time.monotonic() < end_s:
+            self._run_tick()
+            request.left -= 1
         self._publishers.publish_time()
-        if burst.left == 1:
-            self._take_tick(is_last=True)
-            burst.left = 0
-            self._end_burst()
+        if request.left == 1:
+            self._run_tick(is_last=True)
+            request.left = 0
+            self._end_request()
             self._status.publish(False)
-            burst.finish(self.world.clock.tick, self.world.clock.stamp_ns)
+            request.finish(self.world.clock.tick, self.world.clock.stamp_ns)
 
-    def _end_burst(self) -> StepBurst:
-        assert self._burst is not None
-        burst, self._burst, self._state.is_stepping = self._burst, None, False
-        return burst
+    def _end_request(self) -> StepRequest:
+        assert self._request is not None
+        request, self._request, self._state.is_stepping = self._request, None, False
+        return request
 
-    def _break_burst(self, error: Exception) -> None:
+    def _abort_request(self, error: Exception) -> None:
         """Ends the ticks of a request before their time, with all of the last one published."""
-        burst = self._end_burst()
+        request = self._end_request()
         self._halt()
-        burst.fail(error)
+        request.fail(error)
 
     def _refuse_while_moving(self) -> None:
         if self.running:
@@ -261,7 +261,7 @@ class Simulation:
         self._refuse_while_stepping()
 
     def _refuse_while_stepping(self) -> None:
-        if self._burst is not None:
+        if self._request is not None:
             raise InterfaceError("the simulation is stepping: wait for that, or stop it")
 
     def _break_off(self, error: Exception) -> None:
@@ -270,8 +270,8 @@ class Simulation:
             return  # it goes on saying the same
         log.error("simulation stopped: %s", error, exc_info=not isinstance(error, InterfaceError))
         self.running, self._failure = False, str(error)
-        if self._burst is not None:
-            self._end_burst().fail(error)
+        if self._request is not None:
+            self._end_request().fail(error)
         self.world.halt("the simulation broke off")
         self._publishers.publish_last_time()
         self._status.publish(False)
@@ -287,5 +287,5 @@ class Simulation:
             return
         self._publishers.repeat_time()
         if self._failure is None:
-            self.world.take_inputs()
+            self.world.apply_inputs()
             self._publishers.publish_idle()

@@ -1,4 +1,4 @@
-"""Follows TF frames: what they say goes into the world, and what is wrong with them is said now and then."""
+"""Follows TF frames: passes their poses to the world, and logs problems at a limited rate."""
 
 import contextlib
 import math
@@ -21,21 +21,21 @@ from rpbi.plugins import is_foreign
 from .headers import named_frame, world_frame
 
 TF_MISSING_AFTER_S = 5.0
-"""How long a TF frame may be missing before that is worth a warning [s] of wall time."""
+"""Longest absence of a TF frame [s] of wall time; beyond it, a warning is logged."""
 LONGEST_NAP_S = 0.1
-"""How soon a new frame to follow is noticed [s] of wall time."""
+"""Longest sleep, after which a new frame to follow is noticed [s] of wall time."""
 EARLY, LATE = 0.75, 1.5
 """Shares of a period: from the first on, a transform that comes is looked at; where more are to come, till the last."""
 STALE_AGAIN_AFTER_S = 30.0
-"""How soon it is told again that a frame is stale [s] of wall time."""
+"""Time until a stale frame is logged again [s] of wall time."""
 
 
 class WatchedTf:
-    """What is known of TF.
+    """Transforms received.
 
     Attributes:
-        watched: Frames of which it is told when they come.
-        came_s: When each of them last came [s] of wall time.
+        watched: Frames whose arrival is noted.
+        came_s: Time of the last arrival of each [s] of wall time.
         something_came: Set whenever one comes.
     """
 
@@ -63,7 +63,7 @@ class WatchedTf:
 
 
 def refusal(slot: str, taken: Input, error: Exception) -> Exception:
-    """Returns why a value is refused: what its check says, or what went wrong in another package.
+    """Returns the reason why a value is refused: the error of its check, or one of another package.
 
     Raises:
         Exception: The error, if it is a bug of this package.
@@ -71,15 +71,15 @@ def refusal(slot: str, taken: Input, error: Exception) -> Exception:
     if isinstance(error, (InterfaceError, ValueError)):
         return error
     if is_foreign(taken.apply):
-        return PluginError(full_name(taken.apply), f"taking '{slot}'", cause_of(error))
+        return PluginError(full_name(taken.apply), f"applying '{slot}'", cause_of(error))
     raise error
 
 
 class Followed:
-    """A pose input and what is known of its frame.
+    """A pose input and the state of its frame.
 
-    It is looked at when it comes, about once a period: a look at other times would find now more, now less of a motion.
-    Where nothing comes, since the frame moves with others, it is looked at after a period.
+    It is looked up when it comes, about once a period: at other times, steps of a motion would differ. Where nothing
+    comes, since the frame moves with others, it is looked up after a period.
     """
 
     def __init__(self, name: str, slot: str, pose_input: PoseInput) -> None:
@@ -103,7 +103,7 @@ class Followed:
         return self.looked_s + LATE * self.period_s if is_early else came_s
 
     def is_new(self, stamp_ns: int, now_s: float, time_s: float) -> bool:
-        """Notes its stamp; tells whether that is another one."""
+        """Stores its stamp; returns whether it is new."""
         self.news_time_s = min(self.news_time_s, time_s)  # the world was reset
         if stamp_ns == self.last_stamp_ns:
             return False
@@ -175,7 +175,7 @@ class TfFollower:
             return
         pose, stamp_ns = found
         is_seen_again = followed.pose_input.is_tracked and stamp_ns != followed.last_stamp_ns
-        self._tell_if_stale(followed, stamp_ns, now_s)
+        self._report_stale(followed, stamp_ns, now_s)
         if is_seen_again or pose != followed.last_pose:
             followed.last_pose = pose
             try:
@@ -185,8 +185,8 @@ class TfFollower:
                 if followed in self._followed:  # else it has gone meanwhile
                     self._warn(followed.slot, f"TF refused: {reason}")
 
-    def _tell_if_stale(self, followed: Followed, stamp_ns: int, now_s: float) -> None:
-        """Tells once that nothing new has come of a frame, unless it is static, and once that something has again."""
+    def _report_stale(self, followed: Followed, stamp_ns: int, now_s: float) -> None:
+        """Logs once that a frame is stale, unless it is static, and once that it is back."""
         time_s = self._time_s()
         if followed.is_new(stamp_ns, now_s, time_s):
             if followed.is_stale:

@@ -23,19 +23,19 @@ class TickListener:
         self._changed = threading.Condition()
         self._newest: dict[str, Any] = {}
         self._subscribers = {
-            topic: rospy.Subscriber(topic, message_type, self._take, topic, queue_size=1000, tcp_nodelay=True)
+            topic: rospy.Subscriber(topic, message_type, self._on_message, topic, queue_size=1000, tcp_nodelay=True)
             for topic, message_type in topics.items()
         }
 
     def wait_for_tick(self, stamp: genpy.Time, timeout_s: float = 5.0) -> dict[str, Any]:
-        """Returns the newest message of each topic, once all have come of a tick or later.
+        """Waits for messages of a tick or later on all topics, and returns the newest of each.
 
         Args:
-            stamp: Stamp of the tick, as `rpbi/step_n` tells it.
-            timeout_s: How long to wait [s] of wall time.
+            stamp: Stamp of the tick, as `rpbi/step_n` returns it.
+            timeout_s: Longest wait [s] of wall time.
 
         Raises:
-            TimeoutError: If a topic has nothing as new as that; it names all such topics.
+            TimeoutError: If topics have no such message; it names them.
         """
         end_s = time.monotonic() + timeout_s
         with self._changed:
@@ -54,7 +54,7 @@ class TickListener:
     def _has(self, topic: str, stamp: genpy.Time) -> bool:
         return topic in self._newest and self._newest[topic].header.stamp >= stamp
 
-    def _take(self, message: Any, topic: str) -> None:
+    def _on_message(self, message: Any, topic: str) -> None:
         with self._changed:
             self._newest[topic] = message
             self._changed.notify_all()

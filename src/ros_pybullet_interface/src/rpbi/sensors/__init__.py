@@ -1,11 +1,13 @@
 """The types of sensors; a new one is a class in a file of its own and a line here."""
 
-from custom_ros_tools.plugins import ClassTable, find_class
+from custom_ros_tools.plugins.table import PluginTable
 from rpbi.config.sensors import SensorConfig
 
 from .sensor import BodySensor, Sensor
 
-SENSOR_TYPES = ClassTable(
+SENSOR_TYPES: PluginTable[BodySensor] = PluginTable(
+    "sensor",
+    "rpbi.sensors.sensor:BodySensor",
     {
         "joint_state": "rpbi.sensors.joint_state:JointStateSensor",
         "link_pose": "rpbi.sensors.link_pose:LinkPoseSensor",
@@ -20,19 +22,9 @@ SENSOR_TYPES = ClassTable(
         "rgbd": "rpbi.sensors.rgbd:RgbdSensor",
         "vicon": "rpbi.sensors.tracking.vicon:ViconSensor",
         "april_tags": "rpbi.sensors.tracking.april_tags:AprilTagsSensor",
-    }
+    },
+    suggests=False,
 )
+"""All types of sensors. A `BodySensor` may be under `sensors` of any object, the others have keys of their own."""
 
-
-def sensor_class(kind: str) -> type[BodySensor]:
-    """Returns the class of sensors that a body's YAML asks for by a key of SENSOR_TYPES or by `module:Class`.
-
-    Raises:
-        ValueError: If there is none.
-    """
-    known = SENSOR_TYPES.get(kind, Sensor)
-    found: type[BodySensor] = known if issubclass(known, BodySensor) else find_class(kind, BodySensor)
-    return found
-
-
-__all__ = ["SENSOR_TYPES", "BodySensor", "Sensor", "SensorConfig", "sensor_class"]
+__all__ = ["SENSOR_TYPES", "BodySensor", "Sensor", "SensorConfig"]

@@ -3,9 +3,9 @@
 import math
 
 from custom_ros_tools.errors import PhysicsError
-from rpbi.bodies.body import Body
 from rpbi.samples import BaseStateSample
 
+from .sensed import SensedBody
 from .sensor import Sensor
 
 
@@ -17,8 +17,9 @@ class BaseStateSensor(Sensor):
     """
 
     sample_type = BaseStateSample
+    ros_topic = "rpbi.ros.publishers.sample_topics:BASE_STATE"
 
-    def __init__(self, body: Body, hz: float, frame: str | None = None) -> None:
+    def __init__(self, body: SensedBody, hz: float, frame: str | None = None) -> None:
         super().__init__(body.name, hz)
         self._body = body
         self._frame = frame or f"rpbi/{body.name}/{body.root_link}"

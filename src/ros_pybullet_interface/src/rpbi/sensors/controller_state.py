@@ -1,19 +1,20 @@
-"""How a controller does."""
+"""State of a controller as a sensor."""
 
-from rpbi.control.controllers.manager import ControllerManager, ControllerSample
+from rpbi.control.controllers.manager import ControllerManager, ControllerStateSample
 
 from .sensor import Sensor
 
 
 class ControllerStateSensor(Sensor):
-    """Whether a controller of a robot is active, and what it tells of itself."""
+    """Reports whether a controller of a robot is active, and its own numbers."""
 
-    sample_type = ControllerSample
+    sample_type = ControllerStateSample
+    ros_topic = "rpbi.ros.publishers.sample_topics:CONTROLLER_STATE"
 
     def __init__(self, robot: str, controllers: ControllerManager, name: str, hz: float) -> None:
         super().__init__(f"{robot}/{name}", hz)
         self._robot, self._controllers, self._name = robot, controllers, name
 
-    def read(self, tick: int) -> ControllerSample:
+    def read(self, tick: int) -> ControllerStateSample:
         """Asks the controller."""
         return self._controllers.sample(self._robot, self._name)

@@ -25,7 +25,7 @@ class LowPass:
         """The newest value, None before the first."""
 
     def step(self, value: npt.NDArray[np.float64]) -> None:
-        """Takes the value of one more tick."""
+        """Adds the value of one tick."""
         self.output = value if self.output is None else self.output + self._gain * (value - self.output)
 
 
@@ -64,16 +64,16 @@ class SeededNoise:
 
 
 class Zeroing:
-    """Averages so many samples to come."""
+    """Averages the next `count` samples."""
 
     def __init__(self, count: int) -> None:
         self.mean: Future[npt.NDArray[np.float64]] = Future()
-        """The mean, once it is known; another thread may wait for it."""
+        """The mean; another thread may wait for it."""
         self._left = self._count = count
         self._sum: npt.NDArray[np.float64] | float = 0.0
 
-    def take(self, value: npt.NDArray[np.float64]) -> None:
-        """Takes one more sample; the last one settles the mean."""
+    def add(self, value: npt.NDArray[np.float64]) -> None:
+        """Adds a sample; the last one sets the mean."""
         self._sum = self._sum + value
         self._left -= 1
         if not self._left:

@@ -8,32 +8,34 @@ import numpy as np
 import numpy.typing as npt
 
 from custom_ros_tools.errors import PhysicsError
-from rpbi.bodies.body import Body
+from robot_model.geometry import Vector, cross, minus, plus, scaled
 from rpbi.config.sensors import ForceTorqueConfig
-from rpbi.geometry import Load, Vector, cross, minus, plus, rotated_back, scaled
+from rpbi.geometry import LinkWrench, rotated_back
 from rpbi.samples import WrenchSample
 from rpbi.urdf.joints import Joint
 from rpbi.urdf.subtree import LinkStates, Subtree
 
 from .filters import LowPass, SeededNoise, Zeroing
-from .sensor import SensedWorld, Sensor
+from .sensed import SensedBody, SensedWorld
+from .sensor import Sensor
 
 
 class ForceTorqueSensor(Sensor):
     """Force and moment that a joint transmits, about its origin, in the axes of its child link's URDF frame.
 
     PyBullet's own reading is of no use here: it lacks the motors' efforts (bullet3 issues 2966, 3204, 4451, 4604), and
-    with them added it is still wrong, see docs/force_torque.md. So the wrench is what changed the momentum of all links
-    below the joint during the last tick, less their weight and less what touches, holds or pushes them (Newton-Euler,
-    as an impulse balance). That holds for all types of joints, control modes and limits.
+    with them added it is still wrong, see docs/force_torque.md. The wrench is therefore the change of momentum of all
+    links below the joint during the last tick, less their weight and less all contact, attachment and external forces
+    (Newton-Euler, as an impulse balance). That holds for all types of joints, control modes and limits.
 
     It is read at `default_hz` unless its part of the robot's YAML, the configuration, has a rate.
     """
 
     Config = ForceTorqueConfig
     sample_type = WrenchSample
+    ros_topic = "rpbi.ros.publishers.sample_topics:WRENCH"
 
-    def __init__(self, robot: Body, joint: Joint, config: ForceTorqueConfig, default_hz: float) -> None:
+    def __init__(self, robot: SensedBody, joint: Joint, config: ForceTorqueConfig, default_hz: float) -> None:
         super().__init__(f"{robot.name}/{joint.name}", config.hz or default_hz)
         self.joint = joint
         self.frame_id = config.frame_id or f"rpbi/{robot.name}/{joint.link}"
@@ -57,7 +59,7 @@ class ForceTorqueSensor(Sensor):
         self._sample: WrenchSample | None = None
 
     def enter(self, world: SensedWorld) -> None:
-        """Gets to know what holds the robot's links."""
+        """Stores the world's attachments."""
         self._attachments = world.attachments
 
     def before_step(self, tick: int) -> None:
@@ -65,7 +67,7 @@ class ForceTorqueSensor(Sensor):
         self._gravity, self._contact_factor = self._robot.pb.gravity, max(1, self._robot.pb.sub_steps)
         if self._dynamics_changes != self._robot.dynamics_changes:
             self._dynamics_changes = self._robot.dynamics_changes
-            self._subtree.take_dynamics()
+            self._subtree.update_dynamics()
         self._before = self._subtree.states()
         self._sample = None
 
@@ -80,27 +82,27 @@ class ForceTorqueSensor(Sensor):
             self._sample = self._measure(self._before, tick)
         return self._sample
 
-    def _loads(self) -> Iterator[Load]:
+    def _loads(self) -> Iterator[LinkWrench]:
         """Yields what attachments and external wrenches did to the links below the joint in the last step."""
         for load in (*self._attachments.loads_on(self._robot.name), *self._robot.external_wrenches.loads):
             if load.link in self._subtree.links:
                 yield load
 
     def zero(self, count: int) -> Zeroing:
-        """Takes what so many samples to come show on average for zero, unless it is being zeroed already."""
+        """Zeroes to the mean of the next `count` samples, unless zeroing already runs."""
         if self._zeroing is None:
             self._zeroing = Zeroing(count)
         return self._zeroing
 
     def cancel_zeroing(self) -> None:
-        """Gives a zeroing up that runs; the old zero stays."""
+        """Cancels a running zeroing; the old zero stays."""
         self._zeroing = None
 
     def _measure(self, before: LinkStates, tick: int) -> WrenchSample:
         filtered = None if self._low_pass is None else self._low_pass.output
         shown = (self._wrench(before, tick) if filtered is None else filtered) + self._noise.at(tick)
         if self._zeroing is not None:
-            self._zeroing.take(shown)
+            self._zeroing.add(shown)
             if self._zeroing.mean.done():
                 self._offset = self._zeroing.mean.result()
                 self._zeroing = None

@@ -3,9 +3,9 @@
 import math
 
 from custom_ros_tools.errors import PhysicsError
-from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.samples import JointStateSample
 
+from .sensed import SensedRobot
 from .sensor import Sensor
 
 
@@ -13,8 +13,9 @@ class JointStateSensor(Sensor):
     """Positions, velocities and motor efforts of all joints of a robot."""
 
     sample_type = JointStateSample
+    ros_topic = "rpbi.ros.publishers.sample_topics:JOINT_STATES"
 
-    def __init__(self, robot: JointedBody, hz: float) -> None:
+    def __init__(self, robot: SensedRobot, hz: float) -> None:
         super().__init__(robot.name, hz)
         self._robot = robot
         self._names = tuple(joint.name for joint in robot.joints)

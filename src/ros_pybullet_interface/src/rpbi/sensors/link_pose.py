@@ -3,14 +3,14 @@
 import math
 
 from custom_ros_tools.errors import PhysicsError
-from rpbi.bodies.body import Body
 from rpbi.geometry import Pose
 from rpbi.samples import LinkPoseSample
 
+from .sensed import SensedBody
 from .sensor import Sensor
 
 
-def index_of_link(body: Body, link: str | None) -> int | None:
+def index_of_link(body: SensedBody, link: str | None) -> int | None:
     """Returns PyBullet's index of a link by its name, -1 without one; None if there is no such link."""
     return -1 if link is None else next((i for i in (-1, *body.link_indices) if body.link_name(i) == link), None)
 
@@ -19,21 +19,22 @@ class LinkPoseSensor(Sensor):
     """Poses of the URDF frames of a body's links in the world.
 
     Args:
-        links: Whether to tell every link as `rpbi/NAME/LINK`; otherwise the root link alone.
-        root_frame: TF frame of the root link; without it, it is as any link's.
+        links: Whether to report every link as `rpbi/NAME/LINK`; otherwise the root link alone.
+        root_frame: TF frame of the root link; by default `rpbi/NAME/LINK`, as for all links.
 
     Attributes:
-        frames: TF frames of its poses, without prefix, that of the root link first.
+        tf_frames: TF frames of its poses, without prefix, that of the root link first.
     """
 
     sample_type = LinkPoseSample
+    ros_topic = None
 
-    def __init__(self, body: Body, hz: float, links: bool = True, root_frame: str | None = None) -> None:
+    def __init__(self, body: SensedBody, hz: float, links: bool = True, root_frame: str | None = None) -> None:
         super().__init__(body.name, hz)
         self._body = body
         self._indices = body.link_indices if links else ()
         self.root_frame = root_frame or f"rpbi/{body.name}/{body.root_link}"
-        self.frames = (self.root_frame, *(f"rpbi/{body.name}/{body.link_name(index)}" for index in self._indices))
+        self.tf_frames = (self.root_frame, *(f"rpbi/{body.name}/{body.link_name(index)}" for index in self._indices))
 
     def read(self, tick: int) -> LinkPoseSample:
         """Reads the base and all links."""
@@ -42,6 +43,6 @@ class LinkPoseSensor(Sensor):
         if not math.isfinite(sum(base.position)):
             raise PhysicsError(f"{self.name}: pose is not finite any more at tick {tick}: {base.position}")
         if not self._indices:
-            return LinkPoseSample(self.name, self.frames, (base,))
+            return LinkPoseSample(self.name, self.tf_frames, (base,))
         states = pb.getLinkStates(body_id, self._indices, computeForwardKinematics=1)
-        return LinkPoseSample(self.name, self.frames, (base, *(Pose(state[4], state[5]) for state in states)))
+        return LinkPoseSample(self.name, self.tf_frames, (base, *(Pose(state[4], state[5]) for state in states)))

@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 
-from rpbi.bodies.body import Body
 from rpbi.config.sensors import RgbdSensorConfig
 from rpbi.engine.clock import Clock
 from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Pose
 from rpbi.samples import SceneSample
 
+from .sensed import SensedBody
 from .sensor import Sensor
 
 
@@ -22,8 +22,11 @@ class RgbdSensor(Sensor):
 
     Config = RgbdSensorConfig
     sample_type = SceneSample
+    ros_topic = None
 
-    def __init__(self, config: RgbdSensorConfig, bodies: Mapping[str, Body], clock: Clock, topic_name: str) -> None:
+    def __init__(
+        self, config: RgbdSensorConfig, bodies: Mapping[str, SensedBody], clock: Clock, topic_name: str
+    ) -> None:
         super().__init__(config.name, config.hz)
         self.config = config
         self.topic_name = topic_name
@@ -33,7 +36,7 @@ class RgbdSensor(Sensor):
         self._clock = clock
 
     def inputs(self) -> Mapping[str, Input]:
-        """Takes `pose`, the pose of the optical frame in the world."""
+        """Returns `pose`, the pose of the optical frame in the world."""
         return {"pose": PoseInput.following(self.config.object_tf, self._set_pose)}
 
     def read(self, tick: int) -> SceneSample | None:

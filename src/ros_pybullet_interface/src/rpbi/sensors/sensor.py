@@ -1,38 +1,15 @@
-"""What every sensor has in common."""
+"""Base classes of sensors."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 from rpbi.config.sensors import SensorConfig
-from rpbi.engine.client import Client
-from rpbi.engine.clock import Clock
 from rpbi.engine.inputs import Input
 
-
-class SensedWorld(Protocol):
-    """What a sensor may ask of its world, which is a `World`."""
-
-    pb: Client
-    clock: Clock
-
-    @property
-    def bodies(self) -> Mapping[str, Any]:
-        """All bodies by name."""
-
-    @property
-    def cameras(self) -> Mapping[str, Any]:
-        """All cameras by name, each an `RgbdSensor`."""
-
-    @property
-    def contacts(self) -> Any:
-        """Who touches whom, a `ContactReader`."""
-
-    @property
-    def attachments(self) -> Any:
-        """Who holds whom, `Attachments`."""
+from .sensed import SensedWorld
 
 
 class Sensor(ABC):
@@ -40,15 +17,20 @@ class Sensor(ABC):
 
     Attributes:
         name: The body or sensor that its topics are named after.
-        hz: How often it is read [Hz] of the world's time, 0 is never; the world changes it.
-        wanted: Whether anybody looks at its samples; it is not read while nobody does.
+        hz: Rate [Hz] of the world's time, 0 is never; the world changes it.
+        wanted: Whether its samples have receivers; it is not read without.
     """
 
     wanted: bool = True
     sample_type: ClassVar[type]
-    """The type of its samples, by which their topic is found."""
-    ros_topic: ClassVar[str] = ""
-    """Where to find the topic of a sensor from another package, a Topic, as `module:NAME`."""
+    """Type of its samples."""
+    ros_topic: ClassVar[str | None] = ""
+    """Place of its `Topic`, as `module:NAME`.
+
+    Empty stands for the topic of the sensors of this package with the same type of samples, None for no topic.
+    """
+    tf_frames: tuple[str, ...] = ()
+    """TF frames that it publishes, without prefix."""
     topic: str | None = None
     """Name of its topic, where it is not the one that the Topic has."""
 
@@ -57,11 +39,11 @@ class Sensor(ABC):
         self.hz = hz
 
     def enter(self, world: SensedWorld) -> None:  # noqa: B027 (most sensors need nothing but their body)
-        """Gets to know the world that it is in, before it is read for the first time."""
+        """Enters its world, before it is read for the first time."""
 
     @abstractmethod
     def read(self, tick: int) -> Any:
-        """Returns a sample of the world at `tick`, None if there is nothing to tell yet.
+        """Returns a sample of the world at `tick`, None if there is none yet.
 
         Raises:
             PhysicsError: If the world holds something that is not finite.
@@ -74,7 +56,7 @@ class Sensor(ABC):
         """Acts just after the physics of each tick, before sensors are read."""
 
     def inputs(self) -> Mapping[str, Input]:
-        """Returns what the sensor takes while the world runs, by name."""
+        """Returns the inputs of the sensor by name."""
         return {}
 
 

@@ -3,9 +3,9 @@
 import math
 
 from custom_ros_tools.errors import PhysicsError
-from rpbi.bodies.body import Body
 from rpbi.samples import SurfaceSample
 
+from .sensed import SensedBody
 from .sensor import Sensor
 
 
@@ -13,8 +13,9 @@ class SurfaceSensor(Sensor):
     """Where the triangles of a soft body's surface are."""
 
     sample_type = SurfaceSample
+    ros_topic = "rpbi.ros.publishers.sample_topics:SURFACE"
 
-    def __init__(self, body: Body, hz: float) -> None:
+    def __init__(self, body: SensedBody, hz: float) -> None:
         super().__init__(body.name, hz)
         self._body = body
         self._rgba = body.pb.getVisualShapeData(body.body_id)[0][7]

@@ -1,8 +1,8 @@
-"""How far a robot is with its trajectory."""
+"""Progress of a robot on its trajectory as a sensor."""
 
 from rpbi.control.joint_drive import JointDrive
 from rpbi.control.trajectories.follower import TrajectoryFollower
-from rpbi.control.trajectories.trajectory import ControllerState
+from rpbi.control.trajectories.trajectory import TrajectoryStateSample
 
 from .sensor import Sensor
 
@@ -10,13 +10,14 @@ from .sensor import Sensor
 class TrajectoryStateSensor(Sensor):
     """Where the joints of a robot's follower of trajectories are to be, and where they are."""
 
-    sample_type = ControllerState
+    sample_type = TrajectoryStateSample
+    ros_topic = "rpbi.ros.publishers.sample_topics:TRAJECTORY_STATE"
 
     def __init__(self, drive: JointDrive, follower: TrajectoryFollower) -> None:
         super().__init__(drive.name, follower.config.state_publish_rate)
         self._dt_s = drive.dt_s
         self._follower = follower
 
-    def read(self, tick: int) -> ControllerState:
+    def read(self, tick: int) -> TrajectoryStateSample:
         """Reads the joints that the follower drives."""
         return self._follower.state(tick * self._dt_s)

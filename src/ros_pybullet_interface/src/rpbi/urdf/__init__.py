@@ -1,1 +1,1 @@
-"""What a URDF says of a robot."""
+"""URDFs in PyBullet."""

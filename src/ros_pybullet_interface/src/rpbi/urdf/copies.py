@@ -1,4 +1,4 @@
-"""Changed copies of a URDF."""
+"""Changed copies of a URDF for PyBullet and for ROS."""
 
 import copy
 import logging
@@ -6,10 +6,8 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 from custom_ros_tools.errors import ConfigError, Problem, shortened
-from rpbi.geometry import scaled
-
-from .document import UrdfDocument
-from .elements import (
+from robot_model.urdf.document import UrdfDocument
+from robot_model.urdf.elements import (
     READ,
     Element,
     UrdfJoint,
@@ -18,11 +16,10 @@ from .elements import (
     inertial,
     joint_element,
     new_element,
-    read_vector,
     text_of,
-    words,
 )
-from .files import address_for_ros, beside_or_above, found_mesh
+from robot_model.urdf.files import beside_or_above, found_by_ros, found_mesh
+from rpbi.meshes.copies import with_textures_that_exist
 
 log = logging.getLogger(__name__)
 
@@ -79,10 +76,11 @@ def for_pybullet(document: UrdfDocument, files: Files) -> Element:
 
 
 def description_for_ros(path: str) -> str:
-    """Returns a URDF file as ROS wants it, which does not know where the file is.
+    """Returns the text of a URDF file for ROS, which does not have its path.
 
     Returns:
-        Its text, with relative mesh paths as `file://` addresses; paths of ROS packages stay.
+        Its text, with relative mesh paths as `file://` addresses; paths of ROS packages stay. Meshes whose textures
+        are missing are copies without them.
 
     Raises:
         ConfigError: If it is no URDF, or a mesh belongs to an unknown package.
@@ -91,54 +89,15 @@ def description_for_ros(path: str) -> str:
     robot = copy.deepcopy(document.root)
     for tag in ("mesh", "texture"):
         for element in robot.iterfind(f".//{tag}[@filename]"):
-            element.set("filename", address_for_ros(element.get("filename", ""), document.source))
+            found = found_by_ros(element.get("filename", ""), document.source)
+            element.set("filename", found if isinstance(found, str) else f"file://{with_textures_that_exist(found)}")
     return text_of(robot)
 
 
 WORLD_LINK = "world"
-"""The link that PyBullet takes for the world: without inertia it weighs nothing, and as a root it is fixed."""
+"""Name of the link that PyBullet treats as the world: without inertia it has no mass, and as a root it is fixed."""
 LEAST_KG = "1e-06"
 """Mass of a floating root that is a mere frame [kg]: PyBullet would fix one without mass to the world."""
-
-
-def without_shapes(document: UrdfDocument, links: Sequence[str] | None = None) -> str:
-    """Returns a URDF without shapes, of all or some links and the joints between them.
-
-    It loads in half a millisecond where meshes take up to some hundred. Every link has unit mass at its own frame, so
-    that PyBullet's frames of mass centres are the links' frames.
-    """
-    root = document.root_link()
-    kept = sorted((name for name in document.links if links is None or name in links), key=lambda name: name != root)
-    ends = {*kept}
-    every = document.joint_elements
-    tied = (one for one in every if links is None or {end_of(one, "parent"), end_of(one, "child")} <= ends)
-    joints = map(as_read, tied)
-    bare = [new_element("link", inertial("1"), name=name) for name in kept]
-    return text_of(new_element("robot", *bare, *joints, **document.root.attrib))
-
-
-def with_limited_joints(document: UrdfDocument, base: str | None = None) -> str:
-    """Returns a URDF with limits from 0 to 0, which mean none, for joints that turn without end.
-
-    So each of them has one number in Pinocchio, which else has two for it, sine and cosine.
-
-    Args:
-        base: The link that all hangs on instead of the root.
-
-    Raises:
-        ValueError: If a joint between it and the root makes no sense; it names the joint.
-    """
-    root = copy.deepcopy(document.root)
-    if base is not None:
-        _hang_on(root, base)
-    for joint in root.findall("joint"):
-        if joint.get("type") == "continuous":
-            joint.set("type", "revolute")
-            if joint.find("limit") is None:
-                joint.append(new_element("limit", effort="0", velocity="0"))
-            for limit in joint.iterfind("limit"):
-                limit.attrib.update(lower="0", upper="0")
-    return text_of(root)
 
 
 def mounted_on(robot: Element, root_link: str, joints: Sequence[UrdfJoint]) -> None:
@@ -159,11 +118,11 @@ def mounted_on(robot: Element, root_link: str, joints: Sequence[UrdfJoint]) -> N
 
 
 def frame_masses(document: UrdfDocument, is_fixed: bool) -> dict[str, str]:
-    """Returns the masses [kg] of links that are mere frames, which PyBullet would give 1 kg each.
+    """Returns the masses [kg] of links that are mere frames, to which PyBullet would assign 1 kg each.
 
-    A frame is a link without inertia and shape. It weighs nothing, but PyBullet needs some mass where something moves
-    freely: a root that is not fixed weighs `LEAST_KG`, if mass is fixed to it. Left out are frames on a moving joint
-    that moves no mass, and a root that is neither fixed nor has mass fixed to it.
+    A frame is a link without inertia and shape. It has no mass, but PyBullet needs some mass on free bodies: a root
+    that is not fixed weighs `LEAST_KG`, if mass is fixed to it. Left out are frames on a moving joint that moves no
+    mass, and a root that is neither fixed nor has mass fixed to it.
 
     Args:
         is_fixed: Whether the base is fixed to the world.
@@ -201,14 +160,14 @@ def _from_the_root(document: UrdfDocument) -> list[str]:
 
 
 def weigh_frames(robot: Element, masses: Mapping[str, str]) -> None:
-    """Gives links of a robot, by name, masses [kg] such as `frame_masses` returns."""
+    """Sets masses [kg] of links of a robot, by name, such as `frame_masses` returns."""
     for link in robot.findall("link"):
         if (mass := masses.get(link.get("name", ""))) is not None:
             link.append(inertial(mass))
 
 
 def weighed_by_pybullet(document: UrdfDocument, is_fixed: bool) -> list[str]:
-    """Returns the links that can move and weigh 1 kg because the URDF says nothing of their mass."""
+    """Returns the links that can move and weigh 1 kg because the URDF has no mass for them."""
     above = {edge.child: edge for edge in document.edges}
     moving: set[str] = set()
     for link in _from_the_root(document):
@@ -239,39 +198,3 @@ def put_first_visuals_last(robot: Element) -> None:
         if len(visuals := link.findall("visual")) > 1:
             link.remove(visuals[0])
             link.append(visuals[0])
-
-
-def chain_urdf(joints: Sequence[UrdfJoint]) -> str:
-    """Returns a URDF of a chain of joints with bare links, from its base to its tip."""
-    links = [new_element("link", name=name) for name in (joints[0].parent, *(joint.child for joint in joints))]
-    return text_of(new_element("robot", *links, *map(joint_element, joints), name="chain"))
-
-
-def _hang_on(robot: Element, base: str) -> None:
-    """Turns the joints between a link and the root around, with further links; their positions mean what they did."""
-    above = {end_of(joint, "child"): joint for joint in robot.findall("joint")}
-    link = base
-    while (joint := above.pop(link, None)) is not None:
-        name, parent = joint.get("name", ""), end_of(joint, "parent")
-        x, y, z = read_vector(joint, "origin", "xyz", "0 0 0")
-        roll, pitch, yaw = read_vector(joint, "origin", "rpy", "0 0 0")
-        backwards = scaled(-1.0, read_vector(joint, "axis", "xyz", "1 0 0"))
-        for part in ("origin", "axis", "parent", "child"):
-            for element in joint.findall(part):
-                joint.remove(element)
-        # A joint moves where its origin puts it, so the origin comes back afterwards, one turn after the other.
-        steps = (
-            ("rpy", (-roll, 0.0, 0.0)),
-            ("rpy", (0.0, -pitch, 0.0)),
-            ("rpy", (0.0, 0.0, -yaw)),
-            ("xyz", (-x, -y, -z)),
-        )
-        ends = [*(f"{name}/{number}" for number in range(len(steps))), parent]
-        joint.extend([new_element("parent", link=link), new_element("child", link=ends[0])])
-        joint.append(new_element("axis", xyz=words(backwards)))
-        for (kind, vector), start, end in zip(steps, ends, ends[1:]):
-            between = [new_element("parent", link=start), new_element("child", link=end)]
-            origin = new_element("origin", **{kind: words(vector)})
-            robot.append(new_element("link", name=start))
-            robot.append(new_element("joint", *between, origin, name=f"{start}/fixed", type="fixed"))
-        link = parent

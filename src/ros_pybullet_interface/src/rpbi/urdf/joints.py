@@ -1,29 +1,24 @@
-"""What is known of a robot's joints."""
+"""Joints of a robot."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import pybullet
 
 from custom_ros_tools.errors import UnknownNameError
-from custom_ros_tools.schema.type_names import shown
+from robot_model.joints import AffineMap, followed
+from robot_model.limits import LIMIT_ROUNDING, MAX_MAGNITUDE
+from robot_model.urdf.elements import Mimic
 from rpbi.engine.client import Client
-from rpbi.plain_values import joint_values
-
-from .elements import Mimic
 
 _TYPES = ("JOINT_REVOLUTE", "JOINT_PRISMATIC", "JOINT_SPHERICAL", "JOINT_PLANAR", "JOINT_FIXED")
 _TYPE_NAMES = {getattr(pybullet, name): name for name in _TYPES}
-QUANTITIES = ("position", "velocity", "effort")
-LARGEST = 1e9
-"""Positions, velocities and efforts beyond this are no use to anybody, and would not stay finite."""
-LIMIT_ROUNDING = 1e-6
-"""A position may be this far beyond a limit [rad or m] and still counts as within."""
 
 
 @dataclass(frozen=True)
@@ -109,59 +104,6 @@ class Joint:
         return self.type in (pybullet.JOINT_REVOLUTE, pybullet.JOINT_PRISMATIC)
 
 
-class WrongQuantityError(ValueError):
-    """A target gives other quantities than those that are asked for."""
-
-
-class JointTarget(NamedTuple):
-    """Values for some of a robot's joints; the others keep theirs.
-
-    Attributes:
-        names: n joint names.
-        position: n positions [rad or m], or none.
-        velocity: n velocities [rad/s or m/s], or none.
-        effort: n torques or forces [N m or N], or none.
-        stamp_ns: When it was sent, by the sender's clock [ns], 0 if that is not known.
-    """
-
-    names: Sequence[str]
-    position: Sequence[float] = ()
-    velocity: Sequence[float] = ()
-    effort: Sequence[float] = ()
-    stamp_ns: int = 0
-
-    @classmethod
-    def of(cls, given: JointTarget | Mapping[str, float], quantity: str) -> JointTarget:
-        """Returns a target; a mapping of joints to numbers becomes one of that quantity.
-
-        Raises:
-            ValueError: If it is neither.
-        """
-        if isinstance(given, cls):
-            return given
-        if not isinstance(given, Mapping):
-            raise ValueError(f"expected a JointTarget or a mapping of joints to numbers, got {shown(given)}")
-        values = joint_values(given)
-        given_values: dict[str, Any] = {quantity: tuple(values.values())}
-        return cls(tuple(values), **given_values)
-
-    def values_of(self, quantity: str, reason: str) -> Sequence[float]:
-        """Returns the values of one quantity.
-
-        Args:
-            quantity: `position`, `velocity` or `effort`.
-            reason: Why it must be this one, for the message.
-
-        Raises:
-            WrongQuantityError: If joints are named and it has none for them.
-        """
-        values: Sequence[float] = getattr(self, quantity)
-        if not values and self.names:
-            given = " and ".join(each for each in QUANTITIES if getattr(self, each)) or "no values"
-            raise WrongQuantityError(f"expected {quantity}, since {reason}; got {given}")
-        return values
-
-
 class Coupling(NamedTuple):
     """That a joint follows another: its position is `multiplier` times that of the leader, plus `offset`.
 
@@ -181,14 +123,14 @@ class JointModel:
 
     Args:
         joints: All joints in PyBullet's index order.
-        base_joints: How many of them, the first ones, move its base and are none of the robot's own.
-        mimics: What joints follow others, by name.
+        base_joints: Number of the first joints, which move its base and are not the robot's own.
+        mimics: Mimic joints by name.
 
     Attributes:
         own: All of its own joints.
         moving: Those that have one axis.
-        couplings: By index, what joints follow others.
-        driven: Those of one axis that follow no other: motors drive them.
+        couplings: Couplings of mimic joints, by index.
+        driven: Those of one axis that are no mimic joints: motors drive them.
 
     Raises:
         ValueError: If a joint cannot follow another; it names the joint.
@@ -204,6 +146,13 @@ class JointModel:
         mimics = {name: mimic for name, mimic in mimics.items() if name in self._by_name and self[name].is_driven}
         self.couplings = {self[name].index: self._coupling(name, mimics) for name in mimics}
         self.driven = tuple(joint for joint in self.moving if joint.index not in self.couplings)
+        self._mimics = mimics
+
+    @cached_property
+    def by_driven(self) -> AffineMap:
+        """The map from the driven joints to those that have one axis."""
+        names, driven = ([joint.name for joint in joints] for joints in (self.moving, self.driven))
+        return AffineMap.of(names, driven, self._mimics)
 
     def __getitem__(self, name: str) -> Joint:
         """Returns a joint by name.
@@ -217,15 +166,8 @@ class JointModel:
             raise UnknownNameError("joint", name, list(self._by_name)) from None
 
     def _coupling(self, name: str, mimics: Mapping[str, Mimic]) -> Coupling:
-        """Returns what a joint follows in the end: the leader may follow another itself."""
-        leader, multiplier, offset = mimics[name]
-        passed = [name]
-        while leader in mimics and leader not in passed:
-            passed.append(leader)
-            leader, more, shift = mimics[leader]
-            multiplier, offset = multiplier * more, multiplier * shift + offset
-        if leader in passed:
-            raise ValueError(f"joint '{name}' follows '{mimics[name].joint}', which follows itself in the end")
+        """Returns the joint that a joint follows in the end."""
+        leader, multiplier, offset = followed(name, mimics)
         if leader not in self._by_name or not self[leader].is_driven:
             movable = ", ".join(joint.name for joint in self.moving)
             raise ValueError(f"joint '{name}' follows '{leader}', which is none that moves; there are {movable}")
@@ -239,7 +181,7 @@ class JointModel:
             if leader == joint.index
         )
 
-    def with_followers(self, positions: Mapping[int, float], offsets: bool = True) -> dict[int, float]:
+    def with_mimic_joints(self, positions: Mapping[int, float], offsets: bool = True) -> dict[int, float]:
         """Returns positions by joint index, with those of the joints that follow them; velocities without `offsets`."""
         followers = {
             index: multiplier * positions[leader] + (offset if offsets else 0.0)
@@ -251,7 +193,7 @@ class JointModel:
     def resolve(self, names: Sequence[str], values: Sequence[float]) -> dict[int, float]:
         """Checks values of joints and returns them by joint index.
 
-        Fixed joints, and those that follow others, are known but not driven.
+        Fixed joints and mimic joints are accepted but not driven.
 
         Raises:
             UnknownNameError: If the robot lacks one of the joints.
@@ -266,8 +208,8 @@ class JointModel:
             joint = self[name]
             if not math.isfinite(value):
                 raise ValueError(f"values must be finite, got {value} for joint '{name}'")
-            if abs(value) > LARGEST:
-                raise ValueError(f"values must be within +-{LARGEST:g}, got {value:g} for joint '{name}'")
+            if abs(value) > MAX_MAGNITUDE:
+                raise ValueError(f"values must be within +-{MAX_MAGNITUDE:g}, got {value:g} for joint '{name}'")
             if joint.is_driven and joint.index not in self.couplings:
                 resolved[joint.index] = float(value)
         return resolved

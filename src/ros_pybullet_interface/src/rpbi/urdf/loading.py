@@ -11,26 +11,26 @@ from typing import Any, NamedTuple
 import pybullet
 
 from custom_ros_tools.errors import ConfigError, Problem, shortened
-from rpbi.config.asset_files import ROBOT_DESCRIPTION
+from robot_model.asset_files import ROBOT_DESCRIPTION
+from robot_model.urdf.document import UrdfDocument
+from robot_model.urdf.elements import Element, text_of
+from robot_model.urdf.files import found_mesh
+from robot_model.urdf.structure import check_structure, structure_problems
 from rpbi.engine.client import MAXIMAL_COORDINATES, Client
 from rpbi.meshes.checks import mesh_file_problem
 from rpbi.meshes.trial import Mesh, Use, faults_in
 
 from .copies import Files, files_of, for_pybullet, frame_masses, put_first_visuals_last, put_root_first, weigh_frames
-from .document import UrdfDocument
-from .elements import Element, text_of
-from .files import found_mesh
-from .structure import check_structure, structure_problems
 
 log = logging.getLogger(__name__)
 
-MOST_JOINTS = 127
-"""Joints of a robot that PyBullet can tell of, fixed ones too."""
+MAX_JOINTS = 127
+"""Largest number of joints that PyBullet reports of a robot, fixed ones included; beyond it, fixed ones are merged."""
 MESH_FORMATS = (".obj", ".stl", ".dae", ".cdf")
 OTHER_FORMATS = {"sdf": "SDF", "world": "SDF", "gazebo": "SDF", "mujoco": "MJCF"}
 """Formats of robots that are not read, by the element at the top of their files."""
 PLACEHOLDER_FACTOR = 10.0
-"""Moments of inertia this many times what a link's size allows are taken for placeholders."""
+"""Ratio of moments of inertia to those possible for a link's size above which they are placeholders."""
 
 
 def urdf_problems(path: str) -> list[str]:
@@ -45,7 +45,7 @@ def urdf_problems(path: str) -> list[str]:
     except ConfigError as error:
         return [str(error).replace(": is not XML", " is not XML")]
     if document.tag in OTHER_FORMATS:
-        return [f"{path} is {OTHER_FORMATS[document.tag]}, not URDF; docs/robots.md says how to make a URDF of it"]
+        return [f"{path} is {OTHER_FORMATS[document.tag]}, not URDF; see docs/robots.md for a conversion to URDF"]
     if document.tag != "robot":
         return [f"{path}: expected <robot> at the top, got <{shortened(document.tag)}>"]
     if not document.links and not document.is_soft:
@@ -66,8 +66,8 @@ def check_joints(file: str, robot: Element) -> None:
         ConfigError: If there are too many.
     """
     moving = sum(joint.get("type") != "fixed" for joint in robot.findall("joint"))
-    if moving > MOST_JOINTS:
-        message = f"expected at most {MOST_JOINTS} joints that are not fixed, got {moving}"
+    if moving > MAX_JOINTS:
+        message = f"expected at most {MAX_JOINTS} joints that are not fixed, got {moving}"
         raise ConfigError([Problem(file, "", message)])
 
 
@@ -123,11 +123,11 @@ def prepared_urdf(
 
     Args:
         arguments: Those of `loadURDF`.
-        prepare: Makes the robot that PyBullet shall read.
+        prepare: Returns the URDF for PyBullet.
         has_window: Whether PyBullet draws it.
 
     Raises:
-        ConfigError: If it cannot be loaded; it names what is wrong with the file.
+        ConfigError: If it cannot be loaded; it names the problem of the file.
     """
     document = UrdfDocument(arguments["fileName"])
     check_structure(document)
@@ -158,11 +158,11 @@ def load_urdf(
     Args:
         name: Name of the body, for messages.
         arguments: Those of `loadURDF`.
-        prepare: Makes the robot that PyBullet shall read.
-        inertia_from_urdf: Whether moments of inertia are the URDF's, else PyBullet guesses them unless `flags` say.
+        prepare: Returns the URDF for PyBullet.
+        inertia_from_urdf: Whether moments of inertia are the URDF's, else PyBullet guesses them unless `flags` are set.
 
     Raises:
-        ConfigError: If it cannot be loaded; it names what is wrong with the file.
+        ConfigError: If it cannot be loaded; it names the problem of the file.
     """
     file: str = arguments["fileName"]
     try:
@@ -170,8 +170,8 @@ def load_urdf(
         asked = arguments.get("flags") or 0
         flags = flags_for(robot.joints, asked)
         if flags != asked:
-            message = "%d joints are more than the %d that PyBullet takes: fixed ones are left out, with their links"
-            log.warning(f"%s: {message}", name, robot.joints, MOST_JOINTS)
+            message = "%d joints are more than the %d of PyBullet: fixed ones are left out, with their links"
+            log.warning(f"%s: {message}", name, robot.joints, MAX_JOINTS)
         if inertia_from_urdf:
             flags |= pybullet.URDF_USE_INERTIA_FROM_FILE
         with tempfile.NamedTemporaryFile("w", suffix=".urdf", encoding="utf-8") as written:
@@ -194,11 +194,11 @@ def flags_for(joints: int, flags: int) -> int:
 
     PyBullet loads more than 127, but then does not report where joints and links are.
     """
-    return flags | (pybullet.URDF_MERGE_FIXED_LINKS if joints > MOST_JOINTS else 0)
+    return flags | (pybullet.URDF_MERGE_FIXED_LINKS if joints > MAX_JOINTS else 0)
 
 
 def _complete_inertias(pb: Client, name: str, body_id: int, without: Collection[str], scaling: float) -> None:
-    """Gives links without moments of inertia in the URDF some, and those of a scaled body its own."""
+    """Sets moments of inertia of links without any in the URDF, and those of a scaled body."""
     links = {index: pb.getJointInfo(body_id, index)[12] for index in range(pb.getNumJoints(body_id))}
     unusable, too_large = [], []
     for index, link in {-1: pb.getBodyInfo(body_id)[0], **links}.items():

@@ -2,11 +2,12 @@
 
 from typing import Any, NamedTuple
 
+from robot_model.geometry import Quaternion, Vector, cross, minus, plus, scaled
 from rpbi.engine.client import Client
-from rpbi.geometry import Quaternion, Vector, cross, minus, plus, rotated, rotated_back, scaled
+from rpbi.geometry import rotated, rotated_back
 
 LinkStates = tuple[Any, ...]
-"""What PyBullet's `getLinkStates` returned for the subtree's links, with velocities."""
+"""Result of PyBullet's `getLinkStates` for the subtree's links, with velocities."""
 
 
 class Momentum(NamedTuple):
@@ -46,16 +47,16 @@ class Subtree:
             if pb.getJointInfo(body_id, index)[16] in links:
                 links.append(index)
         self.links = tuple(links)
-        self.take_dynamics()
+        self.update_dynamics()
 
-    def take_dynamics(self) -> None:
-        """Takes the links' masses and inertias as they are now."""
+    def update_dynamics(self) -> None:
+        """Reads the present masses and inertias of the links."""
         infos = [self._pb.getDynamicsInfo(self._body_id, link) for link in self.links]
         self._inertias = tuple((float(info[0]), info[2]) for info in infos)
         self.mass_kg = sum(mass for mass, _ in self._inertias)
 
     def states(self) -> LinkStates:
-        """Reads where the links are and how they move, to be made sense of later."""
+        """Returns poses and velocities of the links."""
         states: LinkStates = self._pb.getLinkStates(
             self._body_id, self.links, computeLinkVelocity=1, computeForwardKinematics=1
         )

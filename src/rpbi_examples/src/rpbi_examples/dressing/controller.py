@@ -10,11 +10,11 @@ from .way import AHEAD_AT_START, ArmPosition, Array, Way
 TARGET_HZ = 50
 """Targets a second."""
 SETTLING_S = 0.5
-"""For so long the cuff is held at the end of its way [s]."""
-LARGEST_LEAD_M = 0.02
-"""The next place of the cuff is so far from where it is at most; it goes no further until it has come so near [m]."""
-LARGEST_TURN_RATE = 1.5
-"""Of the cuff [rad/s]."""
+"""Time for which the cuff is held at the end of its path [s]."""
+MAX_LEAD_M = 0.02
+"""Largest distance of the cuff's next place from its present one [m]; it waits until the cuff is that near."""
+MAX_TURN_RATE = 1.5
+"""Largest angular speed of the cuff [rad/s]."""
 
 
 class Dressing:
@@ -24,7 +24,7 @@ class Dressing:
     hand that does not follow, so that the hand has never far to go when it can again.
 
     Args:
-        speed: Of the cuff where nothing is touched [m/s].
+        speed: Speed of the cuff without contact [m/s].
     """
 
     def __init__(self, speed: float) -> None:
@@ -56,17 +56,17 @@ class Dressing:
         if self._left_m is None:
             self._left_m = way.length
         speed = self._speed * max(-1.0, 1.0 - force_share)
-        if np.linalg.norm(way.place(way.length - self._left_m) - cuff) > LARGEST_LEAD_M:
+        if np.linalg.norm(way.place(way.length - self._left_m) - cuff) > MAX_LEAD_M:
             speed = min(speed, 0.0)
         self._left_m = min(max(self._left_m - speed * dt, 0.0), way.length)
         self._rested_s = 0.0 if self._left_m else self._rested_s + dt
         done = way.length - self._left_m
-        self._ahead = _towards(self._ahead, way.ahead(done), LARGEST_TURN_RATE * dt)
+        self._ahead = _towards(self._ahead, way.ahead(done), MAX_TURN_RATE * dt)
         self._ahead /= np.linalg.norm(self._ahead)
-        return holding(_towards(cuff, way.place(done), LARGEST_LEAD_M), self._ahead)
+        return holding(_towards(cuff, way.place(done), MAX_LEAD_M), self._ahead)
 
 
 def _towards(start: Array, end: Array, largest: float) -> Array:
-    """Returns the end if it is so near, else a point on the way to it."""
+    """Returns the end if it is within the distance, otherwise a point on the way to it."""
     step = end - start
     return start + step * min(1.0, largest / max(float(np.linalg.norm(step)), 1e-12))

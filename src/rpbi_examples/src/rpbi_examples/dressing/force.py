@@ -54,7 +54,7 @@ class ArmForce:
     Attributes:
         arm_n: Sum over the arm, as mean over 0.1 s [N].
         peak_n: Largest of these so far [N].
-        share: How much of the limit that is nearest is used; above 1 it is exceeded.
+        share: Largest share of a limit that is used; above 1 it is exceeded.
         peak_share: Largest of these so far.
     """
 

@@ -8,28 +8,28 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rpbi.geometry import Pose
+from robot_model.geometry import Pose
 from rpbi.kinematics import Kinematics
 from rpbi.kinematics.problem import PybulletProblem
 
 from .way import Array
 
 RADIUS_M = 0.085
-"""Of the sleeve."""
+"""File of the sleeve."""
 ROBOT, HAND_LINK = "franka_panda/panda.urdf", "panda_grasptarget"
-"""Of PyBullet's data."""
+"""File of PyBullet's data."""
 ROBOT_BASE = Pose((0.4, -0.85, 0.7))
-"""Where the robot stands, as in `panda.yaml`."""
-LARGEST_TURN_RAD = 0.3
+"""Base of the robot, as in `panda.yaml`."""
+MAX_TURN_RAD = 0.3
 """Joints that would have to turn farther for the next target stay where they are."""
 
 
 class HandTarget(NamedTuple):
-    """Where the point between the fingertips of the robot is to be in the world.
+    """Pose of the point between the fingertips of the robot in the world.
 
     Attributes:
         position: x, y, z [m].
-        quat_xyzw: Its orientation: z points at the person's arm, and x where the sleeve trails.
+        quat_xyzw: Its orientation: z points at the person's arm, and x along the trailing sleeve.
     """
 
     position: tuple[float, float, float]
@@ -82,5 +82,5 @@ class HandSolver:
         solution = self._kinematics.solve(problem)
         found = dict(zip(solution.chain, solution.chain_positions))
         now = dict(zip(self._kinematics.joint_names, positions))
-        near = all(abs(found[name] - now[name]) <= LARGEST_TURN_RAD for name in found)
+        near = all(abs(found[name] - now[name]) <= MAX_TURN_RAD for name in found)
         return found if solution.success and near else None

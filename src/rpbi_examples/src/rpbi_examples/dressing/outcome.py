@@ -1,4 +1,4 @@
-"""Whether somebody is dressed."""
+"""Evaluation of whether a person is dressed."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from .way import ArmPosition, Array
 AROUND, RINGS = 14, 12
 """Corners of each ring of the sleeve, and rings."""
 ENOUGH_M = 0.05
-"""How far counts as past the elbow [m]."""
+"""Distance past the elbow that counts as past [m]."""
 
 
 class Outcome(NamedTuple):
-    """What became of it.
+    """Result of dressing.
 
     Attributes:
-        past_elbow_m: How far the middle of the cuff is past the elbow, along the upper arm [m].
+        past_elbow_m: Distance of the middle of the cuff past the elbow, along the upper arm [m].
         is_around: Whether the arm is inside the cuff, and inside the ring of the sleeve that is nearest to the elbow.
         peak_force_n: Largest force on the arm [N]: the sum of all magnitudes, as mean over 0.1 s.
-        peak_share: How much of a force's limit was used at most: of a contact, of a segment or of the arm.
+        peak_share: Largest share of a force limit that was reached: of a contact, of a segment or of the arm.
     """
 
     past_elbow_m: float
@@ -44,10 +44,10 @@ class Outcome(NamedTuple):
 
 
 def outcome(rings: Array, arm: ArmPosition, force: ArmForce) -> Outcome:
-    """Returns what became of it.
+    """Returns the result of dressing.
 
     Args:
-        rings: Of the sleeve (11 x 14 x 3) [m].
+        rings: Rings of the sleeve (11 x 14 x 3) [m].
         arm: Where the person's arm is.
         force: Forces on the arm so far.
     """

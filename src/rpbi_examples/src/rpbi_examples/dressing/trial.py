@@ -15,7 +15,7 @@ from operator_node.avatar.joints import HINGES
 from operator_node.avatar.retargeting import AvatarPose, Retargeting
 from operator_node.avatar.segment_forces import forces_by_segment
 from operator_node.emulators.arm_held_out import RAISING_S, ArmHeldOut
-from rpbi.geometry import Pose, Vector
+from robot_model.geometry import Pose, Vector
 from rpbi.samples import ContactsSample, SurfaceSample
 from rpbi.world import World
 
@@ -28,18 +28,18 @@ from .way import ArmPosition
 WORLD = "{rpbi_examples}/configs/telepresence/config.yaml"
 AVATAR_HEIGHT_M = 1.75
 HEIGHTS_M = (1.60, 1.90)
-"""Of the people."""
+"""Heights of the people."""
 FORCE_LIMIT_N, SPEED = 15.0, 0.1
-LONGEST_S = 30.0
+MAX_DURATION_S = 30.0
 
 
 def run_trial(seed: int, force_limit_n: float = FORCE_LIMIT_N, speed: float = SPEED) -> Outcome:
-    """Runs the example as fast as it goes and returns what became of it.
+    """Runs the example as fast as possible and returns its result.
 
     Args:
-        seed: Of the person: how tall they are, and how they hold the arm.
+        seed: Seed of the person's height and the pose of the arm.
         force_limit_n: Force on the arm above which the cuff goes back [N].
-        speed: Of the cuff [m/s].
+        speed: Speed of the cuff [m/s].
     """
     world = World.from_file(WORLD)
     try:
@@ -94,7 +94,7 @@ class Trial:
     @property
     def is_over(self) -> bool:
         """Whether the cuff is led no further, or it has taken too long."""
-        return self._dressing.is_done or self.time_s >= LONGEST_S
+        return self._dressing.is_done or self.time_s >= MAX_DURATION_S
 
     def step(self) -> None:
         """Goes on by the time of one target."""
@@ -130,7 +130,7 @@ class Trial:
 
 
 def main() -> int:
-    """Runs the command; returns 1 if somebody is not dressed."""
+    """Runs the command; returns 1 if a person is not dressed."""
     parser = argparse.ArgumentParser(description="Dresses people of chance, as fast as it goes and without ROS.")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0], metavar="N", help="one for each person, default 0")
     parser.add_argument("--force-limit", type=float, default=FORCE_LIMIT_N, metavar="N", help="on the arm [N]")

@@ -13,21 +13,21 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 CUFF = (0.86, -0.26, 1.43)
-"""Where the middle of the cuff is at the start [m], as in `sleeve.yaml`."""
+"""Initial position of the middle of the cuff [m], as in `sleeve.yaml`."""
 AHEAD_AT_START = (-1.0, 0.0, 0.0)
-"""Where the cuff is drawn to at the start, as unit vector."""
+"""Initial direction in which the cuff is drawn, as unit vector."""
 HAND_M, BEFORE_HAND_M = 0.19, 0.05
 """Length of a hand, and how far before it the cuff is in line with the forearm [m]."""
 PAST_ELBOW_M = 0.10
-"""How far past the elbow the cuff is drawn [m]."""
+"""Distance past the elbow to which the cuff is drawn [m]."""
 BLEND_M = 0.05
-"""Over so much of its way to either side of the elbow the cuff turns [m]."""
+"""Distance before and after the elbow over which the cuff turns [m]."""
 HELD_OUT_M = 0.25
-"""So near the start of the cuff is the place before the hand of one who holds out the arm [m]."""
+"""Distance from the start of the cuff to the place before the hand of a person who holds out the arm [m]."""
 
 
 class ArmPosition(NamedTuple):
-    """Where the joints of a person's arm are in the world (3 each) [m]."""
+    """Positions of the joints of a person's arm in the world (3 each) [m]."""
 
     shoulder: Array
     elbow: Array
@@ -41,7 +41,7 @@ class Way:
         arm: Where the person's arm is.
 
     Attributes:
-        length: Of the way [m].
+        length: Length of the way [m].
     """
 
     def __init__(self, arm: ArmPosition) -> None:

@@ -1,4 +1,4 @@
-"""Has an arm take a box, carry it to one place after the other and put it there, by topics and services alone."""
+"""Moves an arm that picks a box, carries it from place to place and puts it down, by topics and services only."""
 
 import math
 from itertools import cycle
@@ -17,7 +17,7 @@ LINK = "panda_grasptarget"
 FINGER = "panda_finger_joint1"
 GOALS = (PlanarPose(0.5, 0.2, 0.0), PlanarPose(0.4, -0.2, 0.35))
 MOVE_S, FINGERS_S = 2.0, 1.0
-"""Time that a step of the hand or of the fingers takes [s]."""
+"""Duration of a step of the hand or of the fingers [s]."""
 
 
 def main() -> None:

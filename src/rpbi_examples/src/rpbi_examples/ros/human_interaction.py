@@ -14,7 +14,7 @@ import rospy
 import tf2_ros
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from std_msgs.msg import Float64
-from std_srvs.srv import Empty, SetBool
+from std_srvs.srv import Empty, SetBool, Trigger
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.run_node import run_node
@@ -28,15 +28,15 @@ SENSOR = "rpbi/kuka_lwr/force_torque_sensor_mount/ft_sensor"
 WORLD, TOOL, TARGET = "rpbi/world", "rpbi/kuka_lwr/end_effector_ball", "rpbi/target"
 SAMPLE_HZ = 100.0
 PLOT_S = 0.25
-KEPT = 1000
-"""So many forces and poses wait on a busy machine until all that belongs to a moment is there."""
-SHOWN_S = 20.0
-"""So much of the past is in the window [s]."""
-LONGEST_FAREWELL_S = 15.0
+MAX_BUFFERED = 1000
+"""Largest number of forces and poses that wait on a busy machine until all data of a moment have arrived."""
+WINDOW_S = 20.0
+"""Time span shown in the window [s]."""
+MAX_FAREWELL_S = 15.0
 """Time-out of an interrupt by roslaunch [s]."""
 LEFT_S = 2.0
-"""So long after the scripted hand has gone, its press is over in any case [s]."""
-LARGEST_ERROR = 0.05
+"""Time after the end of the scripted hand at which its press is over in any case [s]."""
+MAX_ERROR = 0.05
 """Largest error of the mean force of a press, as a share of the force that stiffness and depth predict."""
 
 
@@ -52,10 +52,10 @@ class Watch:
             raise InterfaceError(message) from error
         self._is_scripted = rospy.get_param("~device", "") == "scripted"
         self._press = self._new_press()
-        self._measured: deque[tuple[rospy.Time, float]] = deque(maxlen=KEPT)
-        """What is not in a sample yet."""
-        self._felt_n: deque[tuple[float, float]] = deque(maxlen=KEPT)
-        self._handle_z: deque[tuple[float, float]] = deque(maxlen=KEPT)
+        self._measured: deque[tuple[rospy.Time, float]] = deque(maxlen=MAX_BUFFERED)
+        """Data that are not in a sample yet."""
+        self._felt_n: deque[tuple[float, float]] = deque(maxlen=MAX_BUFFERED)
+        self._handle_z: deque[tuple[float, float]] = deque(maxlen=MAX_BUFFERED)
         self._newest_s = 0.0
         self._start_s: float | None = None
         self._over = threading.Event()
@@ -64,21 +64,25 @@ class Watch:
         # what it reads while it touches nothing is the weight of the tool
         get_srv_handler(SENSOR, Empty)()
         self._reading = rospy.Publisher("ft_reading", Float64, queue_size=10)
-        rospy.Subscriber(SENSOR, WrenchStamped, self._measure, queue_size=KEPT, tcp_nodelay=True)
-        rospy.Subscriber("haptics/force", WrenchStamped, self._feel, queue_size=KEPT, tcp_nodelay=True)
-        rospy.Subscriber("haptics/pose", PoseStamped, self._move, queue_size=KEPT, tcp_nodelay=True)
+        rospy.Subscriber(SENSOR, WrenchStamped, self._measure, queue_size=MAX_BUFFERED, tcp_nodelay=True)
+        rospy.Subscriber("haptics/force", WrenchStamped, self._feel, queue_size=MAX_BUFFERED, tcp_nodelay=True)
+        rospy.Subscriber("haptics/pose", PoseStamped, self._move, queue_size=MAX_BUFFERED, tcp_nodelay=True)
         self._connected_s = float("inf")
         rospy.Subscriber("haptics/state", HapticState, self._note_state, queue_size=1)
+        if rospy.get_param("~guard", False):
+            get_srv_handler(
+                "robot_safety/start_subscriber", Trigger
+            )  # otherwise the press is over before it subscribes
         for toggle in ("ik/setup/kdl/toggle", "ik/solver/kdl/toggle", "haptics/toggle"):
             call_service(toggle, SetBool, True)
         rospy.loginfo("the handle moves the arm up and down; press it on the box")
         WallTimer(SAMPLE_HZ, self._sample)
 
     def run(self) -> None:
-        """Shows the figure while it comes, until ROS shuts down or the scripted press is over.
+        """Shows the live figure, until ROS shuts down or the scripted press is over.
 
         Raises:
-            InterfaceError: If the scripted press felt otherwise than predicted.
+            InterfaceError: If the scripted press differs from the prediction.
         """
         if rospy.get_param("~plot", False):
             self._show()
@@ -89,7 +93,7 @@ class Watch:
         if not rospy.is_shutdown() and interrupt_roslaunch():
             left = threading.Event()
             rospy.on_shutdown(left.set)
-            left.wait(LONGEST_FAREWELL_S)
+            left.wait(MAX_FAREWELL_S)
         rospy.signal_shutdown("the press is over")
 
     def _new_press(self) -> Press:
@@ -114,7 +118,7 @@ class Watch:
             self._connected_s = time.monotonic()
 
     def _sample(self) -> None:
-        """Adds what was at each moment of which all is known by now: on a busy machine some of it comes late."""
+        """Adds the samples that are complete by now: on a busy machine some data arrive late."""
         buffer = self._tf.tf_buffer
         while self._measured and not self._over.is_set():
             stamp, measured_n = self._measured[0]
@@ -141,17 +145,17 @@ class Watch:
         press.write_table(self._folder / "human_interaction.csv")
         press.write_figure(self._folder / "human_interaction.png")
         report = press.report()
-        told = (
-            "pressed too shortly to tell how strongly, or the simulator stood still" if report is None else str(report)
+        summary = (
+            "pressed too shortly to measure the force, or the simulator stood still" if report is None else str(report)
         )
-        rospy.loginfo("%s; see human_interaction.png and .csv in %s", told, self._folder.resolve())
-        if report is not None and report.felt_error > LARGEST_ERROR:
+        rospy.loginfo("%s; see human_interaction.png and .csv in %s", summary, self._folder.resolve())
+        if report is not None and report.felt_error > MAX_ERROR:
             rospy.logwarn(
                 "the handle felt otherwise: is the machine too busy? See haptics/state for why forces are cut"
             )
         if self._is_scripted:
-            if report is None or report.error > LARGEST_ERROR:
-                self._failure = f"the force is not what it should be: {told}"
+            if report is None or report.error > MAX_ERROR:
+                self._failure = f"the force is not what it should be: {summary}"
             self._over.set()
 
     def _show(self) -> None:
@@ -161,7 +165,7 @@ class Watch:
         while plt.fignum_exists(figure.number) and not rospy.is_shutdown() and not self._over.is_set():
             press = self._press
             recent = self._new_press()
-            recent.samples = [each for each in press.samples if each.time_s > press.samples[-1].time_s - SHOWN_S]
+            recent.samples = [each for each in press.samples if each.time_s > press.samples[-1].time_s - WINDOW_S]
             recent.draw(figure)
             plt.pause(PLOT_S)
         plt.close(figure)

@@ -1,4 +1,4 @@
-"""Takes an arm to where its target is and then has it track the target, by a solver of `ik_ros`."""
+"""Moves an arm to its target and then tracks the target, with a solver of `ik_ros`."""
 
 import sys
 
@@ -21,11 +21,11 @@ from ros_pybullet_interface.srv import ResetJointState
 from rpbi_examples.motions import FigureEight
 
 HOME = {"lwr_arm_1_joint": 0.52, "lwr_arm_3_joint": -1.57, "lwr_arm_5_joint": 1.05}
-"""Where the search begins [rad]; other joints at 0."""
+"""Start of the search [rad]; other joints at 0."""
 APPROACH_S = 5.0
 """Time for the way to the figure [s]."""
 WAYPOINTS = 16
-"""How many a round has, where the trajectory is planned as a whole."""
+"""Number of waypoints of a round, where the trajectory is planned as a whole."""
 WHOLE_TRAJECTORIES = "trajectory"
 
 

@@ -12,7 +12,7 @@ from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import RobotInfo, RobotInfoResponse
 
 HZ = 50.0
-"""How often targets are sent."""
+"""Rate of the targets."""
 
 
 class JointTargets:
@@ -32,7 +32,7 @@ class JointTargets:
         self.limits = [_limits(joint) for joint in joints]
         self._publisher = rospy.Publisher(f"rpbi/{robot_name}/joint_states/target", JointState, queue_size=10)
         self._running = threading.Event()
-        rospy.Subscriber("rpbi/status", Int64, self._take_status, queue_size=1)
+        rospy.Subscriber("rpbi/status", Int64, self._on_status, queue_size=1)
         self._rate = rospy.Rate(HZ)
 
     def send(self, positions: Sequence[float]) -> None:
@@ -42,13 +42,19 @@ class JointTargets:
             rospy.ROSInterruptException: If ROS shuts down meanwhile.
         """
         while not self._running.is_set():
-            self._rate.sleep()
+            self._sleep()
         target = JointState(name=self._names, position=positions)
         target.header.stamp = rospy.Time.now()
         self._publisher.publish(target)
-        self._rate.sleep()
+        self._sleep()
 
-    def _take_status(self, status: Int64) -> None:
+    def _sleep(self) -> None:
+        """Waits for the next period; unlike rospy's, it also ends with ROS where time is wall time."""
+        self._rate.sleep()
+        if rospy.is_shutdown():
+            raise rospy.ROSInterruptException("ROS shuts down")
+
+    def _on_status(self, status: Int64) -> None:
         if status.data == 1:
             self._running.set()
         else:
@@ -56,6 +62,6 @@ class JointTargets:
 
 
 def _limits(joint: JointInfo) -> tuple[float, float]:
-    """Returns lower and upper position limit; PyBullet gives an inverted range where there is none."""
+    """Returns lower and upper position limit; PyBullet returns an inverted range if there is none."""
     limited = joint.jointLowerLimit < joint.jointUpperLimit
     return (joint.jointLowerLimit, joint.jointUpperLimit) if limited else (float("-inf"), float("inf"))

@@ -56,7 +56,7 @@ class _FigureEightNode:
 def _move(parent: str, child: str, pose: Callable[[float], tuple[ArrayLike, ArrayLike]], hz: float) -> None:
     """Broadcasts a frame until ROS shuts down.
 
-    `pose` gives position [m] and orientation (x, y, z, w) at a time since the start [s of ROS time].
+    `pose` returns position [m] and orientation (x, y, z, w) at a time since the start [s of ROS time].
     """
     tf = TfInterface()
     start = last = rospy.Time.now()
@@ -64,7 +64,7 @@ def _move(parent: str, child: str, pose: Callable[[float], tuple[ArrayLike, Arra
     try:
         while not rospy.is_shutdown():
             now = rospy.Time.now()
-            if now > last:  # TF warns of a stamp that comes twice
+            if now > last:  # TF warns about a repeated stamp
                 message = tf.pack_tf_msg(parent, child, *pose((now - start).to_sec()))
                 message.header.stamp = last = now
                 tf.tf_broadcaster.sendTransform(message)

@@ -21,7 +21,7 @@ from .joint_targets import HZ, JointTargets
 
 LINK = "lbr_iiwa_link_7"
 SETTLING_S = 0.5
-"""How long the arm presses before it wipes [s]."""
+"""Time for which the arm presses before it wipes [s]."""
 APPROACH_S = 3.0
 """Time for the way to the circles [s]."""
 
@@ -40,12 +40,12 @@ def drive_around() -> None:
 
 
 def dual_arm_example() -> None:
-    """Has the hands of two robots, which the arguments name, the left one first, draw mirrored circles."""
+    """Draws mirrored circles with the hands of two robots, which the arguments name, the left one first."""
     run_node("dual_arm_example", _draw)
 
 
 def wiping_example() -> None:
-    """Has the KUKA of the wiping example wipe back and forth once it touches the table."""
+    """Wipes back and forth with the KUKA of the wiping example once it touches the table."""
     run_node("wiping_example", _wipe)
 
 

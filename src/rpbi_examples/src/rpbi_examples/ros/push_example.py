@@ -1,4 +1,4 @@
-"""Has an arm push a box to and fro; where the box is, it knows by TF."""
+"""Moves an arm that pushes a box to and fro; the position of the box is looked up in TF."""
 
 import math
 from itertools import cycle
@@ -17,7 +17,7 @@ from .joint_targets import HZ, JointTargets
 ROBOT = "kuka_lwr"
 URDF = "{rpbi_examples}/robots/kuka_lwr.urdf"
 REST_S = 0.5
-"""How long the arm stands still at first, and before it looks again for a box that is out of reach [s]."""
+"""Time for which the arm stands still at first, and between two looks for a box that is out of reach [s]."""
 
 
 def main() -> None:

@@ -11,7 +11,7 @@ from ros_pybullet_interface.srv import AddPybulletObject
 BOX = "{rpbi_examples}/configs/pybullet_objects_example/box.yaml"
 NAME = "box"
 STAY_S = 3.0
-"""How long each box stays [s] of ROS time."""
+"""Time for which each box stays [s] of ROS time."""
 
 
 def main() -> None:

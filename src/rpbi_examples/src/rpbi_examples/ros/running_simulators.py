@@ -13,8 +13,8 @@ import roslaunch.config
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, TIMEOUT_S, TimedTransport
 
-LONGEST_END_S = 60.0
-"""Time that a simulator, and the launch that it belongs to, may take to end [s]; longer is an error."""
+MAX_END_S = 60.0
+"""Longest time for the end of a simulator and its launch [s]; beyond it an error is reported."""
 _CALLER = "/rpbi_launch"
 _PACKAGE = "ros_pybullet_interface"
 _POLL_S = 0.1
@@ -38,15 +38,15 @@ class RunningNode(NamedTuple):
             master: Address of its ROS master, which may end with that `roslaunch`.
 
         Raises:
-            InterfaceError: If it does not end within `LONGEST_END_S`.
+            InterfaceError: If it does not end within `MAX_END_S`.
         """
         launch = self._launch_process(master)
-        end_s = time.monotonic() + LONGEST_END_S
+        end_s = time.monotonic() + MAX_END_S
         with suppress(*MASTER_FAILURES):  # it may end before it has answered
             _proxy(self.uri).shutdown(_CALLER, "replaced by another simulator")
         while _answers(self.uri) or (launch is not None and _is_running(launch)):
             if time.monotonic() > end_s:
-                raise InterfaceError(f"{self.name} at {self.uri} did not end within {LONGEST_END_S:g} s")
+                raise InterfaceError(f"{self.name} at {self.uri} did not end within {MAX_END_S:g} s")
             time.sleep(_POLL_S)
 
     def _launch_process(self, master: str) -> int | None:

@@ -25,7 +25,7 @@ from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.schema import ConfigModel, Positive
 from operator_node.msg import SegmentForces
-from rpbi.config.asset_files import find_file
+from robot_model.asset_files import find_file
 from rpbi.kinematics import Kinematics
 from rpbi_examples.dressing.controller import TARGET_HZ, Dressing
 from rpbi_examples.dressing.force import ArmForce, forces_on_arm
@@ -35,21 +35,21 @@ from rpbi_examples.dressing.way import ArmPosition, Array, is_held_out
 
 JOINTS_OF_ARM = ("RightUpperArm", "RightForeArm", "RightHand")
 STILL_S = 1.0
-"""For so long the person holds out the arm before the robot begins [s]."""
+"""Time for which the person holds out the arm before the robot begins [s]."""
 SEES_NOTHING_S = 1.0
-"""Without news of the arm, or of the force on it, for so long, the robot waits [s]."""
+"""Time without a message about the arm, or about the force on it, after which the robot waits [s]."""
 
 
 class TelepresenceParameters(ConfigModel):
     """Private parameters of `telepresence_node.py`."""
 
     force_limit: Positive = Field(15.0, description="Sum of forces on the arm above which the cuff goes back [N].")
-    speed: Positive = Field(0.1, description="Of the cuff where nothing is touched [m/s].")
+    speed: Positive = Field(0.1, description="Speed of the cuff where nothing is touched [m/s].")
     out: str = Field("", description="File that the outcome is written to, as JSON; empty: none.")
 
 
 class TelepresenceNode:
-    """Waits until the person holds out the right arm, then has the robot draw the sleeve over it, and says how it went.
+    """Waits until the person holds out the right arm, then draws the sleeve over it, and reports the result.
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -68,9 +68,9 @@ class TelepresenceNode:
         self._force_topic = rospy.Publisher("telepresence/force", Float64, queue_size=10)
         self._marker = rospy.Publisher("telepresence/marker", Marker, queue_size=10)
         self._warn = ThrottledWarning()
-        self._subscribe("rpbi/panda/joint_states", JointState, self._take_state, queue_size=1)
-        self._subscribe("rpbi/sleeve/surface", Marker, self._take_surface, queue_size=1)
-        self._subscribe("avatar/segment_forces", SegmentForces, self._take_forces, queue_size=100)
+        self._subscribe("rpbi/panda/joint_states", JointState, self._on_state, queue_size=1)
+        self._subscribe("rpbi/sleeve/surface", Marker, self._on_surface, queue_size=1)
+        self._subscribe("avatar/segment_forces", SegmentForces, self._on_forces, queue_size=100)
 
     def run(self) -> None:
         """Dresses the person, and returns when the sleeve is on, or ROS shuts down."""
@@ -90,7 +90,7 @@ class TelepresenceNode:
                 rospy.loginfo("drawing the sleeve over the arm, with at most %g N", self._config.force_limit)
             self._lead(arm, dt)
         if not rospy.is_shutdown():
-            self._tell(self._outcome())
+            self._report(self._outcome())
 
     def _lead(self, arm: ArmPosition, dt: float) -> None:
         with self._lock:
@@ -132,7 +132,7 @@ class TelepresenceNode:
             raise InterfaceError("the sleeve or the arm has gone: rpbi/sleeve/surface or TF of rpbi/human ceased")
         return outcome(self._rings, arm, self._force)
 
-    def _tell(self, found: Outcome) -> None:
+    def _report(self, found: Outcome) -> None:
         words = "is past the elbow" if found.is_dressed else "is NOT past the elbow"
         force = f"peak force {found.peak_force_n:.2f} N, {found.peak_share:.0%} of a limit"
         rospy.loginfo("the sleeve %s (%.3f m); %s", words, found.past_elbow_m, force)
@@ -140,25 +140,27 @@ class TelepresenceNode:
             figures: dict[str, Any] = {**found._asdict(), "is_dressed": found.is_dressed}
             Path(self._config.out).write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
 
-    def _subscribe(self, topic: str, kind: type, take: Callable[[Any], None], queue_size: int) -> None:
-        rospy.Subscriber(topic, kind, partial(self._take, rospy.resolve_name(topic), take), queue_size=queue_size)
+    def _subscribe(self, topic: str, kind: type, on_message: Callable[[Any], None], queue_size: int) -> None:
+        rospy.Subscriber(
+            topic, kind, partial(self._receive, rospy.resolve_name(topic), on_message), queue_size=queue_size
+        )
 
-    def _take(self, topic: str, take: Callable[[Any], None], message: Any) -> None:
+    def _receive(self, topic: str, on_message: Callable[[Any], None], message: Any) -> None:
         try:
-            take(message)
+            on_message(message)
         except (InterfaceError, ValueError) as error:
             self._warn(topic, f"message refused: {error}")
 
-    def _take_state(self, message: JointState) -> None:
+    def _on_state(self, message: JointState) -> None:
         positions = resolve_joint_order(message, self._kinematics.joint_names).position
         if not positions:
             raise ValueError("expected positions of the joints, got none")
         self._positions = tuple(positions)
 
-    def _take_surface(self, message: Marker) -> None:
+    def _on_surface(self, message: Marker) -> None:
         self._rings = rings_of([(point.x, point.y, point.z) for point in message.points])
 
-    def _take_forces(self, message: SegmentForces) -> None:
+    def _on_forces(self, message: SegmentForces) -> None:
         forces = forces_on_arm(message.segments, message.sums, message.largest)
         with self._lock:
             self._felt_s = message.header.stamp.to_sec()

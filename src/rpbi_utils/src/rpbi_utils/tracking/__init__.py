@@ -1,1 +1,1 @@
-"""Objects that a tracking system sees: what is made of their poses, and tags in images."""
+"""Objects of a tracking system: filters of their poses, and tags in images."""

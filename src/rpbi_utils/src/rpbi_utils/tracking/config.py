@@ -1,4 +1,4 @@
-"""What the nodes of tracking systems read from `~config`."""
+"""Configuration of the nodes of tracking systems."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from custom_ros_tools.schema import (
     TopicName,
     optional,
 )
-from rpbi.geometry import Pose
+from robot_model.geometry import Pose
 
 from .one_euro import SmoothingConfig
 from .tracker import OutlierConfig
@@ -40,9 +40,9 @@ class TrackedObjectConfig(ConfigModel):
         ("tag_detections",), description="Topics of the detectors that see its tags, one for each camera."
     )
     frame_id: FrameId | None = optional("TF frame that its poses are in; without it, the one that messages name.")
-    unit: Literal["m", "mm"] = Field("m", description="Unit of the positions that come.")
+    unit: Literal["m", "mm"] = Field("m", description="Unit of the received positions.")
     position: Position = Field((0.0, 0.0, 0.0), description="The object's frame in what is tracked.")
-    orientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="How it is turned there, x, y, z, w.")
+    orientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Orientation there, x, y, z, w.")
 
     @model_validator(mode="after")
     def _one_source(self) -> TrackedObjectConfig:
@@ -71,9 +71,11 @@ class TrackingNodeConfig(ConfigModel):
     """Objects that a tracking system sees, and what is made of their poses."""
 
     frame_id: FrameId = Field("rpbi/world", description="TF frame in which poses are smoothed and broadcast.")
-    timeout_s: Seconds = Field(0.5, description="Without a pose for so long an object is lost: nothing is broadcast.")
-    smoothing: SmoothingConfig = Field(SmoothingConfig(), description="How poses are smoothed.")
-    outliers: OutlierConfig = Field(OutlierConfig(), description="Which poses are left out.")
+    timeout_s: Seconds = Field(
+        0.5, description="Time without a pose after which an object is lost: nothing is broadcast."
+    )
+    smoothing: SmoothingConfig = Field(SmoothingConfig(), description="Smoothing of poses.")
+    outliers: OutlierConfig = Field(OutlierConfig(), description="Rejection of outliers.")
     objects: ListOf[TrackedObjectConfig] = Field(description="The objects.")
 
     @model_validator(mode="after")
@@ -96,7 +98,7 @@ class StandaloneTag(ConfigModel):
 
 
 class AprilTagNodeConfig(ConfigModel):
-    """Which tags of the family tag36h11 are reported."""
+    """Tags of the family tag36h11 to report."""
 
     standalone_tags: ListOf[StandaloneTag] = Field(description="The tags.")
     publish_tf: Switch = Field(True, description="Whether their poses are on TF too.")

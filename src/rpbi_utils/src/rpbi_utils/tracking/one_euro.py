@@ -8,20 +8,35 @@ from typing import Annotated
 from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, Hz, HzOrOff, NonNegative, Unit
-from rpbi.geometry import Pose, Quaternion, Vector, minus, normalized, plus, rotation_between, scaled
+from robot_model.geometry import (
+    Pose,
+    Quaternion,
+    Vector,
+    minus,
+    normalized,
+    plus,
+    quaternion_of,
+    quaternion_product,
+    rotation_between,
+    scaled,
+)
 
 
 class SmoothingConfig(ConfigModel):
-    """How strongly poses are smoothed: at rest by the lowest frequency, in motion less, so that they are less late."""
+    """Smoothing of poses: strongest at rest, with the lowest frequency, and weaker in motion, to reduce the delay."""
 
     min_cutoff_hz: HzOrOff = Field(2.0, description="Cut-off frequency at rest; 0 leaves poses as they are.")
-    per_speed: Annotated[NonNegative, Unit("Hz/(m/s)")] = Field(20.0, description="What each m/s adds to that.")
-    per_angular_speed: Annotated[NonNegative, Unit("Hz/(rad/s)")] = Field(5.0, description="What each rad/s adds.")
+    per_speed: Annotated[NonNegative, Unit("Hz/(m/s)")] = Field(
+        20.0, description="Increase of the cut-off frequency per m/s."
+    )
+    per_angular_speed: Annotated[NonNegative, Unit("Hz/(rad/s)")] = Field(
+        5.0, description="Increase of the cut-off frequency per rad/s."
+    )
     speed_cutoff_hz: Hz = Field(2.0, description="Cut-off frequency of the low-pass of the speeds.")
 
 
 class OneEuroPose:
-    """A low-pass of poses whose cut-off grows with the speed, in the time between samples as it is.
+    """A low-pass of poses whose cut-off frequency grows with the speed, for samples at any spacing.
 
     Formulas: Casiez, Roussel, Vogel, "1 Euro Filter", CHI 2012; the gain of a low-pass is `1 - exp(-2 pi f dt)`, as
     for a value that is held between samples. Orientations move along the shortest rotation by the same share.
@@ -36,7 +51,7 @@ class OneEuroPose:
         """The newest pose, None before the first."""
 
     def step(self, pose: Pose, dt_s: float) -> Pose:
-        """Takes a pose that is `dt_s` later than the one before; returns the smoothed one."""
+        """Filters a pose that is `dt_s` later than the previous one; returns the smoothed one."""
         if self.output is None or self._last is None:
             self._last = self.output = pose
             return pose
@@ -60,9 +75,5 @@ def _gain(cutoff_hz: float, dt_s: float) -> float:
 
 def _between(start: Quaternion, end: Quaternion, share: float) -> Quaternion:
     """Returns the orientation that is a share of the shortest rotation from one to another."""
-    turn = scaled(share, rotation_between(start, end))
-    angle = math.hypot(*turn)
-    half = 0.5 if angle < 1e-9 else math.sin(angle / 2.0) / angle
-    x, y, z = scaled(half, turn)
-    rotated = Pose((0.0, 0.0, 0.0), (x, y, z, math.cos(angle / 2.0))) @ Pose((0.0, 0.0, 0.0), start)
-    return normalized(rotated.quat_xyzw)
+    turn = quaternion_of(scaled(share, rotation_between(start, end)))
+    return normalized(quaternion_product(turn, start))

@@ -12,12 +12,12 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from custom_ros_tools.errors import MissingDependency
-from rpbi.geometry import Pose
+from robot_model.geometry import Pose
 
 CELLS = 8
 """Cells along a side of a tag's black square."""
 PIXEL_CENTRE = 0.5
-"""Where the family's own search for squares, which OpenCV has as CORNER_REFINE_APRILTAG, has the centre of pixel 0."""
+"""Coordinate of the centre of pixel 0 in the family's own search for squares, OpenCV's CORNER_REFINE_APRILTAG."""
 Image = npt.NDArray[np.uint8]
 
 

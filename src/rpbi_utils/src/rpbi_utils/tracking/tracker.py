@@ -1,4 +1,4 @@
-"""What is made of the poses of one tracked object before anybody gets them."""
+"""Filters the poses of one tracked object."""
 
 from __future__ import annotations
 
@@ -8,21 +8,24 @@ from typing import Annotated
 from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, Count, NonNegative, NonNegativeMetres, Positive, Unit
-from rpbi.geometry import Pose, rotation_between
+from robot_model.geometry import Pose, rotation_between
 
 from .one_euro import OneEuroPose, SmoothingConfig
 
 
 class OutlierConfig(ConfigModel):
-    """What no object does: such poses are left out, unless they go on."""
+    """Limits of an object's motion: poses beyond them are dropped as outliers, unless they persist."""
 
     max_speed: Annotated[Positive, Unit("m/s")] = Field(5.0, description="Fastest motion of the object.")
     max_angular_speed: Annotated[Positive, Unit("rad/s")] = Field(20.0, description="Its fastest rotation.")
-    tolerance_m: NonNegativeMetres = Field(0.02, description="What is added to the way at that speed, for noise.")
-    tolerance_rad: Annotated[NonNegative, Unit("rad")] = Field(0.2, description="What is added to the rotation.")
+    tolerance_m: NonNegativeMetres = Field(0.02, description="Distance added to that at the largest speed, for noise.")
+    tolerance_rad: Annotated[NonNegative, Unit("rad")] = Field(
+        0.2, description="Angle added to that at the largest angular speed."
+    )
     in_a_row: Annotated[Count, Field(ge=1)] = Field(
         5,
-        description="So many in a row that agree with each other are where it is now; 1 leaves none out.",
+        description="Number of consecutive poses, consistent with each other, after which they are accepted; 1 drops "
+        "none.",
     )
 
 
@@ -31,12 +34,12 @@ class OutlierError(ValueError):
 
 
 class PoseTracker:
-    """Makes a smooth path of the poses of one object, in the time of their stamps.
+    """Computes a smooth path from the poses of one object, in the time of their stamps.
 
     Args:
-        smoothing: How they are smoothed.
-        outliers: What is left out.
-        timeout_s: After so long without a pose it begins anew [s].
+        smoothing: The smoothing.
+        outliers: The rejection of outliers.
+        timeout_s: Time without a pose after which it restarts [s].
     """
 
     def __init__(self, smoothing: SmoothingConfig, outliers: OutlierConfig, timeout_s: float) -> None:
@@ -47,16 +50,16 @@ class PoseTracker:
         self._filter: OneEuroPose | None = None
         self._forget()
 
-    def take(self, pose: Pose, stamp_s: float) -> Pose | None:
-        """Takes a pose and the time [s] at which the object was there; returns the smoothed one.
+    def observe(self, pose: Pose, stamp_s: float) -> Pose | None:
+        """Adds a pose with its time [s]; returns the smoothed one.
 
-        None is for a pose that is not later than the one before: it was there already, or messages changed places.
+        Returns None for a pose that is not later than the previous one: a repetition, or messages out of order.
 
         Raises:
-            OutlierError: If the object cannot be there; the pose is left out.
+            OutlierError: If the object cannot be there; the pose is dropped.
         """
         age_s = math.inf if self._stamp_s is None else stamp_s - self._stamp_s
-        if age_s > self._timeout_s or age_s < -self._timeout_s:  # seen anew, or another clock
+        if age_s > self._timeout_s or age_s < -self._timeout_s:  # seen again, or another clock
             self._forget()
         elif age_s <= 0.0:
             return None

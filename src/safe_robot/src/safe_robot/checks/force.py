@@ -5,12 +5,12 @@ import math
 from pydantic import Field
 
 from custom_ros_tools.schema import Positive, Seconds
-from safe_robot.check import Check, CheckConfig, Situation, Violation
-from safe_robot.motion import Motion
+from safe_robot.check import Check, CheckConfig, CheckContext, Violation
+from safe_robot.motion import CommandedMotion
 
 
 class ForceConfig(CheckConfig):
-    """How much force a sensor may feel."""
+    """Largest forces and torques of a sensor."""
 
     force_n: Positive = Field(50.0, description="Largest force [N].")
     torque_nm: Positive = Field(10.0, description="Largest torque [N m].")
@@ -24,14 +24,14 @@ class Force(Check):
     name = "force"
     watches = True
 
-    def check(self, motion: Motion, situation: Situation) -> Violation | None:
+    def check(self, motion: CommandedMotion, context: CheckContext) -> Violation | None:
         """See `Check`."""
         config = self.config
-        if not situation.wrench_age_s <= config.timeout_s:
-            return Violation(self.name, "the age of the wrench", situation.wrench_age_s, config.timeout_s, "s")
+        if not context.wrench_age_s <= config.timeout_s:
+            return Violation(self.name, "the age of the wrench", context.wrench_age_s, config.timeout_s, "s")
         for what, values, limit, unit in (
-            ("the force", situation.wrench[:3], config.force_n, "N"),
-            ("the torque", situation.wrench[3:], config.torque_nm, "N m"),
+            ("the force", context.wrench[:3], config.force_n, "N"),
+            ("the torque", context.wrench[3:], config.torque_nm, "N m"),
         ):
             size = math.hypot(*values)
             if not size <= limit:

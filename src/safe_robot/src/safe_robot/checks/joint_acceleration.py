@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from safe_robot.check import Check, Situation, Violation
-from safe_robot.motion import Motion
+from safe_robot.check import Check, CheckContext, Violation
+from safe_robot.motion import CommandedMotion
 
 UNIT = ("rad/s^2", "m/s^2")
 
@@ -14,6 +14,6 @@ class JointAcceleration(Check):
     name = "joint_acceleration"
     is_default = True
 
-    def check(self, motion: Motion, situation: Situation) -> Violation | None:
+    def check(self, motion: CommandedMotion, context: CheckContext) -> Violation | None:
         """See `Check`."""
         return self.first_above(np.abs(motion.acceleration), self.limits.acceleration, "acceleration", UNIT)

@@ -2,19 +2,19 @@
 
 import numpy as np
 
-from safe_robot.check import Check, Situation, Violation
-from safe_robot.motion import Motion
+from safe_robot.check import Check, CheckContext, Violation
+from safe_robot.motion import CommandedMotion
 
 UNIT = ("rad", "m")
 
 
 class JointPosition(Check):
-    """Every joint stays within its limits, and can come to rest there: so it is the slower the nearer the limit is."""
+    """Every joint stays within its limits, and can come to rest there: its speed falls towards the limit."""
 
     name = "joint_position"
     is_default = True
 
-    def check(self, motion: Motion, situation: Situation) -> Violation | None:
+    def check(self, motion: CommandedMotion, context: CheckContext) -> Violation | None:
         """See `Check`."""
         q, before = motion.position, motion.start.position
         low, high = np.minimum(self.limits.lower, before), np.maximum(self.limits.upper, before)

@@ -6,18 +6,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import Field, model_validator
 
-from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.schema import ConfigModel, KeyedError
-from safe_robot.check import Check, CheckConfig, Situation, Violation
-from safe_robot.commands.detour import Bound
-from safe_robot.limits import JointLimits
-from safe_robot.motion import Motion
+from safe_robot.check import Check, CheckConfig, CheckContext, Violation
+from safe_robot.limits import MotionLimits
+from safe_robot.motion import Bound, CommandedMotion
 from safe_robot.robot import GuardedRobot
 
 STEP = 1e-6
-"""By so much joints are moved to see where a link goes [rad or m]."""
-KEPT_M = 1e-4
-"""So much inside its box a link is kept where a command is chosen [m]."""
+"""Step of the joints by which the motion of a link is tried [rad or m]."""
+SPARE_M = 1e-4
+"""Distance from the faces of its box that a link keeps where a command is chosen [m]."""
 
 
 class BoxConfig(ConfigModel):
@@ -43,12 +41,12 @@ class LinkBoxConfig(CheckConfig):
 
 
 class Box(NamedTuple):
-    """Where a link stays.
+    """Box that a link stays in.
 
     Attributes:
         low: Least x, y and z in the robot's root [m].
         high: Greatest x, y and z [m].
-        reach: How far, at most, each of n joints moves the link, for 1 rad or m each.
+        reach: Largest motion of the link by each of n joints, for 1 rad or m each.
     """
 
     low: np.ndarray
@@ -62,20 +60,17 @@ class LinkBox(Check):
     Config = LinkBoxConfig
     name = "link_box"
 
-    def __init__(self, config: Any, robot: GuardedRobot, limits: JointLimits, file: str) -> None:
+    def __init__(self, config: Any, robot: GuardedRobot, limits: MotionLimits, file: str) -> None:
         super().__init__(config, robot, limits, file)
         self._boxes: dict[str, Box] = {}
         self._room: dict[str, tuple[np.ndarray, float]] = {}  # in some configuration a link had so much of it
         for link, box in config.boxes.items():
-            try:
-                robot.check_link(link)
-            except UnknownNameError as error:
-                raise ConfigError([Problem(file, f"checks.link_box.boxes.{link}", str(error))]) from None
+            self.require_link(link, "boxes")
             low = [-math.inf if axis[0] is None else axis[0] for axis in (box.x, box.y, box.z)]
             high = [math.inf if axis[1] is None else axis[1] for axis in (box.x, box.y, box.z)]
             self._boxes[link] = Box(np.array(low), np.array(high), robot.reach(link, 0.0))
 
-    def check(self, motion: Motion, situation: Situation) -> Violation | None:
+    def check(self, motion: CommandedMotion, context: CheckContext) -> Violation | None:
         """See `Check`."""
         for link, (low, high, reach) in self._boxes.items():
             if link in self._room:
@@ -99,10 +94,10 @@ class LinkBox(Check):
         k, n = rows.shape
         tried = np.concatenate((before[None], rows, (rows[:, None] + STEP * np.eye(n)).reshape(-1, n)))
         for link, (low, high, _) in self._boxes.items():
-            position = self.robot.link_positions(tried, link)
+            position = self.robot.frames.positions(tried, link)
             at = position[1 : k + 1]
             slopes = (position[k + 1 :].reshape(k, n, 3) - at[:, None]).transpose(0, 2, 1) / STEP  # k x 3 x n
-            low, high = np.minimum(low + KEPT_M, position[0]), np.maximum(high - KEPT_M, position[0])
+            low, high = np.minimum(low + SPARE_M, position[0]), np.maximum(high - SPARE_M, position[0])
             for slope, room in ((slopes, at - low), (-slopes, high - at)):
                 near = np.argwhere(np.abs(slope) @ spread > room)
                 bounds += [Bound(row, slope[row, axis], float(room[row, axis])) for row, axis in near.tolist()]

@@ -5,16 +5,15 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.schema import Positive
-from safe_robot.check import Check, CheckConfig, Situation, Violation
-from safe_robot.limits import JointLimits
-from safe_robot.motion import Motion
+from safe_robot.check import Check, CheckConfig, CheckContext, Violation
+from safe_robot.limits import MotionLimits
+from safe_robot.motion import CommandedMotion
 from safe_robot.robot import GuardedRobot
 
 
 class LinkVelocityConfig(CheckConfig):
-    """How fast links may be."""
+    """Largest speeds of links."""
 
     links: dict[str, Positive] = Field({}, description="The largest speed of the origin of each of these links [m/s].")
 
@@ -25,17 +24,14 @@ class LinkVelocity(Check):
     Config = LinkVelocityConfig
     name = "link_velocity"
 
-    def __init__(self, config: Any, robot: GuardedRobot, limits: JointLimits, file: str) -> None:
+    def __init__(self, config: Any, robot: GuardedRobot, limits: MotionLimits, file: str) -> None:
         super().__init__(config, robot, limits, file)
         self._reach: dict[str, np.ndarray] = {}  # how far, at most, each joint moves a link, for 1 rad or m each
         for link in config.links:
-            try:
-                robot.check_link(link)
-            except UnknownNameError as error:
-                raise ConfigError([Problem(file, f"checks.link_velocity.links.{link}", str(error))]) from None
+            self.require_link(link, "links")
             self._reach[link] = robot.reach(link, 0.0)
 
-    def check(self, motion: Motion, situation: Situation) -> Violation | None:
+    def check(self, motion: CommandedMotion, context: CheckContext) -> Violation | None:
         """See `Check`."""
         for link, limit in self.config.links.items():
             if (np.abs(motion.velocity) @ self._reach[link]).max() <= limit:  # no joints could make it faster

@@ -12,14 +12,14 @@ from pydantic import Field
 
 from custom_ros_tools.errors import ConfigError, Problem, hint
 from custom_ros_tools.schema import NonNegativeMetres, Text
-from rpbi.urdf.document import disabled_collisions
-from safe_robot.check import Check, CheckConfig, Inside, Situation, Violation
-from safe_robot.commands.detour import Bound
+from robot_model.urdf.document import disabled_collisions
+from safe_robot.check import CheckConfig, CheckContext, Violation
 from safe_robot.geometry.distances import GEOMETRY, Geometry, LinkDistances, Pair
-from safe_robot.geometry.proximity import Proximity
-from safe_robot.limits import JointLimits
-from safe_robot.motion import Motion
+from safe_robot.limits import MotionLimits
+from safe_robot.motion import CommandedMotion
 from safe_robot.robot import GuardedRobot
+
+from .proximity import Proximity, ProximityCheck
 
 SAMPLES = 200
 """Random configurations in which pairs are tried that may always be near."""
@@ -28,7 +28,7 @@ ALWAYS = 0.95
 
 
 class SelfCollisionConfig(CheckConfig):
-    """How near the links of the robot may come to each other."""
+    """Least distances between the links of the robot."""
 
     margin_m: NonNegativeMetres = Field(0.01, description="Least distance between links [m].")
     geometry: Geometry = Field("hulls", description=GEOMETRY)
@@ -38,38 +38,25 @@ class SelfCollisionConfig(CheckConfig):
     )
 
 
-class SelfCollision(Check):
+class SelfCollision(ProximityCheck):
     """Links that are not neighbours stay apart, also while the robot brakes."""
 
     Config = SelfCollisionConfig
     name = "self_collision"
     is_default = True
 
-    def __init__(self, config: Any, robot: GuardedRobot, limits: JointLimits, file: str) -> None:
+    def __init__(self, config: Any, robot: GuardedRobot, limits: MotionLimits, file: str) -> None:
         super().__init__(config, robot, limits, file)
         self.distances = LinkDistances(robot, config.geometry)
         self.pairs = self._pairs()
         self.proximity = Proximity(self.distances, self.pairs, config.margin_m)
 
-    def check(self, motion: Motion, situation: Situation) -> Violation | None:
+    def check(self, motion: CommandedMotion, context: CheckContext) -> Violation | None:
         """See `Check`."""
-        if not np.isfinite(motion.position).all():  # PyBullet would find nothing near it
-            return Violation(self.name, "the robot", math.nan, self.config.margin_m, "m", quantity="distance")
-        found = self.proximity.first(motion)
-        if found is None:
-            return None
-        subject, margin_m = self._subject(found.pair), self.config.margin_m
-        return Violation(self.name, subject, found.distance, margin_m, "m", found.is_while_braking, "distance")
+        return self.undefined(motion) or self.too_near(motion)
 
-    def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
-        """See `Check`."""
-        return self.proximity.bounds(rows, spread, before)
-
-    def inside(self, q: np.ndarray) -> list[Inside]:
-        """See `Check`."""
-        return self.proximity.inside(q, self.name, self._subject)
-
-    def _subject(self, pair: Pair) -> str:
+    def subject(self, pair: Pair) -> str:
+        """See `ProximityCheck`."""
         return "links '{}' and '{}'".format(*pair)
 
     def _pairs(self) -> list[tuple[str, str]]:

@@ -3,12 +3,12 @@
 from pydantic import Field
 
 from custom_ros_tools.schema import Seconds
-from safe_robot.check import Check, CheckConfig, Situation, Violation
-from safe_robot.motion import Motion
+from safe_robot.check import Check, CheckConfig, CheckContext, Violation
+from safe_robot.motion import CommandedMotion
 
 
 class StalenessConfig(CheckConfig):
-    """How late a target may be."""
+    """Largest delays of targets."""
 
     timeout_s: Seconds = Field(0.1, description="Oldest target; and longest time without one while the robot moves.")
 
@@ -21,18 +21,18 @@ class Staleness(Check):
     watches = True
     is_default = True
 
-    def check(self, motion: Motion, situation: Situation) -> Violation | None:
+    def check(self, motion: CommandedMotion, context: CheckContext) -> Violation | None:
         """See `Check`."""
         timeout_s = self.config.timeout_s
-        if not abs(situation.age_s) <= timeout_s:
-            return too_old(situation.age_s, timeout_s, "checks.staleness.timeout_s")
-        step_s = situation.stamp_step_s
+        if not abs(context.age_s) <= timeout_s:
+            return too_old(context.age_s, timeout_s, "checks.staleness.timeout_s")
+        step_s = context.stamp_step_s
         if step_s is not None and not step_s > 0.0:
             return Violation(
                 self.name, "the stamp, after that of the target before,", step_s, 0.0, "s", words=_order(step_s)
             )
-        if not motion.start.is_at_rest and not situation.since_command_s <= timeout_s:
-            since_s = situation.since_command_s
+        if not motion.start.is_at_rest and not context.since_command_s <= timeout_s:
+            since_s = context.since_command_s
             words = (
                 f"no target for {since_s:.3g} s while the robot moves, limit {timeout_s:.6g} s; publish until it"
                 " rests, or raise checks.staleness.timeout_s"

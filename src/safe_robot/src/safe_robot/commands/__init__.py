@@ -1,1 +1,1 @@
-"""How commands are found: rest, the nearest to a target, smooth ones, and what leads out of a margin."""
+"""Search for commands: rest, the nearest to a target, smooth ones, and those that lead out of a margin."""

@@ -1,22 +1,21 @@
-"""How joints come near a target as fast as their limits allow, and stop there."""
+"""Motion of joints towards a target as fast as their limits allow, with a stop there."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from safe_robot.limits import JointLimits
+from safe_robot.braking import INSIDE, Braking
+from safe_robot.limits import MotionLimits
 from safe_robot.motion import State
 
-from .braking import INSIDE, Braking
-
 STEPS = 10
-"""Between braking hard and going on as fast as possible so many commands are tried, and as many between two of them."""
+"""Number of commands tried between the hardest braking and the fastest motion, and again between two of them."""
 ROUNDING = 1e-12
 """Positions that differ by less are equal [rad or m]."""
 
 
 class Pursuit(NamedTuple):
-    """What n joints can do in the next period: anything from one to the other.
+    """Range of the commands that n joints can follow in the next period.
 
     Attributes:
         wanted: n positions that come nearest to the targets [rad or m].
@@ -30,16 +29,16 @@ class Pursuit(NamedTuple):
 def pursue(
     target: np.ndarray,
     state: State,
-    limits: JointLimits,
+    limits: MotionLimits,
     braking: Braking,
     period_s: float,
     stop: np.ndarray,
     acceleration: np.ndarray | None = None,
 ) -> Pursuit:
-    """Returns what comes nearest to n targets, a period later, without any joint having to go past its.
+    """Returns the command nearest to n targets, a period later, without any joint having to pass its target.
 
-    It keeps the limits of joints; whether the command is safe is for checks to say. What comes nearest to
-    n accelerations [rad/s^2 or m/s^2], if they are given, takes the place of what comes nearest to the targets.
+    It keeps the limits of joints; whether the command is safe is for checks to say. What comes nearest to n
+    accelerations [rad/s^2 or m/s^2], if they are given, takes the place of what comes nearest to the targets.
 
     The shortest braking from a new state may be longer than what is left of the one before, and go past a target that
     the latter stays before. Such joints go on with the latter.
@@ -48,9 +47,9 @@ def pursue(
         target: n positions [rad or m].
         state: State before the command.
         limits: Limits of the joints.
-        braking: Finds how they come to rest.
+        braking: Computes their braking.
         period_s: Time between two commands [s].
-        stop: The commands of the present braking, k x n [rad or m].
+        stop: Commands of the present braking, k x n [rad or m].
         acceleration: n accelerations.
     """
     target = np.clip(target, limits.lower, limits.upper)

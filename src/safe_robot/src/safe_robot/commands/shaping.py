@@ -6,26 +6,27 @@ import numpy as np
 from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, Positive, Seconds, Unit
-from safe_robot.limits import JointLimits
+from safe_robot.braking import Braking
+from safe_robot.limits import MotionLimits
 from safe_robot.motion import State
 
-from .braking import Braking
 from .pursuit import pursue
 
 CAUGHT_UP = 0.05
-"""A joint has caught up with its target when going there takes at most this share of its acceleration and jerk."""
+"""Largest share of a joint's acceleration and jerk to reach its target with which it has caught up."""
 OVERSHOOT = 0.01
 """A target outside limits by no more than this counts as one at the limit: motors go as much past it [rad or m]."""
 
 
 class ShapingConfig(ConfigModel):
-    """How targets are smoothed that joints cannot follow."""
+    """Options for smoothing targets that joints cannot follow."""
 
     time_s: Annotated[Seconds, Field(ge=1e-4)] = Field(
         0.03, description="Time constant: smoothed commands are about twice as far behind."
     )
     reach: Annotated[Positive, Unit("rad or m")] = Field(
-        0.25, description="How far from the last command a target may be; one further away is a jump, and not smoothed."
+        0.25,
+        description="Largest distance of a target from the last command; one further away is a jump, and not smoothed.",
     )
 
 
@@ -34,16 +35,16 @@ class Shaper:
 
     Targets within these limits are commands, to the last bit. From one on that is not, each command follows the
     targets as a critically damped filter of second order does, as far as limits allow and no joint has to go past its
-    target, until all joints have caught up. So targets that tremble do not make the robot tremble.
+    target, until all joints have caught up. Jitter of targets therefore does not reach the robot.
 
     Args:
-        config: How it smooths.
+        config: Parameters of the smoothing.
         limits: Limits of the joints.
-        braking: How they come to rest.
+        braking: Their braking.
         period_s: Time between two commands [s].
     """
 
-    def __init__(self, config: ShapingConfig, limits: JointLimits, braking: Braking, period_s: float) -> None:
+    def __init__(self, config: ShapingConfig, limits: MotionLimits, braking: Braking, period_s: float) -> None:
         self._reach, self._rate = config.reach, 1.0 / config.time_s
         self._limits, self._braking, self._period_s = limits, braking, period_s
         self._is_behind = False

@@ -10,19 +10,20 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from custom_ros_tools.errors import MissingDependency
-from custom_ros_tools.transforms import matrix_of
-from rpbi.engine.client import Client
+from robot_model.geometry import ZERO, Vector, minus, scaled
+from robot_model.urdf.shapes import CollisionShape
 
 try:
     import hppfcl
 except ImportError:
     raise MissingDependency("hpp-fcl", "./rpbi setup ik") from None
 
-from .hulls import Solid, extent_of
-from .obstacles import NO_FILE, OF_PYBULLET, Kind, Obstacle
+from .fcl import load_mesh, primitive, sizes_of, transform
+from .obstacles import Kind, Obstacle
+from .solids import ClosestPoints, Solid, extent_of
 
 TOUCHING_M = 1e-5
-"""What is nearer has no direction [m]: convex hulls decide."""
+"""Distance below which there is no direction [m]: convex hulls decide."""
 OUT_OF_PLACE_M = 0.015
 """Boxes around a link's exact shapes and around its hulls differ by less [m]."""
 SAME_M = 1e-7
@@ -79,63 +80,40 @@ class Piece(NamedTuple):
         return self._replace(frame=frame, pose=pose @ self.pose)
 
 
-class Nearest(NamedTuple):
-    """How far two things are apart [m], and where each of them is nearest, in the root [m]."""
-
-    distance: float
-    first: tuple[float, float, float]
-    second: tuple[float, float, float]
-
-
-def pieces_of_link(pb: Client, body: int, link: int, solids: Sequence[Solid]) -> list[Piece]:
-    """Returns the collision shapes of a link in the frame of its centre of mass; none if hulls have to do.
+def pieces_of_link(shapes: Sequence[CollisionShape], solids: Sequence[Solid]) -> list[Piece]:
+    """Returns the collision shapes of a link in its frame.
 
     Args:
-        pb: The client.
-        body: The body.
-        link: The link.
+        shapes: The shapes.
         solids: Its hulls, in the same frame.
 
     Raises:
         ValueError: If a mesh cannot be read, or is not where its hull is.
     """
-    data = dict.fromkeys(pb.getCollisionShapeData(body, link))  # a file of several objects is told of several times
-    return _placed([_piece(OF_PYBULLET.get(each[2]), each[3], each[4], matrix_of(*each[5:7])) for each in data], solids)
+    return _placed([_piece(each.kind, each.size, each.mesh_file, each.pose) for each in shapes], solids)
 
 
 def pieces_of_obstacle(obstacle: Obstacle, solids: Sequence[Solid]) -> list[Piece]:
-    """Returns an obstacle in its own frame, see `pieces_of_link`."""
-    x, y, z = size = obstacle.size
-    sizes = {"sphere": (max(size) / 2.0,), "cylinder": (z, max(x, y) / 2.0), "capsule": (z, max(x, y) / 2.0)}
-    piece = _piece(obstacle.kind, sizes.get(obstacle.kind, size), obstacle.mesh_file.encode(), np.eye(4))
-    return _placed([piece], solids)
-
-
-def _piece(kind: Kind | None, size: tuple[float, ...], file: bytes, pose: np.ndarray) -> Piece | None:
-    """Returns a shape with sizes as PyBullet tells them; None of one of which there is no more than its hull."""
-    if kind == "mesh" and file.decode() not in NO_FILE:
-        return Piece(0, pose, *_mesh(file.decode(), size))
-    if kind == "box":
-        return Piece(0, pose, hppfcl.Box(*size))
-    if kind == "sphere":
-        return Piece(0, pose, hppfcl.Sphere(size[0]))
-    if kind in ("cylinder", "capsule"):
-        made = hppfcl.Cylinder if kind == "cylinder" else hppfcl.Capsule
-        return Piece(0, pose, made(size[1], size[0]))
-    return None
-
-
-def _placed(found: Sequence[Piece | None], solids: Sequence[Solid]) -> list[Piece]:
-    pieces = [piece for piece in found if piece is not None]
-    if len(pieces) < len(found):
+    """Returns an obstacle in its own frame, see `pieces_of_link`; none if it is no more than its hull."""
+    if obstacle.kind in ("plane", "points"):
         return []
+    return _placed([_piece(obstacle.kind, sizes_of(obstacle), obstacle.mesh_file, np.eye(4))], solids)
+
+
+def _piece(kind: Kind, size: tuple[float, ...], file: str, pose: np.ndarray) -> Piece:
+    return Piece(0, pose, *_mesh(file, size)) if kind == "mesh" else Piece(0, pose, primitive(kind, size))
+
+
+def _placed(pieces: list[Piece], solids: Sequence[Solid]) -> list[Piece]:
     extent, expected = (np.array(extent_of(each)) for each in ([_corners(piece) for piece in pieces], solids))
     if pieces and not (np.abs(extent - expected) < OUT_OF_PLACE_M).all():
         raise ValueError(f"expected exact shapes where hulls are, {expected.tolist()} m, got {extent.tolist()} m")
     return pieces
 
 
-def nearest(firsts: Sequence[Piece], seconds: Sequence[Piece], frames: np.ndarray, within_m: float) -> Nearest | None:
+def nearest(
+    firsts: Sequence[Piece], seconds: Sequence[Piece], frames: np.ndarray, within_m: float
+) -> ClosestPoints | None:
     """Returns how far two things are apart, inf if that is more than a distance; None if they are in each other.
 
     Args:
@@ -144,21 +122,22 @@ def nearest(firsts: Sequence[Piece], seconds: Sequence[Piece], frames: np.ndarra
         frames: m frames, m x 4 x 4.
         within_m: The distance [m].
     """
-    found = Nearest(math.inf, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    found = ClosestPoints(math.inf, ZERO, ZERO, ZERO)
     request = hppfcl.CollisionRequest()
     request.security_margin = within_m
     for first in firsts:
         place = frames[first.frame] @ first.pose
         for second in seconds:
             other = frames[second.frame] @ second.pose
-            shapes = first.shape, _transform(place), second.shape, _transform(other)
+            shapes = first.shape, transform(place), second.shape, transform(other)
             if hppfcl.collide(*shapes, request, hppfcl.CollisionResult()):
                 result = hppfcl.DistanceResult()
                 distance = hppfcl.distance(*shapes, hppfcl.DistanceRequest(True), result)
                 if not distance > TOUCHING_M:
                     return None
                 if distance < found.distance:
-                    found = Nearest(distance, tuple(result.getNearestPoint1()), tuple(result.getNearestPoint2()))
+                    ends: tuple[Vector, Vector] = tuple(result.getNearestPoint1()), tuple(result.getNearestPoint2())
+                    found = ClosestPoints(distance, scaled(1.0 / distance, minus(*ends)), *ends)
             elif _is_inside(first, second, np.linalg.solve(other, place)):
                 return None
             elif _is_inside(second, first, np.linalg.solve(place, other)):
@@ -174,10 +153,6 @@ def _is_inside(piece: Piece, other: Piece, pose: np.ndarray) -> bool:
     return other.surface.holds(points @ pose[:3, :3].T + pose[:3, 3])
 
 
-def _transform(pose: np.ndarray) -> Any:
-    return hppfcl.Transform3f(pose[:3, :3], pose[:3, 3])
-
-
 @lru_cache(maxsize=64)
 def _mesh(file: str, scale: tuple[float, ...]) -> tuple[Any, Surface]:
     """Returns a mesh, and its triangles.
@@ -186,11 +161,11 @@ def _mesh(file: str, scale: tuple[float, ...]) -> tuple[Any, Surface]:
         ValueError: If it cannot be read.
     """
     try:
-        mesh = hppfcl.MeshLoader(hppfcl.NODE_TYPE.BV_OBBRSS).load(file, np.array(scale))
+        mesh = load_mesh(file, scale)
         corners = np.array(mesh.vertices())
         rows = np.array([[mesh.tri_indices(i)[k] for k in range(3)] for i in range(mesh.num_tris)])
         triangles = corners[rows]
-    except (RuntimeError, ValueError, IndexError) as error:
+    except IndexError as error:
         raise ValueError(f"mesh {file}: {error}") from None
     if not np.isfinite(triangles).all():
         raise ValueError(f"mesh {file}: expected finite corners")

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .hulls import Solid
+from .solids import Solid
 
 ROUNDING_M = 1e-4
 """PyBullet's distances may be that much too small [m]."""

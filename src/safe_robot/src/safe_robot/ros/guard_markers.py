@@ -1,4 +1,4 @@
-"""What the guard sees, for RViz: where things are nearest to each other, and the boxes that links stay in."""
+"""Markers for RViz: the points at which things are nearest to each other, and the boxes that links stay in."""
 
 from collections.abc import Iterator
 from threading import Condition
@@ -10,7 +10,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
-from rpbi.geometry import plus, scaled
+from robot_model.geometry import plus, scaled
 from safe_robot.checks.environment import Environment
 from safe_robot.checks.link_box import BoxConfig, LinkBox
 from safe_robot.checks.self_collision import SelfCollision

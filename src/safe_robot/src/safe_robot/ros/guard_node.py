@@ -29,14 +29,16 @@ from .target_queue import TargetQueue
 
 NODE = "robot_safety_node"
 QUEUE_SIZE = 100
-"""Messages kept while the machine is busy; what has become too old is refused."""
+"""Number of messages buffered while the machine is busy; beyond it, the oldest are dropped."""
 WATCH_HZ = 100.0
-"""How often it is looked whether targets still come."""
+"""Rate at which the node checks that targets still arrive [Hz]."""
 JUMP_S = 0.5
-"""How much further than the time that has gone by a stamp may be from the one before [s]."""
+"""Largest difference between two stamps beyond the time between their targets [s]; more is a jump."""
+FIRST_STATE_S = 1.0
+"""Longest time for which the node waits for a measured state before it subscribes to targets [s]."""
 NEVER_S = float("-inf")
 SWITCH_S = 0.0005
-"""After so long Python gives way to another thread that waits, such as one that a target has just reached [s]."""
+"""Time after which Python switches to a waiting thread, such as one that has just received a target [s]."""
 
 
 class GuardNode:
@@ -68,14 +70,16 @@ class GuardNode:
         # what limits or shapes can skip late targets; a skipped one makes the next a jump, at which `reject` halts
         can_skip = self._guard.config.policy == "limit" or self._guard.config.shape
         size = 1 if can_skip else QUEUE_SIZE
-        self._queue = TargetQueue(self._guard.config.period_s, self._silence_s, size, self._take, self._end_wait)
+        self._queue = TargetQueue(self._guard.config.period_s, self._silence_s, size, self._process, self._end_wait)
         GuardMarkers(self._guard, self._queue.lock, config.base_frame or self._guard.robot.document.root_link())
         self._master = MasterConnection(self._lose_master)
-        rospy.Service("robot_safety/start_subscriber", Trigger, self._start)
-        rospy.Service("robot_safety/stop_subscriber", Trigger, self._stop)
+        if self._guard.config.start_from == "measured":
+            self._measurements.wait(FIRST_STATE_S)  # a first target that must be dropped makes the next one too far
         self._targets = rospy.Subscriber(
             self._target_topic, JointState, self._receive, queue_size=QUEUE_SIZE, tcp_nodelay=True
         )
+        rospy.Service("robot_safety/start_subscriber", Trigger, self._start)
+        rospy.Service("robot_safety/stop_subscriber", Trigger, self._stop)
         gc.collect()
         gc.freeze()  # what is there stays, so that collecting the rest takes next to no time
         WallTimer(WATCH_HZ, self._watch)
@@ -87,8 +91,16 @@ class GuardNode:
             message = JointState(message.header, [name for name, _ in guarded], [q for _, q in guarded], [], [])
         self._queue.put(message, (_now() - stamp).to_sec() if stamp else 0.0)
 
-    def _take(self, message: JointState) -> bool:
-        """Decides on a target; returns whether a command has gone out."""
+    def _process(self, message: JointState) -> bool:
+        """Decides on a target; returns whether a command was sent. A node that shuts down drops it."""
+        try:
+            return self._answer(message)
+        except rospy.ROSException:
+            if not rospy.is_shutdown():
+                raise
+            return False
+
+    def _answer(self, message: JointState) -> bool:
         if self._guard.is_halted:
             self._status.warn_of_halt()
             return False
@@ -97,6 +109,8 @@ class GuardNode:
             if decision.command is not None:
                 self._send(message, decision)
         except Exception as error:
+            if rospy.is_shutdown():
+                return False
             decision = Decision(None, violation_of("input", f"it cannot be judged: {error!r}"), True)
         if decision.is_halted:
             self._halt(decision.violation, message.header)
@@ -115,7 +129,7 @@ class GuardNode:
                 self._halt(violation_of("master", reason))
 
     def _halt(self, violation: Violation | None, header: Header | None = None) -> None:
-        """Halts, brakes if the guard is to, and says why; the queue's lock is held."""
+        """Halts, brakes if configured, and reports the reason; the queue's lock is held."""
         self._guard.halt()
         self._queue.run_instead(self._brake)
         if violation is not None:
@@ -151,7 +165,7 @@ class GuardNode:
             self._last_stamp = stamp, now_s
             if self._guard.last_command is None and age_s > self._silence_s:  # it waited for a connection
                 return Decision(None, too_old(age_s, self._silence_s, "silence_s"))
-        return self._guard.decide(values.position, self._measurements.situation(self._sent_s, age_s, step_s))
+        return self._guard.decide(values.position, self._measurements.context(self._sent_s, age_s, step_s))
 
     def _checked(self, message: JointState) -> JointValues:
         """Returns the positions of the guarded joints, in order.
@@ -204,9 +218,9 @@ class GuardNode:
                 self._halt(violation_of("source", reason))
                 return
             try:
-                violation = self._guard.late(self._measurements.situation(self._sent_s))
+                violation = self._guard.check_watchdogs(self._measurements.context(self._sent_s))
             except Exception as error:
-                violation = violation_of("input", f"the situation cannot be judged: {error!r}")
+                violation = violation_of("input", f"the context cannot be judged: {error!r}")
             if violation is not None:
                 self._halt(violation)
 

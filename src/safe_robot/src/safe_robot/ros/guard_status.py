@@ -1,4 +1,4 @@
-"""What the guard's node says of its decisions."""
+"""Publishes the decisions of the guard's node."""
 
 import math
 
@@ -23,11 +23,11 @@ def violation_of(check: str, reason: str) -> Violation:
 
 
 class GuardStatus:
-    """Publishes a status for each decision, and warns of what is not safe.
+    """Publishes a status for each decision, and warns of violations.
 
     Args:
         guard: The guard.
-        subject: What warnings are about: the topic of targets.
+        subject: Subject of warnings: the topic of targets.
     """
 
     def __init__(self, guard: Guard, subject: str) -> None:
@@ -41,11 +41,11 @@ class GuardStatus:
     def publish(
         self, header: Header, violation: Violation | None, obstacles: tuple[Obstacle, ...] | None = None
     ) -> None:
-        """Says what was decided.
+        """Reports a decision.
 
         Args:
             header: The target's.
-            violation: Why it is not safe; None if it is.
+            violation: Its violation; None if it is safe.
             obstacles: Bodies of the environment; equal ones are the same tuple.
         """
         if violation is None:
@@ -72,7 +72,7 @@ class GuardStatus:
             self._warn(f"{self._subject}: {violation.check}", message.removeprefix(check))
 
     def warn_of_halt(self) -> None:
-        """Says that a target has come in vain."""
+        """Warns that a target was ignored."""
         self._warn(self._subject, "halted; call robot_safety/start_subscriber to go on")
 
     def _way_out(self, obstacles: tuple[Obstacle, ...] | None) -> str:

@@ -10,16 +10,16 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
 from custom_ros_tools.ros.tf_listener import TfListener
-from rpbi.geometry import Pose
+from robot_model.geometry import Pose
 from safe_robot.geometry.obstacles import Kind, Obstacle
 
 TOPIC = "rpbi/markers"
 HZ = 50.0
-"""How often it is looked where bodies are."""
+"""Rate at which the poses of bodies are read [Hz]."""
 STILL = 1e-4
-"""What moves and turns less than that [m, and parts of a quaternion] stays where it is."""
+"""Smallest motion of a body [m, and parts of a quaternion]; smaller ones are ignored."""
 OLDEST_S = 0.5
-"""From this age on of what TF says, nobody knows where a body is [s]."""
+"""Largest age of a transform [s]; beyond it, the pose of the body is unknown."""
 KINDS: dict[int, Kind] = {
     Marker.CUBE: "box",
     Marker.SPHERE: "sphere",
@@ -48,7 +48,7 @@ class LiveObstacles:
         self._warn = ThrottledWarning()
         self._buffer = tf2_ros.Buffer(debug=False)
         self._listener = TfListener(self._buffer)
-        self._subscriber = rospy.Subscriber(TOPIC, MarkerArray, self._take, queue_size=100)
+        self._subscriber = rospy.Subscriber(TOPIC, MarkerArray, self._on_markers, queue_size=100)
         self._timer = WallTimer(HZ, self._look)
 
     def close(self) -> None:
@@ -57,7 +57,7 @@ class LiveObstacles:
         self._subscriber.unregister()
         self._listener.unregister()
 
-    def _take(self, message: MarkerArray) -> None:
+    def _on_markers(self, message: MarkerArray) -> None:
         markers = dict(self._markers)
         for marker in message.markers:
             if marker.action == Marker.DELETEALL:

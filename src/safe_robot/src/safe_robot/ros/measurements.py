@@ -1,5 +1,6 @@
-"""What the guard's node is told beside targets: where the robot is, what it feels, and what is around it."""
+"""Inputs of the guard's node beside targets: measured positions and forces, and bodies around the robot."""
 
+import threading
 import time
 from collections.abc import Mapping, Sequence
 
@@ -10,7 +11,7 @@ from sensor_msgs.msg import JointState
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.joint_states import values_in
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
-from safe_robot.check import Situation
+from safe_robot.check import CheckContext
 from safe_robot.geometry.obstacles import Obstacle
 
 from .live_obstacles import LiveObstacles
@@ -20,15 +21,14 @@ NEVER_S = float("-inf")
 
 
 class Measurements:
-    """Takes measured states and wrenches, and bodies of the environment; the last ones count.
+    """Receives measured states and wrenches, and bodies of the environment; the last ones count.
 
     A state without all guarded joints, or with values that are not finite, is refused with a warning: then the one
-    before counts, and gets older. Wrenches are taken as they come, in N and N m of their own frame. What has never
-    come is infinitely old.
+    before counts, and gets older. Wrenches are in N and N m of their own frame. A missing value is infinitely old.
 
     Args:
         joint_names: The n guarded joints.
-        base_frame: TF frame of the robot's root; None: nobody tells of bodies.
+        base_frame: TF frame of the robot's root; None without a source of bodies.
         left_out: Bodies that are none.
     """
 
@@ -36,28 +36,33 @@ class Measurements:
         self._joint_names = tuple(joint_names)
         self._around = None if base_frame is None else LiveObstacles(base_frame, left_out)
         self._measured: tuple[Mapping[str, float], float] = {}, NEVER_S
+        self._has_measured = threading.Event()
         self._wrench: tuple[tuple[float, ...], float] = (0.0,) * 6, NEVER_S
         self._warn = ThrottledWarning()
         options = {"queue_size": QUEUE_SIZE, "tcp_nodelay": True}
-        rospy.Subscriber("joint_states/measured", JointState, self._take_measured, **options)
-        rospy.Subscriber("robot_safety/wrench", WrenchStamped, self._take_wrench, **options)
+        rospy.Subscriber("joint_states/measured", JointState, self._on_measured, **options)
+        rospy.Subscriber("robot_safety/wrench", WrenchStamped, self._on_wrench, **options)
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...] | None:
-        """Bodies of the environment, as they are now; None if nobody tells."""
+        """Present bodies of the environment; None without a source."""
         return None if self._around is None else self._around.obstacles
 
-    def situation(self, sent_s: float, age_s: float = 0.0, stamp_step_s: float | None = None) -> Situation:
-        """Returns what a target is judged by.
+    def wait(self, timeout_s: float) -> None:
+        """Waits for the first measured state, at most for a time [s]."""
+        self._has_measured.wait(timeout_s)
+
+    def context(self, sent_s: float, age_s: float = 0.0, stamp_step_s: float | None = None) -> CheckContext:
+        """Returns the context of the checks of a target.
 
         Args:
-            sent_s: When the last command was sent [s], by the monotonic clock.
-            age_s: How old the target is [s].
-            stamp_step_s: How much later its stamp is than the one before [s].
+            sent_s: Time of the last command [s], by the monotonic clock.
+            age_s: Age of the target [s].
+            stamp_step_s: Difference to the stamp before [s].
         """
         now_s = time.monotonic()
         (measured, measured_s), (wrench, wrench_s) = self._measured, self._wrench
-        return Situation(
+        return CheckContext(
             now_s=now_s,
             age_s=age_s,
             stamp_step_s=stamp_step_s,
@@ -69,7 +74,7 @@ class Measurements:
             obstacles=self.obstacles,
         )
 
-    def _take_measured(self, message: JointState) -> None:
+    def _on_measured(self, message: JointState) -> None:
         try:
             values = values_in(message)
             values.in_order(self._joint_names)
@@ -77,8 +82,9 @@ class Measurements:
             self._warn(rospy.resolve_name("joint_states/measured"), f"message refused: {error}")
             return
         self._measured = dict(zip(values.names, values.position)), time.monotonic()
+        self._has_measured.set()
 
-    def _take_wrench(self, message: WrenchStamped) -> None:
+    def _on_wrench(self, message: WrenchStamped) -> None:
         force, torque = message.wrench.force, message.wrench.torque
         wrench = (force.x, force.y, force.z, torque.x, torque.y, torque.z)
         self._wrench = wrench, time.monotonic()

@@ -1,4 +1,4 @@
-"""What the guard's node is told by parameters."""
+"""Parameters of the guard's node."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,7 +8,7 @@ import rospy
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
 from custom_ros_tools.schema.type_names import shown
-from rpbi.urdf.files import write_description
+from robot_model.urdf.files import write_description
 from safe_robot import legacy
 from safe_robot.config import GuardConfig, NodeConfig
 from safe_robot.guard import Guard
@@ -23,7 +23,7 @@ START_FROM_TARGET = (
 
 
 def guard_of_parameters() -> tuple[Guard, NodeConfig]:
-    """Returns the guard that private parameters and `robot_description` tell of, and what its node does beside.
+    """Returns the guard of the private parameters and `robot_description`, and the configuration of its node.
 
     Raises:
         ConfigError: If a parameter, or the robot, is wrong.

@@ -8,28 +8,27 @@ from typing import Generic, TypeVar
 
 Item = TypeVar("Item")
 PATIENCE_S = 0.1
-"""How long targets wait for a sign of life of their source [s]."""
+"""Time that targets wait for a sign of life of their source [s]."""
 WAKE_UP_S = 0.0002
-"""So long before a target is due the queue's thread is woken up, since that takes time [s]."""
+"""Time before a target is due at which the queue's thread is woken up [s]."""
 
 
 class TargetQueue(Generic[Item]):
-    """Hands targets on, a period apart, as long as the newest one is fresh.
+    """Passes targets on, a period apart, as long as the newest one is fresh.
 
-    A target that comes when the period is over is handed on at once, by the thread that brings it. What comes sooner
-    waits, so that a burst makes no robot faster. What waits is handed on only while the newest target that has come is
-    younger than a limit: a source that died leaves nothing behind that would go on moving a robot.
+    A target that comes after the period is passed on at once, in the thread that delivers it. An earlier one waits, so
+    that a burst does not make the robot faster. Waiting targets are passed on only while the newest one is younger than
+    a limit: after the death of a source, the robot stops.
 
     Args:
         period_s: The period [s].
-        silence_s: How old the newest target may be [s].
-        size: How many targets wait at most; older ones are dropped.
-        take: Gets each target, `lock` held; returns whether the period begins anew.
-        give_up: Is called, `lock` held, with the age of the newest target [s], when targets have waited in vain;
-            they are dropped.
+        silence_s: Largest age of the newest target [s]; beyond it, waiting targets are dropped.
+        size: Largest number of waiting targets; beyond it, the oldest are dropped.
+        on_target: Called with each target, `lock` held; returns whether the period restarts.
+        give_up: Called, `lock` held, with the age of the newest target [s] when waiting targets are dropped.
 
     Attributes:
-        lock: Held while a target is taken.
+        lock: Held while a target is passed on.
     """
 
     def __init__(
@@ -37,11 +36,11 @@ class TargetQueue(Generic[Item]):
         period_s: float,
         silence_s: float,
         size: int,
-        take: Callable[[Item], bool],
+        on_target: Callable[[Item], bool],
         give_up: Callable[[float], None],
     ) -> None:
         self._period_s, self._silence_s = period_s, silence_s
-        self._take, self._give_up = take, give_up
+        self._on_target, self._give_up = on_target, give_up
         self.lock = threading.Condition()
         self._waiting: deque[tuple[Item, float]] = deque(maxlen=size)
         self._step: Callable[[], bool] | None = None
@@ -49,11 +48,11 @@ class TargetQueue(Generic[Item]):
         threading.Thread(target=self._run, name="target queue", daemon=True).start()
 
     def put(self, item: Item, age_s: float) -> None:
-        """Hands a target on, now or later.
+        """Passes a target on, now or later.
 
         Args:
             item: The target.
-            age_s: How old it is [s]; 0 if nobody knows.
+            age_s: Its age [s]; 0 if unknown.
         """
         with self.lock:
             now_s = time.monotonic()
@@ -69,12 +68,12 @@ class TargetQueue(Generic[Item]):
         self._waiting.clear()
 
     def run_instead(self, step: Callable[[], bool]) -> None:
-        """Drops all that waits, and calls a step a period after what was handed on last, and so on; `lock` is held.
+        """Drops all waiting targets, and calls a step each period after the last target; `lock` is held.
 
-        What is late is not caught up with: no call follows another one sooner than a period.
+        Lateness is not caught up with: calls are at least a period apart.
 
         Args:
-            step: Is called, `lock` held, until it returns False.
+            step: Called, `lock` held, until it returns False.
         """
         self._waiting.clear()
         self._step = step
@@ -89,7 +88,7 @@ class TargetQueue(Generic[Item]):
     def _hand_on(self) -> None:
         item, _ = self._waiting.popleft()
         begin_s = time.monotonic()  # else each period would be longer by what a decision takes
-        if self._take(item):
+        if self._on_target(item):
             self._due_s = max(self._due_s, begin_s) + self._period_s
 
     def _run(self) -> None:

@@ -1,1 +1,1 @@
-"""The life of a node: start, interrupts, log, the master, end."""
+"""Lifecycle of a node: start, interrupts, log, the master, end."""

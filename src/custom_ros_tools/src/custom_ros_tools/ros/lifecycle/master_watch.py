@@ -1,4 +1,4 @@
-"""Keeps a node known to a ROS master that goes away and comes back with an empty memory."""
+"""Keeps a node registered with a ROS master that goes away and comes back with an empty memory."""
 
 import contextlib
 import threading
@@ -20,17 +20,17 @@ _METHODS = {"sub": "Subscriber", "pub": "Publisher", "srv": "Service"}
 
 
 class Registrations:
-    """Registers the topics and services of this node, in the place of rospy's own part for that.
+    """Registers the topics and services of this node, instead of rospy's own code.
 
-    That one waits for a master that has gone, with all topics locked, and registers nothing again. Here what is opened
-    or closed while there is no master is told to the next one.
+    That code waits for a master that has gone, with all topics locked, and registers nothing again. Here, topics and
+    services that are opened or closed without a master are registered with the next one.
 
     Args:
-        registry: What there is.
+        registry: The node's topics and services.
         uri: The node's master.
 
     Attributes:
-        are_complete: Whether the master knows them all, as far as is known.
+        are_complete: Whether the master has them all, as far as is known.
     """
 
     def __init__(self, registry: Registry, uri: str) -> None:
@@ -38,11 +38,11 @@ class Registrations:
         self._registry, self._uri = registry, uri
         self._name, self._node_uri = rospy.get_name(), rospy.get_node_uri()
         self._withdrawn: list[tuple[str, tuple[str, str, str]]] = []
-        """Calls that a master who comes back, and has not forgotten anything, has to hear."""
+        """Pending calls for a master that comes back with its memory intact."""
         registry.hand_over(self)
 
     def reg_added(self, name: str, type_or_uri: str, kind: str) -> None:
-        """Registers a topic or service; rospy calls it."""
+        """Registers a topic or service; called by rospy."""
         if not self.are_complete:
             return
         try:
@@ -52,10 +52,10 @@ class Registrations:
         except MASTER_FAILURES:
             self.are_complete = False
             return
-        self._take(kind, name, answer)
+        self._on_answer(kind, name, answer)
 
     def reg_removed(self, name: str, type_or_uri: str, kind: str) -> None:
-        """Withdraws a topic or service; rospy calls it."""
+        """Withdraws a topic or service; called by rospy."""
         uri = type_or_uri if kind == "srv" else self._node_uri
         method, arguments = f"unregister{_METHODS[kind]}", (self._name, name, uri)
         try:
@@ -68,7 +68,7 @@ class Registrations:
         self._withdrawn.append((method, arguments))
 
     def repeat(self, master: Any) -> tuple[int, int]:
-        """Registers everything again, and parameters with it; returns the number of topics and that of services."""
+        """Registers everything again, and parameters with it; returns the numbers of topics and of services."""
         with self._registry.entries() as entries:  # no topic or service comes or goes meanwhile
             kept_parameters.restore(master)
             calls: Any = MultiCall(master)
@@ -80,11 +80,11 @@ class Registrations:
             self._withdrawn.clear()
             self.are_complete = True
         for (kind, name, _), answer in zip(entries, answers, strict=True):
-            self._take(kind, name, answer)
+            self._on_answer(kind, name, answer)
         served = sum(kind == "srv" for kind, _, _ in entries)
         return len(entries) - served, served
 
-    def _take(self, kind: str, name: str, answer: tuple[int, str, Any]) -> None:
+    def _on_answer(self, kind: str, name: str, answer: tuple[int, str, Any]) -> None:
         code, message, value = answer
         if code != 1:
             rospy.logfatal("the ROS master does not take %s: %s", name, message)
@@ -93,14 +93,14 @@ class Registrations:
 
 
 class MasterWatch:
-    """Looks after the ROS master once a second, until the node shuts down.
+    """Checks the ROS master once a second, until the node shuts down.
 
-    When the master cannot be reached, it says so; connections that exist do not need it. When the master is back, all
+    A master that cannot be reached is reported; existing connections do not need it. When the master is back, all
     topics, services and parameters of the node are registered again, since rospy does that at the start only. If
-    another node has taken the name meanwhile, this one ends, as ROS has it when a master sees both. A rospy that is
-    built otherwise than expected registers nothing again, which is said at the start.
+    another node has taken the name meanwhile, this one ends, as ROS requires when a master sees both. A rospy with
+    different internals registers nothing again, which is reported at the start.
 
-    Make it once, after `rospy.init_node`.
+    Create it once, after `rospy.init_node`.
     """
 
     def __init__(self) -> None:
@@ -114,7 +114,7 @@ class MasterWatch:
             self._process = master.getPid(self._name)[2]
             kept_parameters.keep("/use_sim_time")
             kept_parameters.keep(self._name)
-            # rospy asks the master for each line that it logs: one that hangs would hold up who says anything
+            # rospy contacts the master for each logged line: one that hangs would block any thread that logs
             answer_cached(_ASKED_BY_LOGGING, rospy.get_param_cached(_ASKED_BY_LOGGING, False))
         rospy.on_shutdown(self._end)
         WallTimer(LOOK_HZ, self._look)
@@ -136,7 +136,7 @@ class MasterWatch:
                 self._registrations.are_complete = False
 
     def _compare(self, master: Any) -> None:
-        """Compares what the master knows of us with what is."""
+        """Compares the master's registrations of this node with the actual ones."""
         calls: Any = MultiCall(master)
         calls.getPid(self._name)
         calls.lookupNode(self._name, self._name)
@@ -167,6 +167,6 @@ class MasterWatch:
         )
 
     def _end(self) -> None:
-        """Sees to it that nothing is registered after the node has taken its leave."""
+        """Ensures that nothing is registered after the node has unregistered."""
         with self._registering:
             self._is_over = True

@@ -1,4 +1,4 @@
-"""Parameters of a node: private ones, checked, and those that it sets again at a ROS master that has lost them."""
+"""Parameters of a node: checked private ones, and those that are set again at a ROS master that has lost them."""
 
 import contextlib
 from typing import Any, TypeVar
@@ -13,52 +13,52 @@ Model = TypeVar("Model", bound=ConfigModel)
 
 
 def private_config(model: type[Model]) -> Model:
-    """Returns what the parameter `~config` says.
+    """Returns the parameter `~config`.
 
     Raises:
-        ConfigError: If it is wrong; it tells everything that is.
+        ConfigError: If it is wrong; lists every fault.
     """
     return model.parse(rospy.get_param("~config", {}), "~config")
 
 
 def private_parameters(model: type[Model]) -> Model:
-    """Returns the private parameters that a model names; others are left alone.
+    """Returns the private parameters that a model names; others are ignored.
 
     Raises:
-        ConfigError: If one is wrong; it names the node.
+        ConfigError: If one is wrong; names the node.
     """
     keys = [key for key in model.model_fields if rospy.has_param(f"~{key}")]
     return model.parse({key: rospy.get_param(f"~{key}") for key in keys}, rospy.get_name())
 
 
 class KeptParameters:
-    """Remembers parameters and their values for a master that comes back without them."""
+    """Stores parameters and their values for a master that comes back without them."""
 
     def __init__(self) -> None:
         self._values: dict[str, Any] = {}
 
     def keep(self, name: str) -> None:
-        """Remembers the present value of a parameter, or of all in a namespace, if there is one."""
+        """Stores the present value of a parameter, or of all in a namespace, if there is one."""
         name = rospy.resolve_name(name)
         if rospy.has_param(name):
             self._values[name] = rospy.get_param(name)
 
     def set(self, name: str, value: Any) -> None:
-        """Sets a parameter and remembers it, for later if there is no master now."""
+        """Sets a parameter and stores it, for later if there is no master now."""
         name = rospy.resolve_name(name)
         self._values[name] = value
         with contextlib.suppress(*MASTER_FAILURES), timed_master() as master:
             master.setParam(rospy.get_name(), name, value)
 
     def delete(self, name: str) -> None:
-        """Deletes a parameter and forgets it; it, or the master, may have gone already."""
+        """Deletes a parameter from the master and the store; it, or the master, may have gone already."""
         name = rospy.resolve_name(name)
         self._values.pop(name, None)
         with contextlib.suppress(*MASTER_FAILURES), timed_master() as master:
             master.deleteParam(rospy.get_name(), name)
 
     def restore(self, master: Any) -> None:
-        """Sets those that a master (see `timed_master`) does not have; what it has by now is left alone."""
+        """Sets those that a master (see `timed_master`) does not have; existing ones stay unchanged."""
         caller = rospy.get_name()
         for name, value in dict(self._values).items():
             if not master.hasParam(caller, name)[2]:
@@ -66,4 +66,4 @@ class KeptParameters:
 
 
 kept_parameters = KeptParameters()
-"""Those of this process: a process is one node."""
+"""Parameters of this process: a process is one node."""

@@ -1,9 +1,9 @@
 """The life of a node: start, wait, end; with Ctrl-C at any moment, without hanging and without a traceback.
 
 rospy would shut down inside the signal handler, wherever the program happens to be. If that is inside a lock that the
-shutdown needs too, the process hangs for good; and also if anybody opens or closes a topic meanwhile. So SIGINT stays
-blocked (see `custom_ros_tools.ros.node`), and is waited for where it is safe to act on it, in a thread. Child processes
-inherit the block, which leaves their end to this process.
+shutdown needs too, the process hangs for good; and also if anybody opens or closes a topic meanwhile. SIGINT therefore
+stays blocked (see `custom_ros_tools.ros.node`), and is waited for where it is safe to act on it, in a thread. Child
+processes inherit the block, which leaves their end to this process.
 """
 
 import atexit
@@ -32,23 +32,23 @@ from .timed_master import address_fault
 
 T = TypeVar("T")
 
-LONGEST_FAREWELL_S = 10.0
-"""How long leaving the ROS master may take [s]; it may hang or be gone."""
+MAX_FAREWELL_S = 10.0
+"""Longest time for unregistering from the ROS master [s]; it may hang or be gone."""
 MASTER_PERIOD_S = 0.2
 ROSOUT = "/rosout"
 ROSPY_LOGGER = "rosout"
 LOG_PARAMETER = "/rosout_disable_topics_generation"
-LONGEST_WAIT_S = 10.0
-"""How long to wait for those who listen to /rosout; a node that has just begun is not connected to them yet."""
-LONGEST_LOOK_S = 1.0
+MAX_WAIT_S = 10.0
+"""Longest time to wait for subscribers of /rosout [s]; a node that has just started is not connected to them yet."""
+MAX_LOOK_S = 1.0
 SENDING_S = 0.2
 INTERRUPTED_TOO_S = 1.0
-"""How much later than the node of a service an interrupt may reach this one, where it goes to both [s]."""
-MOST_FILES = 8192
+"""Time by which an interrupt may reach this node later than the node of a service, if both get it [s]."""
+MAX_FILES = 8192
 
 
 def init_node(name: str, loggers: Iterable[str] = (), anonymous: bool = False, ros_time: bool = True) -> None:
-    """Makes this process a node that a ROS master finds again when it comes back; for the arguments see `run_node`."""
+    """Makes this process a node that registers again at a restarted ROS master; for the arguments see `run_node`."""
     keep_accepting()
     rospy.init_node(name, anonymous=anonymous, disable_rostime=not ros_time, disable_signals=True)
     rospy.on_shutdown(_leave_parameters)
@@ -68,18 +68,18 @@ def run_node(
     ros_time: bool = True,
     loggers: Iterable[str] = (),
 ) -> None:
-    """Runs a node until it is interrupted; what is wrong with its configuration ends it with 1.
+    """Runs a node until it is interrupted; a wrong configuration ends it with 1.
 
-    The program is one that `custom_ros_tools.ros.node.run` runs.
+    The program must be one that `custom_ros_tools.ros.node.run` runs.
 
     Args:
-        name: The node's name unless it is given another one.
-        start: Opens topics and services, and perhaps does the node's work itself until ROS shuts down, which
-            `rospy.ROSInterruptException` may tell; what it returns lives as long as the node.
-        run: Does the work of what `start` returns, until ROS shuts down; if it is given, an interrupt waits until
+        name: Default name of the node.
+        start: Opens topics and services. It may do the node's work itself until ROS shuts down, which
+            `rospy.ROSInterruptException` may indicate. Its result is referenced until the end.
+        run: Does the work with the result of `start`, until ROS shuts down; if it is given, an interrupt waits until
             `start` has returned.
         anonymous: Whether the name is made unique.
-        ros_time: Whether the node goes by ROS time; else it never waits for a clock.
+        ros_time: Whether the node uses ROS time; otherwise it never waits for a clock.
         loggers: Top-level Python modules whose loggers go to /rosout, beside that of `start`.
     """
     if not _wait_for_master():
@@ -115,13 +115,13 @@ def run_node(
 
 
 def _wait_for_master() -> bool:
-    """Waits for a ROS master and returns False if it was interrupted; from here on, SIGTERM does the same as SIGINT."""
+    """Waits for a ROS master; returns False if it was interrupted. From here on, SIGTERM acts like SIGINT."""
     signal.signal(signal.SIGTERM, lambda *_: _interrupt())
-    told = False
+    is_reported = False
     while not rosgraph.is_master_online():
-        if not told:
+        if not is_reported:
             print(f"waiting for a ROS master at {rosgraph.get_master_uri()}: is roscore running?", flush=True)
-            told = True
+            is_reported = True
         if signal.sigtimedwait({signal.SIGINT}, MASTER_PERIOD_S) is not None:
             return False
     return True
@@ -136,7 +136,7 @@ def _leaving_ros_on_interrupt() -> Iterator[None]:
         yield
     finally:
         _interrupt()
-        thread.join(LONGEST_FAREWELL_S)
+        thread.join(MAX_FAREWELL_S)
 
 
 def leave_ros_on_signals() -> None:
@@ -153,20 +153,20 @@ def leave_ros_on_signals() -> None:
 
     def leave() -> None:
         os.write(writing, b".")
-        thread.join(LONGEST_FAREWELL_S)
+        thread.join(MAX_FAREWELL_S)
 
     thread = threading.Thread(target=wait_and_leave, name="interrupts", daemon=True)
     thread.start()
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: os.write(writing, b"."))  # all that is safe wherever the script happens to be
+        signal.signal(number, lambda *_: os.write(writing, b"."))  # only this is safe wherever the script happens to be
     atexit.register(leave)
 
 
 def _leave_parameters() -> None:
-    """Takes leave of the parameter that rospy subscribes to with the first line it logs.
+    """Unsubscribes from the parameter to which rospy subscribes with the first line that it logs.
 
-    rospy itself does not. A master that still knows the node would shut down, once its name is used again, whoever has
-    come to its address since.
+    rospy itself does not. A master that still has the subscription would shut down any node that has this address when
+    the name is used again.
     """
     with contextlib.suppress(OSError, rosgraph.MasterException):
         rosgraph.Master(rospy.get_name()).unsubscribeParam(rospy.get_node_uri(), LOG_PARAMETER)
@@ -182,9 +182,9 @@ def _wait_and_leave() -> None:
 
 
 def _allow_many_files() -> None:
-    """Raises the limit of open files, of which every connection of a topic takes one, as far as that is allowed."""
+    """Raises the limit of open files, one of which every connection of a topic needs, as far as permitted."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    most = MOST_FILES if hard == resource.RLIM_INFINITY else min(hard, MOST_FILES)
+    most = MAX_FILES if hard == resource.RLIM_INFINITY else min(hard, MAX_FILES)
     if soft != resource.RLIM_INFINITY and soft < most:
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
 
@@ -215,9 +215,9 @@ def _attach_logging(modules: Iterable[str]) -> None:
 
 
 def _is_news(record: logging.LogRecord) -> bool:
-    """Returns whether a message of rospy is worth a line: not that a callback met a topic that a shutdown has closed.
+    """Returns whether a message of rospy is worth logging; a callback that met a topic closed by the shutdown is not.
 
-    rospy closes topics first, and only then takes what callbacks raise for what it is.
+    rospy closes topics first, and only then recognises exceptions of callbacks as a consequence.
     """
     return not (rospy.core.is_shutdown_requested() and record.getMessage().startswith("bad callback"))
 
@@ -225,7 +225,7 @@ def _is_news(record: logging.LogRecord) -> bool:
 def _log_fatal_lines(lines: Iterable[str]) -> None:
     """Logs lines as fatal, on the console and in /rosout, just before the node ends."""
     publisher = rospy.Publisher(ROSOUT, Log, queue_size=100, latch=True)  # another handle on what rospy logs to
-    end_s = time.monotonic() + LONGEST_WAIT_S
+    end_s = time.monotonic() + MAX_WAIT_S
     expected = _listeners()
     while publisher.get_num_connections() < expected and time.monotonic() < end_s and not rospy.is_shutdown():
         time.sleep(0.01)
@@ -236,16 +236,16 @@ def _log_fatal_lines(lines: Iterable[str]) -> None:
 
 
 def _listeners() -> int:
-    """Returns how many nodes listen to /rosout; those that were killed do so by the master's word only."""
+    """Returns the number of nodes that subscribe to /rosout, according to the master; killed ones may be among them."""
     with contextlib.suppress(OSError, rosgraph.MasterException):
         master = rosgraph.Master(rospy.get_name())
         nodes = dict(master.getSystemState()[1]).get(ROSOUT, ())
-        return sum(map(_takes_connections, map(master.lookupNode, nodes)))
+        return sum(map(_accepts_connections, map(master.lookupNode, nodes)))
     return 0
 
 
-def _takes_connections(uri: str) -> bool:
+def _accepts_connections(uri: str) -> bool:
     with contextlib.suppress(OSError, ValueError):
-        socket.create_connection(rosgraph.network.parse_http_host_and_port(uri), LONGEST_LOOK_S).close()
+        socket.create_connection(rosgraph.network.parse_http_host_and_port(uri), MAX_LOOK_S).close()
         return True
     return False

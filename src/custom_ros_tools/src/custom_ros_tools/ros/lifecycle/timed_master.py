@@ -1,4 +1,4 @@
-"""The ROS master: asked without waiting for ever, whether its side reaches this node, and a port for another one."""
+"""Calls to the ROS master with a time limit, a check of this node's address, and a port for another master."""
 
 import http.client
 import os
@@ -11,12 +11,12 @@ from xmlrpc.client import Error, ServerProxy, Transport
 import rosgraph
 
 TIMEOUT_S = 2.0
-"""How long the master may take to answer [s]; a healthy one takes milliseconds."""
+"""Longest time for an answer of the master [s]; a healthy one takes milliseconds."""
 MASTER_FAILURES = (OSError, Error, http.client.HTTPException, ExpatError)
-"""What its calls raise if it has gone, hangs or is something else."""
+"""Exceptions of its calls if it has gone, hangs or is something else."""
 
 PORTS = range(22000, 32000)
-"""Ports for masters, below those that the kernel gives to whoever asks for any."""
+"""Ports for masters, below those that the kernel assigns for port 0."""
 
 
 class TimedTransport(Transport):
@@ -27,14 +27,15 @@ class TimedTransport(Transport):
         self._timeout_s = timeout_s
 
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        """Returns the connection to a host; the base class calls it."""
+        """Returns the connection to a host; called by the base class."""
         connection = super().make_connection(host)
         connection.timeout = self._timeout_s
         return connection
 
 
 def timed_master(uri: str | None = None) -> Any:
-    """Returns the XML-RPC interface of a master, by default of the environment's, a context that closes the connection.
+    """Returns the XML-RPC interface of a master, by default that of the environment, as a context that closes the
+    connection.
 
     Its calls return (code, message, value) and raise one of MASTER_FAILURES if the master does not answer.
     """
@@ -42,11 +43,11 @@ def timed_master(uri: str | None = None) -> Any:
 
 
 def address_fault() -> str | None:
-    """Returns in one line why others cannot, or may not, reach this node by the address that it gives, else None.
+    """Returns in one line why other nodes cannot, or may not, reach this node by its address, or None.
 
-    The address is that of ROS_HOSTNAME, ROS_IP or this computer's name. It has to be one of this computer; where the
-    master is reached by a network, none that only this computer reaches, and if the master is on another computer, the
-    one from which this computer reaches it.
+    The address is that of ROS_HOSTNAME, ROS_IP or this computer's name. It has to belong to this computer. If the
+    master is reached through a network, it must not be a loopback address. If the master is on another computer, it has
+    to be the address from which this computer reaches it.
     """
     variable = next((name for name in ("ROS_HOSTNAME", "ROS_IP") if os.environ.get(name)), None)
     given = rosgraph.network.get_host_name()
@@ -85,9 +86,9 @@ def _is_of_this_computer(address: str) -> bool:
 
 
 def unused_port() -> int:
-    """Returns a port for a master of one's own.
+    """Returns a port for a private master.
 
-    It is one that the kernel gives to nobody, so that none of the many nodes around has it before the master does.
+    The kernel assigns it to nobody, so that no other node takes it before the master does.
 
     Raises:
         OSError: If there is none.

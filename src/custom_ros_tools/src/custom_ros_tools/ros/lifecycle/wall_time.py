@@ -9,11 +9,11 @@ import rospy
 
 
 class WallRate:
-    """Says when something is due at a rate; what it is late for it leaves out.
+    """Schedules events at a rate; missed ones are skipped.
 
     Args:
         hz: The rate [Hz]; 0 is never.
-        delay_s: When it is due for the first time [s] from now.
+        delay_s: Time until it is due for the first time [s].
     """
 
     def __init__(self, hz: float, delay_s: float = 0.0) -> None:
@@ -22,7 +22,7 @@ class WallRate:
 
     @property
     def left_s(self) -> float:
-        """How long until it is due again [s]; 0 or less if it is."""
+        """Time until it is due again [s]; 0 or less if it is due."""
         return self._due_s - time.monotonic()
 
     def is_due(self) -> bool:
@@ -34,12 +34,12 @@ class WallRate:
         return True
 
     def rest(self, duration_s: float) -> None:
-        """Is not due for some time from now [s]."""
+        """Postpones the next event by some time from now [s]."""
         self._due_s = max(self._due_s, time.monotonic() + duration_s)
 
 
 class WallTimer:
-    """Calls something at a rate [Hz], in a thread of its own, until it is stopped or ROS shuts down.
+    """Calls a function at a rate [Hz], in a thread of its own, until it is stopped or ROS shuts down.
 
     An exception is logged, and the next call is made all the same.
     """
@@ -52,7 +52,7 @@ class WallTimer:
         threading.Thread(target=self._run, name="wall timer", daemon=True).start()
 
     def stop(self) -> None:
-        """Makes no further call; one that is being made ends by itself."""
+        """Makes no further call; a running one ends by itself."""
         self._ended.set()
 
     def _run(self) -> None:
@@ -61,12 +61,12 @@ class WallTimer:
                 if self._rate.is_due():
                     self._action()
             except Exception:
-                if not rospy.is_shutdown():  # else its topics are closed already
+                if not rospy.is_shutdown():  # otherwise its topics are closed already
                     self._warn(threading.current_thread().name, traceback.format_exc())
 
 
 class ThrottledWarning:
-    """Warns about each subject at most once in a period of wall time [s], and counts what it kept back."""
+    """Warns about each subject at most once in a period of wall time [s], and counts suppressed warnings."""
 
     def __init__(self, period_s: float = 5.0) -> None:
         self._period_s = period_s
@@ -74,7 +74,7 @@ class ThrottledWarning:
         self._last: dict[str, tuple[float, int]] = {}
 
     def __call__(self, subject: str, message: str) -> None:
-        """Warns `SUBJECT: MESSAGE`, unless it did so a moment ago."""
+        """Warns `SUBJECT: MESSAGE`, unless it did so within the period."""
         now_s = time.monotonic()
         with self._lock:
             last_s, kept_back = self._last.get(subject, (-self._period_s, 0))

@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 
 
 class AttachMarkerNode:
-    """Repeats the marker of `~config` and, if it is asked to, the pose of the marker as TF.
+    """Repeats the marker of `~config` and, on request, the pose of the marker as TF.
 
     Raises:
         ConfigError: If the configuration is wrong.
@@ -42,10 +42,10 @@ class AttachMarkerNode:
 
 
 def _marker(config: MarkerConfig) -> Marker:
-    """Returns the message but for its pose and stamp."""
+    """Returns the message except for its pose and stamp."""
     marker = Marker(type=getattr(Marker, config.type), action=getattr(Marker, config.action))
     marker.header.frame_id = config.frame_id
-    marker.ns = rospy.get_name()  # else markers of several nodes on one topic would replace each other
+    marker.ns = rospy.get_name()  # otherwise markers of several nodes on one topic would replace each other
     marker.scale.x, marker.scale.y, marker.scale.z = config.scale
     marker.color = ColorRGBA(*config.rgba)
     marker.mesh_resource = config.mesh_uri

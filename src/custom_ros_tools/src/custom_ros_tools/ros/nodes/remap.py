@@ -1,4 +1,4 @@
-"""The nodes that remap joint states: to another topic, or as bare numbers, with names and units that a driver wants."""
+"""Nodes that remap joint states: to another topic, or as bare numbers, with names and units of a driver."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -22,17 +22,17 @@ Config = TypeVar("Config", bound=RemapConfig)
 TO_FLOAT_ARRAY = "remap_joint_state_to_floatarray"
 TO_JOINT_STATE = "remap_joint_state_to_joint_state"
 QUEUE_SIZE = 100
-"""Messages kept while the machine is busy: 0.1 s of joint states at 1 kHz."""
+"""Largest number of queued messages on a busy machine: 0.1 s of joint states at 1 kHz."""
 START_WAIT_S = 2.0
-"""How long to wait for each of the joint states that must be near each other at the start [s]."""
+"""Longest time to wait for each of the joint states of the condition at the start [s]."""
 
 
 class RemapNode:
-    """Publishes what it makes of joint states while it is switched on; off, it does not even listen.
+    """Converts and publishes joint states while it is switched on; while off, it is not even subscribed.
 
-    It has the service `remap_joint_state/toggle` and the same under the name of its executable. `convert` makes what is
-    published; it raises InterfaceError or ValueError for a message that must be refused. `config` may say what must be
-    near for it to be switched on.
+    It has the service `remap_joint_state/toggle` and the same under the name of its executable. `convert` returns the
+    published message; it raises InterfaceError or ValueError for a message that must be refused. `config` may have a
+    condition for switching on.
     """
 
     def __init__(
@@ -67,14 +67,14 @@ class RemapNode:
         if self._config.start_within is not None:
             _check_start(self._config, self._source)
         self._subscriber = rospy.Subscriber(
-            self._source, JointState, self._take, queue_size=QUEUE_SIZE, tcp_nodelay=True
+            self._source, JointState, self._on_message, queue_size=QUEUE_SIZE, tcp_nodelay=True
         )
 
     def _listen_no_more(self) -> None:
         if self._subscriber is not None:
             self._subscriber.unregister()
 
-    def _take(self, message: JointState) -> None:
+    def _on_message(self, message: JointState) -> None:
         try:
             converted = self._convert(message)
         except (InterfaceError, ValueError) as error:
@@ -84,10 +84,10 @@ class RemapNode:
 
 
 def _check_start(config: RemapConfig, source: str) -> None:
-    """Waits for what would be commanded and for where the robot is.
+    """Waits for the first command and the state of the robot, and compares them.
 
     Raises:
-        InterfaceError: If they are too far apart, lack joints or do not come.
+        InterfaceError: If they are too far apart, lack joints or do not arrive.
         ValueError: If one of the messages is no joint state.
     """
     assert config.start_within is not None

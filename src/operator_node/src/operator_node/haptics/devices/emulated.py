@@ -1,30 +1,29 @@
-"""What devices without hardware share: a hand on a handle, which the force moves as well."""
+"""Base of devices without hardware: a hand on a handle, which the force moves, too."""
 
 import time
 from abc import abstractmethod
 
 from operator_node.haptics.device import HapticDevice, HapticReading
 from operator_node.haptics.hand import Hand
-from operator_node.haptics.vectors import ZERO
-from rpbi.geometry import Vector
+from robot_model.geometry import ZERO, Vector
 
 STEP_S = 0.001
-LONGEST_S = 0.05
-"""Time beyond this is lost: the handle stands still meanwhile [s]."""
+MAX_STEP_S = 0.05
+"""Longest time that is simulated at once [s]; the rest is dropped, and the handle stands still meanwhile."""
 
 
 class EmulatedDevice(HapticDevice):
-    """A handle that is drawn to where a hand wants it, and pushed by the force; time is the monotonic clock."""
+    """A handle that a hand pulls to a wanted position and the force pushes; its time is the monotonic clock."""
 
     hand: Hand
     buttons: tuple[int, ...] = ()
 
     @abstractmethod
     def wanted(self, time_s: float) -> Vector:
-        """Returns where the hand wants the handle, some time after `open` [m]."""
+        """Returns the position to which the hand pulls the handle, some time after `open` [m]."""
 
     def open(self) -> None:
-        """Takes hold of the handle, at rest in the middle."""
+        """Starts with the handle at rest in the middle."""
         self.hand = self.make_hand()
         self._start_s = self._now_s = time.monotonic()
         self._force, self._expires_s = ZERO, 0.0
@@ -35,13 +34,13 @@ class EmulatedDevice(HapticDevice):
 
     @property
     def force(self) -> Vector:
-        """The force that is felt now [N]."""
+        """Force that is rendered now [N]."""
         return self._force if self._now_s < self._expires_s else ZERO
 
     def read(self) -> HapticReading | None:
-        """Lets the time since the last call pass, and returns where the handle is then."""
+        """Simulates the time since the last call, and returns the handle's state."""
         now_s = time.monotonic()
-        self._now_s = max(self._now_s, now_s - LONGEST_S)
+        self._now_s = max(self._now_s, now_s - MAX_STEP_S)
         if now_s - self._now_s < 0.5 * STEP_S:
             return None
         while (left_s := now_s - self._now_s) > 1e-9:
@@ -51,9 +50,9 @@ class EmulatedDevice(HapticDevice):
         return HapticReading(self.hand.position, self.hand.velocity, buttons=self.buttons)
 
     def send(self, force: Vector, expires_s: float) -> None:
-        """Has the handle be pushed until then."""
+        """Applies a force to the handle until it expires."""
         self._force, self._expires_s = force, expires_s
 
     def close(self) -> None:
-        """Lets go of the handle."""
+        """Removes the force."""
         self._force = ZERO

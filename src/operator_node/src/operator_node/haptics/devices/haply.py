@@ -1,4 +1,4 @@
-"""Haply Inverse3, by the websocket of its service."""
+"""Haply Inverse3, through the websocket of its service."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from custom_ros_tools.errors import MissingDependency
 from custom_ros_tools.schema import Positive, PositiveMetres, Text, Vec3
 from operator_node.device import DeviceError
 from operator_node.haptics.device import HapticConfig, HapticDevice, HapticReading, ReadingError
-from operator_node.haptics.vectors import ZERO, norm
-from rpbi.geometry import Vector, minus
+from robot_model.geometry import ZERO, Vector, minus, norm
 
 from .haply_messages import command_of, device_in, state_in
 
@@ -25,31 +24,31 @@ except ImportError as error:
     raise MissingDependency("websockets", "apt-get install python3-websockets") from error
 
 PATIENCE_S = 1.0
-"""After so long without an answer the connection counts as lost [s]."""
+"""Time without an answer after which the connection counts as lost [s]."""
 PERIOD_S = 0.001
-LONGEST_FRAME = 1 << 18
+MAX_FRAME_BYTES = 1 << 18
 TRIED = 50
-"""So many forces in a row that are not felt mean that the service knows another key."""
+"""Number of consecutive forces without effect after which the other key is tried."""
 FELT_N = 0.3
-"""Forces below this tell nothing about the key [N]."""
+"""Force below which the reported force is not evaluated [N]."""
 KEYS = ("vector", "values")
 
 
 class HaplyConfig(HapticConfig):
     """A Haply Inverse3."""
 
-    max_force_n: Positive = Field(8.0, description="The largest force that it is sent [N].")
+    max_force_n: Positive = Field(8.0, description="Largest force that is sent to it [N].")
     workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")
     url: Text = Field("ws://localhost:10001", description="The service's websocket; port 10000 before 3.1.")
-    device_id: str = Field("", description="Which Inverse3, if there are several; empty takes the first one.")
+    device_id: str = Field("", description="Id of the Inverse3, if there are several; empty selects the first one.")
     centre: Vec3 = Field((0.0, 0.0, 0.0), description="Middle of the workspace in the device's own axes [m].")
     force_key: Literal["auto", "vector", "values"] = Field(
-        "auto", description="What the service calls a force; auto tries which one it reports back."
+        "auto", description="Name of a force in the service's messages; auto tries which one has an effect."
     )
 
 
 class HaplyDevice(HapticDevice):
-    """Speaks with the service in a thread of its own, at 1 kHz: one force there, one state back."""
+    """Exchanges messages with the service in a thread of its own, at 1 kHz: one force for each state."""
 
     Config = HaplyConfig
     config: HaplyConfig
@@ -89,8 +88,8 @@ class HaplyDevice(HapticDevice):
         if frame is None:
             if self._trouble:
                 raise DeviceError("haply", self._trouble)
-            if time.monotonic() - self._came_s > 2.0 * PATIENCE_S:  # it takes nothing: sending waits for ever
-                raise DeviceError("haply", f"{self.config.url}: it takes no forces any more")
+            if time.monotonic() - self._came_s > 2.0 * PATIENCE_S:  # it reads nothing: sending blocks forever
+                raise DeviceError("haply", f"{self.config.url}: it accepts no forces any more")
             return None
         self._came_s = time.monotonic()
         state = state_in(frame, self._device_id)
@@ -103,11 +102,11 @@ class HaplyDevice(HapticDevice):
         return HapticReading((y, -x, z), (vy, -vx, vz), (qy, -qx, qz, qw), state.buttons)
 
     def send(self, force: Vector, expires_s: float) -> None:
-        """Has the thread send a force until it expires."""
+        """Hands a force to the thread, which sends it until it expires."""
         self._command = force, expires_s
 
     def close(self) -> None:
-        """Sends zero force and hangs up."""
+        """Sends zero force and closes the connection."""
         if self._thread is not None:
             self._closing.set()
             self._thread.join(2.0 * PATIENCE_S)
@@ -120,7 +119,7 @@ class HaplyDevice(HapticDevice):
             self._trouble = f"{self.config.url}: {error or 'does not answer'}"
         except ReadingError as error:
             self._trouble = f"{self.config.url}: {error}"
-        except Exception as error:  # whatever the service says; nobody would hear of it from this thread
+        except Exception as error:  # any failure must reach `read`; otherwise it would be lost in this thread
             self._trouble = f"{self.config.url}: {type(error).__name__}: {error}"
         finally:
             self._trouble = self._trouble or "closed"
@@ -129,7 +128,7 @@ class HaplyDevice(HapticDevice):
     async def _converse(self) -> None:
         """Exchanges forces and states until the device is closed."""
         async with connect(
-            self.config.url, open_timeout=PATIENCE_S, ping_interval=None, close_timeout=0.1, max_size=LONGEST_FRAME
+            self.config.url, open_timeout=PATIENCE_S, ping_interval=None, close_timeout=0.1, max_size=MAX_FRAME_BYTES
         ) as connection:
             first = await asyncio.wait_for(connection.recv(), PATIENCE_S)
             self._device_id = device_in(first, self.config.device_id)
@@ -150,10 +149,10 @@ class HaplyDevice(HapticDevice):
 
 
 class ForceKey:
-    """Which key of a force the service takes: its documentation has `vector`, its examples `values`.
+    """Key under which the service accepts a force: its documentation has `vector`, its examples `values`.
 
     Args:
-        key: One of them, or `auto` to find out by what the service reports back.
+        key: One of them, or `auto` to determine it from the forces that the service reports back.
 
     Attributes:
         key: The one in use.
@@ -165,7 +164,7 @@ class ForceKey:
         self._unfelt = 0
 
     def judge(self, sent: Vector, reported: Vector) -> bool:
-        """Takes a force that was sent and one that was reported [N]; returns False when it seems to have no effect."""
+        """Compares a force that was sent with the reported one [N]; returns False when it seems to have no effect."""
         if norm(sent) < FELT_N:
             return True
         if norm(reported) > 0.1 * norm(sent):

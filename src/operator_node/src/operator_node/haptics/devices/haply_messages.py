@@ -1,4 +1,4 @@
-"""Messages of the service of a Haply Inverse3, as JSON: states in, forces out."""
+"""JSON messages of the service of a Haply Inverse3: states in, forces out."""
 
 from __future__ import annotations
 
@@ -6,19 +6,18 @@ import json
 from typing import Any, NamedTuple
 
 from operator_node.haptics.device import ReadingError
-from operator_node.haptics.vectors import ZERO
-from rpbi.geometry import Quaternion, Vector
+from robot_model.geometry import ZERO, Quaternion, Vector
 
 
 class HaplyState(NamedTuple):
-    """What the service says, in the device's own axes: x right, y forward, z up.
+    """State in a message of the service, in the device's own axes: x right, y forward, z up.
 
     Attributes:
-        position: Of the cursor [m].
-        velocity: Of the cursor [m/s].
-        quat_xyzw: Orientation of the grip, none without one.
-        buttons: Those of the grip.
-        force: What the device pushes with [N].
+        position: Position of the cursor [m].
+        velocity: Velocity of the cursor [m/s].
+        quat_xyzw: Orientation of the grip; identity without one.
+        buttons: Buttons of the grip.
+        force: Force of the device [N].
     """
 
     position: Vector
@@ -36,10 +35,10 @@ def command_of(device_id: str, force: Vector, key: str) -> str:
 
 
 def device_in(frame: str | bytes, wanted: str) -> str:
-    """Returns the id of an Inverse3 that the first message names.
+    """Returns the id of an Inverse3 in the first message.
 
     Raises:
-        ReadingError: If it names none, or not the one that is wanted.
+        ReadingError: If there is none, or not the wanted one.
     """
     known = [str(each.get("device_id", "")) for each in _entries(_message(frame), "inverse3")]
     if not known or (wanted and wanted not in known):
@@ -52,7 +51,7 @@ def state_in(frame: str | bytes, device_id: str) -> HaplyState:
     """Returns the state of an Inverse3, and of the first grip, in a message.
 
     Raises:
-        ReadingError: If it is not there, or not made of finite numbers.
+        ReadingError: If it is missing, or not made of finite numbers.
     """
     message = _message(frame)
     states = [each for each in _entries(message, "inverse3") if each.get("device_id") == device_id]

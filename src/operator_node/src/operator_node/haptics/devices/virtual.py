@@ -1,4 +1,4 @@
-"""A haptic device for those who have none: a window, a mouse, and an arrow for the force."""
+"""A haptic device without hardware: a window, a mouse, and an arrow for the force."""
 
 import math
 import os
@@ -13,8 +13,7 @@ from pydantic import Field
 from custom_ros_tools.schema import NonNegative, Positive, PositiveMetres, Switch
 from operator_node.device import DeviceError
 from operator_node.haptics.device import DeviceEnded, HapticConfig, HapticReading
-from operator_node.haptics.vectors import ZERO, within
-from rpbi.geometry import Vector
+from robot_model.geometry import ZERO, Vector, shortened_to
 
 from .emulated import EmulatedDevice
 
@@ -23,17 +22,19 @@ FROM_WINDOW = struct.Struct("=4d")
 TO_WINDOW = struct.Struct("=6d")
 """Position of the handle [m] and force [N]."""
 SHOW_S = 0.02
-"""How often the window is told [s]."""
+"""Period at which the window is updated [s]."""
 
 
 class VirtualConfig(HapticConfig):
     """A window with a handle."""
 
-    max_force_n: Positive = Field(10.0, description="The largest force that it is sent [N].")
+    max_force_n: Positive = Field(10.0, description="Largest force that is sent to it [N].")
     workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")
     resolution_m: NonNegative = Field(0.0, description="It is exact [m].")
     returns: Switch = Field(
-        False, description="Whether the handle goes back to the middle when it is let go, for speeds rather than ways."
+        False,
+        description="Whether the handle returns to the middle when it is released, for control by speeds rather than "
+        "positions.",
     )
 
 
@@ -56,10 +57,10 @@ class VirtualDevice(EmulatedDevice):
         """Opens the window.
 
         Raises:
-            DeviceError: If there is no screen.
+            DeviceError: If there is no display.
         """
         if not os.environ.get("DISPLAY"):
-            raise DeviceError("virtual", "its window needs a screen, and DISPLAY is not set")
+            raise DeviceError("virtual", "its window needs a display, and DISPLAY is not set")
         ours, theirs = socket.socketpair()
         ours.setblocking(False)
         config = self.config
@@ -73,11 +74,11 @@ class VirtualDevice(EmulatedDevice):
         super().open()
 
     def wanted(self, time_s: float) -> Vector:
-        """Returns where the mouse is."""
+        """Returns the position of the mouse."""
         return self._mouse
 
     def read(self) -> HapticReading | None:
-        """Returns where the handle is.
+        """Returns the state of the handle.
 
         Raises:
             DeviceEnded: If the window was closed.
@@ -119,7 +120,7 @@ class VirtualDevice(EmulatedDevice):
             x, y, z, held = FROM_WINDOW.unpack(self._received[whole - size : whole])
             self._received = self._received[whole:]
             if math.isfinite(x + y + z):
-                self._mouse = within((x, y, z), 1.5 * self.config.workspace_m)
+                self._mouse = shortened_to((x, y, z), 1.5 * self.config.workspace_m)
             self.buttons = (int(held > 0.5),)
 
     def _show(self, message: bytes) -> None:
@@ -127,6 +128,6 @@ class VirtualDevice(EmulatedDevice):
         try:
             self._socket.send(message)
         except BlockingIOError:
-            return  # a window that is slow gets the next one
+            return  # a slow window gets the next one
         except OSError:
             raise DeviceEnded("virtual", "its window was closed") from None

@@ -1,7 +1,7 @@
-"""The window of the virtual haptic device, a program: a mouse moves a handle, an arrow is the force.
+"""The window of the virtual haptic device, a program: a mouse moves a handle, and an arrow shows the force.
 
-It is started with the number of a socket, the radius of the workspace [m], the largest force [N], and 1 if the handle
-goes back to the middle when it is let go, else 0.
+Its arguments are the number of a socket, the radius of the workspace [m], the largest force [N], and 1 if the handle
+returns to the middle when it is released, else 0.
 """
 
 import os
@@ -12,28 +12,28 @@ import tkinter
 
 FROM_WINDOW, TO_WINDOW = struct.Struct("=4d"), struct.Struct("=6d")
 SIZE, BAR, MARGIN = 420, 90, 30
-"""The square for x and y, the bar for z beside it, and the room around them [px]."""
+"""The square for x and y, the bar for z beside it, and the margin around them [px]."""
 WHEEL_PARTS = 50
-"""So many notches of the wheel are the radius of the workspace."""
+"""Number of notches of the wheel for the radius of the workspace."""
 PERIOD_MS = 16
 WHEEL_RETURN_MS = 300
-"""So long after the last notch of the wheel a handle that goes back does so."""
+"""Time after the last notch of the wheel at which a returning handle goes back [ms]."""
 TEXT = "drag: x, y    wheel or right button: z    space: button"
 
 
 class HandleWindow:
-    """Shows a workspace from above, its front at the top, and its height in a bar.
+    """Shows a workspace from above, its front at the top, and the height in a bar.
 
     Args:
-        connection: To the device.
-        radius_m: Of the workspace [m].
-        max_force_n: Drawn as half of the workspace [N].
-        returns: Whether the handle goes back to the middle when it is let go.
+        connection: Socket to the device.
+        radius_m: Radius of the workspace [m].
+        max_force_n: Force that is drawn as half of the workspace [N].
+        returns: Whether the handle returns to the middle when it is released.
     """
 
     def __init__(self, connection: socket.socket, radius_m: float, max_force_n: float, returns: bool) -> None:
         self._connection, self._radius_m, self._max_force_n = connection, radius_m, max_force_n
-        self._returns, self._is_told = returns, True
+        self._returns, self._is_sent = returns, True
         connection.setblocking(False)
         self._mouse = [0.0, 0.0, 0.0]
         self._button, self._last = 0.0, (0, 0)
@@ -49,18 +49,18 @@ class HandleWindow:
             self._canvas.bind(f"<Button-{number}>", self._press)
         self._canvas.bind("<B1-Motion>", lambda event: self._drag(event, "xy"))
         self._canvas.bind("<B3-Motion>", lambda event: self._drag(event, "z"))
-        self._canvas.bind("<ButtonRelease-1>", lambda _: self._let_go(0, 1))
-        self._canvas.bind("<ButtonRelease-3>", lambda _: self._let_go(2))
+        self._canvas.bind("<ButtonRelease-1>", lambda _: self._release(0, 1))
+        self._canvas.bind("<ButtonRelease-3>", lambda _: self._release(2))
         self._canvas.bind("<Button-4>", lambda _: self._turn(1))
         self._canvas.bind("<Button-5>", lambda _: self._turn(-1))
         self._wheel_return: str | None = None
         root.bind("<KeyPress-space>", lambda _: self._hold(1.0))
         root.bind("<KeyRelease-space>", lambda _: self._hold(0.0))
-        root.bind("<FocusOut>", lambda _: self._hold(0.0))  # that the key goes up is told to another window then
+        root.bind("<FocusOut>", lambda _: self._hold(0.0))  # the release of the key goes to another window then
         root.after(PERIOD_MS, self._update)
 
     def run(self) -> None:
-        """Shows the window until it is closed, or the device is."""
+        """Shows the window until it or the device is closed."""
         self._root.mainloop()
 
     def _draw_room(self) -> None:
@@ -94,37 +94,37 @@ class HandleWindow:
         else:
             self._mouse[0] = self._inside(self._mouse[0] + up)
             self._mouse[1] = self._inside(self._mouse[1] - right)
-            self._tell()
+            self._send()
 
     def _turn(self, notches: int) -> None:
         self._lift(notches * self._radius_m / WHEEL_PARTS)
         if self._wheel_return is not None:
             self._root.after_cancel(self._wheel_return)
-        self._wheel_return = self._root.after(WHEEL_RETURN_MS, self._let_go, 2)
+        self._wheel_return = self._root.after(WHEEL_RETURN_MS, self._release, 2)
 
-    def _let_go(self, *axes: int) -> None:
+    def _release(self, *axes: int) -> None:
         if self._returns:
             for axis in axes:
                 self._mouse[axis] = 0.0
-            self._tell()
+            self._send()
 
     def _lift(self, up_m: float) -> None:
         self._mouse[2] = self._inside(self._mouse[2] + up_m)
-        self._tell()
+        self._send()
 
     def _hold(self, button: float) -> None:
         self._button = button
-        self._tell()
+        self._send()
 
     def _inside(self, value: float) -> float:
         return min(max(value, -self._radius_m), self._radius_m)
 
-    def _tell(self) -> None:
+    def _send(self) -> None:
         try:
             self._connection.send(FROM_WINDOW.pack(*self._mouse, self._button))
-            self._is_told = True
+            self._is_sent = True
         except BlockingIOError:
-            self._is_told = False  # the device is busy; it is told with the next update, and be it that a hand lets go
+            self._is_sent = False  # the device is busy; the next update sends the state again
         except OSError:
             self._root.destroy()
 
@@ -144,8 +144,8 @@ class HandleWindow:
             self._draw(*TO_WINDOW.unpack(self._received[whole - TO_WINDOW.size : whole]))
             self._received = self._received[whole:]
         self._root.after(PERIOD_MS, self._update)
-        if not self._is_told:
-            self._tell()
+        if not self._is_sent:
+            self._send()
 
     def _draw(self, x: float, y: float, z: float, fx: float, fy: float, fz: float) -> None:
         canvas, middle, scale = self._canvas, SIZE / 2, self._scale
@@ -167,7 +167,7 @@ class HandleWindow:
 def main() -> None:
     """Runs the program."""
     number, radius_m, max_force_n, returns = sys.argv[1:]
-    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # not before all others, as the loop is
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # without the real-time priority of the loop
     HandleWindow(socket.socket(fileno=int(number)), float(radius_m), float(max_force_n), returns == "1").run()
 
 

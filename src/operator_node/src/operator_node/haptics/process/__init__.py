@@ -1,1 +1,1 @@
-"""The process that the haptic loop has for itself, and the link between it and the node."""
+"""The process of the haptic loop, and the link between it and the node."""

@@ -1,4 +1,4 @@
-"""`avatar_node.py`: segments of a person in, joint targets and base of their avatar out."""
+"""`avatar_node.py`: from segments of a person to joint targets and base of an avatar."""
 
 import threading
 import time
@@ -17,7 +17,7 @@ from custom_ros_tools.ros.tf_interface import TfInterface
 from operator_node.avatar.engagement import Engagement
 from operator_node.avatar.joints import HINGES
 from operator_node.avatar.parameters import AvatarParameters
-from operator_node.avatar.retargeting import AvatarPose, Place, Retargeting
+from operator_node.avatar.retargeting import AvatarPlace, AvatarPose, Retargeting
 from operator_node.avatar.urdf_offsets import urdf_offsets
 from operator_node.mvn.segments import SegmentFrame
 
@@ -25,13 +25,13 @@ from .messages import frame_in
 
 SEGMENTS_TOPIC = "mvn/segments"
 START_PATIENCE_S = 5.0
-"""After so long without joint states, it is said that the avatar waits for them [s]."""
+"""Time without joint states after which a warning reports that the avatar waits for them [s]."""
 LOOKS_HZ = 20.0
-"""How often to look whether segments have ceased."""
+"""Rate of the check for ceased segments."""
 
 
 class AvatarNode:
-    """Has an avatar do what a person does, as long as segments come.
+    """Moves an avatar like a person, as long as segments arrive.
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -45,17 +45,17 @@ class AvatarNode:
         self._warn = ThrottledWarning()
         self._lock = threading.Lock()
         self._hinges: np.ndarray | None = None
-        """Where the avatar's hinges are as the simulator says; None as long as that is not known."""
+        """Positions of the avatar's hinges in the simulator; None until they are known."""
         self._begins, self._last_s, self._holds = True, 0.0, True
         self._began_s, self._last_stamp = time.monotonic(), rospy.Time()
         self._states = f"rpbi/{config.robot_name}/joint_states"
         self._targets = rospy.Publisher(f"{self._states}/target", JointState, queue_size=1, tcp_nodelay=True)
-        rospy.Subscriber(self._states, JointState, self._take_state, queue_size=1)
-        rospy.Subscriber(SEGMENTS_TOPIC, PoseArray, self._take, queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber(self._states, JointState, self._on_state, queue_size=1)
+        rospy.Subscriber(SEGMENTS_TOPIC, PoseArray, self._on_segments, queue_size=1, tcp_nodelay=True)
         rospy.Service("avatar/engage", Trigger, self._engage)
         WallTimer(LOOKS_HZ, self._look)
 
-    def _take_state(self, message: JointState) -> None:
+    def _on_state(self, message: JointState) -> None:
         positions = dict(zip(message.name, message.position))
         hinges = [positions.get(hinge) for hinge in HINGES]
         if None in hinges:
@@ -67,24 +67,24 @@ class AvatarNode:
             return
         self._warn(rospy.resolve_name(self._states), f"message refused: {reason}")
 
-    def _take(self, message: PoseArray) -> None:
+    def _on_segments(self, message: PoseArray) -> None:
         with self._lock:
             try:
                 self._follow(frame_in(message))
-            except (ValueError, InterfaceError, OSError) as error:  # the last one of a ROS master that has gone
+            except (ValueError, InterfaceError, OSError) as error:  # an OSError follows the loss of the ROS master
                 self._warn(rospy.resolve_name(SEGMENTS_TOPIC), f"message refused: {error}")
 
     def _follow(self, frame: SegmentFrame) -> None:
         now = rospy.Time.now()
-        if now < self._last_stamp:  # the simulation has begun anew
+        if now < self._last_stamp:  # the simulation was restarted
             self._begins, self._last_stamp = True, rospy.Time()
         if now <= self._last_stamp:
-            return  # simulated time stands still, or has not begun: TF with wall time would hide all that comes later
+            return  # simulated time stands still, or has not begun: TF with wall time would hide all later transforms
         if self._hinges is None and time.monotonic() - self._began_s < START_PATIENCE_S:
             return
         if self._begins or self._retargeting is None:
             self._begin(frame)
-            self._last_stamp = now  # the first target is where the avatar is
+            self._last_stamp = now  # the first target is the present pose of the avatar
         assert self._retargeting is not None
         target = self._retargeting.pose(frame)
         if self._holds:
@@ -93,17 +93,17 @@ class AvatarNode:
         self._last_stamp, self._last_s, self._holds = now, time.monotonic(), False
 
     def _begin(self, frame: SegmentFrame) -> None:
-        """Begins where the avatar is, with a person of any size.
+        """Starts at the present pose of the avatar, with a person of any size.
 
         Raises:
-            ValueError: If nothing is known of the avatar yet.
+            ValueError: If the pose of the avatar is not known yet.
         """
         name, place = self._config.robot_name, self._config.place
         if self._hinges is None:
-            raise ValueError(f"nothing has come on {rospy.resolve_name(self._states)} yet: is the avatar in the world?")
+            raise ValueError(f"no message on {rospy.resolve_name(self._states)} yet: is the avatar in the world?")
         parameter = rospy.resolve_name(f"rpbi/{name}/robot_description")
         offsets = urdf_offsets(parameter, rospy.get_param(parameter, ""))
-        self._retargeting = Retargeting(offsets, None if place is None else Place(*place))
+        self._retargeting = Retargeting(offsets, None if place is None else AvatarPlace(*place))
         self._retargeting.begin(self._hinges)
         target = self._retargeting.pose(frame)
         position, quat = self._tf.get_tf(self._config.parent_frame_id, f"rpbi/{name}/Pelvis")
@@ -126,14 +126,14 @@ class AvatarNode:
         with self._lock:
             if not self._holds and time.monotonic() - self._last_s > self._config.input_timeout_s:
                 self._holds = True
-                silence = f"nothing has come for {self._config.input_timeout_s:g} s"
+                silence = f"no message for {self._config.input_timeout_s:g} s"
                 rospy.logwarn("%s: %s; the avatar holds its last pose", rospy.resolve_name(SEGMENTS_TOPIC), silence)
 
     def _engage(self, _: object) -> TriggerResponse:
-        """Begins anew from where the avatar is now, with whoever is in the suit."""
+        """Restarts from the present pose of the avatar, with the present person."""
         with self._lock:
             self._begins = True
-        return TriggerResponse(True, "the avatar begins anew with the next segments")
+        return TriggerResponse(True, "the avatar restarts with the next segments")
 
 
 def main() -> None:

@@ -20,7 +20,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Prints a person as URDF, for the simulator and RViz.")
     parser.add_argument("--height", type=float, default=1.75, metavar="M", help="height [m], default 1.75")
     parser.add_argument("--mass", type=float, default=75.0, metavar="KG", help="mass [kg], default 75")
-    parser.add_argument("--measure", metavar="TOPIC", help="take lengths from these segments, such as mvn/segments")
+    parser.add_argument("--measure", metavar="TOPIC", help="measure lengths on these segments, such as mvn/segments")
     arguments = parser.parse_args(rospy.myargv(sys.argv)[1:])
     offsets = None
     try:

@@ -1,4 +1,4 @@
-"""Segments of a person as message, and the other way round."""
+"""Conversion of messages to segments of a person."""
 
 import numpy as np
 from geometry_msgs.msg import PoseArray
@@ -6,14 +6,14 @@ from geometry_msgs.msg import PoseArray
 from operator_node.mvn.segments import SEGMENTS, SegmentFrame
 
 NORMS = (0.9, 1.1)
-"""A quaternion of another length is none."""
+"""Range of the length of a quaternion; others are rejected."""
 
 
 def frame_in(message: PoseArray) -> SegmentFrame:
-    """Returns the segments that a message has.
+    """Returns the segments in a message.
 
     Raises:
-        ValueError: If there are not 23, a number is not finite or a quaternion is none.
+        ValueError: If there are not 23, a number is not finite or a quaternion has not length 1.
     """
     if len(message.poses) != len(SEGMENTS):
         raise ValueError(f"expected {len(SEGMENTS)} poses, got {len(message.poses)}")

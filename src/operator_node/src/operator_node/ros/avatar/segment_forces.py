@@ -1,4 +1,4 @@
-"""`segment_forces_node.py`: contacts of the avatar in, the forces on each segment out."""
+"""`segment_forces_node.py`: from contacts of the avatar to the forces on each segment."""
 
 import numpy as np
 import rospy
@@ -26,9 +26,9 @@ class SegmentForcesNode:
     def __init__(self) -> None:
         self._name = name = private_parameters(SegmentForcesParameters).robot_name
         self._publisher = rospy.Publisher("avatar/segment_forces", SegmentForces, queue_size=QUEUE_SIZE)
-        rospy.Subscriber(f"rpbi/{name}/contacts", Contacts, self._take, queue_size=QUEUE_SIZE, tcp_nodelay=True)
+        rospy.Subscriber(f"rpbi/{name}/contacts", Contacts, self._on_contacts, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
-    def _take(self, message: Contacts) -> None:
+    def _on_contacts(self, message: Contacts) -> None:
         contacts = [(point.link, _force(point)) for point in message.points if point.other_body != self._name]
         sizes = forces_by_segment(SEGMENTS, ((segment, force.tolist()) for segment, force in contacts))
         sums = {segment: np.zeros(3) for segment in SEGMENTS}
@@ -47,7 +47,7 @@ class SegmentForcesNode:
 
 
 def _force(point: ContactPoint) -> Array:
-    """Returns the whole force of a contact on the body (3) [N]."""
+    """Returns the total force of a contact on the body (3) [N]."""
     parts = (
         (point.normal, point.normal_force),
         (point.friction_direction_1, point.friction_force_1),

@@ -1,4 +1,4 @@
-"""The nodes of input devices: `joy`, and what is native to each."""
+"""Nodes of input devices: they publish `joy`, and native topics of each device."""
 
 import math
 import pkgutil
@@ -17,7 +17,7 @@ from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
 from custom_ros_tools.schema import ConfigModel, Positive, Text
 from operator_node.device import Device, Reading
 from operator_node.device_feed import DeviceFeed, FeedConfig, held_text
-from operator_node.lookup import device_class, make_device
+from operator_node.devices import DEVICES
 from operator_node.ros.stamps import stamp
 
 from .topics import DeviceTopics
@@ -25,25 +25,27 @@ from .topics import DeviceTopics
 QUEUE_SIZE = 10
 DIAGNOSTICS_HZ = 1.0
 LAST_READING_S = 2.0
-"""How long a node that ends waits for the last reading [s]."""
+"""Longest time that a node waits for the last reading when it ends [s]."""
 SENDING_S = 0.1
-"""How long it then takes until that has been sent [s]."""
+"""Time for sending that reading [s]."""
 
 
 class DeviceParameters(ConfigModel):
-    """Which device."""
+    """Selection of the device."""
 
     device: Text = Field(description="A name of the table, or `their_package.module:Class`.")
 
 
 class CueConfig(ConfigModel):
-    """How forces are felt."""
+    """Scaling of force cues."""
 
-    cue_full_scale: Positive = Field(20.0, description="The force that is felt as strongly as the device can [N].")
+    cue_full_scale: Positive = Field(
+        20.0, description="Force that is rendered with the full strength of the device [N]."
+    )
 
 
 class DeviceNode:
-    """Publishes what a device says on `joy`, and on topics of its own.
+    """Publishes the readings of a device on `joy`, and its events on topics of their own.
 
     Args:
         name: Name of the device; it is the frame of the messages.
@@ -56,8 +58,8 @@ class DeviceNode:
 
     def __init__(self, name: str) -> None:
         self._name = name
-        options = private_parameters(device_class(name).Config)
-        self._device = device = make_device(name, options.model_dump(exclude_unset=True), rospy.get_name())
+        options = private_parameters(DEVICES.configured(name).Config)
+        self._device = device = DEVICES.make(name, options.model_dump(exclude_unset=True), rospy.get_name())
         self._feed = DeviceFeed(name, device, private_parameters(FeedConfig), self._publish)
         self._joy: rospy.Publisher | None = None
         self._topics: DeviceTopics | None = None
@@ -65,14 +67,14 @@ class DeviceNode:
             self._topics = pkgutil.resolve_name(device.ros_topics)(device, self._feed.post)
         if type(device).cue is not Device.cue:
             self._full_scale_n = private_parameters(CueConfig).cue_full_scale
-            rospy.Subscriber("force_cue", WrenchStamped, self._take_force, queue_size=1, tcp_nodelay=True)
+            rospy.Subscriber("force_cue", WrenchStamped, self._on_force, queue_size=1, tcp_nodelay=True)
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=QUEUE_SIZE)
         WallTimer(DIAGNOSTICS_HZ, self._diagnose)
         self._is_ending, self._has_ended = threading.Event(), threading.Event()
         rospy.on_shutdown(self._end)
 
     def run(self) -> None:
-        """Reads the device until ROS shuts down, or the person closes it, which ends the node."""
+        """Reads the device until ROS shuts down, or until the user closes it, which ends the node."""
         try:
             self._feed.run(self._is_ending.is_set)
         finally:
@@ -80,7 +82,7 @@ class DeviceNode:
         rospy.signal_shutdown("its device was closed")
 
     def _end(self) -> None:
-        """Has the last reading published while topics are still open."""
+        """Waits until the last reading is published, while topics are still open."""
         self._is_ending.set()
         if self._has_ended.wait(LAST_READING_S):
             threading.Event().wait(SENDING_S)
@@ -88,14 +90,14 @@ class DeviceNode:
     def _publish(self, reading: Reading) -> None:
         now = stamp()
         if reading.axes or reading.buttons:
-            if self._joy is None:  # keys may be all that there is
+            if self._joy is None:  # a keyboard may have keys only
                 self._joy = rospy.Publisher("joy", Joy, queue_size=QUEUE_SIZE, tcp_nodelay=True)
             header = Header(stamp=now, frame_id=self._name)
             self._joy.publish(Joy(header=header, axes=reading.axes, buttons=reading.buttons))
         if self._topics is not None:
             self._topics.publish(reading, now)
 
-    def _take_force(self, message: WrenchStamped) -> None:
+    def _on_force(self, message: WrenchStamped) -> None:
         force = (message.wrench.force.x, message.wrench.force.y, message.wrench.force.z)
         if all(map(math.isfinite, force)):
             share = [max(-1.0, min(1.0, each / self._full_scale_n)) for each in force]
@@ -105,8 +107,8 @@ class DeviceNode:
         feed = self._feed
         problem, refused, held = feed.problem, dict(feed.refused), feed.held
         level = DiagnosticStatus.ERROR if problem else DiagnosticStatus.WARN if refused or held else DiagnosticStatus.OK
-        remarks = ["some of what it says is refused"] * bool(refused) + [held_text(held)] * bool(held)
-        message = problem or "; ".join(remarks) or "it is there"
+        remarks = ["some readings are refused"] * bool(refused) + [held_text(held)] * bool(held)
+        message = problem or "; ".join(remarks) or "connected"
         status = DiagnosticStatus(
             name=f"{rospy.get_name()}: {self._name}", hardware_id=self._name, level=level, message=message
         )
@@ -133,6 +135,11 @@ def keyboard() -> None:
 def mouse() -> None:
     """Runs `mouse_node.py`."""
     run_node("mouse", lambda: DeviceNode("mouse"), DeviceNode.run)
+
+
+def mvn() -> None:
+    """Runs `mvn_node.py`."""
+    run_node("mvn", lambda: DeviceNode("mvn"), DeviceNode.run)
 
 
 def spacenav() -> None:

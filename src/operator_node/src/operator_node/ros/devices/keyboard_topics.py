@@ -1,4 +1,4 @@
-"""Topics of a keyboard, with the names of the driver that the release used."""
+"""Topics of a keyboard, with the names of the driver used by the release."""
 
 from typing import Any
 

@@ -17,7 +17,7 @@ QUEUE_SIZE = 10
 
 
 class SpacenavTopics(DeviceTopics):
-    """Publishes translation, rotation, both as a twist, and all unscaled, below `spacenav`."""
+    """Publishes translation, rotation, both as a twist, and the unscaled axes, below `spacenav`."""
 
     device: Spacenav
 

@@ -1,4 +1,4 @@
-"""What a device publishes beside `joy`, and takes."""
+"""Topics of a device beside `joy`."""
 
 from collections.abc import Callable
 
@@ -8,15 +8,15 @@ from operator_node.device import Device, Reading
 
 
 class DeviceTopics:
-    """Publishes what is native to a device, and takes what it is sent; derive from it.
+    """Publishes the events of a device, and subscribes to its inputs; base class.
 
     Args:
         device: The device.
-        post: Has the device's thread do something with it; whatever is done to the device goes by this.
+        post: Schedules an action in the thread of the device; every access to the device has to use it.
     """
 
     def __init__(self, device: Device, post: Callable[[Callable[[], None]], None]) -> None:
         self.device, self.post = device, post
 
     def publish(self, reading: Reading, stamp: rospy.Time) -> None:
-        """Publishes what a reading has beside axes and buttons."""
+        """Publishes the part of a reading beside axes and buttons."""

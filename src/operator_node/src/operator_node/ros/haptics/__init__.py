@@ -1,1 +1,1 @@
-"""The haptic node, and devices that are spoken to by topics."""
+"""The haptic node, and devices that communicate by topics."""

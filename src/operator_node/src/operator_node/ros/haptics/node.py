@@ -1,34 +1,31 @@
-"""`haptic_node.py`: a haptic device moves a TF frame, and lets its person feel what the tool there feels."""
+"""`haptic_node.py`: a haptic device moves a TF frame and renders the forces on the tool there."""
 
 import re
 import sys
 import time
-from typing import cast
 
 import rospy
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
-from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
-from custom_ros_tools.plugins import find_in_table
+from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
 from custom_ros_tools.ros.services import ToggleService
 from custom_ros_tools.toggle import Toggle
 from operator_node.haptics.coupling import stiffest_n_per_m
-from operator_node.haptics.device import HapticDevice
 from operator_node.haptics.devices import HAPTIC_DEVICES
 from operator_node.haptics.loop import HZ
+from operator_node.haptics.messages import LoopReport, Setup
 from operator_node.haptics.node_config import HapticNodeConfig
 from operator_node.haptics.process.client import LoopClient
-from operator_node.haptics.process.messages import Report, Setup
 
-from .publishers import HandlePublisher, StatePublisher
+from .publishers import HandlePublisher, HapticStatePublisher
 from .tool_feed import ToolFeed
 
 
 class HapticNode:
-    """Joins a haptic device to a tool; the loop between them is a process of its own.
+    """Connects a haptic device to a tool; the loop between them runs in a process of its own.
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -48,10 +45,10 @@ class HapticNode:
             )
         self._warn = ThrottledWarning()
         self._handle = HandlePublisher(config, setup.options.workspace_m)
-        self._state = StatePublisher(config, stiffness_bound)
+        self._state = HapticStatePublisher(config, stiffness_bound)
         self._tool: ToolFeed | None = None
-        self._last = Report()
-        self.loop = LoopClient(setup, self._take, _arguments())
+        self._last = LoopReport()
+        self.loop = LoopClient(setup, self._on_report, _arguments())
         rospy.on_shutdown(self.loop.close)
         self._tool = ToolFeed(config, self.loop)
         feedback = Toggle("the haptic device", self.loop.start, self.loop.stop)
@@ -62,21 +59,21 @@ class HapticNode:
         WallTimer(config.state_hz, lambda: self._state.publish(self.loop.report))
 
     def run(self) -> None:
-        """Waits until the person is done with the device, or ROS shuts down.
+        """Waits until the user has finished with the device, or ROS shuts down.
 
         Raises:
-            InterfaceError: If the loop's process ends again and again.
+            InterfaceError: If the loop's process ends repeatedly.
         """
         while not rospy.is_shutdown():
             if self.loop.ended.wait(0.1):
-                self._state.publish(self.loop.report)  # that it is over
+                self._state.publish(self.loop.report)  # with the final state
                 time.sleep(0.1)
                 if self.loop.failure:
                     raise InterfaceError(f"{self._config.device}: {self.loop.failure}")
                 rospy.signal_shutdown(self.loop.report.trouble)
 
-    def _take(self, report: Report) -> None:
-        """Publishes what the loop reports, in the thread that hears it."""
+    def _on_report(self, report: LoopReport) -> None:
+        """Publishes a report of the loop, in the thread that receives it."""
         last, self._last, name = self._last, report, self._config.device
         if report.trouble != last.trouble:
             if report.is_connected:
@@ -87,29 +84,26 @@ class HapticNode:
         if report.fault:
             self._warn(name, f"reading refused: {report.fault}")
         self._state.note(report)
-        if not rospy.is_shutdown():  # else the topics are closed
+        if not rospy.is_shutdown():  # otherwise the topics are closed
             self._handle.publish(report, self._tool.start if self._tool else None)
 
     def _reset(self, _: TriggerRequest) -> TriggerResponse:
         self.loop.reset()
-        return TriggerResponse(True, "the target goes back to where it was at the start")
+        return TriggerResponse(True, "the target returns to its start")
 
 
 def _setup(config: HapticNodeConfig) -> Setup:
-    """Returns the device that the loop is to have.
+    """Returns the setup of the loop, with the device.
 
     Raises:
         ConfigError: If there is no such device, or its options are wrong.
     """
-    try:
-        device = cast(type[HapticDevice], find_in_table(config.device, HapticDevice, HAPTIC_DEVICES, "haptic device"))
-    except ValueError as error:
-        raise ConfigError([Problem(rospy.get_name(), "device", str(error))]) from None
+    device = HAPTIC_DEVICES.configured(config.device, rospy.get_name(), "device")
     return Setup(device, device.Config.parse(config.device_options, f"{rospy.get_name()}/device_options"), config)
 
 
 def _arguments() -> list[str]:
-    """Returns the remappings for the loop's process, for devices that make it a node too."""
+    """Returns the remappings for the loop's process, for devices that make it a node, too."""
     *_, name = rospy.get_name().split("/")
     given = [each for each in sys.argv[1:] if ":=" in each and not re.match("_[^_]|__(name|ns|log):=", each)]
     return [*given, f"__ns:={rospy.get_namespace()}", f"__name:={name}_device"]

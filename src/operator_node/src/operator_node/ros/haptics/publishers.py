@@ -1,4 +1,4 @@
-"""What the haptic node publishes of the loop's reports."""
+"""Topics that the haptic node publishes from the loop's reports."""
 
 import math
 import time
@@ -21,21 +21,21 @@ from std_msgs.msg import Header
 
 from custom_ros_tools.ros.transform_messages import transform_message
 from operator_node.haptics.controller import Snapshot
+from operator_node.haptics.messages import LoopReport
 from operator_node.haptics.node_config import HapticNodeConfig
-from operator_node.haptics.process.messages import Report
 from operator_node.msg import HapticState
-from rpbi import geometry
+from robot_model import geometry
 
 QUEUE_SIZE = 10
 _publisher = partial(rospy.Publisher, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
 
 class HandlePublisher:
-    """Publishes handle and force, and where the tool is to go.
+    """Publishes handle, force and target.
 
     Args:
         config: Names of the frames.
-        workspace_m: Radius of the device's workspace, which axes of `joy` are parts of [m].
+        workspace_m: Radius of the device's workspace, the unit of the axes of `joy` [m].
     """
 
     def __init__(self, config: HapticNodeConfig, workspace_m: float) -> None:
@@ -48,15 +48,15 @@ class HandlePublisher:
         self._joy = _publisher("joy", Joy)
         self._tf = tf2_ros.TransformBroadcaster()
 
-    def publish(self, report: Report, start: geometry.Pose | None) -> None:
-        """Publishes what a report says; `start` is the target's at first, None if that is not known yet."""
+    def publish(self, report: LoopReport, start: geometry.Pose | None) -> None:
+        """Publishes a report; `start` is the initial pose of the target, None until it is known."""
         header = Header(stamp=rospy.Time.now(), frame_id=self._config.base_frame_id)
         message = WrenchStamped(header=header)
         message.wrench.force = Vector3(*report.force)
         self._force.publish(message)
         snapshot = report.snapshot
         if snapshot is None or snapshot == self._sent:
-            return  # the device is silent
+            return  # no new sample of the device
         self._sent = snapshot
         reading = snapshot.reading
         self._pose.publish(PoseStamped(header, Pose(Point(*reading.position), Quaternion(*reading.quat_xyzw))))
@@ -65,7 +65,9 @@ class HandlePublisher:
         self._twist.publish(twist)
         axes = [min(max(each / self._workspace_m, -1.0), 1.0) for each in snapshot.deviation]
         self._joy.publish(Joy(header, axes, reading.buttons))
-        if header.stamp != self._stamp:  # else ROS time stands still, and TF takes no second transform of one moment
+        if (
+            header.stamp != self._stamp
+        ):  # otherwise ROS time stands still, and TF ignores a second transform with one stamp
             self._stamp = header.stamp
             self._broadcast(header, snapshot, start)
 
@@ -83,12 +85,12 @@ class HandlePublisher:
         self._tf.sendTransform(transforms)
 
 
-class StatePublisher:
+class HapticStatePublisher:
     """Publishes `haptics/state`.
 
     Args:
-        config: What does not change.
-        stiffness_bound: Colgate's [N/m].
+        config: The constant part.
+        stiffness_bound: Colgate's bound [N/m].
     """
 
     def __init__(self, config: HapticNodeConfig, stiffness_bound: float) -> None:
@@ -97,12 +99,12 @@ class StatePublisher:
         self._lateness_s = 0.0
         self._state = _publisher("haptics/state", HapticState)
 
-    def note(self, report: Report) -> None:
-        """Takes note of how late the loop was."""
+    def note(self, report: LoopReport) -> None:
+        """Records the lateness of the loop."""
         self._lateness_s = max(self._lateness_s, report.lateness_s)
 
-    def publish(self, report: Report) -> None:
-        """Publishes what the newest report says, and what has been noted since the last time."""
+    def publish(self, report: LoopReport) -> None:
+        """Publishes the newest report, with the largest lateness recorded since the last call."""
         config, snapshot, now_s = self._config, report.snapshot, time.monotonic()
         rate_hz = max(report.samples - self._samples, 0) / (now_s - self._samples_s)
         self._samples, self._samples_s = report.samples, now_s

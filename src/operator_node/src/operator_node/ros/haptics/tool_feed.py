@@ -1,4 +1,4 @@
-"""What the haptic loop is told of the tool: the force on it, and where it is."""
+"""Input of the haptic loop from ROS: force and position of the tool."""
 
 import math
 
@@ -11,21 +11,21 @@ from custom_ros_tools.ros.tf_listener import TfListener
 from custom_ros_tools.ros.transform_messages import position_in, quat_in
 from operator_node.haptics.node_config import HapticNodeConfig
 from operator_node.haptics.process.client import LoopClient
-from rpbi.geometry import Pose, Quaternion, minus, rotated
+from robot_model.geometry import Pose, Quaternion, minus, rotated
 
 TOOL_HZ = 500.0
-"""How often TF is asked for the tool."""
+"""Rate at which TF is queried for the tool."""
 LOOK_HZ = 50.0
-"""How often TF is asked how the sensor is turned."""
+"""Rate at which TF is queried for the orientation of the sensor."""
 TF_CACHE_S = 2.0
 NO_ROTATION: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 
 class ToolFeed:
-    """Hears `haptics/wrench` and TF, and tells the loop.
+    """Sends forces on `haptics/wrench` and poses from TF to the loop.
 
     Attributes:
-        start: Of the tool at first, where the target begins; None until TF knows it.
+        start: Initial pose of the tool, where the target starts; None until TF has it.
     """
 
     def __init__(self, config: HapticNodeConfig, loop: LoopClient) -> None:
@@ -37,13 +37,13 @@ class ToolFeed:
         self._rotation: Quaternion | None = NO_ROTATION
         self._buffer = tf2_ros.Buffer(rospy.Duration.from_sec(TF_CACHE_S), debug=False)
         self._listener = TfListener(self._buffer)
-        rospy.Subscriber("haptics/wrench", WrenchStamped, self._take_wrench, queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber("haptics/wrench", WrenchStamped, self._on_wrench, queue_size=1, tcp_nodelay=True)
         WallTimer(LOOK_HZ, self._look)
         if config.mode == "coupling":
-            WallTimer(TOOL_HZ, self._take_tool)
+            WallTimer(TOOL_HZ, self._observe_tool)
 
-    def _take_wrench(self, message: WrenchStamped) -> None:
-        """Takes the force on the tool, which counts from now on."""
+    def _on_wrench(self, message: WrenchStamped) -> None:
+        """Sends the force on the tool to the loop."""
         f = message.wrench.force
         if not math.isfinite(f.x + f.y + f.z):
             self._warn("haptics/wrench", f"refused, expected finite numbers, got {f.x:g}, {f.y:g}, {f.z:g}")
@@ -52,7 +52,7 @@ class ToolFeed:
             self._frame, self._rotation = message.header.frame_id, None if message.header.frame_id else NO_ROTATION
             self._look_up_sensor()
         if (rotation := self._rotation) is not None:
-            self._loop.take_wrench(rotated(rotation, (f.x, f.y, f.z)), _age_s(message.header.stamp))
+            self._loop.observe_wrench(rotated(rotation, (f.x, f.y, f.z)), _age_s(message.header.stamp))
 
     def _look(self) -> None:
         if self.start is None and (found := self._tool()) is not None:
@@ -60,7 +60,7 @@ class ToolFeed:
         self._look_up_sensor()
 
     def _look_up_sensor(self) -> None:
-        """Asks TF how the frame of the force is turned."""
+        """Looks up the orientation of the force's frame in TF."""
         frame = self._frame.strip("/")
         if not frame:
             return
@@ -72,7 +72,7 @@ class ToolFeed:
             self._warn("haptics/wrench", f"refused, since its frame '{frame}' is not known: {error}")
 
     def _tool(self) -> tuple[Pose, rospy.Time] | None:
-        """Returns pose and stamp of the tool, None as long as TF does not have it."""
+        """Returns pose and stamp of the tool, None while TF does not have it."""
         frame = self._config.tool_frame_id
         if frame is None:
             return Pose(), rospy.Time(0)
@@ -87,17 +87,17 @@ class ToolFeed:
             self._warn(f"TF of '{frame}'", f"refused: {error}")
             return None
 
-    def _take_tool(self) -> None:
-        """Takes where the tool is, if TF says something new."""
+    def _observe_tool(self) -> None:
+        """Sends the position of the tool to the loop, if TF has a new one."""
         if self.start is None or (found := self._tool()) is None:
             return
         tool, stamp = found
         if stamp == self._stamp:
             return
         self._stamp = stamp
-        self._loop.take_tool(minus(tool.position, self.start.position), _age_s(stamp))
+        self._loop.observe_tool(minus(tool.position, self.start.position), _age_s(stamp))
 
 
 def _age_s(stamp: rospy.Time) -> float:
-    """Returns how old a stamp is [s]; 0 without one."""
+    """Returns the age of a stamp [s]; 0 without one."""
     return max((rospy.Time.now() - stamp).to_sec(), 0.0) if stamp else 0.0

@@ -1,4 +1,4 @@
-"""3D Systems Touch (Phantom Omni, Geomagic Touch), by the topics of its drivers."""
+"""3D Systems Touch (Phantom Omni, Geomagic Touch), through the topics of its drivers."""
 
 import math
 import threading
@@ -15,39 +15,39 @@ from custom_ros_tools.ros.lifecycle.run_node import init_node
 from custom_ros_tools.schema import Hz, Name, Positive, PositiveMetres, Text, Vec3
 from operator_node.device import DeviceError
 from operator_node.haptics.device import DeviceEnded, HapticConfig, HapticDevice, HapticReading, ReadingError
-from operator_node.haptics.vectors import ZERO
-from rpbi.geometry import Vector, minus, scaled
+from robot_model.geometry import ZERO, Vector, minus, scaled
 
 PATIENCE_S = 1.0
-"""After so long without a state the driver counts as gone [s]."""
+"""Time without a state after which the driver counts as gone [s]."""
 GOODBYES, GOODBYE_S = 30, 0.01
-"""So often zero is sent at the end, and so far apart: the driver holds the last force for ever, and rospy's own thread
-needs the time to send."""
+"""Number and period of zero forces at the end [s]: the driver holds the last force forever, and rospy's own thread
+needs the time to send.
+"""
 
-LONGEST_LEAVE_S = 2.0
+MAX_LEAVE_S = 2.0
 ENDED = "its ROS node was shut down"
 
 
 class TouchConfig(HapticConfig):
-    """A Touch, and what its driver is like."""
+    """A Touch and its driver."""
 
-    max_force_n: Positive = Field(3.0, description="The largest force that it is sent [N]; the Touch X has 7.9.")
+    max_force_n: Positive = Field(3.0, description="Largest force that is sent to it [N]; the Touch X has 7.9.")
     workspace_m: PositiveMetres = Field(0.1, description="Radius of its workspace.")
     driver: Literal["omni", "touch_x"] = Field(
-        "omni", description="omni: omni_msgs, as omni_common has them; touch_x: cmd_force, twist and TF."
+        "omni", description="omni: omni_msgs, as in omni_common; touch_x: cmd_force, twist and TF."
     )
-    name: Name = Field("phantom", description="What the topics begin with.")
+    name: Name = Field("phantom", description="Prefix of the topics.")
     metres_per_unit: Positive = Field(0.001, description="Unit of lengths of `omni`: 0.001 for mm, 1 for m.")
-    handle_frame: Text = Field("touch_x_ee", description="TF frame of the handle, of `touch_x`.")
-    force_hz: Hz = Field(1000.0, description="How often a force is published at most.")
+    handle_frame: Text = Field("touch_x_ee", description="TF frame of the handle, for `touch_x`.")
+    force_hz: Hz = Field(1000.0, description="Largest rate at which forces are published.")
     centre: Vec3 = Field((0.0, 0.0, 0.0), description="Middle of the workspace in the driver's own axes [m].")
 
 
 class TouchDevice(HapticDevice):
-    """States and forces are topics; the newest state counts.
+    """Exchanges states and forces by topics; only the newest state counts.
 
-    It makes the process that it is in a ROS node, if that is none yet. So it is the loop's process that speaks with the
-    driver, and sends it zero, also when the haptic node has gone.
+    It makes its process a ROS node, unless it is one already. The loop's process therefore communicates with the driver
+    itself, and sends zero force also when the haptic node has gone.
     """
 
     Config = TouchConfig
@@ -68,7 +68,7 @@ class TouchDevice(HapticDevice):
         """Subscribes, and waits for the first state.
 
         Raises:
-            DeviceError: If none comes.
+            DeviceError: If none arrives.
             DeviceEnded: If ROS has shut the node down.
         """
         if rospy.is_shutdown():
@@ -79,13 +79,13 @@ class TouchDevice(HapticDevice):
         name = self.config.name
         if self.config.driver == "omni":
             self._subscribers = [
-                rospy.Subscriber(f"{name}/state", OmniState, self._take_state, queue_size=1, tcp_nodelay=True),
-                rospy.Subscriber(f"{name}/button", OmniButtonEvent, self._take_buttons, queue_size=10),
+                rospy.Subscriber(f"{name}/state", OmniState, self._on_state, queue_size=1, tcp_nodelay=True),
+                rospy.Subscriber(f"{name}/button", OmniButtonEvent, self._on_buttons, queue_size=10),
             ]
         else:
             self._subscribers = [
-                rospy.Subscriber("/tf", TFMessage, self._take_tf, queue_size=100, tcp_nodelay=True),
-                rospy.Subscriber(f"{name}/twist", TwistStamped, self._take_twist, queue_size=1, tcp_nodelay=True),
+                rospy.Subscriber("/tf", TFMessage, self._on_tf, queue_size=100, tcp_nodelay=True),
+                rospy.Subscriber(f"{name}/twist", TwistStamped, self._on_twist, queue_size=1, tcp_nodelay=True),
             ]
         self._force = self._publisher()
         self._closed.clear()
@@ -93,14 +93,14 @@ class TouchDevice(HapticDevice):
         while self._newest is None:
             if time.monotonic() - opened_s > PATIENCE_S or rospy.is_shutdown():
                 self.close()
-                raise DeviceError("touch", f"no state comes from the driver '{self.config.driver}' of '{name}'")
+                raise DeviceError("touch", f"no state from the driver '{self.config.driver}' of '{name}'")
             time.sleep(0.01)
 
     def read(self) -> HapticReading | None:
         """Returns the newest state.
 
         Raises:
-            DeviceError: If none has come for long.
+            DeviceError: If none has arrived for too long.
             DeviceEnded: If ROS shuts the node down.
             ReadingError: If it is not made of finite numbers.
         """
@@ -110,14 +110,14 @@ class TouchDevice(HapticDevice):
             reading, self._newest = self._newest, None
         if reading is None:
             if time.monotonic() - self._seen_s > PATIENCE_S:
-                raise DeviceError("touch", f"nothing has come from '{self.config.name}' for {PATIENCE_S:g} s")
+                raise DeviceError("touch", f"no state from '{self.config.name}' for {PATIENCE_S:g} s")
             return None
         if not math.isfinite(sum(reading.position)):
             raise ReadingError("not finite", f"position {reading.position}")
         return reading
 
     def send(self, force: Vector, expires_s: float) -> None:
-        """Publishes a force; a driver keeps it, so zero has to follow, which the loop sees to."""
+        """Publishes a force; a driver holds it, so that zero has to follow, which the loop ensures."""
         now_s = time.monotonic()
         if self._force is None or (force != ZERO and now_s - self._sent_s < 1.0 / self.config.force_hz):
             return
@@ -125,7 +125,7 @@ class TouchDevice(HapticDevice):
         self._publish(force)
 
     def close(self) -> None:
-        """Sends zero, and lets the topics be."""
+        """Sends zero force, and unregisters the topics."""
         if self._force is None:
             return
         self._send_zeros()
@@ -135,7 +135,9 @@ class TouchDevice(HapticDevice):
         self._closed.set()
 
     def silence(self) -> None:
-        """Sends zero, by a publisher that is there from the first time on and so has found the driver by the next."""
+        """Sends zero force with a publisher that persists after the first call, so that it is connected at the next
+        one.
+        """
         if self._force is None:
             self._force = self._publisher()
         self._send_zeros()
@@ -153,9 +155,9 @@ class TouchDevice(HapticDevice):
             time.sleep(GOODBYE_S)
 
     def _leave(self) -> None:
-        """Has zero sent before ROS shuts the node down."""
+        """Ensures zero force before ROS shuts the node down."""
         self._is_leaving = True
-        self._closed.wait(LONGEST_LEAVE_S)
+        self._closed.wait(MAX_LEAVE_S)
 
     def _publish(self, force: Vector) -> None:
         assert self._force is not None
@@ -173,24 +175,24 @@ class TouchDevice(HapticDevice):
         with self._lock:
             self._newest = HapticReading(position, velocity, quat, self._buttons)
 
-    def _take_state(self, message: OmniState) -> None:
-        """Takes a state in axes x right, y forward, z up."""
+    def _on_state(self, message: OmniState) -> None:
+        """Stores a state in axes x right, y forward, z up."""
         p, v, q = message.pose.position, message.velocity, message.pose.orientation
         unit_m = self.config.metres_per_unit
         x, y, z = minus(scaled(unit_m, (p.x, p.y, p.z)), self.config.centre)
         self._put((y, -x, z), scaled(unit_m, (v.y, -v.x, v.z)), (q.y, -q.x, q.z, q.w))
 
-    def _take_buttons(self, message: OmniButtonEvent) -> None:
+    def _on_buttons(self, message: OmniButtonEvent) -> None:
         self._buttons = int(bool(message.grey_button)), int(bool(message.white_button))
 
-    def _take_tf(self, message: TFMessage) -> None:
-        """Takes a transform in axes x right, y up, z towards the person."""
+    def _on_tf(self, message: TFMessage) -> None:
+        """Stores a transform in axes x right, y up, z towards the user."""
         for transform in message.transforms:
             if transform.child_frame_id.strip("/") == self.config.handle_frame:
                 p, q = transform.transform.translation, transform.transform.rotation
                 x, y, z = minus((p.x, p.y, p.z), self.config.centre)
                 self._put((-z, -x, y), self._velocity, (-q.z, -q.x, q.y, q.w))
 
-    def _take_twist(self, message: TwistStamped) -> None:
+    def _on_twist(self, message: TwistStamped) -> None:
         v = message.twist.linear
         self._velocity = -v.z, -v.x, v.y

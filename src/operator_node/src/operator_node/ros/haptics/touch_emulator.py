@@ -1,4 +1,4 @@
-"""`touch_emulator.py`: the driver of a Touch with a hand on it; like the real one it holds the last force for ever."""
+"""`touch_emulator.py`: the driver of a Touch with a hand on it; like the real one it holds the last force forever."""
 
 import threading
 import time
@@ -11,21 +11,20 @@ from tf2_msgs.msg import TFMessage
 
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
-from operator_node.haptics.hand import Hand, Press
-from operator_node.haptics.vectors import ZERO
-from rpbi.geometry import Vector
+from operator_node.haptics.hand import Hand, PressMotion
+from robot_model.geometry import ZERO, Vector
 
 STEP_S = 0.001
 
 
 class TouchEmulator:
-    """Publishes states, and has the hand feel what comes, without clamp and without time-out."""
+    """Publishes states, and applies forces to the hand, without limits and without time-out."""
 
     def __init__(self) -> None:
         self._driver = rospy.get_param("~driver", "omni")
         name = rospy.get_param("~name", "phantom")
         self._unit = 1.0 / rospy.get_param("~metres_per_unit", 0.001)
-        self._press = Press(rospy.get_param("~depth", 0.04))
+        self._press = PressMotion(rospy.get_param("~depth", 0.04))
         self._hand, self._force, self._lock = Hand(), ZERO, threading.Lock()
         self._start_s = self._now_s = time.monotonic()
         if self._driver == "omni":
@@ -37,7 +36,7 @@ class TouchEmulator:
             self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10, tcp_nodelay=True)
             self._twist = rospy.Publisher(f"{name}/twist", TwistStamped, queue_size=1, tcp_nodelay=True)
             rospy.Subscriber(f"{name}/cmd_force", Wrench, self._feel_touch_x, queue_size=1, tcp_nodelay=True)
-        # What the hand feels, for whoever looks on
+        # Force on the hand, for observers
         self._felt = rospy.Publisher(f"{name}/felt", Vector3, queue_size=1, tcp_nodelay=True)
         WallTimer(rospy.get_param("~hz", 500.0), self._publish)
 

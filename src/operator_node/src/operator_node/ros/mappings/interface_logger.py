@@ -1,4 +1,4 @@
-"""`operator_interface_logger`: the last seconds of the operator's signal."""
+"""`operator_interface_logger`: the most recent part of the operator's signal."""
 
 import threading
 
@@ -14,13 +14,13 @@ from operator_node.signal_window import SignalWindow
 
 NAME = "operator_interface_logger"
 QUEUE_SIZE = 100
-"""Signals kept while the machine is busy: none may be missing in the window."""
+"""Largest number of queued signals on a busy machine; the window must not miss any."""
 
 
 class InterfaceLogger:
-    """Publishes on `operator_node/window` what came on `operator_node/signal`, with each signal or at a rate.
+    """Publishes the recent signals of `operator_node/signal` on `operator_node/window`, with each signal or at a rate.
 
-    The data are records `[t, s_1, ..., s_n]`, oldest first, where t is ROS time when the signal came [s].
+    The data are records `[t, s_1, ..., s_n]`, oldest first, where t is the ROS time of arrival [s].
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -34,12 +34,12 @@ class InterfaceLogger:
         self._warn = ThrottledWarning()
         self._publisher = rospy.Publisher("operator_node/window", Float64MultiArray, queue_size=1, tcp_nodelay=True)
         self._subscriber = rospy.Subscriber(
-            "operator_node/signal", Float64MultiArray, self._take, queue_size=QUEUE_SIZE, tcp_nodelay=True
+            "operator_node/signal", Float64MultiArray, self._on_signal, queue_size=QUEUE_SIZE, tcp_nodelay=True
         )
         if parameters.hz:
             WallTimer(parameters.hz, self._publish_present)
 
-    def _take(self, message: Float64MultiArray) -> None:
+    def _on_signal(self, message: Float64MultiArray) -> None:
         with self._lock:
             try:
                 self._window.add(stamp().to_sec(), message.data)
@@ -53,7 +53,7 @@ class InterfaceLogger:
         with self._lock:
             had_any = self._window.size > 0
             self._window.forget(stamp().to_sec())
-            if had_any:  # the last one is empty, and says so
+            if had_any:  # the last message is empty
                 self._publish()
 
     def _publish(self) -> None:

@@ -1,4 +1,4 @@
-"""`joy_remap`: a device that tells changes only, at a steady rate."""
+"""`joy_remap`: repeats a device that reports changes only at a steady rate."""
 
 import copy
 import math
@@ -20,7 +20,7 @@ NAME = "joy_remap"
 class JoyRemap:
     """Repeats the newest message of `joy_in` on `joy_out` with the present time, from the first one on.
 
-    When input ceases, or is not finite, one message of zeros follows, and then nothing until input comes again.
+    When input ceases or is not finite, one message of zeros follows, and then nothing until there is input again.
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -33,10 +33,10 @@ class JoyRemap:
         self._is_refused = False
         self._warn = ThrottledWarning()
         self._publisher = rospy.Publisher("joy_out", Joy, queue_size=QUEUE_SIZE, tcp_nodelay=True)
-        self._input = WatchedInput("joy_in", Joy, self._take, parameters.input_timeout_s)
+        self._input = WatchedInput("joy_in", Joy, self._on_joy, parameters.input_timeout_s)
         WallTimer(parameters.hz, self._publish)
 
-    def _take(self, joy: Joy) -> None:
+    def _on_joy(self, joy: Joy) -> None:
         is_refused = not all(map(math.isfinite, joy.axes))
         if is_refused:
             axes = ", ".join(f"{value:g}" for value in joy.axes)

@@ -1,4 +1,4 @@
-"""`keyboard_to_joy.py`: keys that are held, as axes and buttons."""
+"""`keyboard_to_joy.py`: maps held keys to axes and buttons."""
 
 import math
 import threading
@@ -21,15 +21,14 @@ from operator_node.ros.watched_input import QUEUE_SIZE, WatchedInput
 NAME = "keyboard_to_joy"
 FRAME_ID = "keyboard"
 DISORDER_S = 5.0
-"""How late a press may come; after that, a stamp from before is one of a clock that was set back [s]."""
+"""Largest delay of a press behind its release [s]; beyond it, an earlier stamp means that the clock was set back."""
 
 
 class KeyboardToJoy:
     """Publishes `joy` from `keyboard/keydown` and `keyboard/keyup`, at a rate and whenever a key changes.
 
-    A key is held or not, however often it is said: repeats, and a release without a press, change nothing. Topics keep
-    no order among each other, so a press that comes just after its release, by the stamps, counts for nothing. When
-    the keyboard has gone, no key is held.
+    Repeated presses, and a release without a press, change nothing. Topics are not ordered relative to each other: a
+    press that arrives after its release, by the stamps, is ignored. When the keyboard has gone, no key is held.
 
     Raises:
         ConfigError: If `~config` or a parameter is wrong.

@@ -1,4 +1,4 @@
-"""`scale_node.py`, `isometric_node.py` and `mapping_node.py MAPPING`: the mappings as nodes."""
+"""`scale_node.py`, `isometric_node.py` and `mapping_node.py MAPPING`: nodes of the mappings."""
 
 import sys
 
@@ -7,13 +7,13 @@ from sensor_msgs.msg import Joy
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from operator_node.lookup import make_mapping
+from operator_node.mappings import MAPPINGS
 
 from .operator_node import NAME, OperatorNode
 
 
 class MappingNode(OperatorNode):
-    """Publishes what a mapping makes of the axes.
+    """Publishes the signal that a mapping computes from the axes.
 
     Args:
         name: A name of the table `MAPPINGS`, or `"their_package.module:Class"`.
@@ -24,7 +24,7 @@ class MappingNode(OperatorNode):
     """
 
     def __init__(self, name: str) -> None:
-        self._mapping = make_mapping(name, rospy.get_param("~config", {}))
+        self._mapping = MAPPINGS.make(name, rospy.get_param("~config", {}), "~config")
         super().__init__()
 
     def callback(self, joy: Joy) -> None:
@@ -43,7 +43,7 @@ def isometric() -> None:
 
 
 def main() -> None:
-    """Runs the node with the mapping that the argument names."""
+    """Runs the node with the mapping named by its argument."""
 
     def make() -> MappingNode:
         arguments = rospy.myargv(sys.argv)[1:]

@@ -1,4 +1,4 @@
-"""From `joy` to `operator_node/signal`."""
+"""Base of the nodes that map `joy` to `operator_node/signal`."""
 
 import math
 import threading
@@ -21,18 +21,18 @@ from operator_node.ros.watched_input import QUEUE_SIZE, WatchedInput
 
 NAME = "operator_node"
 LOOK_HZ = 50.0
-"""How often it is looked whether input has ceased."""
+"""Rate of the check for ceased input."""
 
 
 class OperatorNode(ABC):
-    """Publishes a signal while it is switched on, which `operator_node/toggle` does.
+    """Publishes a signal while it is switched on; `operator_node/toggle` switches it.
 
-    A subclass says in `callback` by `publish` what the signal is. It stays in force until the next one, and is repeated
-    `~repeat_hz` times a second unless it is zero, so that whoever takes it can tell a person who holds still from a
-    node that has gone. When it is switched off, when input ceases (`~input_timeout_s`) or a message is refused, what is
-    in force ends with one zero signal.
+    A subclass computes the signal in `callback` and passes it to `publish`. It stays in force until the next one, and
+    is repeated `~repeat_hz` times a second unless it is zero, so that subscribers can distinguish a user who holds
+    still from a node that has gone. When the node is switched off, when input ceases (`~input_timeout_s`) or a message
+    is refused, the signal ends with one zero signal.
 
-    In a process that is no node yet, it makes the node `operator_node`; `run_node` is the other way.
+    In a process that is no node yet, it makes the node `operator_node`; `run_node` is the alternative.
 
     Attributes:
         config: The parameter `~config`, a mapping.
@@ -58,7 +58,7 @@ class OperatorNode(ABC):
         self._toggle = Toggle("operator node", self._start, self._end)
         if parameters.start_on_init:
             self.start()
-        self._joy = WatchedInput("joy", Joy, self._take, parameters.input_timeout_s)
+        self._joy = WatchedInput("joy", Joy, self._on_joy, parameters.input_timeout_s)
         ToggleService("operator_node/toggle", self.start, self.stop)
         rospy.on_shutdown(self._end)
         WallTimer(LOOK_HZ, self._look)
@@ -66,14 +66,14 @@ class OperatorNode(ABC):
             WallTimer(parameters.repeat_hz, self._repeat)
 
     def post_init(self) -> None:  # noqa: B027 (most need none)
-        """Prepares what the subclass needs, before the first message; `config` is there."""
+        """Prepares the subclass before the first message; `config` is available."""
 
     @abstractmethod
     def callback(self, joy: Joy) -> None:
-        """Publishes what a message means; its numbers are finite.
+        """Maps a message to a signal and publishes it; its numbers are finite.
 
         Raises:
-            ValueError: If it makes no sense; it says why.
+            ValueError: If it is invalid; states why.
         """
 
     def start(self) -> tuple[bool, str]:
@@ -117,7 +117,7 @@ class OperatorNode(ABC):
                 self._publisher.publish(Float64MultiArray(data=[0.0] * len(self._in_force)))
                 self._in_force = ()
 
-    def _take(self, joy: Joy) -> None:
+    def _on_joy(self, joy: Joy) -> None:
         with self._lock:
             if not self._is_on:
                 return
@@ -125,7 +125,7 @@ class OperatorNode(ABC):
                 if not all(map(math.isfinite, joy.axes)):
                     raise ValueError(f"axes must be finite, got {', '.join(f'{v:g}' for v in joy.axes)}")
                 self.callback(joy)
-            except Exception as error:  # whatever goes wrong in a class of another's, the signal ends
+            except Exception as error:  # whatever fails in a user's class, the signal ends
                 reason = str(error) if isinstance(error, ValueError) else cause_of(error)
                 self._warn(self._joy.topic, f"message refused: {reason}")
                 self._end_signal()

@@ -1,4 +1,4 @@
-"""A person as RViz draws them: a thick line for each bone, and a head."""
+"""RViz markers of a person: a thick line for each bone, and a head."""
 
 import numpy as np
 from geometry_msgs.msg import Point
@@ -10,16 +10,16 @@ from operator_node.mvn.skeleton import BONES, inverse, rotate
 
 LINE_M, HEAD_M = 0.035, 0.20
 COLOURS = ((0.16, 0.42, 0.72), (0.85, 0.45, 0.12), (0.20, 0.60, 0.35), (0.60, 0.30, 0.65))
-"""Of the people, in turns."""
+"""Colours of the people, in turn."""
 _TIPS = {
     "RightHand": (0.0, -0.16, 0.0),
     "LeftHand": (0.0, 0.16, 0.0),
     "RightToe": (0.07, 0, 0),
     "LeftToe": (0.07, 0, 0),
 }
-"""Where segments end that nothing hangs on, as they see it [m]."""
+"""Tip of segments without children, in their frames [m]."""
 _HEAD_M = 0.09
-"""How far above its joint the middle of the head is."""
+"""Height of the middle of the head above its joint [m]."""
 
 
 class PersonMarkers:
@@ -27,7 +27,7 @@ class PersonMarkers:
 
     Args:
         number: Number of the person.
-        prefix: What the TF frames of the segments begin with.
+        prefix: Prefix of the TF frames of the segments.
     """
 
     def __init__(self, number: int, prefix: str) -> None:
@@ -45,7 +45,7 @@ class PersonMarkers:
         head.pose.position.z = _HEAD_M
 
     def message(self, frame: SegmentFrame) -> MarkerArray:
-        """Returns what draws the bones of a frame; they are rigid, so it need not be sent often."""
+        """Returns the markers of the bones of a frame; bones are rigid, so that markers are sent rarely."""
         parents, children = BONES.T
         ways = frame.positions[children] - frame.positions[parents]
         ends = rotate(inverse(frame.quats_xyzw[parents]), ways)
@@ -58,7 +58,7 @@ class PersonMarkers:
         return MarkerArray([each for name, each in self._markers.items() if each.points or name == "Head"])
 
     def gone(self) -> MarkerArray:
-        """Returns what takes the person away."""
+        """Returns a message that removes the person."""
         return MarkerArray(
             [
                 Marker(header=each.header, ns=each.ns, id=each.id, action=Marker.DELETE)

@@ -1,4 +1,4 @@
-"""Frames as messages that are packed in one go: the bytes that their types write, in a fraction of the time."""
+"""Messages of frames that are serialised at once: the same bytes as from their types, in a fraction of the time."""
 
 import struct
 from io import BytesIO
@@ -14,8 +14,8 @@ from operator_node.mvn.segments import SEGMENTS, SegmentFrame
 _COUNT = struct.Struct("<I")
 
 
-class PackedTransforms(TFMessage):
-    """A message for /tf that is packed already; its `transforms` stay empty."""
+class SerializedTransforms(TFMessage):
+    """A serialised message for /tf; its `transforms` stay empty."""
 
     packed: bytes
 
@@ -24,8 +24,8 @@ class PackedTransforms(TFMessage):
         buff.write(self.packed)
 
 
-class PackedPoses(PoseArray):
-    """Poses that are packed already, with an ordinary header; its `poses` stay empty."""
+class SerializedPoses(PoseArray):
+    """Serialised poses, with an ordinary header; its `poses` stay empty."""
 
     packed: bytes
 
@@ -37,11 +37,11 @@ class PackedPoses(PoseArray):
 
 
 class FramePacker:
-    """Makes the messages of one person.
+    """Creates the messages of one person.
 
     Args:
-        prefix: What the TF frames of the segments begin with.
-        parent: TF frame that they are in.
+        prefix: Prefix of the TF frames of the segments.
+        parent: Their parent TF frame.
     """
 
     def __init__(self, prefix: str, parent: str) -> None:
@@ -55,9 +55,9 @@ class FramePacker:
         numbers: list[object] = []
         for text, row in zip(self._texts, rows.tolist()):
             numbers += (0, stamp.secs, stamp.nsecs, text, *row)
-        transforms = PackedTransforms()
+        transforms = SerializedTransforms()
         transforms.packed = self._pack(len(SEGMENTS), *numbers)
-        poses = PackedPoses(header=Header(stamp=stamp, frame_id=self._parent))
+        poses = SerializedPoses(header=Header(stamp=stamp, frame_id=self._parent))
         poses.packed = _COUNT.pack(len(SEGMENTS)) + rows.astype("<f8").tobytes()
         return transforms, poses
 

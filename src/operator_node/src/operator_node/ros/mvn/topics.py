@@ -1,4 +1,4 @@
-"""Frames of people, and what else MVN streams, as topics and TF."""
+"""Topics and TF for the messages of MVN."""
 
 import time
 from datetime import datetime
@@ -22,13 +22,13 @@ from custom_ros_tools.ros.services import ToggleService
 from operator_node.device import Reading
 from operator_node.devices.mvn import Mvn
 from operator_node.mvn.checks import Finding
-from operator_node.mvn.node_config import MvnTopicsConfig
 from operator_node.mvn.receiver import Silence
 from operator_node.mvn.segments import CenterOfMass, JointAngles, Message, PersonInfo, SegmentFrame
+from operator_node.node_configs import MvnTopicsConfig
 from operator_node.ros.devices.topics import DeviceTopics
 from operator_node.ros.stamps import has_begun
 from operator_node.ros.stamps import stamp as present_stamp
-from rpbi.ros.publishers.topics import FastTopic
+from rpbi.ros.messages.topics import FastTopic
 
 from .markers import PersonMarkers
 from .packed import FramePacker
@@ -36,11 +36,11 @@ from .packed import FramePacker
 MARKER_HZ = 2.0
 DIAGNOSTICS_HZ = 1.0
 RECENT_S = 5.0
-"""For so long the diagnostics tell a finding [s]."""
+"""Time for which the diagnostics show a finding [s]."""
 
 
 class MvnTopics(DeviceTopics):
-    """Publishes what the device MVN says, and serves calibration and recording.
+    """Publishes the events of the device MVN, and provides calibration and recording.
 
     Raises:
         ConfigError: If a parameter is wrong.
@@ -68,7 +68,7 @@ class MvnTopics(DeviceTopics):
         WallTimer(DIAGNOSTICS_HZ, self._diagnose)
 
     def publish(self, reading: Reading, stamp: rospy.Time) -> None:
-        """Publishes what came, each frame with a stamp of its own."""
+        """Publishes the events, each frame with a stamp of its own."""
         for event in reading.events:
             stamp = present_stamp()
             if isinstance(event, SegmentFrame):
@@ -92,7 +92,7 @@ class MvnTopics(DeviceTopics):
 
     def _fall_silent(self, silence: Silence) -> None:
         who = f"mvn, person {silence.person}"
-        self._warn(who, f"no frame has come for {silence.seconds:g} s; TF and topics wait for the next one")
+        self._warn(who, f"no frame for {silence.seconds:g} s; TF and topics wait for the next one")
         if silence.person in self._people:
             self._people[silence.person].vanish()
 
@@ -122,16 +122,16 @@ class MvnTopics(DeviceTopics):
     # --- Services, in threads of their own.
 
     def _calibrate(self, _: Any) -> TriggerResponse:
-        """Takes the pose in which everybody stands as a T-pose."""
+        """Calibrates everybody with their present pose as the T-pose."""
         try:
             return TriggerResponse(True, self._receiver.calibrate())
         except InterfaceError as error:
             return TriggerResponse(False, str(error))
 
     def _clear_calibration(self, _: Any) -> TriggerResponse:
-        """Forgets the calibration."""
+        """Clears the calibration."""
         self._receiver.calibration.clear()
-        return TriggerResponse(True, "orientations are as they come")
+        return TriggerResponse(True, "orientations are uncalibrated")
 
     def _start_recording(self) -> tuple[bool, str]:
         name = datetime.now().strftime("mvn_%Y-%m-%d_%H-%M-%S.mvn")
@@ -169,7 +169,7 @@ class _Person:
         self._stamp = rospy.Time()
 
     def publish_frame(self, frame: SegmentFrame, stamp: rospy.Time) -> None:
-        """Publishes a frame; nothing if its stamp is that of the last one, as while simulated time stands still."""
+        """Publishes a frame, unless its stamp equals the last one, as while simulated time stands still."""
         if stamp == self._stamp:
             return
         self._stamp = stamp
@@ -181,7 +181,7 @@ class _Person:
             self._markers.publish(self._drawing.message(frame))
 
     def publish(self, message: Message, stamp: rospy.Time) -> None:
-        """Publishes what else came of the person."""
+        """Publishes another message about the person."""
         header = Header(stamp=stamp, frame_id=self._parent)
         if isinstance(message, PersonInfo):
             self.name = message.fields.get("name", self.name)
@@ -195,5 +195,5 @@ class _Person:
             self._joints.publish(JointState(header, names, message.angles_rad.ravel().tolist(), [], []))
 
     def vanish(self) -> None:
-        """Takes the person out of RViz."""
+        """Removes the person from RViz."""
         self._markers.publish(self._drawing.gone())

@@ -1,4 +1,4 @@
-"""What robots that move and robots that are only shown have in common."""
+"""Base class of robots, simulated or only shown."""
 
 import logging
 import math
@@ -7,7 +7,9 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
+from robot_model.urdf.document import mimics_of
 from rpbi.bodies.body import Body
+from rpbi.control.joint_command import JointCommand
 from rpbi.engine.client import Client
 from rpbi.kinematics import Kinematics
 from rpbi.sensors.base_state import BaseStateSensor
@@ -15,8 +17,7 @@ from rpbi.sensors.force_torque import ForceTorqueSensor
 from rpbi.sensors.link_pose import LinkPoseSensor
 from rpbi.sensors.sensor import Sensor
 from rpbi.urdf.copies import for_pybullet
-from rpbi.urdf.document import mimics_of
-from rpbi.urdf.joints import Joint, JointModel, JointTarget
+from rpbi.urdf.joints import Joint, JointModel
 from rpbi.urdf.loading import load_urdf, prepared_urdf
 
 from .robot_config import RobotConfig
@@ -24,7 +25,7 @@ from .robot_config import RobotConfig
 log = logging.getLogger(__name__)
 
 START_TOLERANCE = 1e-3
-"""How far apart start positions of coupled joints may be [rad or m] that are measured ones."""
+"""Largest error of measured start positions of coupled joints [rad or m]; beyond it, they are refused."""
 DEFAULT_BASE_STATE_HZ = 50.0
 """Rate of the state of a base that physics moves [Hz]."""
 
@@ -41,11 +42,11 @@ class JointedBody(Body):
     section = "robots"
     force_torque_sensors: tuple[ForceTorqueSensor, ...] = ()
     base_joints: ClassVar[int] = 0
-    """How many joints `prepare_urdf` puts between the world and the root link."""
+    """Number of joints that `prepare_urdf` adds between the world and the root link."""
     prepare_urdf = staticmethod(for_pybullet)
     """Returns what PyBullet reads of the configured URDF."""
     fixes_base: ClassVar[bool] = False
-    """Whether PyBullet fixes the base, whatever the configuration says."""
+    """Whether PyBullet fixes the base regardless of the configuration."""
 
     @classmethod
     def prepare(cls, config: RobotConfig, has_window: bool) -> None:
@@ -72,7 +73,7 @@ class JointedBody(Body):
             self.root_link = joints[self.base_joints - 1].link
         if problems := self._problems():
             raise ConfigError(problems)
-        starts = self.model.with_followers(self.start_positions())
+        starts = self.model.with_mimic_joints(self.start_positions())
         for index in self.model.couplings:
             self._compare_start(self.model.joints[index], starts[index])
         self._put_joints(starts)
@@ -118,8 +119,8 @@ class JointedBody(Body):
         """Returns the motors' efforts [N m or N] of all joints, of which PyBullet reported some."""
         return reported
 
-    def set_joint_state(self, target: JointTarget) -> None:
-        """Puts joints at positions [rad or m] with velocities [rad/s or m/s], 0 where none is given, at once.
+    def set_joint_state(self, target: JointCommand) -> None:
+        """Sets positions [rad or m] and velocities [rad/s or m/s] of joints at once; velocities are 0 by default.
 
         Raises:
             UnknownNameError: If the robot lacks one of the joints.
@@ -134,16 +135,18 @@ class JointedBody(Body):
                 limit = f"{joint.max_velocity:g} {joint.unit}/s"
                 raise ValueError(f"velocity of joint '{joint.name}' must be within +-{limit}, got {velocity:g}")
         velocities = {index: velocities.get(index, 0.0) for index in positions}
-        self._put_joints(self.model.with_followers(positions), self.model.with_followers(velocities, offsets=False))
+        self._put_joints(
+            self.model.with_mimic_joints(positions), self.model.with_mimic_joints(velocities, offsets=False)
+        )
 
     def remove(self) -> None:
-        """Takes it out of the world, and its kinematics with it."""
+        """Removes it from the world, and closes its kinematics."""
         if "kinematics" in vars(self):
             self.kinematics.close()
         super().remove()
 
     def _put_joints(self, positions: Mapping[int, float], velocities: Mapping[int, float] | None = None) -> None:
-        """Puts joints by index at positions [rad or m] with velocities, 0 where none is given, in one call of PyBullet.
+        """Sets positions [rad or m] of joints by index, with velocities, 0 by default, in one call of PyBullet.
 
         With a window and no graphics card, a call takes milliseconds.
         """
@@ -152,7 +155,7 @@ class JointedBody(Body):
         self.pb.resetJointStatesMultiDof(self.body_id, [*positions], values, speeds)
 
     def _joint_model(self, joints: list[Joint]) -> JointModel:
-        """Returns the joints, coupled as the URDF and the configuration say.
+        """Returns the joints with the couplings of the URDF and the configuration.
 
         Raises:
             ConfigError: If a joint cannot follow another.

@@ -16,8 +16,7 @@ from .robot_config import RobotConfig
 class MobileRobot(Robot):
     """A robot whose base stays in a plane, the one that is x-y of its start pose, and drives there by velocity.
 
-    Joints between the world and the root link move it. They are none of the robot's own: neither its joint states nor
-    its targets know them.
+    Joints between the world and the root link move it. They are not part of its joint states and targets.
     """
 
     base_joints = len(PLANAR_JOINTS)
@@ -33,11 +32,11 @@ class MobileRobot(Robot):
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
-        """Tells whether a YAML of the section `robots` is that of a robot whose base drives."""
+        """Returns whether a YAML of the section `robots` is that of a robot whose base drives."""
         return data.get("planar_base") is not None
 
     def inputs(self) -> Mapping[str, Input]:
-        """Takes `cmd_vel`, a Twist in the base frame, beside what every robot takes."""
+        """Returns `cmd_vel`, a Twist in the base frame, beside the inputs of every robot."""
         return {**super().inputs(), "cmd_vel": Input(PlanarVelocity.checked, self.planar_base.follow)}
 
     def before_step(self, tick: int) -> None:

@@ -11,13 +11,14 @@ import pybullet
 
 from custom_ros_tools.errors import Problem
 from rpbi.config.pybullet_args import IMPEDANCE_CONTROL
-from rpbi.constraints.couplings import couple
-from rpbi.control.controllers.controller import Arm, RobotState
+from rpbi.control.controllers.controller import ControlledRobot, RobotState
 from rpbi.control.controllers.impedance import JointImpedance
 from rpbi.control.controllers.manager import ControllerManager, ControllerSwitch, controller_problems
+from rpbi.control.couplings import couple
+from rpbi.control.joint_command import JointCommand
 from rpbi.control.joint_drive import JointDrive
-from rpbi.control.motors import QUANTITIES, Command, LimitReports, Motors, joined
-from rpbi.control.robot_model import RobotModel
+from rpbi.control.motors import QUANTITIES, LimitReports, Motors, ResolvedCommand, coalesce
+from rpbi.control.robot_dynamics import RobotDynamics
 from rpbi.control.trajectories.config import trajectory_problems
 from rpbi.control.trajectories.follower import TrajectoryFollower
 from rpbi.engine.client import Client
@@ -29,7 +30,6 @@ from rpbi.sensors.force_torque import ForceTorqueSensor
 from rpbi.sensors.joint_state import JointStateSensor
 from rpbi.sensors.sensor import Sensor
 from rpbi.sensors.trajectory_state import TrajectoryStateSensor
-from rpbi.urdf.joints import JointTarget
 
 from .jointed import JointedBody
 from .robot_config import RobotConfig
@@ -61,7 +61,7 @@ class Robot(JointedBody):
     }
 
     def __init__(self, pb: Client, config: RobotConfig) -> None:
-        self._robot_model: RobotModel | None = None
+        self._robot_model: RobotDynamics | None = None
         super().__init__(pb, config)
         assert config.setJointMotorControlArray is not None  # the model demands it
         mode = config.setJointMotorControlArray.controlMode
@@ -76,7 +76,7 @@ class Robot(JointedBody):
             config.target_timeout_s,
         )
         couple(pb, self.body_id, self.model.couplings)
-        self._told_followers = not self.model.couplings
+        self._warned_mimic = not self.model.couplings
         self.drive = JointDrive(
             self.name,
             pb,
@@ -92,14 +92,14 @@ class Robot(JointedBody):
         )
         follower = config.joint_trajectory_controller
         self.follower = None if follower is None else TrajectoryFollower(self.drive, follower)
-        self.controllers = ControllerManager(self._arm(), config.controllers, self.motors)
+        self.controllers = ControllerManager(self._controlled_robot(), config.controllers, self.motors)
         self.drive.controlled = lambda: self.controllers.driven
         self._springs = JointImpedance(config.impedance, self.model.driven, self.drive.dt_s)
         self._start_base(config.resetBaseVelocity, config.object_tf, self.has_fixed_base)
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
-        """Tells whether a YAML of the section `robots` is that of a robot with motors whose base does not drive."""
+        """Returns whether a YAML of the section `robots` is that of a robot with motors whose base does not drive."""
         return data.get("is_visual_robot") not in (True, 1) and data.get("planar_base") is None
 
     def sensors(self) -> tuple[Sensor, ...]:
@@ -116,11 +116,11 @@ class Robot(JointedBody):
         return (*joint_states, *controllers, *self.force_torque_sensors, *trajectory, *contacts, *super().sensors())
 
     def inputs(self) -> Mapping[str, Input]:
-        """Takes `target` beside the pose of its base.
+        """Returns `target` beside the pose of its base.
 
-        It is a JointTarget, or a mapping of joints to numbers, of what the control mode asks for.
+        It is a JointCommand, or a mapping of joints to numbers in the quantity of the control mode.
         """
-        target = Input(self._check_target, self.drive.follow, merge=joined)
+        target = Input(self._check_target, self.drive.follow, merge=coalesce)
         return {**super().inputs(), "target": target, **self._controller_inputs()}
 
     def before_step(self, tick: int) -> None:
@@ -144,11 +144,11 @@ class Robot(JointedBody):
         self.motors.before_step(tick, holding, self.controllers.driven)
 
     @property
-    def robot_model(self) -> RobotModel:
+    def robot_model(self) -> RobotDynamics:
         """Its dynamics and kinematics."""
         if self._robot_model is None:
             config = self.config
-            self._robot_model = RobotModel(self.pb, self.model, config.loadURDF, config.inertia_from_urdf)
+            self._robot_model = RobotDynamics(self.pb, self.model, config.loadURDF, config.inertia_from_urdf)
         return self._robot_model
 
     def switch_controllers(self, switch: ControllerSwitch) -> None:
@@ -161,7 +161,7 @@ class Robot(JointedBody):
         taken = self.controllers.switch(switch)
         if self.drive.motion is not None and taken & self.drive.motion.joints:
             self.halt("a controller drives its joints")
-            self.motors.let_go(taken)
+            self.motors.disable(taken)
         self.drive.drop_targets(taken)
 
     def halt(self, reason: str) -> None:
@@ -180,16 +180,16 @@ class Robot(JointedBody):
             self.drive.drop_targets()
             self.motors.switch(mode)
             self._springs.restart()
-            self.motors.let_go(self.controllers.driven)
+            self.motors.disable(self.controllers.driven)
 
-    def set_joint_state(self, target: JointTarget) -> None:
+    def set_joint_state(self, target: JointCommand) -> None:
         """Puts joints somewhere at once, where the motors then hold them; a motion that runs is ended."""
         super().set_joint_state(target)
         self.halt("its joints were put elsewhere")
         positions = self.model.resolve(target.names, target.position)
         self.drive.drop_targets(positions)
-        self.motors.rest(positions)
-        self.motors.let_go(self.controllers.driven & positions.keys())
+        self.motors.reset_setpoints(positions)
+        self.motors.disable(self.controllers.driven & positions.keys())
 
     def teleport(self, pose: Pose) -> None:
         """Puts the base link's URDF frame at a pose in the world, at rest; a motion that runs is ended."""
@@ -204,17 +204,17 @@ class Robot(JointedBody):
         return tuple(applied.get(joint.index, effort) for joint, effort in zip(self.joints, reported))
 
     def remove(self) -> None:
-        """Takes the robot out of the world; a motion that runs is ended."""
+        """Removes the robot from the world, and ends its motion."""
         self.halt("the robot was removed")
         if self._robot_model is not None:
             self._robot_model.close()
         super().remove()
 
-    def _check_target(self, given: JointTarget | Mapping[str, float]) -> tuple[Command]:
-        target = JointTarget.of(given, QUANTITIES[self.motors.mode])
+    def _check_target(self, given: JointCommand | Mapping[str, float]) -> tuple[ResolvedCommand]:
+        target = JointCommand.of(given, QUANTITIES[self.motors.mode])
         command = self.motors.check(target)
-        if not self._told_followers:
-            self._tell_followers(target.names)
+        if not self._warned_mimic:
+            self._warn_mimic(target.names)
         motion = self.drive.motion
         driven = [] if motion is None else [self.model.joints[i].name for i in command.values if i in motion.joints]
         if driven:
@@ -232,8 +232,10 @@ class Robot(JointedBody):
     def _spring(self, state: RobotState) -> None:
         """Applies the efforts of the springs of IMPEDANCE_CONTROL, and those that balance gravity and motion."""
         motors, model = self.motors, self.robot_model
-        wanted = [motors.leads.get(joint.index, (motors.targets[joint.index], 0.0)) for joint in model.joints]
-        motors.leads.clear()
+        wanted = [
+            motors.impedance_setpoints.get(joint.index, (motors.targets[joint.index], 0.0)) for joint in model.joints
+        ]
+        motors.impedance_setpoints.clear()
         if not wanted:
             return
         positions, velocities = np.array(wanted).T
@@ -242,20 +244,20 @@ class Robot(JointedBody):
         efforts = springs + model.bias(state.base, state.position, state.velocity)
         indices = (joint.index for joint in model.joints)
         driven = self.controllers.driven
-        motors.push({index: effort for index, effort in zip(indices, efforts.tolist()) if index not in driven})
+        motors.apply_efforts({index: effort for index, effort in zip(indices, efforts.tolist()) if index not in driven})
 
-    def _arm(self) -> Arm:
+    def _controlled_robot(self) -> ControlledRobot:
         links = {joint.link: joint.index for joint in self.joints}
         none = np.zeros(0, np.int64)
         dt_s: float = self.pb.getPhysicsEngineParameters()["fixedTimeStep"]
-        return Arm(self.name, self.link_pose, self.robot_model, links, none, dt_s)
+        return ControlledRobot(self.name, self.link_pose, self.robot_model, links, none, dt_s)
 
     def _controller_inputs(self) -> dict[str, Input]:
-        """Returns what controllers take: `CONTROLLER/INPUT`."""
+        """Returns the inputs of controllers: `CONTROLLER/INPUT`."""
         return {
             f"{name}/{key}": Input(
                 partial(self._check_controller_input, name, key),
-                partial(self.controllers.take, name, key),
+                partial(self.controllers.set_target, name, key),
                 ros_topic=topic,
                 owner=f"{self.name}/{name}",
             )
@@ -266,13 +268,13 @@ class Robot(JointedBody):
     def _check_controller_input(self, name: str, key: str, value: Any) -> Any:
         return self.controllers.of(name).check(key, value)
 
-    def _tell_followers(self, names: Sequence[str]) -> None:
-        """Says once that joints that follow others take no targets of their own."""
+    def _warn_mimic(self, names: Sequence[str]) -> None:
+        """Warns once that mimic joints have no targets of their own."""
         for index, coupling in self.model.couplings.items():
             joint, leader = self.model.joints[index].name, self.model.joints[coupling.leader].name
             if joint in names:
                 log.info("%s: targets of '%s' have no effect: it follows '%s'", self.name, joint, leader)
-                self._told_followers = True
+                self._warned_mimic = True
 
     def _gains(self) -> dict[int, dict[str, float]]:
         """Returns PyBullet's gains by joint index; what does not fit was found before."""
@@ -304,7 +306,7 @@ class Robot(JointedBody):
             elif len(gains) not in (1, len(moving)):
                 message = f"expected 1 number or {len(moving)}, one for each of {', '.join(moving)}; got {len(gains)}"
                 problems.append(Problem(self.name, path, message))
-        problems += controller_problems(self.name, self._arm(), self.config.controllers)
+        problems += controller_problems(self._controlled_robot(), self.config.controllers)
         for key in ("stiffness", "damping_ratio"):
             try:
                 self.config.impedance.by_joint(key, self.model.driven)
@@ -313,7 +315,7 @@ class Robot(JointedBody):
         return [*problems, *self._force_torque_problems(), *self._model_problems()]
 
     def _model_problems(self) -> list[Problem]:
-        """PyBullet's inverse dynamics know joints of one axis only."""
+        """Returns a problem if joints have several axes, which PyBullet's inverse dynamics does not support."""
         others = [joint.name for joint in self.joints if not (joint.is_driven or joint.is_fixed)]
         motors = self.config.setJointMotorControlArray
         needs = {

@@ -1,4 +1,4 @@
-"""What the YAML file of a robot may say."""
+"""Keys of a robot's YAML file."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from custom_ros_tools.schema import (
     Switch,
     Text,
 )
+from robot_model.urdf.elements import Mimic
 from rpbi.bodies.body_config import BodyConfig
 from rpbi.config.pybullet_models import LoadURDF, ObjectTf, ResetBaseVelocity, SetJointMotorControlArray
 from rpbi.config.sensors import ContactsConfig, ForceTorqueEntry
 from rpbi.control.controllers.entry import ControllerEntry
 from rpbi.control.controllers.impedance import JointSprings
-from rpbi.control.jitter_buffer import BUFFER_S
 from rpbi.control.planar_base import PlanarBaseConfig
+from rpbi.control.streams.jitter_buffer import BUFFER_S
 from rpbi.control.trajectories.config import JointTrajectoryControllerConfig
-from rpbi.urdf.elements import Mimic
 
 _NOT_VISUAL = {
     "controllers": "a visual robot has no motors to drive",
@@ -37,7 +37,7 @@ _NOT_VISUAL = {
 
 
 class CoupledJoint(ConfigModel):
-    """How a joint follows another, as `<mimic>` says it in a URDF."""
+    """A mimic joint, as `<mimic>` defines it in a URDF."""
 
     joint: Text = Field(description="The joint that it follows.")
     multiplier: float = Field(1.0, description="Its velocity over that of the other.")
@@ -69,7 +69,7 @@ class RobotConfig(BodyConfig):
         False, description="Whether it is only shown: it follows joint targets and TF, and nothing can touch it."
     )
     setJointMotorControlArray: SetJointMotorControlArray | None = Field(
-        None, description="How its motors follow targets; required unless it is a visual robot."
+        None, description="Its motors; required unless it is a visual robot."
     )
     initial_joint_position: dict[str, float] = Field(
         {}, description="Start position by joint; those not named start at 0.", json_schema_extra={"unit": "deg or m"}
@@ -80,20 +80,18 @@ class RobotConfig(BodyConfig):
     initial_joint_state_topic: str | None = Field(
         None, description="Joint states, for instance of the real robot, to start at instead."
     )
-    initial_joint_state_timeout_s: Seconds = Field(5.0, description="How long they are waited for, of wall time.")
+    initial_joint_state_timeout_s: Seconds = Field(5.0, description="Longest wait for them, of wall time.")
     move_to_initial_joint_state_on_startup: Switch = Field(
         False, description="Accepted without effect: a robot starts there and its motors hold it."
     )
-    coupled_joints: dict[str, CoupledJoint] = Field(
-        {}, description="Joints that follow others, by name, beside those of which the URDF says so."
-    )
+    coupled_joints: dict[str, CoupledJoint] = Field({}, description="Mimic joints by name, beside those of the URDF.")
     target_timeout_s: Seconds = Field(
         0.5, description="Age at which velocity and torque targets expire, in the world's time; positions never do."
     )
     target_interpolation: Literal["hold", "linear", "smooth"] = Field(
         "smooth",
-        description="How it moves from one position target of a stream to the next: at once, at constant velocity, or "
-        "with rounded corners.",
+        description="Interpolation of a stream of position targets: at once, at constant velocity, or with rounded "
+        "corners.",
     )
     target_buffer_s: NonNegative = Field(
         BUFFER_S,
@@ -132,7 +130,9 @@ class RobotConfig(BodyConfig):
     do_log_joint_limit_violations: Switch = Field(
         True, description="Whether a visual robot that is beyond its joints' limits is reported."
     )
-    log_joint_limit_violations_hz: Hz = Field(50.0, description="Accepted without effect: each violation is told once.")
+    log_joint_limit_violations_hz: Hz = Field(
+        50.0, description="Accepted without effect: each violation is logged once."
+    )
     start_ik_callback: Switch = Field(
         False, description="Whether it moves to what inverse kinematics finds for problems on the topic `ik`."
     )

@@ -1,12 +1,12 @@
-"""Visual robots: shown where joint targets and TF say, felt by nobody."""
+"""Visual robots: shown at joint targets and TF poses, without collisions."""
 
 from collections.abc import Mapping
 from typing import Any
 
+from rpbi.control.joint_command import JointCommand
 from rpbi.control.motors import LimitReports
 from rpbi.engine.client import Client
 from rpbi.engine.inputs import Input
-from rpbi.urdf.joints import JointTarget
 
 from .jointed import JointedBody
 from .robot_config import RobotConfig
@@ -36,20 +36,20 @@ class VisualRobot(JointedBody):
 
     @classmethod
     def claims(cls, data: Mapping[str, Any]) -> bool:
-        """Tells whether a YAML of the section `robots` is that of a visual robot."""
+        """Returns whether a YAML of the section `robots` is that of a visual robot."""
         return data.get("is_visual_robot") in (True, 1)
 
     def inputs(self) -> Mapping[str, Input]:
-        """Takes `target`, a JointTarget or mapping of joints to positions [rad or m], beside the pose of its base."""
+        """Returns `target`, a JointCommand or mapping of joints to positions [rad or m], and the pose of its base."""
         return {**super().inputs(), "target": Input(self._check_target, self._show, merge=dict.__or__)}
 
-    def _check_target(self, given: JointTarget | Mapping[str, float]) -> dict[int, float]:
-        target = JointTarget.of(given, "position")
+    def _check_target(self, given: JointCommand | Mapping[str, float]) -> dict[int, float]:
+        target = JointCommand.of(given, "position")
         return self.model.resolve(target.names, target.values_of("position", "a visual robot shows positions"))
 
     def _show(self, positions: dict[int, float]) -> None:
-        positions = self.model.with_followers(positions)
+        positions = self.model.with_mimic_joints(positions)
         self._put_joints(positions)
         if self.config.do_log_joint_limit_violations:
             for index, position in positions.items():
-                self._limit_reports.take(self.joints[index], position, "it is shown there")
+                self._limit_reports.observe(self.joints[index], position, "it is shown there")

@@ -9,24 +9,25 @@ import numpy as np
 from pydantic import Field, WithJsonSchema
 
 from custom_ros_tools.schema import NonNegative, Text, Unit
-from rpbi.control.jitter_buffer import BUFFER_S, JitterBuffer
-from rpbi.control.target_stream import TargetStream
+from robot_model.geometry import minus, plus
+from rpbi.control.streams.jitter_buffer import BUFFER_S, JitterBuffer
+from rpbi.control.streams.target_stream import TargetStream
 from rpbi.engine.inputs import check_pose
-from rpbi.geometry import Pose, minus, plus, rotated
+from rpbi.geometry import Pose, rotated
 
-from .controller import Arm, Array, Controller, ControllerConfig, RobotState
+from .controller import Array, ControlledRobot, Controller, ControllerConfig, RobotState
 from .impedance import DampingRatio, Disturbance, force_for, implicit, implicit_wrench, inverse, turn_between
 
 LEAST_MOBILITY = 0.01
-"""Of a direction in which the arm can hardly move, for damping [1/kg, 1/(kg m^2)]."""
+"""Smallest mobility that damping is computed with [1/kg, 1/(kg m^2)], for directions in which the arm hardly moves."""
 
 
 class PoseTarget(NamedTuple):
-    """Where a point of a link is to be.
+    """Target pose of a point of a link.
 
     Attributes:
-        pose: In the world.
-        stamp_ns: When it was sent, by the sender's clock [ns], 0 if that is not known.
+        pose: Pose in the world.
+        stamp_ns: Time of sending by the sender's clock [ns], 0 if unknown.
     """
 
     pose: Pose
@@ -37,7 +38,7 @@ class CartesianImpedanceConfig(ControllerConfig):
     """Keys of `cartesian_impedance`."""
 
     type: Annotated[Text, WithJsonSchema({"enum": ["cartesian_impedance"]})] = Field(
-        description="`cartesian_impedance`, or a class that takes its keys."
+        description="`cartesian_impedance`, or a class with its keys."
     )
 
     link: Text = Field(description="The link that is held.")
@@ -62,9 +63,9 @@ class CartesianImpedanceController(Controller):
     """
 
     Config = CartesianImpedanceConfig
-    inputs = {"target": "rpbi.ros.robots.controller_messages:POSE_TARGET"}
+    inputs = {"target": "rpbi.ros.messages.controllers:POSE_TARGET"}
 
-    def __init__(self, arm: Arm, config: Any) -> None:
+    def __init__(self, arm: ControlledRobot, config: Any) -> None:
         super().__init__(arm, config)
         if config.link not in arm.links:
             raise ValueError(f"link: there is no link '{config.link}', there are {', '.join(arm.links)}")
@@ -77,7 +78,7 @@ class CartesianImpedanceController(Controller):
         self._posture_stiffness = np.full(len(arm.chosen), config.posture_stiffness)
 
     def check(self, key: str, value: PoseTarget | Pose | Mapping[str, Any]) -> PoseTarget:
-        """Takes finite poses."""
+        """Accepts finite poses."""
         if not isinstance(value, PoseTarget):
             return PoseTarget(check_pose(value))
         return value._replace(pose=check_pose(value.pose))
@@ -92,7 +93,7 @@ class CartesianImpedanceController(Controller):
 
     def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array:
         """Returns the efforts of the spring, the damper and what balances gravity and motion."""
-        self._take(targets.get("target"), tick)
+        self._update_target(targets.get("target"), tick)
         arm, config = self.arm, self.config
         q, velocity = arm.of_chosen(np.array((state.position, state.velocity)))
         error = self._error = np.array(self._way(tick))
@@ -147,7 +148,7 @@ class CartesianImpedanceController(Controller):
         position, quat = self.arm.link_pose(self._link)
         return Pose(plus(position, rotated(quat, self.config.point)), quat)
 
-    def _take(self, target: PoseTarget | None, tick: int) -> None:
+    def _update_target(self, target: PoseTarget | None, tick: int) -> None:
         if target is None or target is self._taken:
             return
         self._taken = target

@@ -1,4 +1,4 @@
-"""What every controller has in common: it turns the state of a robot into efforts or set points, tick by tick."""
+"""Base class of controllers, which turn the state of a robot into efforts or set points, tick by tick."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, HzOrOff, ListOf, Switch, Text
-from rpbi.control.robot_model import RobotModel
+from rpbi.control.robot_dynamics import RobotDynamics
 from rpbi.geometry import Pose
 
 Array = npt.NDArray[np.float64]
@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 class ControllerConfig(ConfigModel):
     """An entry of a robot's `controllers`; a controller with more keys has a subclass of this as its `Config`."""
 
-    type: Text = Field(description="What it is: a key of CONTROLLERS, or `module:Class`.")
+    type: Text = Field(description="Its type: a key of CONTROLLERS, or `module:Class`.")
     active: Switch = Field(True, description="Whether it drives its joints from the start on.")
     joints: ListOf[Text] | None = Field(None, description="The joints that it drives; all, if they are not named.")
     state_hz: HzOrOff = Field(50.0, description="Rate of its state; 0 is off.")
@@ -31,7 +31,7 @@ class RobotState(NamedTuple):
 
     Attributes:
         base: Pose of the root link in the world.
-        position: Positions of all n driven joints [rad or m], in the order of `RobotModel.joints`.
+        position: Positions of all n driven joints [rad or m], in the order of `RobotDynamics.joints`.
         velocity: Their velocities [rad/s or m/s].
     """
 
@@ -50,7 +50,7 @@ class SetPoints(NamedTuple):
     position: Array
 
 
-class Arm(NamedTuple):
+class ControlledRobot(NamedTuple):
     """The robot of a controller, and its part of it.
 
     Attributes:
@@ -64,7 +64,7 @@ class Arm(NamedTuple):
 
     name: str
     link_pose: Callable[[int], Pose]
-    model: RobotModel
+    model: RobotDynamics
     links: Mapping[str, int]
     chosen: npt.NDArray[np.int64]
     dt_s: float
@@ -81,22 +81,22 @@ class Controller(ABC):
 
     Args:
         arm: The robot.
-        config: What YAML says.
+        config: Its keys in YAML.
 
     Raises:
-        ValueError: If they do not fit.
+        ValueError: If they do not fit each other.
     """
 
     Config: ClassVar[type[ControllerConfig]] = ControllerConfig
     inputs: ClassVar[Mapping[str, str]] = {}
-    """Where to find the Topic of each thing that it takes while it runs, as `module:NAME`, by the name in `targets`."""
+    """Place of the Topic of each input, as `module:NAME`, by the input's name in `targets`."""
 
-    def __init__(self, arm: Arm, config: Any) -> None:
+    def __init__(self, arm: ControlledRobot, config: Any) -> None:
         self.arm = arm
         self.config = config
 
     def check(self, key: str, value: Any) -> Any:
-        """Returns what `targets` shall have of a value that came by topic; any thread calls it.
+        """Returns the entry of `targets` for a value received by topic; any thread calls it.
 
         Raises:
             ValueError: If the value is refused.
@@ -117,5 +117,5 @@ class Controller(ABC):
         """
 
     def report(self) -> Mapping[str, float]:
-        """Returns numbers that tell how it does, by name, for its topic of state."""
+        """Returns numbers for its state topic, by name."""
         return {}

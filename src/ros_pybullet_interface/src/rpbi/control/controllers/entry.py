@@ -1,23 +1,19 @@
-"""What YAML says of controllers."""
+"""Entries of controllers in YAML."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Union
 
 from pydantic import ConfigDict, Field, PlainValidator, ValidationInfo, WithJsonSchema
 
 from custom_ros_tools.schema import Text
-from rpbi.plugins import entry_config
 
-from . import CONTROLLERS, controller_class
-from .cartesian_impedance import CartesianImpedanceConfig
+from . import CONTROLLERS
 from .controller import ControllerConfig
-from .force import ForceConfig
-from .joint_impedance import JointImpedanceConfig
 
 
 def controller_config(entry: Any, info: ValidationInfo) -> ControllerConfig:
     """Returns the configuration of a controller, by the model of its class."""
     expected = f"a mapping with 'type', one of {', '.join(CONTROLLERS)}, or module:Class"
-    return entry_config(entry, info, ControllerConfig, controller_class, expected)
+    return CONTROLLERS.parse_entry(entry, info, ControllerConfig, expected)
 
 
 class OwnControllerConfig(ControllerConfig):
@@ -28,6 +24,6 @@ class OwnControllerConfig(ControllerConfig):
     type: Annotated[Text, WithJsonSchema({"type": "string", "pattern": ":"})] = Field(description="`module:Class`.")
 
 
-_Entry = JointImpedanceConfig | CartesianImpedanceConfig | ForceConfig | OwnControllerConfig
+_Entry: Any = Union[(*CONTROLLERS.configs().values(), OwnControllerConfig)]  # noqa: UP007 (known at run time only)
 ControllerEntry = Annotated[Any, PlainValidator(controller_config, json_schema_input_type=_Entry)]
 """A controller: `{type: KEY or module:Class, KEY: VALUE, ...}`."""

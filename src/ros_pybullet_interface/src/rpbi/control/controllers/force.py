@@ -10,21 +10,17 @@ from pydantic import Field, WithJsonSchema, field_validator
 from custom_ros_tools.schema import NonNegative, Positive, Text, Unit, Vec3
 
 from .cartesian_impedance import CartesianImpedanceConfig, CartesianImpedanceController
-from .controller import Arm, Array
+from .controller import Array, ControlledRobot
 
 
-class ForceConfig(CartesianImpedanceConfig):
+class ForceControllerConfig(CartesianImpedanceConfig):
     """Keys of `force`, beside those of `cartesian_impedance`."""
 
-    type: Annotated[Text, WithJsonSchema({"enum": ["force"]})] = Field(
-        description="`force`, or a class that takes its keys."
-    )
+    type: Annotated[Text, WithJsonSchema({"enum": ["force"]})] = Field(description="`force`, or a class with its keys.")
 
     axis: Vec3 = Field((0.0, 0.0, -1.0), description="Where it pushes, in the world.")
     force: Annotated[NonNegative, Unit("N")] = Field(10.0, le=1000.0, description="With what force.")
-    approach_speed: Annotated[Positive, Unit("m/s")] = Field(
-        0.05, description="How fast it moves along the axis as long as nothing is there."
-    )
+    approach_speed: Annotated[Positive, Unit("m/s")] = Field(0.05, description="Speed along the axis without contact.")
 
     @field_validator("axis")
     @classmethod
@@ -41,9 +37,9 @@ class ForceController(CartesianImpedanceController):
     force is the one asked for. The target's place along the axis does not count.
     """
 
-    Config = ForceConfig
+    Config = ForceControllerConfig
 
-    def __init__(self, arm: Arm, config: Any) -> None:
+    def __init__(self, arm: ControlledRobot, config: Any) -> None:
         super().__init__(arm, config)
         axis = np.array(config.axis) / np.linalg.norm(config.axis)
         side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])

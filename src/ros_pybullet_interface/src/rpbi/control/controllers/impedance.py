@@ -1,8 +1,8 @@
 """Springs and dampers that stay stable at a tick's length, however stiff.
 
 An explicit spring of stiffness k on a mass m oscillates, and then diverges, once k dt^2 / m is large. Here the spring
-is evaluated where the joint will be after the tick, which the mass matrix tells (Tan, Liu and Turk, "Stable
-Proportional-Derivative Controllers", 2011) and what else acts on the joint, which is estimated.
+is evaluated where the joint will be after the tick, predicted from the mass matrix (Tan, Liu and Turk, "Stable
+Proportional-Derivative Controllers", 2011) and an estimate of all other efforts on the joint.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from scipy.linalg import lapack
 
 from custom_ros_tools.errors import hint
 from custom_ros_tools.schema import ConfigModel, Positive, Unit
-from rpbi.geometry import Vector, scaled
+from robot_model.geometry import Vector, scaled
 from rpbi.urdf.joints import Joint
 
 Array = npt.NDArray[np.float64]
@@ -35,7 +35,7 @@ class JointSprings(ConfigModel):
     """Springs and dampers at joints."""
 
     stiffness: Annotated[Positive, Unit("N m/rad or N/m")] | dict[str, Positive] = Field(
-        500.0, description="Of all joints, or by joint."
+        500.0, description="For all joints, or by joint."
     )
     damping_ratio: DampingRatio | dict[str, DampingRatio] = Field(
         0.7, description="By the critical damping of each joint's inertia: of all joints, or by joint."
@@ -59,10 +59,10 @@ class JointSprings(ConfigModel):
 
 
 class Disturbance:
-    """Estimates how what a controller does not know of accelerates n joints, from where they are beside its prediction.
+    """Estimates the acceleration of n joints by what is not modelled, from the error of predicted positions.
 
     Args:
-        count: How many joints there are.
+        count: Number of joints.
         dt_s: Length of a tick [s].
     """
 
@@ -74,7 +74,7 @@ class Disturbance:
         self._predicted: Array | None = None
 
     def update(self, velocity: Array) -> None:
-        """Takes the velocities [rad/s or m/s] after the tick of the last `predict`."""
+        """Updates the estimate by the velocities [rad/s or m/s] after the tick of the last `predict`."""
         if self._predicted is not None:
             self.estimate += self._share * (velocity - self._predicted)
 
@@ -87,7 +87,7 @@ class JointImpedance:
     """Springs and dampers at n joints from tick to tick.
 
     Args:
-        springs: How stiff and how damped they are.
+        springs: Their stiffness and damping.
         joints: The n joints.
         dt_s: Length of a tick [s].
 
@@ -112,9 +112,9 @@ class JointImpedance:
 
         Args:
             mass: Mass matrix, shape (n, n).
-            error: How far each joint is from where it is to be [rad or m], positive if it is to move forward.
+            error: n position errors, desired less measured [rad or m].
             velocity: n measured velocities [rad/s or m/s].
-            wanted_velocity: n velocities that joints are to have.
+            wanted_velocity: n desired velocities [rad/s or m/s].
             push: n efforts [N m or N] to add.
         """
         self._disturbance.update(velocity)
@@ -155,8 +155,8 @@ def implicit_wrench(
         stiffness: 6 stiffnesses [N/m, N m/rad] along and about the axes of the springs.
         damping: 6 dampings [N s/m, N m s/rad].
         wrench: Force [N] and moment [N m] if the point did not move, shape (6,).
-        acceleration: Of the point, that brings its velocity about within a tick, and by what else acts on the arm
-            [m/s^2, rad/s^2], shape (6,).
+        acceleration: Acceleration of the point that results in its velocity within a tick, plus that by everything else
+            that acts on the arm [m/s^2, rad/s^2], shape (6,).
         dt_s: Length of the tick [s].
     """
     by_acceleration = (damping + stiffness * dt_s) * dt_s
@@ -168,8 +168,8 @@ def implicit_wrench(
 def inverse(matrix: Array) -> Array:
     """Returns the inverse of a symmetric positive definite matrix, such as a mass matrix.
 
-    It takes no solution of several right sides at once: LAPACK makes them in threads of its own, which on a busy
-    machine wait for each other for many times as long as the sums take.
+    It avoids a solution of several right sides at once: LAPACK uses threads of its own for that, which on a busy
+    machine wait for each other much longer than the computation lasts.
     """
     root = lapack.dtrtri(lapack.dpotrf(matrix, lower=1)[0], lower=1)[0]
     inverted: Array = root.T @ root
@@ -177,7 +177,7 @@ def inverse(matrix: Array) -> Array:
 
 
 def force_for(mobility: Array, acceleration: Array) -> Array:
-    """Returns force and moment that give a point an acceleration [m/s^2, rad/s^2], shapes (6,).
+    """Returns force and moment that result in an acceleration of a point [m/s^2, rad/s^2], shapes (6,).
 
     Args:
         mobility: Acceleration by force, shape (6, 6); of a singular arm it is not invertible but for a small part.

@@ -9,11 +9,11 @@ import numpy as np
 from pydantic import Field, WithJsonSchema
 
 from custom_ros_tools.schema import Text
-from rpbi.control.jitter_buffer import BUFFER_S, JitterBuffer
-from rpbi.control.target_stream import TargetStream
-from rpbi.urdf.joints import JointTarget
+from rpbi.control.joint_command import JointCommand
+from rpbi.control.streams.jitter_buffer import BUFFER_S, JitterBuffer
+from rpbi.control.streams.target_stream import TargetStream
 
-from .controller import Arm, Array, Controller, ControllerConfig, RobotState
+from .controller import Array, ControlledRobot, Controller, ControllerConfig, RobotState
 from .impedance import JointImpedance, JointSprings
 
 
@@ -21,7 +21,7 @@ class JointImpedanceConfig(JointSprings, ControllerConfig):
     """Keys of `joint_impedance`."""
 
     type: Annotated[Text, WithJsonSchema({"enum": ["joint_impedance"]})] = Field(
-        description="`joint_impedance`, or a class that takes its keys."
+        description="`joint_impedance`, or a class with its keys."
     )
 
 
@@ -32,17 +32,17 @@ class JointImpedanceController(Controller):
     """
 
     Config = JointImpedanceConfig
-    inputs = {"target": "rpbi.ros.robots.controller_messages:JOINT_TARGET"}
+    inputs = {"target": "rpbi.ros.messages.controllers:JOINT_TARGET"}
 
-    def __init__(self, arm: Arm, config: JointImpedanceConfig) -> None:
+    def __init__(self, arm: ControlledRobot, config: JointImpedanceConfig) -> None:
         super().__init__(arm, config)
         self._joints = [arm.model.joints[place] for place in arm.chosen]
         self._places = {joint.name: place for place, joint in enumerate(self._joints)}
         self._springs = JointImpedance(config, self._joints, arm.dt_s)
 
-    def check(self, key: str, value: JointTarget | Mapping[str, float]) -> JointTarget:
-        """Takes targets for some or all of its joints, or a mapping of them to positions [rad or m]."""
-        value = JointTarget.of(value, "position")
+    def check(self, key: str, value: JointCommand | Mapping[str, float]) -> JointCommand:
+        """Accepts targets for some or all of its joints, or a mapping of them to positions [rad or m]."""
+        value = JointCommand.of(value, "position")
         positions = value.values_of("position", "its targets are positions")
         for name, position in zip(value.names, positions, strict=True):
             joint = self._joint(name)
@@ -67,7 +67,7 @@ class JointImpedanceController(Controller):
 
     def compute(self, state: RobotState, targets: Mapping[str, Any], tick: int) -> Array:
         """Returns the efforts of springs, dampers and what balances gravity and motion."""
-        self._take(targets.get("target"), tick)
+        self._update_target(targets.get("target"), tick)
         before = np.array(list(self._stream.set_points.values()))
         after = np.array(list(self._stream.advance(tick + 1.0).values()))
         chosen, model, dt_s = self.arm.chosen, self.arm.model, self.arm.dt_s
@@ -82,7 +82,7 @@ class JointImpedanceController(Controller):
         """Returns how far each joint is from where it is to be [rad or m]."""
         return {f"error/{joint.name}": float(error) for joint, error in zip(self._joints, self._error)}
 
-    def _take(self, target: JointTarget | None, tick: int) -> None:
+    def _update_target(self, target: JointCommand | None, tick: int) -> None:
         if target is None or target is self._taken:
             return
         self._taken = target

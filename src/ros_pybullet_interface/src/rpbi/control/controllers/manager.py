@@ -1,4 +1,4 @@
-"""The controllers of one robot: which of them drive its joints, and what becomes of those that fail."""
+"""The controllers of one robot: switches them, runs them, and stops those that fail."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ import numpy as np
 
 from custom_ros_tools.errors import InterfaceError, Problem, UnknownNameError
 from rpbi.control.motors import Motors
-from rpbi.plugins import blame
+from rpbi.plugins import raise_plugin_error
 
-from . import controller_class
-from .controller import Arm, Controller, ControllerConfig, RobotState, SetPoints
+from . import CONTROLLERS
+from .controller import ControlledRobot, Controller, ControllerConfig, RobotState, SetPoints
 
 log = logging.getLogger(__name__)
 
 SLOW_TICKS = 50
-"""A controller is stopped when it has needed more than a tick's time for so many ticks in a row."""
+"""Number of ticks in a row that may each need more than a tick's time; then the controller is stopped."""
 
 
-class ControllerSample(NamedTuple):
-    """How a controller does.
+class ControllerStateSample(NamedTuple):
+    """State of a controller.
 
     Attributes:
         name: `ROBOT/CONTROLLER`.
-        type: What it is, as YAML says.
+        type: Its type, as in YAML.
         active: Whether it drives its joints.
-        message: Why it does not; empty if it was stopped by request.
-        values: What it tells of itself, by name.
+        message: Reason why it does not; empty if it was stopped by request.
+        values: Its own numbers, by name.
     """
 
     name: str
@@ -53,7 +53,7 @@ class ControllerSwitch(NamedTuple):
     stop: Sequence[str] = ()
 
 
-class NewGains(NamedTuple):
+class ControllerUpdate(NamedTuple):
     """Another configuration of a controller.
 
     Attributes:
@@ -66,11 +66,11 @@ class NewGains(NamedTuple):
 
 
 class _Managed:
-    """A controller and what is known of it here."""
+    """A controller and its state."""
 
-    def __init__(self, name: str, arm: Arm, config: ControllerConfig) -> None:
-        self.name, self.arm = name, arm
-        self.indices = [arm.model.joints[place].index for place in arm.chosen]
+    def __init__(self, name: str, robot: ControlledRobot, config: ControllerConfig) -> None:
+        self.name, self.robot = name, robot
+        self.indices = [robot.model.joints[place].index for place in robot.chosen]
         self.targets: dict[str, Any] = {}
         self.active = self.has_begun = False
         self.message = ""
@@ -78,16 +78,16 @@ class _Managed:
         self.configure(config)
 
     def configure(self, config: ControllerConfig) -> None:
-        """Makes it anew; one that is active begins again where the robot is."""
-        self.controller = controller_class(config.type)(self.arm, config)
+        """Replaces the controller; an active one starts again from the robot's present state."""
+        self.controller = CONTROLLERS.find(config.type)(self.robot, config)
         self.config = config
         self.has_begun = False
 
     def compute(self, state: RobotState, tick: int) -> np.ndarray | SetPoints:
-        """Returns what it wants, which is finite.
+        """Returns its checked output: efforts or set points, finite.
 
         Raises:
-            Exception: Whatever it raises.
+            Exception: Any that it raises.
         """
         if not self.has_begun:
             self.controller.start(state, tick)
@@ -99,7 +99,7 @@ class _Managed:
                 f"expected one number for each of its {len(self.indices)} joints, got shape {numbers.shape}"
             )
         if not all(map(math.isfinite, numbers.tolist())):  # half the time of numpy's, for the joints of an arm
-            raise ValueError(f"what it wants is not finite: {numbers.tolist()}")
+            raise ValueError(f"the output is not finite: {numbers.tolist()}")
         return SetPoints(numbers) if isinstance(wanted, SetPoints) else numbers
 
 
@@ -107,18 +107,18 @@ class ControllerManager:
     """Runs the controllers of one robot that are active; one joint is driven by one of them at most.
 
     Args:
-        arm: The robot; which joints each controller drives is chosen here.
-        configs: What YAML says, by name.
+        robot: The robot; which joints each controller drives is chosen here.
+        configs: Their configurations by name.
         motors: The robot's motors.
 
     Raises:
         ConfigError: If a configuration does not fit.
     """
 
-    def __init__(self, arm: Arm, configs: Mapping[str, ControllerConfig], motors: Motors) -> None:
+    def __init__(self, robot: ControlledRobot, configs: Mapping[str, ControllerConfig], motors: Motors) -> None:
         self._motors = motors
-        self._arm = arm
-        self._managed = {name: _Managed(name, self._arm_of(config), config) for name, config in configs.items()}
+        self._robot = robot
+        self._managed = {name: _Managed(name, self._with_joints_of(config), config) for name, config in configs.items()}
         self.driven: frozenset[int] = frozenset()
         """Joints that a controller drives, by PyBullet's index."""
         self.switch(ControllerSwitch([name for name, config in configs.items() if config.active], []))
@@ -149,7 +149,7 @@ class ControllerManager:
         for name in self._after(switch):
             for index in self._managed[name].indices:
                 if index in drivers:
-                    joint = next(joint.name for joint in self._arm.model.joints if joint.index == index)
+                    joint = next(joint.name for joint in self._robot.model.joints if joint.index == index)
                     raise ValueError(f"'{name}' and '{drivers[index]}' both drive '{joint}': stop one of them")
                 drivers[index] = name
 
@@ -173,14 +173,14 @@ class ControllerManager:
         self._drive_others(before)
         return self.driven - before
 
-    def configure(self, gains: NewGains) -> None:
+    def configure(self, update: ControllerUpdate) -> None:
         """Changes the keys of a controller, such as its gains.
 
         Raises:
             UnknownNameError: If there is none of that name.
             ValueError: If they do not fit.
         """
-        self._named(gains.name).configure(gains.config)
+        self._named(update.name).configure(update.config)
 
     def config(self, name: str) -> ControllerConfig:
         """Returns the keys of a controller.
@@ -190,29 +190,29 @@ class ControllerManager:
         """
         return self._named(name).config
 
-    def take(self, name: str, key: str, value: Any) -> None:
-        """Hands a controller the newest value of an input."""
+    def set_target(self, name: str, key: str, value: Any) -> None:
+        """Sets the newest value of an input of a controller."""
         self._managed[name].targets[key] = value
 
     def advance(self, state: RobotState, tick: int) -> None:
-        """Has the active controllers drive their joints for one tick; one that fails is stopped and named."""
+        """Runs the active controllers for one tick; one that fails is stopped, and the error logged."""
         for managed in self._managed.values():
             if managed.active:
                 self._advance(managed, state, tick)
 
-    def sample(self, robot: str, name: str) -> ControllerSample:
-        """Returns how a controller does; one that cannot tell is stopped."""
+    def sample(self, robot: str, name: str) -> ControllerStateSample:
+        """Returns the state of a controller; if its `report` fails, it is stopped."""
         managed = self._managed[name]
         values: Mapping[str, float] = {}
         if managed.active and managed.has_begun:
             try:
                 values = {str(key): float(value) for key, value in managed.controller.report().items()}
                 if wrong := [key for key, value in values.items() if not math.isfinite(value)]:
-                    raise ValueError(f"what it tells is not finite: {', '.join(wrong)}")
+                    raise ValueError(f"reported numbers are not finite: {', '.join(wrong)}")
             except Exception as error:
                 self._fail(managed, _cause(managed.controller, "report", error))
                 values = {}
-        return ControllerSample(f"{robot}/{name}", managed.config.type, managed.active, managed.message, values)
+        return ControllerStateSample(f"{robot}/{name}", managed.config.type, managed.active, managed.message, values)
 
     def _advance(self, managed: _Managed, state: RobotState, tick: int) -> None:
         begin_ns, used_ns = time.perf_counter_ns(), time.thread_time_ns() if managed.slow else 0
@@ -222,31 +222,31 @@ class ControllerManager:
             self._fail(managed, _cause(managed.controller, "compute", error))
             return
         took_s = (time.perf_counter_ns() - begin_ns) * 1e-9
-        if managed.slow and took_s > managed.arm.dt_s:  # by the processor's time, which costs more to ask for
+        if managed.slow and took_s > managed.robot.dt_s:  # by the processor's time, which costs more to ask for
             took_s = (time.thread_time_ns() - used_ns) * 1e-9
-        managed.slow = managed.slow + 1 if took_s > managed.arm.dt_s else 0
+        managed.slow = managed.slow + 1 if took_s > managed.robot.dt_s else 0
         if managed.slow >= SLOW_TICKS:
-            self._fail(managed, f"it needs {took_s * 1e3:.3g} ms for a tick of {managed.arm.dt_s * 1e3:.3g} ms")
+            self._fail(managed, f"it needs {took_s * 1e3:.3g} ms for a tick of {managed.robot.dt_s * 1e3:.3g} ms")
         elif isinstance(wanted, SetPoints):
-            measured = (state.position[place] for place in managed.arm.chosen)
+            measured = (state.position[place] for place in managed.robot.chosen)
             for index, before, after in zip(managed.indices, measured, wanted.position.tolist()):
-                self._motors.track(index, before, (after - before) / managed.arm.dt_s)
+                self._motors.track(index, before, (after - before) / managed.robot.dt_s)
         else:
-            self._motors.push(dict(zip(managed.indices, wanted.tolist())))
+            self._motors.apply_efforts(dict(zip(managed.indices, wanted.tolist())))
 
     def _fail(self, managed: _Managed, message: str) -> None:
-        log.error("%s: controller '%s' is stopped, its joints hold: %s", self._arm.name, managed.name, message)
+        log.error("%s: controller '%s' is stopped, its joints hold: %s", self._robot.name, managed.name, message)
         before = self.driven
         managed.active, managed.message = False, message
         self._drive_others(before)
 
     def _drive_others(self, before: frozenset[int]) -> None:
-        """Notes who is driven now; those that were before hold, and those that were not leave the motors."""
+        """Updates `driven`: joints that are no longer driven hold, and motors of new ones are disabled."""
         self.driven = frozenset(
             index for managed in self._managed.values() if managed.active for index in managed.indices
         )
-        self._motors.seize(before - self.driven)
-        self._motors.let_go(self.driven - before)
+        self._motors.hold_measured(before - self.driven)
+        self._motors.disable(self.driven - before)
 
     def _after(self, switch: ControllerSwitch) -> list[str]:
         """Returns the names of those that are active after a switch."""
@@ -258,17 +258,17 @@ class ControllerManager:
             raise UnknownNameError("controller", name, list(self._managed))
         return self._managed[name]
 
-    def _arm_of(self, config: ControllerConfig) -> Arm:
-        return self._arm._replace(chosen=chosen_joints(self._arm, config.joints))
+    def _with_joints_of(self, config: ControllerConfig) -> ControlledRobot:
+        return self._robot._replace(chosen=chosen_joints(self._robot, config.joints))
 
 
-def chosen_joints(arm: Arm, names: Iterable[str] | None) -> np.ndarray:
+def chosen_joints(robot: ControlledRobot, names: Iterable[str] | None) -> np.ndarray:
     """Returns the places among the driven joints of those that are named, of all if none are.
 
     Raises:
         UnknownNameError: If the robot has no such joint, or no motor can move it.
     """
-    known = [joint.name for joint in arm.model.joints]
+    known = [joint.name for joint in robot.model.joints]
     if names is None:
         return np.arange(len(known))
     for name in names:
@@ -278,30 +278,32 @@ def chosen_joints(arm: Arm, names: Iterable[str] | None) -> np.ndarray:
 
 
 def _cause(controller: Controller, doing: str, error: Exception) -> str:
-    """Tells what went wrong in a controller, and where if it is of another package."""
+    """Returns the message of a controller's error; it names the class if that is of another package."""
     try:
-        blame(controller, doing, error)
-    except InterfaceError as blamed:
-        return str(blamed)
+        raise_plugin_error(controller, doing, error)
+    except InterfaceError as named:
+        return str(named)
     return f"{type(error).__name__}: {error}"
 
 
-def controller_problems(robot: str, arm: Arm, configs: Mapping[str, ControllerConfig]) -> list[Problem]:
-    """Returns what does not fit in the controllers of a robot."""
+def controller_problems(robot: ControlledRobot, configs: Mapping[str, ControllerConfig]) -> list[Problem]:
+    """Returns the problems in the configurations of a robot's controllers."""
     problems = []
     drivers: dict[int, str] = {}
     for name, config in configs.items():
         key = f"controllers.{name}"
         try:
-            chosen = chosen_joints(arm, config.joints)
-            controller_class(config.type)(arm._replace(chosen=chosen), config)
+            chosen = chosen_joints(robot, config.joints)
+            CONTROLLERS.find(config.type)(robot._replace(chosen=chosen), config)
         except (InterfaceError, ValueError) as error:
-            problems.append(Problem(robot, key, str(error)))
+            problems.append(Problem(robot.name, key, str(error)))
             continue
         for place in chosen.tolist() if config.active else ():
             if place in drivers:
-                joint = arm.model.joints[place].name
-                problems.append(Problem(robot, key, f"'{drivers[place]}' drives '{joint}' already: only one is active"))
+                joint = robot.model.joints[place].name
+                problems.append(
+                    Problem(robot.name, key, f"'{drivers[place]}' drives '{joint}' already: only one is active")
+                )
                 break
             drivers[place] = name
     return problems

@@ -1,4 +1,4 @@
-"""What a robot's YAML may say about following trajectories; names as in ros_controllers' JointTrajectoryController."""
+"""Keys of a robot's trajectory controller; names as in ros_controllers' JointTrajectoryController."""
 
 from collections.abc import Iterable
 from typing import Annotated, Any
@@ -14,19 +14,19 @@ SpeedTolerance = Annotated[float, Field(ge=0), Unit("rad/s or m/s")]
 
 
 class JointConstraints(ConfigModel):
-    """How far one joint may be off."""
+    """Tolerances of one joint."""
 
     trajectory: Tolerance = Field(0.0, description="Largest distance from the trajectory on the way; 0 is no limit.")
     goal: Tolerance = Field(0.0, description="Largest distance from the goal at the end; 0 is no limit.")
 
 
 class TrajectoryConstraints(ConfigModel):
-    """How far joints may be off, where a goal does not say so itself; further keys are names of joints."""
+    """Default tolerances of goals; further keys are names of joints."""
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, JointConstraints]
 
-    goal_time: SecondsOrNone = Field(0.0, description="How long after the end the goal may be reached.")
+    goal_time: SecondsOrNone = Field(0.0, description="Longest time after the end to reach the goal.")
     stopped_velocity_tolerance: SpeedTolerance = Field(
         0.01, description="Largest speed of a joint that has stopped at its goal; 0 is no limit."
     )
@@ -34,7 +34,7 @@ class TrajectoryConstraints(ConfigModel):
     @model_validator(mode="before")
     @classmethod
     def _joints_have_mappings(cls, data: Any) -> Any:
-        """Tells that a number under an unknown key is a key misspelt rather than a joint without its mapping."""
+        """Refuses a number under an unknown key as a misspelt key, rather than as a joint without its mapping."""
         for key, value in data.items() if isinstance(data, dict) else ():
             if key not in cls.model_fields and not isinstance(value, (dict, JointConstraints)):
                 raise KeyedError(key, f"unknown key '{key}'{hint(key, cls.model_fields)}; joints have mappings")
@@ -52,9 +52,9 @@ class JointTrajectoryControllerConfig(ConfigModel):
     joints: ListOf[Text] | None = Field(
         None, min_length=1, description="Joints that it drives; without it, all that can be driven."
     )
-    constraints: TrajectoryConstraints = Field(TrajectoryConstraints(), description="How far joints may be off.")
+    constraints: TrajectoryConstraints = Field(TrajectoryConstraints(), description="Tolerances of joints.")
     stop_trajectory_duration: SecondsOrNone = Field(
-        0.0, description="How long joints take to stop when a trajectory is cancelled or broken off; 0 is at once."
+        0.0, description="Duration of the stop when a trajectory is cancelled or aborted; 0 is at once."
     )
     state_publish_rate: Hz = Field(50.0, description="Rate of the state topic.")
     action_monitor_rate: Hz = Field(20.0, description="Rate of the action's feedback.")

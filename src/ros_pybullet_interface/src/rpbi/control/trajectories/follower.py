@@ -14,16 +14,16 @@ from .joint_trajectory import JointTrajectory, validate_trajectory
 from .motion import TrajectoryMotion, stopping
 from .request import ErrorCode, GoalTolerances, TrajectoryRefusedError, TrajectoryRequest
 from .tolerances import Tolerances, resolved_tolerances
-from .trajectory import ControllerState, Knot, State, Trajectory
+from .trajectory import DesiredState, Knot, Trajectory, TrajectoryStateSample
 
 
 class CheckedRequest(NamedTuple):
     """A trajectory that can be followed, unless the robot's state forbids it.
 
     Attributes:
-        joint_trajectories: What it asks of each joint that it names; none to stop and hold.
+        joint_trajectories: Trajectories of the joints that it names; none to stop and hold.
         stamp_ns: Stamp of its start [ns]; 0 is now.
-        tolerances: How well it is to be followed; None is not looked at.
+        tolerances: Tolerances; None checks nothing.
     """
 
     joint_trajectories: tuple[JointTrajectory, ...]
@@ -50,7 +50,7 @@ class TrajectoryFollower:
         """Checks a trajectory as far as it can be without looking at the robot; any thread may call it.
 
         Args:
-            tolerances: How well it is to be followed; without them it is not looked at.
+            tolerances: Tolerances; without them nothing is checked.
 
         Raises:
             TrajectoryRefusedError: If it cannot be followed.
@@ -62,15 +62,15 @@ class TrajectoryFollower:
         return CheckedRequest(joint_trajectories, request.stamp_ns, resolved)
 
     def follow(
-        self, request: CheckedRequest, clock: Clock, feedback: Callable[[ControllerState], None] | None = None
+        self, request: CheckedRequest, clock: Clock, feedback: Callable[[TrajectoryStateSample], None] | None = None
     ) -> TrajectoryMotion:
-        """Starts to follow a trajectory, or goes over to it when its time has come; the one before is preempted.
+        """Starts to follow a trajectory, at once or at its start time; the one before is preempted.
 
-        Joints that it leaves out go on with theirs.
+        Joints that it leaves out continue theirs.
 
         Args:
-            request: What `check` returned.
-            feedback: Takes the state at `action_monitor_rate` while the motion lasts.
+            request: Result of `check`.
+            feedback: Called with the state at `action_monitor_rate` while the motion lasts.
 
         Raises:
             TrajectoryRefusedError: If its time has passed, the joints cannot get to it, or the control mode forbids it.
@@ -85,7 +85,7 @@ class TrajectoryFollower:
         for joint_trajectory in request.joint_trajectories:
             index = joint_trajectory.joint.index
             current = trajectories.get(index) or Trajectory.through([Knot(now_s, measured[index][:1])])
-            trajectories[index] = joint_trajectory.joined(current, start_s, from_s)
+            trajectories[index] = joint_trajectory.spliced_onto(current, start_s, from_s)
         if not request.joint_trajectories:
             trajectories, from_s = self._stopping(now_s, measured, trajectories or self._by_index), now_s
         motion = TrajectoryMotion(self._by_index, trajectories, from_s, request.tolerances, self._stop_s)
@@ -98,8 +98,8 @@ class TrajectoryFollower:
         """Stops following; the joints stop and hold where they are.
 
         Args:
-            reason: Why, for whoever waits for it.
-            motion: What to stop; if it is not being followed any more, nothing happens. Without it, whatever it is.
+            reason: Reason for the message of the result.
+            motion: Motion to stop, if it is still followed; without it, the present one.
         """
         running = self._running
         if running is None or motion not in (None, running):
@@ -107,10 +107,10 @@ class TrajectoryFollower:
         trajectories = self._stopping(clock.time_s, self._drive.measured(), running.joints)
         self._run(TrajectoryMotion(self._by_index, trajectories, clock.time_s), reason)
 
-    def state(self, time_s: float, measured: JointMotion | None = None) -> ControllerState:
+    def state(self, time_s: float, measured: JointMotion | None = None) -> TrajectoryStateSample:
         """Returns where the joints are to be and where they are, at the world's time now [s]."""
         running, measured = self._running, measured or self._drive.measured()
-        return ControllerState(
+        return TrajectoryStateSample(
             self._drive.name,
             self.joint_names,
             self.desired(time_s),
@@ -119,18 +119,20 @@ class TrajectoryFollower:
             0.0 if running is None else max(0.0, time_s - running.from_s),
         )
 
-    def desired(self, time_s: float) -> State:
-        """Returns where the joints are to be at a time of the world's [s], as far as it is known now."""
+    def desired(self, time_s: float) -> DesiredState:
+        """Returns the desired state at a time of the world [s], by the present trajectories."""
         running = self._running
         trajectories = {} if running is None else running.trajectories
         held: Mapping[int, float] = self._drive.motors.targets
         if self._drive.motors.mode != pybullet.POSITION_CONTROL:
             held = {index: position for index, (position, _) in self._drive.measured().items()}
         states = [
-            trajectories[index].sample(time_s) if index in trajectories else State((held[index],), (0.0,), (0.0,))
+            trajectories[index].sample(time_s)
+            if index in trajectories
+            else DesiredState((held[index],), (0.0,), (0.0,))
             for index in self._by_index
         ]
-        return State(*(tuple(state[kind][0] for state in states) for kind in range(len(State._fields))))
+        return DesiredState(*(tuple(state[kind][0] for state in states) for kind in range(len(DesiredState._fields))))
 
     @property
     def _running(self) -> TrajectoryMotion | None:
@@ -138,7 +140,7 @@ class TrajectoryFollower:
         return motion if isinstance(motion, TrajectoryMotion) else None
 
     def _feeding(
-        self, feedback: Callable[[ControllerState], None], clock: Clock
+        self, feedback: Callable[[TrajectoryStateSample], None], clock: Clock
     ) -> Callable[[float, JointMotion], None]:
         schedule = Schedule(self.config.action_monitor_rate, clock.dt_ns)
 
@@ -152,7 +154,7 @@ class TrajectoryFollower:
         return {index: stopping(self._by_index[index], measured[index], now_s, self._stop_s) for index in indices}
 
     def _run(self, motion: TrajectoryMotion, reason: str) -> None:
-        """Starts a motion; the reason is for whoever waits for the one before.
+        """Starts a motion; `reason` is the message for the one before.
 
         Raises:
             TrajectoryRefusedError: If the control mode forbids it.

@@ -1,4 +1,4 @@
-"""What a trajectory asks of single joints: checked against the robot, and joined to what the joints do already."""
+"""Trajectories of single joints: checked against the robot, and spliced onto the present motion."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,19 +14,19 @@ from .request import ErrorCode, TrajectoryPoint, TrajectoryRefusedError, Traject
 from .trajectory import Knot, Trajectory
 
 CURVE_SPEED_SLACK = 1.05
-"""How much faster than a joint's limit a curve may be between two points that are not.
+"""Largest speed of a curve between two points, as a multiple of the joint's limit; beyond it, it is refused.
 
 A curve through points that a planner has sampled, a tenth of a second apart, from a motion at the limit swings beyond
 it by 1 or 2 %. The motors hold the limit in any case.
 """
 CURVE_POSITION_SLACK = 1e-3
-"""How far beyond a joint's limits [rad or m] a curve may swing between two points that are within."""
+"""Largest swing of a curve beyond a joint's limits, between points within [rad or m]; beyond it, it is refused."""
 ROUNDING = 1.0 + 1e-6
 TURN = 2.0 * math.pi
 
 
 class JointTrajectory(NamedTuple):
-    """What a trajectory asks of one joint, in times from its start.
+    """Trajectory of one joint, in times from its start.
 
     Attributes:
         joint: The joint.
@@ -38,15 +38,15 @@ class JointTrajectory(NamedTuple):
     knots: tuple[Knot, ...]
     trajectory: Trajectory
 
-    def joined(self, current: Trajectory, start_s: float, from_s: float) -> Trajectory:
-        """Returns what the joint does now until a time, and this trajectory from then on.
+    def spliced_onto(self, current: Trajectory, start_s: float, from_s: float) -> Trajectory:
+        """Returns the present trajectory until a time, and this one from then on.
 
-        Points up to that time are left out: the joint goes straight to the next one. A joint without limits that
-        turns takes the short way there.
+        Points up to that time are left out: the joint moves straight to the next one. A continuous joint moves there
+        the short way.
 
         Args:
             start_s: The world's time at which the trajectory's times begin [s].
-            from_s: When it takes over [s]; there is a point after it.
+            from_s: Time of the transition [s]; there is a point after it.
 
         Raises:
             TrajectoryRefusedError: If the next point cannot be reached in time.

@@ -7,7 +7,7 @@ from rpbi.urdf.joints import Joint
 
 from .request import ErrorCode, JointTolerance
 from .tolerances import Tolerances
-from .trajectory import Knot, State, Trajectory
+from .trajectory import DesiredState, Knot, Trajectory
 
 
 class TrajectoryMotion(Motion):
@@ -18,13 +18,13 @@ class TrajectoryMotion(Motion):
 
     Args:
         trajectories: The joints' trajectories, each of one joint, by joint index, in the world's time.
-        from_s: From when on tolerances hold [s].
-        tolerances: How far the joints may be off.
-        stop_s: How long joints take to stop when it is broken off [s].
+        from_s: Time from which tolerances hold [s].
+        tolerances: Tolerances of the joints.
+        stop_s: Duration of the stop after an abort [s].
 
     Attributes:
-        code: How it ended.
-        preempted: Whether it ended because whoever gives the trajectories wanted something else.
+        code: Outcome.
+        preempted: Whether another request ended it.
         desired: Set points at the end of the last tick, by joint index.
         on_advance: Called at each tick with the world's time [s] and the state of the joints then.
     """
@@ -45,7 +45,7 @@ class TrajectoryMotion(Motion):
         self.end_s = max(trajectory.end_s for trajectory in trajectories.values())
         self.code = ErrorCode.INVALID_GOAL  # unless it ends in a way that has a number of its own
         self.preempted = False
-        self.desired: dict[int, State] = {}
+        self.desired: dict[int, DesiredState] = {}
         self.on_advance: Callable[[float, JointMotion], None] | None = None
         self._joints = joints
         self._tolerances = tolerances
@@ -58,7 +58,7 @@ class TrajectoryMotion(Motion):
         self._sample(time_s)
 
     def advance(self, time_s: float, measured: JointMotion) -> JointMotion:
-        """Compares where the joints are with where they were to be, and goes on if they are near enough."""
+        """Checks the tolerances, and advances if they hold."""
         if self.on_advance is not None:
             self.on_advance(self._time_s, measured)
         if fault := self._path_problem(measured):
@@ -78,7 +78,7 @@ class TrajectoryMotion(Motion):
         self.end(False, self._fault or reason)
 
     def halt(self, reason: str, measured: JointMotion) -> None:
-        """Ends because of something from outside; the result tells the reason and where the joints are."""
+        """Ends for a reason from outside; the result includes it and the errors of the joints."""
         state = ", ".join(f"{self._joints[i].name}={measured[i][0]:.6g}" for i in sorted(self.joints))
         self.end(False, self._fault or f"{reason}; state reached: {state}")
 
@@ -113,10 +113,9 @@ class TrajectoryMotion(Motion):
         return self._go_on(time_s)
 
     def _is_out_of_time(self, time_s: float) -> bool:
-        """Tells whether the goal is not to be waited for any longer.
+        """Returns whether the time to reach the goal is over.
 
-        It is for one tick at least: a trajectory of positions alone arrives with a velocity, which the motors are only
-        then told to stop.
+        It is one tick at least: a trajectory of positions alone arrives with a velocity, and stops only then.
         """
         tick_s = time_s - self._time_s
         return self._tolerances is not None and self._time_s > self.end_s + self._tolerances.goal_time_s + tick_s / 2.0
@@ -142,12 +141,12 @@ class TrajectoryMotion(Motion):
 
 
 def stopping(joint: Joint, measured: tuple[float, float], time_s: float, duration_s: float) -> Trajectory:
-    """Returns how a joint comes to a stop with constant deceleration, within its limits.
+    """Returns the stop of a joint with constant deceleration, within its limits.
 
     Args:
         measured: Its position [rad or m] and velocity [rad/s or m/s].
         time_s: Now [s].
-        duration_s: How long it may take [s]; 0 is at once.
+        duration_s: Longest duration [s]; 0 is at once.
     """
     position, velocity = measured
     if not duration_s:

@@ -1,4 +1,4 @@
-"""The polynomial that joins two knots of one joint, and how far and how fast it goes."""
+"""Polynomials between two knots of one joint, and their extremes of position and speed."""
 
 import math
 from collections.abc import Sequence

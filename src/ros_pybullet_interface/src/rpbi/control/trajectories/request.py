@@ -1,4 +1,4 @@
-"""What is asked of a follower of trajectories, and why it may be refused."""
+"""Requests to follow trajectories, and reasons to refuse them."""
 
 from collections.abc import Mapping
 from enum import IntEnum
@@ -8,7 +8,7 @@ from custom_ros_tools.errors import InterfaceError
 
 
 class ErrorCode(IntEnum):
-    """How following a trajectory ended; numbers of control_msgs/FollowJointTrajectoryResult."""
+    """Outcome of a trajectory; numbers of control_msgs/FollowJointTrajectoryResult."""
 
     SUCCESSFUL = 0
     INVALID_GOAL = -1
@@ -43,7 +43,7 @@ class TrajectoryPoint(NamedTuple):
 
 
 class JointTolerance(NamedTuple):
-    """How far one joint may be off; 0 leaves it to the configuration, less than 0 is no limit.
+    """Tolerance of one joint; 0 is the configured one, less than 0 is no limit.
 
     Attributes:
         position: Distance [rad or m].
@@ -69,13 +69,12 @@ class TrajectoryRequest(NamedTuple):
 
 
 class GoalTolerances(NamedTuple):
-    """How well a goal is to be reached.
+    """Tolerances of a goal.
 
     Attributes:
         path: Tolerances on the way, by name of joint.
         goal: Tolerances at the end, by name of joint.
-        goal_time_s: How long after the end the goal may be reached [s]; 0 leaves it to the configuration, less than 0
-            is no limit.
+        goal_time_s: Longest time after the end to reach the goal [s]; 0 is the configured one, less than 0 is no limit.
     """
 
     path: Mapping[str, JointTolerance] = {}

@@ -1,4 +1,4 @@
-"""How far joints may be off while they follow a trajectory."""
+"""Tolerances of joints that follow a trajectory."""
 
 import math
 from collections.abc import Mapping
@@ -12,12 +12,12 @@ from .request import ErrorCode, GoalTolerances, JointTolerance, TrajectoryRefuse
 
 
 class Tolerances(NamedTuple):
-    """How far joints may be off; infinity is no limit.
+    """Tolerances of joints; infinity is no limit.
 
     Attributes:
         path: On the way, by joint index.
         goal: At the end, by joint index.
-        goal_time_s: How long after the end the goal may be reached [s].
+        goal_time_s: Longest time after the end to reach the goal [s].
     """
 
     path: Mapping[int, JointTolerance]
@@ -48,7 +48,7 @@ def _resolved(given: JointTolerance | None, position: float, velocity: float) ->
 
 
 def _limit(given: float, configured: float, default: float) -> float:
-    """Returns a limit: the one given, the one configured if that is 0, the default if both are; below 0 is none."""
+    """Returns the first limit that is not 0: given, configured, default; below 0 is none."""
     return math.inf if given < 0.0 else given or configured or default
 
 

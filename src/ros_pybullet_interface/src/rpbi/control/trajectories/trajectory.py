@@ -14,10 +14,10 @@ from .polynomial import Polynomial, cubic, line, quintic
 
 
 class Knot(NamedTuple):
-    """What a trajectory of n joints passes through.
+    """A point that a trajectory of n joints passes through.
 
     Attributes:
-        time_s: When [s].
+        time_s: Time [s].
         position: n positions [rad or m].
         velocity: n velocities [rad/s or m/s], None if they are left open.
         acceleration: n accelerations [rad/s^2 or m/s^2], None if they are left open; they need velocities.
@@ -29,8 +29,8 @@ class Knot(NamedTuple):
     acceleration: tuple[float, ...] | None = None
 
 
-class State(NamedTuple):
-    """Where n joints are to be at one time.
+class DesiredState(NamedTuple):
+    """Desired state of n joints at one time.
 
     Attributes:
         position: n positions [rad or m].
@@ -77,8 +77,8 @@ class Trajectory:
         self._starts = tuple(segment.start_s for segment in segments)
         self.start_s = self._starts[0]
         still = (0.0,) * len(goal)
-        self._before = State(_evaluated(segments[0], self.start_s).position, still, still)
-        self._end = State(goal, still, still)
+        self._before = DesiredState(_evaluated(segments[0], self.start_s).position, still, still)
+        self._end = DesiredState(goal, still, still)
 
     @classmethod
     def through(cls, knots: Sequence[Knot]) -> Trajectory:
@@ -95,7 +95,7 @@ class Trajectory:
         last = knots[-1]
         return cls(segments or [_standing(last.time_s, last.position)], last.time_s, last.position)
 
-    def sample(self, time_s: float) -> State:
+    def sample(self, time_s: float) -> DesiredState:
         """Returns where the joints are to be at a time [s].
 
         Before the start that is the first knot's position, from the end on exactly the last one's, both at rest.
@@ -110,8 +110,8 @@ class Trajectory:
         """Returns this one until a time, and another from then on.
 
         Args:
-            new: The trajectory of the same joints that takes over: from `at_s` on it is sampled as by itself.
-            at_s: When it takes over [s].
+            new: The later trajectory, of the same joints: from `at_s` on it is sampled unchanged.
+            at_s: Time of the transition [s].
         """
         if at_s <= self.start_s:
             return new
@@ -153,8 +153,8 @@ def minimum_jerk(start: Sequence[float], goal: Sequence[float], start_s: float, 
     Args:
         start: n positions [rad or m].
         goal: n positions [rad or m].
-        start_s: When it begins [s].
-        duration_s: How long it takes [s], more than 0.
+        start_s: Start time [s].
+        duration_s: Duration [s], more than 0.
 
     Raises:
         ValueError: If the numbers of positions differ, or something is not finite or not positive.
@@ -165,14 +165,14 @@ def minimum_jerk(start: Sequence[float], goal: Sequence[float], start_s: float, 
     )
 
 
-def _evaluated(segment: Segment, time_s: float) -> State:
+def _evaluated(segment: Segment, time_s: float) -> DesiredState:
     t = time_s - segment.origin_s
     position, velocity, acceleration = [], [], []
     for c0, c1, c2, c3, c4, c5 in segment.polynomials:
         position.append(c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5)))))
         velocity.append(c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5))))
         acceleration.append(2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5)))
-    return State(tuple(position), tuple(velocity), tuple(acceleration))
+    return DesiredState(tuple(position), tuple(velocity), tuple(acceleration))
 
 
 def _standing(start_s: float, position: Sequence[float]) -> Segment:
@@ -212,7 +212,7 @@ def _check(knots: Sequence[Knot]) -> None:
                 raise ValueError(f"knot {number}: {kind} is not finite: {', '.join(f'{v:g}' for v in values)}")
 
 
-class ControllerState(NamedTuple):
+class TrajectoryStateSample(NamedTuple):
     """Where the joints of a follower of trajectories are to be, and where they are.
 
     Attributes:
@@ -226,7 +226,7 @@ class ControllerState(NamedTuple):
 
     name: str
     joint_names: tuple[str, ...]
-    desired: State
+    desired: DesiredState
     position: tuple[float, ...]
     velocity: tuple[float, ...]
     time_from_start_s: float

@@ -2,16 +2,16 @@
 
 from collections.abc import Sequence
 
+from robot_model.geometry import Vector
 from rpbi.bodies import Body
 from rpbi.engine.client import Client
-from rpbi.geometry import Vector
 
 SHORTEST_STEP_S = 1e-9
 """Length of a step in which nothing moves to speak of [s]."""
 
 
 class SoftShapes:
-    """Gives soft bodies their shape where physics must not.
+    """Sets the shapes of soft bodies in a client without physics.
 
     PyBullet draws a soft body as it was after the last step, so there must be a step now and then.
 

@@ -9,13 +9,13 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 TOLERANCE_M = 2e-4
-"""How far the edges of a circle's polygon may be inside of it, where `MOST_CORNERS` are enough."""
-FEWEST_CORNERS, MOST_CORNERS = 24, 160
+"""Largest distance of a polygon's edges inside its circle [m], unless that needs more than `MAX_CORNERS`."""
+MIN_CORNERS, MAX_CORNERS = 24, 160
 PLANE_HALF_WIDTH_M = 100.0
 """Half the edge of the square that stands for a plane without end."""
 
 
-class Surface(NamedTuple):
+class SurfaceMesh(NamedTuple):
     """Triangles with a normal at each corner.
 
     Attributes:
@@ -36,21 +36,21 @@ class Surface(NamedTuple):
         return "\n".join(lines) + "\n"
 
 
-def box(half_extents: Sequence[float]) -> Surface:
+def box(half_extents: Sequence[float]) -> SurfaceMesh:
     """Returns a box about the origin, each side with its own normal."""
-    unit = _joined([_square(sign * axis) for axis in np.eye(3) for sign in (1.0, -1.0)])
+    unit = _concatenated([_square(sign * axis) for axis in np.eye(3) for sign in (1.0, -1.0)])
     return unit._replace(points=unit.points * np.asarray(half_extents))
 
 
-def plane(normal: Sequence[float]) -> Surface:
+def plane(normal: Sequence[float]) -> SurfaceMesh:
     """Returns a large square through the origin, visible from both sides."""
     upwards = np.asarray(normal) / np.linalg.norm(normal)
-    both = _joined([_square(upwards), _square(-upwards)])
+    both = _concatenated([_square(upwards), _square(-upwards)])
     on_plane = both.points - (both.points @ upwards)[:, None] * upwards
     return both._replace(points=PLANE_HALF_WIDTH_M * on_plane)
 
 
-def capsule(radius: float, length: float) -> Surface:
+def capsule(radius: float, length: float) -> SurfaceMesh:
     """Returns a capsule about the origin along z; `length` is that of its cylinder, 0 makes it a sphere."""
     corners = _corners(radius)
     equator = corners // 4
@@ -62,43 +62,43 @@ def capsule(radius: float, length: float) -> Surface:
     return _turned(radius * profile + np.stack([0.0 * shift, shift], axis=1), profile, corners)
 
 
-def cylinder(radius: float, length: float) -> Surface:
+def cylinder(radius: float, length: float) -> SurfaceMesh:
     """Returns a cylinder about the origin along z, its ends closed."""
     half = length / 2
     outline = np.array([[0, -half], [radius, -half], [radius, -half], [radius, half], [radius, half], [0, half]])
     normals = np.array([[0, -1], [0, -1], [1, 0], [1, 0], [0, 1], [0, 1]], float)
     rows = (slice(begin, begin + 2) for begin in (0, 2, 4))
-    return _joined([_turned(outline[row], normals[row], _corners(radius)) for row in rows])
+    return _concatenated([_turned(outline[row], normals[row], _corners(radius)) for row in rows])
 
 
-def mesh(points: Array, triangles: npt.NDArray[Any], normals: Array | None = None) -> Surface:
-    """Returns given triangles; without normals, each is flat."""
+def mesh(points: Array, triangles: npt.NDArray[Any], normals: Array | None = None) -> SurfaceMesh:
+    """Returns a mesh of triangles; without normals, each is flat."""
     if normals is not None:
-        return Surface(points, normals, triangles)
+        return SurfaceMesh(points, normals, triangles)
     corners = points[triangles]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(across, axis=1, keepdims=True)
     flat = np.divide(across, length, out=np.zeros_like(across), where=length > 0.0)
-    return Surface(corners.reshape(-1, 3), np.repeat(flat, 3, axis=0), np.arange(corners.size // 3).reshape(-1, 3))
+    return SurfaceMesh(corners.reshape(-1, 3), np.repeat(flat, 3, axis=0), np.arange(corners.size // 3).reshape(-1, 3))
 
 
-def _square(outward: Array) -> Surface:
+def _square(outward: Array) -> SurfaceMesh:
     """Returns the side of a cube of edge 2 that has this outward normal of unit length."""
     first = np.roll(np.eye(3)[np.argmax(np.abs(outward))], 1)
     u = np.cross(outward, first)
     u /= np.linalg.norm(u)
     v = np.cross(outward, u)
     points = np.array([outward - u - v, outward + u - v, outward + u + v, outward - u + v])
-    return Surface(points, np.tile(outward, (4, 1)), np.array([[0, 1, 2], [0, 2, 3]]))
+    return SurfaceMesh(points, np.tile(outward, (4, 1)), np.array([[0, 1, 2], [0, 2, 3]]))
 
 
 def _corners(radius: float) -> int:
     """Returns how many corners a circle needs to look round, a multiple of 4; small things are often many."""
     needed = np.pi / np.arccos(1.0 - min(TOLERANCE_M / radius, 1.0))
-    return int(np.clip(4 * np.ceil(needed / 4), FEWEST_CORNERS, MOST_CORNERS))
+    return int(np.clip(4 * np.ceil(needed / 4), MIN_CORNERS, MAX_CORNERS))
 
 
-def _turned(profile: Array, normals: Array, corners: int) -> Surface:
+def _turned(profile: Array, normals: Array, corners: int) -> SurfaceMesh:
     """Returns the surface that an outline makes when it turns about z.
 
     Args:
@@ -121,12 +121,12 @@ def _turned(profile: Array, normals: Array, corners: int) -> Surface:
     points = turn(profile)
     a, b, c = (points[triangles[:, index]] for index in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return Surface(points, turn(normals), triangles[area > 1e-12 * max(area.max(), 1e-300)])
+    return SurfaceMesh(points, turn(normals), triangles[area > 1e-12 * max(area.max(), 1e-300)])
 
 
-def _joined(parts: Sequence[Surface]) -> Surface:
+def _concatenated(parts: Sequence[SurfaceMesh]) -> SurfaceMesh:
     begins = np.cumsum([0] + [len(part.points) for part in parts[:-1]])
-    return Surface(
+    return SurfaceMesh(
         np.concatenate([part.points for part in parts]),
         np.concatenate([part.normals for part in parts]),
         np.concatenate([part.triangles + begin for part, begin in zip(parts, begins)]),

@@ -1,9 +1,8 @@
-"""Shapes that look as they are.
+"""Meshes in place of PyBullet's primitive shapes.
 
 PyBullet draws spheres and cylinders from few triangles (a sphere of 0.2 m is up to 13 mm off), shades the edges of
-boxes away, and with EGL a visual plane or a mesh without a file crashes it. The renderer therefore draws meshes in
-their place, made to measure. Of several transparent shapes from one file EGL draws the wrong ones, so each of them has
-its own.
+boxes away, and with EGL a visual plane or a mesh without a file crashes it. The renderer therefore draws fitted meshes
+in their place. EGL confuses several transparent shapes from one file, so each has its own file.
 """
 
 import os
@@ -13,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pybullet
 
+from custom_ros_tools.processes.temporary import temporary_folder
 from rpbi.config.pybullet_models import CreateVisualShape
-from rpbi.temporary import temporary_folder
 
 from . import surfaces
-from .surfaces import Surface
+from .surfaces import SurfaceMesh
 
 _SHAPE_KEYS = ("radius", "halfExtents", "length", "planeNormal", "vertices", "indices", "normals", "uvs")
 _DEFAULT_RADIUS_M, _DEFAULT_LENGTH_M, _DEFAULT_HALF_EXTENTS_M = 0.5, 1.0, (1.0, 1.0, 1.0)
@@ -34,7 +33,7 @@ class FineShapes:
         self._folder = temporary_folder("shapes")
         self._files: dict[bytes, str] = {}
         self._transparent_count = 0
-        self._surface_of: dict[int, Callable[[CreateVisualShape], Surface | None]] = {
+        self._surface_of: dict[int, Callable[[CreateVisualShape], SurfaceMesh | None]] = {
             pybullet.GEOM_SPHERE: lambda shape: surfaces.capsule(shape.radius or _DEFAULT_RADIUS_M, 0.0),
             pybullet.GEOM_CAPSULE: lambda shape: surfaces.capsule(*_round_size(shape)),
             pybullet.GEOM_CYLINDER: lambda shape: surfaces.cylinder(*_round_size(shape)),
@@ -61,12 +60,12 @@ class FineShapes:
         self._folder.cleanup()
 
     def _as_another_file(self, file: str) -> str:
-        """Returns a path of the same file that PyBullet takes for another one."""
+        """Returns another path of the same file, so that PyBullet loads it again."""
         self._transparent_count += 1
         folder, name = os.path.split(file)
         return os.path.join(folder, "./" * self._transparent_count + name)
 
-    def _file(self, surface: Surface) -> str:
+    def _file(self, surface: SurfaceMesh) -> str:
         """Returns the file of a surface; equal ones share one, which PyBullet then reads once."""
         key = b"".join(part.tobytes() for part in surface)
         if key not in self._files:
@@ -80,7 +79,7 @@ def _round_size(shape: CreateVisualShape) -> tuple[float, float]:
     return shape.radius or _DEFAULT_RADIUS_M, shape.length or _DEFAULT_LENGTH_M
 
 
-def _inline_mesh(shape: CreateVisualShape) -> Surface | None:
+def _inline_mesh(shape: CreateVisualShape) -> SurfaceMesh | None:
     if shape.fileName is not None or not shape.vertices or not shape.indices:
         return None
     triangles = np.array(shape.indices).reshape(-1, 3)

@@ -23,9 +23,9 @@ class TransparentShape(NamedTuple):
 
 
 class Transparency:
-    """Keeps account of the transparent shapes among bodies that come and go.
+    """Tracks the transparent shapes of bodies that are added and removed.
 
-    PyBullet's EGL plugin goes on telling the shapes of removed bodies, before those of later bodies with the same id.
+    PyBullet's EGL plugin still reports the shapes of removed bodies, before those of later bodies with the same id.
     """
 
     def __init__(self, pb: Client) -> None:
@@ -36,7 +36,7 @@ class Transparency:
         """All transparent shapes."""
 
     def update(self, body_ids: set[int]) -> None:
-        """Takes notice of which bodies there are now."""
+        """Updates the set of bodies."""
         for body_id in self._shapes_of.keys() - body_ids:
             del self._shapes_of[body_id]
             self._stale[body_id] = len(self._pb.getVisualShapeData(body_id))

@@ -16,7 +16,7 @@ from custom_ros_tools.ros.lifecycle.run_node import init_node
 from rpbi.render.depth import PointCloud
 from rpbi.render.frame import Camera, Demand, Frame
 from rpbi.ros.headers import to_ros_time
-from rpbi.ros.publishers.topics import StateTopic
+from rpbi.ros.messages.topics import StateTopic
 
 from .topics import camera_info, camera_topics, cloud_message, compressed_message, image_message
 
@@ -26,7 +26,7 @@ warnings.filterwarnings("ignore", "The publisher should be created", SyntaxWarni
 QUEUE_SIZE = 2
 """Images kept for a slow subscriber: a stopped one must not fill the memory."""
 LONGEST_WAIT_S = 5.0
-"""How long subscribers are waited for that the master knows of [s]."""
+"""Longest wait for subscribers that the master has registered [s]."""
 
 
 class ImagePublisher:
@@ -38,7 +38,7 @@ class ImagePublisher:
         self._cameras: dict[str, _CameraTopics] = {}
 
     def add(self, camera: Camera) -> None:
-        """Advertises the topics of a camera; if it is synchronous, waits for those who subscribe to them already."""
+        """Advertises the topics of a camera; if it is synchronous, waits for existing subscribers."""
         topics = self._cameras[camera.name] = _CameraTopics(camera)
         if camera.synchronous:
             topics.wait_for_subscribers()
@@ -62,7 +62,7 @@ class ImagePublisher:
         self._cameras[frame.camera.name].publish(frame)
 
     def close(self) -> None:
-        """Takes leave of the ROS master."""
+        """Unregisters from the ROS master."""
         rospy.signal_shutdown("the simulator has ended")
 
 
@@ -87,7 +87,7 @@ def sink_arguments(node_name: str, argv: Sequence[str]) -> list[str]:
 
 
 class _Topic(StateTopic):
-    """A topic that also counts who has ever come; one that `waits` does so until each message is taken."""
+    """A topic that also counts its subscribers so far; one that `waits` blocks until each message is sent."""
 
     def __init__(self, topic: str, message_type: type, waits: bool) -> None:
         self.seen = 0
@@ -117,7 +117,7 @@ class _CameraTopics:
         self._published_ns = -1
 
     def wait_for_subscribers(self) -> None:
-        """Waits until all who have subscribed at the master are connected; but not for ever, some may be dead."""
+        """Waits until all subscribers of the master are connected, up to `LONGEST_WAIT_S`: some may be dead."""
         registered = dict(rosgraph.Master(rospy.get_name()).getSystemState()[1])
         end_s = time.monotonic() + LONGEST_WAIT_S
         for name, (_, topic) in self._topics.items():
@@ -132,7 +132,7 @@ class _CameraTopics:
         return Demand(streams, sum(topic.seen for _, topic in topics))
 
     def publish(self, frame: Frame) -> None:
-        """Publishes a frame; one with the last stamp again goes only to who has come since."""
+        """Publishes a frame; one with the last stamp is sent to new subscribers only."""
         header = Header(stamp=to_ros_time(frame.stamp_ns), frame_id=self._frame_id)
         again = frame.stamp_ns == self._published_ns
         for stream, topic in self._topics.values():

@@ -14,7 +14,7 @@ from custom_ros_tools.errors import PhysicsError
 from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
 from rpbi.render.client import RenderClient
 from rpbi.render.frame import Camera
-from rpbi.render.priority import take_part
+from rpbi.render.priority import run_normally
 from rpbi.ros.headers import named_frame
 from rpbi.samples import SceneSample
 from rpbi.sensors.rgbd import RgbdSensor
@@ -23,7 +23,7 @@ from rpbi.world import World
 from .image_publisher import SINK, camera_node, sink_arguments
 
 LONGEST_WAIT_S = 20.0
-"""How long the world waits for a synchronous camera before it stands still [s] of wall time."""
+"""Longest wait of the world for a synchronous camera [s] of wall time; beyond it, the world stops."""
 
 
 class ScenePublisher:
@@ -47,13 +47,13 @@ class ScenePublisher:
     def poll(self) -> None:
         """Sees to the process; called at every pass of the loop."""
         if self._sensors is not self._world.cameras:
-            self._take_over(self._world.cameras)
+            self._update_cameras(self._world.cameras)
         self._renderer.poll()
         for name, sensor in self._sensors.items():
             sensor.wanted = name in self._renderer.wanted
 
     def before_tick(self) -> None:
-        """Waits until synchronous cameras can do their part in the coming tick; usually there are none.
+        """Waits until synchronous cameras are ready for the coming tick.
 
         Raises:
             PhysicsError: If that takes too long.
@@ -92,7 +92,7 @@ class ScenePublisher:
             )
 
     def serve_late(self) -> None:
-        """Gives the last images to who has come since."""
+        """Sends the last images to new subscribers."""
         self._renderer.serve_late()
 
     def restart(self) -> None:
@@ -104,17 +104,17 @@ class ScenePublisher:
         self._renderer.forget_body(name)
 
     def facts(self) -> dict[str, str]:
-        """Returns what the diagnostics tell of it."""
+        """Returns its values for the diagnostics."""
         return {"camera_renderer": self._renderer.renderer or "starting"} if self._sensors else {}
 
     def close(self) -> None:
-        """Ends the process, which is in a hurry now: it has to take its leave of the ROS master first."""
+        """Ends the process at normal priority, since it has to unregister from the ROS master first."""
         if self._renderer.process_id is not None:
-            take_part(self._renderer.process_id)  # on a busy machine it might not get to its end otherwise
+            run_normally(self._renderer.process_id)  # on a busy machine it might not get to its end otherwise
         if not self._renderer.stop():
             _unregister(camera_node(rospy.get_name()))
 
-    def _take_over(self, cameras: Mapping[str, RgbdSensor]) -> None:
+    def _update_cameras(self, cameras: Mapping[str, RgbdSensor]) -> None:
         for name, sensor in self._sensors.items():
             if cameras.get(name) is not sensor:
                 self._renderer.remove(name)
@@ -131,7 +131,7 @@ class ScenePublisher:
         while not (condition() or rospy.core.is_shutdown_requested()):
             flush_buffered_sockets()  # what it waits for may come of what others hear of earlier ticks
             self.poll()
-            self._world.take_inputs()
+            self._world.apply_inputs()
             if needs_renderer and not self._renderer.is_up:
                 raise PhysicsError(f"camera '{name}' is synchronous: {missing}, the renderer has ended")
             if time.monotonic() > end_s:
@@ -141,7 +141,7 @@ class ScenePublisher:
 
 
 def _unregister(node: str) -> None:
-    """Takes leave of the ROS master for a node that had to be killed."""
+    """Unregisters a killed node from the ROS master."""
     with contextlib.suppress(OSError, rosgraph.MasterException):
         cleanup_master_blacklist(rosgraph.Master(rospy.get_name()), [node])
 

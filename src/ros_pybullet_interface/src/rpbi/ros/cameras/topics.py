@@ -12,7 +12,7 @@ from rpbi.render.frame import Camera, Frame
 from rpbi.ros.endpoints import Topic
 
 JPEG_QUALITY = 80
-"""Of colour images, from 1 to 95; what image_transport has by default."""
+"""JPEG quality of colour images, from 1 to 95; the default of image_transport."""
 IMAGE_TOPICS = (
     ("colour", Topic("rpbi/{name}/colour/image", Image, meaning="Colour, `rgb8`.")),
     (
@@ -63,7 +63,7 @@ def camera_topics(topic_name: str, pointcloud: bool) -> dict[str, tuple[str, Top
 
 
 def camera_info(camera: Camera) -> CameraInfo:
-    """Returns what ROS has to know of a camera that distorts nothing."""
+    """Returns the CameraInfo of a camera without distortion."""
     info = CameraInfo(width=camera.intrinsics.width_px, height=camera.intrinsics.height_px)
     K = camera.intrinsics.K
     info.K = K.ravel().tolist()

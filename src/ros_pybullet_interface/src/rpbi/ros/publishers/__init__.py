@@ -1,1 +1,1 @@
-"""What the simulator publishes of every tick."""
+"""Publishers of the simulator."""

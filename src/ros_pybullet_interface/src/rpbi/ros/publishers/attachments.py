@@ -1,15 +1,15 @@
-"""What holds what, as a topic."""
+"""Attachments as a topic."""
 
 import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion
 
 from ros_pybullet_interface.msg import Attachment, Attachments
-from rpbi.constraints.attachment_config import AttachmentConfig, AttachmentPose
+from rpbi.config.attachments import AttachmentConfig, AttachmentPose
 from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import to_ros_time
 from rpbi.world import World
 
-ATTACHMENTS = Topic("rpbi/attachments", Attachments, meaning="What holds what, whenever that changes; latched.")
+ATTACHMENTS = Topic("rpbi/attachments", Attachments, meaning="Attachments, whenever one is added or removed; latched.")
 
 
 class AttachmentPublisher:

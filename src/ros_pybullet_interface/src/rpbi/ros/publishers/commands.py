@@ -1,4 +1,4 @@
-"""What a recording needs to be replayed: what the world was built from, and by tick what entered it since."""
+"""Topics from which a recording can be replayed: the world's description, and its commands by tick."""
 
 import logging
 from collections import deque
@@ -10,25 +10,24 @@ from std_msgs.msg import String
 
 from ros_pybullet_interface.msg import WorldCommand as WorldCommandMessage
 from ros_pybullet_interface.msg import WorldCommands
-from rpbi.engine.command_log import WorldCommand
 from rpbi.replay.recorded_values import to_text
 from rpbi.replay.world_description import describe
 from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import to_ros_time
+from rpbi.ros.messages.topics import FastTopic
 from rpbi.world import World
-
-from .topics import FastTopic
+from rpbi.world.command_log import WorldCommand
 
 log = logging.getLogger(__name__)
 
-COMMANDS = Topic("rpbi/commands", WorldCommands, meaning="What enters the world, by tick, for replays; as it comes.")
+COMMANDS = Topic("rpbi/commands", WorldCommands, meaning="Commands to the world, by tick, for replays; as they come.")
 DESCRIPTION = Topic("rpbi/world_description", String, meaning="The world as loaded, as JSON, for replays; latched.")
-MOST_IN_A_MESSAGE = 25
-"""So that making one never takes long."""
+MAX_COMMANDS_PER_MESSAGE = 25
+"""Largest number of commands in a message, so that making one is fast; the others follow in the next."""
 
 
-class _Reader:
-    """Who gets commands, and up to which they have been sent."""
+class _Recipient:
+    """A receiver of commands, and the number of the next one to send."""
 
     def __init__(self, send: Callable[[WorldCommands], None]) -> None:
         self.send = send
@@ -36,25 +35,25 @@ class _Reader:
 
 
 class _CommandTopic(FastTopic):
-    """The topic, which knows its newcomers; whatever is published meanwhile, they want all that came before."""
+    """The topic, with a list of new subscribers, which need all earlier commands."""
 
     def __init__(self) -> None:
-        self.newcomers: deque[_Reader] = deque()
+        self.newcomers: deque[_Recipient] = deque()
         super().__init__(COMMANDS.name, COMMANDS.message_type)
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Callable[[Any], None]) -> None:
         """Notes a new subscriber; rospy calls it from a thread of its own."""
-        self.newcomers.append(_Reader(peer_publish))
+        self.newcomers.append(_Recipient(peer_publish))
 
 
 class CommandPublisher:
-    """Publishes what a world was built from, and its commands, a few at each pass of the loop."""
+    """Publishes the description of a world and its commands, a few at each pass of the loop."""
 
     def __init__(self, world: World) -> None:
         self._world = world
         self._topic = _CommandTopic()
-        self._all = _Reader(self._topic.publish)
-        self._newcomers: list[_Reader] = []
+        self._all = _Recipient(self._topic.publish)
+        self._newcomers: list[_Recipient] = []
         self._description = rospy.Publisher(DESCRIPTION.name, String, queue_size=1, latch=True)
         self._description.publish(describe(world))
         self._resets = world.resets
@@ -78,8 +77,8 @@ class CommandPublisher:
             self._send(reader)
         self._newcomers = [reader for reader in self._newcomers if reader.next < commands.count]
 
-    def _send(self, reader: _Reader) -> None:
-        first, commands = self._world.commands.since(reader.next, MOST_IN_A_MESSAGE)
+    def _send(self, reader: _Recipient) -> None:
+        first, commands = self._world.commands.since(reader.next, MAX_COMMANDS_PER_MESSAGE)
         message = WorldCommands(resets=self._resets, first=first, commands=[_message(each) for each in commands])
         message.header.stamp = to_ros_time(self._world.clock.stamp_ns)
         reader.next = first + len(commands)

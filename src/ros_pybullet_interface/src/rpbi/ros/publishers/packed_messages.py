@@ -55,7 +55,7 @@ class PackedTransforms(TFMessage):
 
 _COUNT = struct.Struct("<I")
 _Format = tuple[Callable[..., bytes], bytes]
-"""What packs a message, and the texts in it."""
+"""Function that packs a message, and the texts in it."""
 
 
 @lru_cache(maxsize=1000)

@@ -1,19 +1,18 @@
-"""The publishers of a world's samples, and the order in which a tick goes out."""
+"""Publishers of a world's samples, and the order of messages of a tick."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from rpbi.engine.inputs import PoseInput
 from rpbi.ros.cameras.publisher import ScenePublisher
 from rpbi.ros.inputs import topic_input
-from rpbi.samples import LinkPoseSample, SceneSample, ViconSample
+from rpbi.ros.messages.topics import FastTopic
+from rpbi.samples import LinkPoseSample, SceneSample
 from rpbi.world import World
 
 from .sample_topics import sample_topic
 from .status import ClockPublisher
 from .topic_publisher import SampleKey, TopicPublisher, TransformPublisher
-from .topics import FastTopic
-from .tracking import transform_of
 
 
 class SamplePublishers:
@@ -29,6 +28,8 @@ class SamplePublishers:
         self._topics, self._transforms = TopicPublisher(), TransformPublisher()
         self._elsewhere: dict[type, Any] = {LinkPoseSample: self._transforms, SceneSample: self.cameras}
         self._all = (self._topics, self._transforms, self.cameras)
+        self._on_tf: dict[type, Callable[[Any, int], tuple[LinkPoseSample, int]]] = {}
+        """Conversion of the types of samples that go to TF too."""
         self._open: dict[str, list[SampleKey]] = {}
         """The sensors of each body whose topics are open."""
 
@@ -39,7 +40,9 @@ class SamplePublishers:
             InterfaceError: If there is one that cannot be found.
         """
         for sensor in self._world.sensors_of(name):
-            sample_topic(sensor)
+            topic = sample_topic(sensor)
+            if topic is not None and topic.on_tf is not None:
+                self._on_tf[sensor.sample_type] = topic.on_tf
         for key, taken in self._world.bodies[name].inputs().items():
             if not isinstance(taken, PoseInput):
                 topic_input(key, taken)
@@ -61,13 +64,14 @@ class SamplePublishers:
         """
         for sample in samples:
             self._elsewhere.get(type(sample), self._topics).publish(sample, stamp_ns)
-            if isinstance(sample, ViconSample):
-                self._transforms.publish(transform_of(sample), stamp_ns - sample.age_ns)
+            on_tf = self._on_tf.get(type(sample))
+            if on_tf is not None:
+                self._transforms.publish(*on_tf(sample, stamp_ns))
         self._transforms.flush()
         self.cameras.flush()
 
     def serve_late(self) -> None:
-        """Gives the last samples to subscribers that have come since."""
+        """Sends the last samples to new subscribers."""
         for publisher in self._all:
             publisher.serve_late()
 
@@ -92,7 +96,7 @@ class SamplePublishers:
 class TickPublisher:
     """Publishes everything of a tick: the time first, then the samples.
 
-    So many `idle_ticks` would pass between two calls of `publish_idle` were the world running.
+    `idle_ticks` is the number of ticks that would pass between two calls of `publish_idle` if the world ran.
     """
 
     def __init__(self, world: World, publishers: SamplePublishers, idle_ticks: int) -> None:
@@ -131,12 +135,12 @@ class TickPublisher:
             self._clock.publish_now()
 
     def repeat_time(self) -> None:
-        """Repeats the time for those who come late."""
+        """Repeats the time for late subscribers."""
         if self._clock is not None:
             self._clock.repeat()
 
     def publish_idle(self) -> None:
-        """Keeps a world that stands still visible to those who come late, without repeating a stamp."""
+        """Publishes a world that stands still to late subscribers, without repeating a stamp."""
         if self._clock is not None:
             self._publishers.publish(self._world.read_rest(), self._world.clock.stamp_ns)
             self._publishers.serve_late()

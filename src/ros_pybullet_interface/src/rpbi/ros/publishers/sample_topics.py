@@ -10,23 +10,20 @@ from custom_ros_tools.errors import ConfigError, Problem
 from custom_ros_tools.plugins import full_name
 from ros_pybullet_interface.msg import ContactPoint, Contacts
 from ros_pybullet_interface.msg import ControllerState as ControllerStateMessage
-from rpbi.control.controllers.manager import ControllerSample
-from rpbi.control.trajectories.trajectory import ControllerState
 from rpbi.ros.endpoints import Topic, find_topic
 from rpbi.ros.headers import prefixed, to_ros_time, world_frame
-from rpbi.ros.robots.controller_messages import controller_state_message
-from rpbi.ros.robots.trajectory_messages import CONTROLLER, JointTrajectoryControllerState, state_message
+from rpbi.ros.messages.controllers import controller_state_message
+from rpbi.ros.messages.trajectories import CONTROLLER, JointTrajectoryControllerState, state_message
 from rpbi.samples import (
     BaseStateSample,
     ContactArrowsSample,
     ContactsSample,
     JointStateSample,
     LinkPoseSample,
-    SceneSample,
     SurfaceSample,
     WrenchSample,
 )
-from rpbi.sensors.sensor import Sensor
+from rpbi.sensors import SENSOR_TYPES, Sensor
 
 from .packed_messages import PackedJointState
 
@@ -107,63 +104,55 @@ def _header(stamp_ns: int) -> Header:
     return Header(stamp=to_ros_time(stamp_ns), frame_id=world_frame())
 
 
-TOPICS: dict[type, Topic] = {
-    ControllerSample: Topic(
-        "rpbi/{name}/state",
-        ControllerStateMessage,
-        controller_state_message,
-        "Whether the controller drives its joints, and what it tells of itself; `state_hz` of the controller.",
-    ),
-    WrenchSample: Topic(
-        "rpbi/{name}/ft_sensor",
-        WrenchStamped,
-        wrench_message,
-        "Force [N] and moment [N m] in the joint, in the frame of its child link; "
-        "`hz` of `enabled_joint_force_torque_sensors`.",
-    ),
-    JointStateSample: Topic(
-        "rpbi/{name}/joint_states",
-        JointState,
-        joint_state_message,
-        "Position [rad or m], velocity and the motor's effort [N m or N] of all joints, fixed ones too, in the URDF's "
-        "order; `joint_state_publisher_hz`.",
-    ),
-    BaseStateSample: Topic(
-        "rpbi/{name}/base_state",
-        Odometry,
-        odometry_message,
-        "Pose of the root link in the world [m], its velocity in its own axes [m/s, rad/s]; `base_state_hz`.",
-    ),
-    ContactsSample: Topic(
-        "rpbi/{name}/contacts",
-        Contacts,
-        contacts_message,
-        "Where others touch the body, and their forces on it [N]; `contacts.hz`.",
-    ),
-    SurfaceSample: Topic(
-        "rpbi/{name}/surface", Marker, surface_message, "The surface as triangles, for RViz; `surface_hz`."
-    ),
-    ContactArrowsSample: Topic(
-        "rpbi/{name}/contacts/arrows",
-        MarkerArray,
-        contact_arrows_message,
-        "The forces as arrows, for RViz; `contacts.arrows_hz`.",
-    ),
-    ControllerState: Topic(
-        f"rpbi/{{name}}/{CONTROLLER}/state",
-        JointTrajectoryControllerState,
-        state_message,
-        "Where joints are to be on the trajectory, and where they are; `state_publish_rate`.",
-    ),
-}
-"""The topic of each type of samples that has topics of its own."""
-
-_ELSEWHERE = (LinkPoseSample, SceneSample)
-"""Samples that go to TF and to the renderer."""
+CONTROLLER_STATE = Topic(
+    "rpbi/{name}/state",
+    ControllerStateMessage,
+    controller_state_message,
+    "Whether the controller drives its joints, and its own numbers; `state_hz` of the controller.",
+)
+WRENCH = Topic(
+    "rpbi/{name}/ft_sensor",
+    WrenchStamped,
+    wrench_message,
+    "Force [N] and moment [N m] in the joint, in the frame of its child link; "
+    "`hz` of `enabled_joint_force_torque_sensors`.",
+)
+JOINT_STATES = Topic(
+    "rpbi/{name}/joint_states",
+    JointState,
+    joint_state_message,
+    "Position [rad or m], velocity and the motor's effort [N m or N] of all joints, fixed ones too, in the URDF's "
+    "order; `joint_state_publisher_hz`.",
+)
+BASE_STATE = Topic(
+    "rpbi/{name}/base_state",
+    Odometry,
+    odometry_message,
+    "Pose of the root link in the world [m], its velocity in its own axes [m/s, rad/s]; `base_state_hz`.",
+)
+CONTACTS = Topic(
+    "rpbi/{name}/contacts",
+    Contacts,
+    contacts_message,
+    "Where others touch the body, and their forces on it [N]; `contacts.hz`.",
+)
+SURFACE = Topic("rpbi/{name}/surface", Marker, surface_message, "The surface as triangles, for RViz; `surface_hz`.")
+CONTACT_ARROWS = Topic(
+    "rpbi/{name}/contacts/arrows",
+    MarkerArray,
+    contact_arrows_message,
+    "The forces as arrows, for RViz; `contacts.arrows_hz`.",
+)
+TRAJECTORY_STATE = Topic(
+    f"rpbi/{{name}}/{CONTROLLER}/state",
+    JointTrajectoryControllerState,
+    state_message,
+    "Where joints are to be on the trajectory, and where they are; `state_publish_rate`.",
+)
 
 
 def address(sensor: Sensor) -> str:
-    """Returns what a sensor is called in requests: its topic below `rpbi/`; `NAME/tf`, or a camera's name."""
+    """Returns the name of a sensor in requests: its topic below `rpbi/`, `NAME/tf`, or the name of a camera."""
     topic = sample_topic(sensor)
     if topic is not None:
         return topic.name.format(name=sensor.name).removeprefix("rpbi/")
@@ -176,12 +165,13 @@ def sample_topic(sensor: Sensor) -> Topic | None:
     Raises:
         ConfigError: If it comes from another package and has no topic that can be found.
     """
-    if sensor.sample_type in _ELSEWHERE:
+    place = sensor.ros_topic
+    if place == "":
+        place = next((each.ros_topic for each in SENSOR_TYPES.values() if each.sample_type is sensor.sample_type), "")
+    if place is None:
         return None
-    if sensor.ros_topic:
-        found = find_topic(sensor.ros_topic, sensor)
-        return found if sensor.topic is None else found._replace(name=sensor.topic)
-    if sensor.sample_type not in TOPICS:
+    if not place:
         message = f"missing, expected 'module:NAME' of the Topic for its {sensor.sample_type.__qualname__}"
         raise ConfigError([Problem(full_name(sensor), "ros_topic", message)])
-    return TOPICS[sensor.sample_type]
+    found = find_topic(place, sensor)
+    return found if sensor.topic is None else found._replace(name=sensor.topic)

@@ -1,4 +1,4 @@
-"""TF frames whose poses the main file says."""
+"""TF frames with poses from the main file."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,7 @@ import rospy
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from tf2_msgs.msg import TFMessage
 
-from rpbi.config.world import FramePose
+from rpbi.config.world import StaticFrame
 from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import named_frame
 
@@ -16,13 +16,13 @@ TF_STATIC = Topic("/tf_static", TFMessage, meaning="Where the frames under `pose
 class StaticFrames:
     """Puts frames on TF once and for all; without any there is no topic."""
 
-    def __init__(self, poses: Sequence[FramePose]) -> None:
+    def __init__(self, poses: Sequence[StaticFrame]) -> None:
         if poses:
             self._publisher = rospy.Publisher(TF_STATIC.name, TF_STATIC.message_type, queue_size=1, latch=True)
             self._publisher.publish(TFMessage([_transform(each) for each in poses]))
 
 
-def _transform(frame: FramePose) -> TransformStamped:
+def _transform(frame: StaticFrame) -> TransformStamped:
     position, quat = frame.pose
     message = TransformStamped(child_frame_id=named_frame(frame.tf_id))
     message.header.frame_id = named_frame(frame.parent)

@@ -1,4 +1,4 @@
-"""How the simulation is doing: /clock, `rpbi/status`, `rpbi/state` and /diagnostics."""
+"""State of the simulation: /clock, `rpbi/status`, `rpbi/state` and /diagnostics."""
 
 import logging
 import time
@@ -16,9 +16,8 @@ from rpbi.engine.clock import Schedule
 from rpbi.engine.pacer import Load, Pacer
 from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import to_ros_time
+from rpbi.ros.messages.topics import FastTopic
 from rpbi.world import World
-
-from .topics import FastTopic
 
 log = logging.getLogger(__name__)
 
@@ -44,9 +43,10 @@ FREE_RUNNING_CLOCK_HZ = 250.0
 FALLING_BEHIND = 0.98
 """Share of the asked real-time factor below which the diagnostics warn."""
 SLOW_PERIODS = 3
-"""Messages of the diagnostics in a row after which a warning says why a world is slow; at its start it may be."""
+"""Number of slow diagnostics in a row after which a warning explains why; a world may be slow at its start."""
+WINDOW_ADVICE = "without a graphics card use RViz and connection_mode DIRECT"
 SLOW_CALL_S = 0.0005
-"""From so long a call of PyBullet on, its window is what slows a world down [s]; without one it takes 10 µs."""
+"""Duration of a call of PyBullet above which its window slows a world down [s]; without a window it is 10 µs."""
 
 
 def _warn_of_rivals() -> None:
@@ -87,7 +87,7 @@ class ClockPublisher:
         self._send()
 
     def repeat(self) -> None:
-        """Publishes the same tick again now and then while the world stands still, for those who come late."""
+        """Publishes the same tick again at intervals while the world stands still, for late subscribers."""
         if time.monotonic() >= self._due_s or self._clock.stamp_ns != self._sent_ns:
             self.publish_now()
 
@@ -97,19 +97,21 @@ class ClockPublisher:
 
 
 class StatusPublisher:
-    """Whether the world runs, and how well.
+    """Publishes whether the world runs, and its diagnostics.
 
     Args:
         world: The world.
-        pacer: What keeps it in step with the wall clock.
-        facts: Returns what else the diagnostics are to have.
+        pacer: Its pacer.
+        facts: Returns further values for the diagnostics.
     """
 
     def __init__(self, world: World, pacer: Pacer, facts: Callable[[], Mapping[str, str]]) -> None:
         self._world, self._clock, self._pacer, self._facts = world, world.clock, pacer, facts
-        self._load: Load | None = Load.now(world.physics_s, world.clock.tick)
-        """At the last message of the diagnostics; None once it was said why the world is slow."""
+        self._load = Load.now(world.physics_s, world.clock.tick)
+        """At the last message of the diagnostics."""
         self._slow_periods = 0
+        self._advice: set[str] = set()
+        """Advice logged so far for slow worlds."""
         self._rate = WallRate(world.config.status_hz)
         self._diagnostics_rate = WallRate(1.0, delay_s=1.0)
         self._status = rospy.Publisher(STATUS.name, Int64, queue_size=10)
@@ -145,7 +147,7 @@ class StatusPublisher:
             self._slow_periods += 1
         else:
             self._slow_periods = 0
-        self._say_why(status.message)
+        self._warn_of_cause(status.message)
         values = {
             "real_time_factor": f"{factor if running else 0.0:.4f}",
             "overruns_total": str(self._pacer.overruns),
@@ -160,23 +162,22 @@ class StatusPublisher:
         message.header.stamp = to_ros_time(self._clock.stamp_ns)
         self._diagnostics.publish(message)
 
-    def _say_why(self, message: str) -> None:
-        """Warns once, when the world has been too slow for a while, of what slows it down."""
-        if self._load is None:
-            return
+    def _warn_of_cause(self, message: str) -> None:
+        """Warns of the cause when the world has been too slow for a while, once for each cause."""
         before, self._load = self._load, Load.now(self._world.physics_s, self._clock.tick)
-        if self._slow_periods < SLOW_PERIODS:
+        if self._slow_periods < SLOW_PERIODS or WINDOW_ADVICE in self._advice:
             return
         reason, window = self._load.since(before).reason(self._clock.dt_s), self._world.window
         if window is not None and (call_s := window.seconds_per_call()) > SLOW_CALL_S:
-            reason = f"with its window, PyBullet takes {1e3 * call_s:.1f} ms a call; without a graphics card use RViz"
-            reason += " and connection_mode DIRECT"
-        self._load = None
-        log.warning("%s: %s (docs/slow.md)", message, reason)
+            reason = f"with its window, PyBullet takes {1e3 * call_s:.1f} ms a call; {WINDOW_ADVICE}"
+        advice = reason.rpartition("; ")[2]
+        if advice not in self._advice:
+            self._advice.add(advice)
+            log.warning("%s: %s (docs/slow.md)", message, reason)
 
 
 class StatePublisher:
-    """Publishes how the simulation is doing, at a rate of the wall clock, and its hash, at a rate of the world's."""
+    """Publishes the state of the simulation, at a rate in wall time, and its hash, at a rate in the world's time."""
 
     def __init__(self, world: World, pacer: Pacer) -> None:
         self._world, self._pacer = world, pacer
@@ -198,7 +199,7 @@ class StatePublisher:
         self._begin_window()
         self._publish(self._schedule is not None)
 
-    def take_tick(self) -> None:
+    def publish_due_hash(self) -> None:
         """Publishes the hash of a tick, if it is due."""
         tick = self._world.clock.tick
         if self._schedule is not None and self._hash_tick is not None and tick >= self._hash_tick:
@@ -223,7 +224,7 @@ class StatePublisher:
             self._publish()
 
     def _begin_window(self) -> None:
-        """Measures the real-time factor from now on; until it is known, it is 0."""
+        """Starts to measure the real-time factor, which is 0 until then."""
         self._factor = 0.0
         self._window_s, self._window_tick = time.monotonic(), self._world.clock.tick
 

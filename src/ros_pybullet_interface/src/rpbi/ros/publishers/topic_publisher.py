@@ -7,13 +7,13 @@ from typing import Any
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
-from rpbi.plugins import blame, blaming
+from rpbi.plugins import plugin_errors, raise_plugin_error
 from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import prefixed, to_ros_time, world_frame
+from rpbi.ros.messages.topics import FastTopic
 from rpbi.samples import LinkPoseSample
 
 from .packed_messages import PackedTransforms
-from .topics import FastTopic
 
 TF = Topic("/tf", TFMessage, meaning="Where it is, see [frames](#frames).")
 
@@ -50,14 +50,14 @@ class TopicPublisher:
             try:
                 topic.publish(to_message(sample, stamp_ns))
             except Exception as error:
-                blame(to_message, f"the message of '{sample.name}'", error)
+                raise_plugin_error(to_message, f"the message of '{sample.name}'", error)
                 raise
 
     def serve_late(self) -> None:
-        """Gives the last samples to who has come since."""
+        """Sends the last samples to new subscribers."""
         for key, (topic, to_message) in self._routes.items():
             if key in self._last:
-                with blaming(to_message, f"the message of '{key[1]}'"):
+                with plugin_errors(to_message, f"the message of '{key[1]}'"):
                     topic.serve_late(partial(to_message, *self._last[key]))
 
     def restart(self) -> None:
@@ -101,7 +101,7 @@ class TransformPublisher:
             self._collected = []
 
     def serve_late(self) -> None:
-        """Gives all last poses to who has come since."""
+        """Sends all last poses to new subscribers."""
         self._topic.serve_late(lambda: TFMessage([one for body in self._last.values() for one in body]))
 
     def restart(self) -> None:

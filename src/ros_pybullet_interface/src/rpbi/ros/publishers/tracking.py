@@ -1,4 +1,4 @@
-"""What tracking systems report, as the nodes of their drivers send it."""
+"""Topics of tracking systems, with the messages of their drivers' nodes."""
 
 from apriltag_ros.msg import AprilTagDetection, AprilTagDetectionArray
 from geometry_msgs.msg import (
@@ -33,9 +33,8 @@ def _detections_message(sample: AprilTagsSample, stamp_ns: int) -> AprilTagDetec
     return message
 
 
-def transform_of(sample: ViconSample) -> LinkPoseSample:
-    """Returns the same for TF."""
-    return LinkPoseSample(sample.name, (sample.frame,), (sample.pose,))
+def _vicon_on_tf(sample: ViconSample, stamp_ns: int) -> tuple[LinkPoseSample, int]:
+    return LinkPoseSample(sample.name, (sample.frame,), (sample.pose,)), stamp_ns - sample.age_ns
 
 
 VICON = Topic(
@@ -43,6 +42,7 @@ VICON = Topic(
     TransformStamped,
     _vicon_message,
     "Pose of a link in the world [m] as vicon_bridge reports it, on TF too; `hz` of a sensor `vicon`.",
+    on_tf=_vicon_on_tf,
 )
 APRIL_TAGS = Topic(
     "tag_detections",

@@ -1,4 +1,4 @@
-"""The whole world as markers for RViz, which otherwise knows robots only."""
+"""The whole world as markers for RViz, which otherwise shows robots only."""
 
 import math
 import time
@@ -51,14 +51,14 @@ def shape_marker(name: str, number: int, shape: BodyShape, frame: str, pose: Pos
 
 
 def deletion(marker: Marker) -> Marker:
-    """Returns the marker that takes another one away."""
+    """Returns the marker that deletes another one."""
     gone = Marker(ns=marker.ns, id=marker.id, action=Marker.DELETE)
     gone.header.frame_id = marker.header.frame_id
     return gone
 
 
 def moved(marker: Marker, pose: Pose) -> Marker:
-    """Returns the marker at another pose in its frame; the one given stays as it is, since it may be on its way."""
+    """Returns a copy of a marker at another pose in its frame; the original may be about to be sent."""
     copied = Marker(*(getattr(marker, slot) for slot in Marker.__slots__))
     copied.pose = pose_message(pose)
     return copied
@@ -76,7 +76,7 @@ MARKERS = Topic(
     key="markers_hz",
 )
 STILL = 1e-4
-"""What moves and turns less than that [m, and parts of a quaternion] is not sent again."""
+"""Smallest motion of a shape that is sent [m, and parts of a quaternion]; less is ignored."""
 
 LONGEST_LOOK_S = 0.002
 """Time after which a poll leaves the rest of a look at all shapes to the next one [s]."""
@@ -85,11 +85,11 @@ _Key = tuple[str, int]
 
 
 class WorldMarkers:
-    """Publishes every visual shape of the world on a latched topic, all together whenever anything comes or goes.
+    """Publishes every visual shape of the world on a latched topic, all together whenever one is added or removed.
 
-    Each is given in the frame of its link, which TF moves. Shapes of links that are not on TF are given in the world;
-    they are looked at while somebody listens, and all is sent again when one of them has moved. It looks at a rate
-    [Hz] of wall time, at many shapes in several polls; only the simulation thread may make and poll it.
+    Each is in the frame of its link, which TF moves. Shapes of links that are not on TF are in the world frame; they
+    are checked while there are subscribers, and all is sent again when one of them has moved. Checks run at a rate [Hz]
+    of wall time, with many shapes in several polls; only the simulation thread may make and poll it.
     """
 
     def __init__(self, world: World, hz: float) -> None:

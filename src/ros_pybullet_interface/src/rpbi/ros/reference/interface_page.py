@@ -5,15 +5,16 @@ from collections.abc import Iterable, Iterator, Mapping
 from rpbi.bodies import BODY_TYPES
 from rpbi.reference.markdown import WRITTEN_BY, block, code, link, page, table
 from rpbi.ros.headers import FRAMES
+from rpbi.ros.messages.trajectories import CONTROLLER
 from rpbi.ros.node_topics import PARAMETERS
-from rpbi.ros.robots.trajectory_messages import CONTROLLER
 from rpbi.world import World
 
 from .interface_table import OF_WINDOW, PUBLISHES, SERVES, SUBSCRIBES, Endpoint, endpoints, of_body, of_camera
 from .reference_world import CONTROLLERS, JOINT
 
 INTRODUCTION = """\
-What the node `ros_pybullet_interface_node.py` has in ROS. `./rpbi check WORLD.yaml` tells the same of your own world.
+Topics, services and parameters of the node `ros_pybullet_interface_node.py`. `./rpbi check WORLD.yaml` lists the same
+for your own world.
 
 - `NAME` stands for the name of an object, `JOINT` for that of a joint, `LINK` for that of a link, `CONTROLLER` for
   that of a [controller](controllers.md) in a robot's YAML.
@@ -35,25 +36,27 @@ FOLLOWED = """\
 All have the prefix `tf_prefix` of the main file, if there is one, as have the frames under `poses`. The node listens to
 TF where `object_tf` names a frame that a body or camera follows."""
 OTHERS = """\
-The nodes of custom_ros_tools, which remap joint states and publish transforms and markers, are told in
+The nodes of custom_ros_tools, which remap joint states and publish transforms and markers, are in
 [custom_ros_tools.md](custom_ros_tools.md#nodes). The commands of rpbi_utils have no topics of their own, see
-[replay.md](replay.md) and [data.md](data.md)."""
+[replay.md](replay.md) and [data.md](data.md). Its nodes are in [interpolation.md](interpolation.md),
+[force_torque.md](force_torque.md#a-zero-and-the-weight-of-a-payload), [tracking.md](tracking.md) and
+[real_robots.md](real_robots.md#the-stand-in)."""
 _FOLLOWER = f"rpbi/NAME/{CONTROLLER}"
 WITH_CONTROL_MSGS = {
     Endpoint(
         SERVES,
         f"{_FOLLOWER}/follow_joint_trajectory",
         "control_msgs/FollowJointTrajectoryAction",
-        meaning="An action: the robot follows a trajectory and tells how well; where control_msgs is installed.",
+        meaning="An action: the robot follows a trajectory and reports its errors; where control_msgs is installed.",
     ): ["robot", "mobile_robot"],
     Endpoint(
         SERVES,
         f"{_FOLLOWER}/query_state",
         "control_msgs/QueryTrajectoryState",
-        meaning="Tells where the joints will be at a time; where control_msgs is installed.",
+        meaning="Returns the desired state at a time; where control_msgs is installed.",
     ): ["robot", "mobile_robot"],
 }
-"""What the page has in any case, so that it is the same where control_msgs is installed and where not."""
+"""Rows that the page always has, so that it does not depend on whether control_msgs is installed."""
 HEADINGS = {PUBLISHES: "Published", SUBSCRIBES: "Subscribed", SERVES: "Services"}
 
 

@@ -37,8 +37,8 @@ class Endpoint(NamedTuple):
         kind: `publishes`, `subscribes`, `serves` or `listens to TF`.
         name: Its relative name, or the TF frame.
         type: Its ROS type.
-        note: Its rate in this world, or what it belongs to.
-        meaning: What it says or does, in a sentence.
+        note: Its rate in this world, or its owner.
+        meaning: Its purpose, in a sentence.
     """
 
     kind: str

@@ -1,13 +1,13 @@
-"""A world of one body of each type, with all that it can have in ROS, for the pages that tell of it."""
+"""A world of one body of each type, with all of its ROS interfaces, for the reference pages."""
 
 import pybullet
 
 from rpbi.bodies import BODY_TYPES
-from rpbi.config.loading import CameraConfig, LoadedWorld
-from rpbi.config.objects import ObjectConfig, load_object
 from rpbi.config.sensors import RgbdSensorConfig
 from rpbi.config.world import WorldConfig
 from rpbi.world import World
+from rpbi.world.loading import CameraConfig, LoadedWorld
+from rpbi.world.objects import ObjectConfig, load_object
 
 FOLLOWED = "FRAME"
 """TF frame that its bodies follow."""

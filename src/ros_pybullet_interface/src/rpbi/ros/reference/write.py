@@ -1,13 +1,12 @@
-"""Writes the JSON Schemas and the pages of the documentation that follow from the code."""
+"""JSON Schemas and pages of the documentation that follow from the code."""
 
-import argparse
 import re
 from pathlib import Path
 
 from custom_ros_tools.node_configs import NODE_CONFIGS
-from custom_ros_tools.schema.json_schema import Schema, explained, json_schema, schema_text
-from rpbi.config.schemas import file_schemas, schemas
+from custom_ros_tools.schema.json_schema import json_schema, schema_texts
 from rpbi.reference.config_page import config_page
+from rpbi.world.schemas import file_schemas, schemas
 
 from .interface_page import interface_page
 from .reference_world import reference_world
@@ -20,7 +19,11 @@ _FIRST_LINE = re.compile(r"# yaml-language-server: .*/(\w+)\.schema\.json\n")
 
 
 def reference_files(root: Path) -> dict[Path, str]:
-    """Returns what the files should have that are written from the code."""
+    """Returns the text of each file that follows from the code, by its path.
+
+    Args:
+        root: The workspace.
+    """
     nodes = {node: json_schema(model, node) for node, model in NODE_CONFIGS.items()}
     world = reference_world()
     try:
@@ -28,23 +31,11 @@ def reference_files(root: Path) -> dict[Path, str]:
     finally:
         world.close()
     return {
-        **_schema_files(root / "src/ros_pybullet_interface/schema", schemas()),
-        **_schema_files(root / "src/custom_ros_tools/schema", nodes),
+        **schema_texts(root / "src/ros_pybullet_interface/schema", schemas()),
+        **schema_texts(root / "src/custom_ros_tools/schema", nodes),
         root / "docs/config_reference.md": config_page(file_schemas(), nodes, _examples(root)),
         root / "docs/topics_and_services.md": topics,
     }
-
-
-def main() -> None:
-    """Runs the command."""
-    parser = argparse.ArgumentParser(prog="./rpbi docs", description="Writes schemas and reference pages anew.")
-    parser.add_argument("root", type=Path, help="the workspace")
-    root = parser.parse_args().root
-    for path, text in reference_files(root).items():
-        path.parent.mkdir(exist_ok=True)
-        is_new = not path.exists() or path.read_text() != text
-        path.write_text(text)
-        print(f"{'written' if is_new else 'as it was'}: {path.relative_to(root)}")
 
 
 def _examples(root: Path) -> dict[str, str]:
@@ -57,10 +48,6 @@ def _examples(root: Path) -> dict[str, str]:
         if named:
             examples.setdefault(named[1], text[named.end() :])
     return examples
-
-
-def _schema_files(folder: Path, by_name: dict[str, Schema]) -> dict[Path, str]:
-    return {folder / f"{name}.schema.json": schema_text(explained(schema)) for name, schema in by_name.items()}
 
 
 def _definitions(root: Path) -> dict[str, str]:

@@ -1,1 +1,1 @@
-"""What robots have in ROS beside their samples."""
+"""Topics, services and actions of robots beside their samples."""

@@ -7,9 +7,9 @@ from custom_ros_tools.errors import ConfigError
 from ros_pybullet_interface.srv import SwitchControllersRequest
 from rpbi.bodies import Body
 from rpbi.bodies.robots.robot import Robot
-from rpbi.control.controllers.manager import ControllerSwitch, NewGains
-from rpbi.ros.endpoints import MOST_BYTES, Answer
-from rpbi.ros.services.body_context import BodyContext
+from rpbi.control.controllers.manager import ControllerSwitch, ControllerUpdate
+from rpbi.ros.body_context import BodyContext
+from rpbi.ros.endpoints import MAX_BYTES, Answer
 
 
 def robots_with_controllers(body: Body) -> list[str]:
@@ -49,7 +49,7 @@ def set_gains(context: BodyContext, request: SetStringRequest) -> Answer:
         ValueError: If a value is refused.
     """
     name = context.owner.split("/", 1)[1]
-    changes = load_configs(request.data, "data", MOST_BYTES)
+    changes = load_configs(request.data, "data", MAX_BYTES)
     if not changes:
         raise ValueError("data: expected a mapping such as '{stiffness: 200}', got nothing")
     fixed = changes.keys() & {"type", "active", "joints", "state_hz"}
@@ -60,5 +60,5 @@ def set_gains(context: BodyContext, request: SetStringRequest) -> Answer:
         changed = type(config).parse({**config.model_dump(exclude_unset=True), **changes}, context.owner)
     except ConfigError as error:
         raise ValueError(str(error)) from None
-    context.act("set_controller_gains", NewGains(name, changed))
+    context.act("set_controller_gains", ControllerUpdate(name, changed))
     return Answer(True, f"changed: {', '.join(map(str, changes))}")

@@ -9,15 +9,16 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
+from robot_model.geometry import angle_between, normalized
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
 from ros_pybullet_interface.srv import CalculateInverseKinematicsRequest
 from rpbi.bodies import Body
 from rpbi.bodies.robots.jointed import JointedBody
+from rpbi.control.joint_command import JointCommand
 from rpbi.geometry import Pose
 from rpbi.kinematics import IKProblem, PybulletSolution
+from rpbi.ros.body_context import BodyContext
 from rpbi.ros.headers import to_ros_time
-from rpbi.ros.services.body_context import BodyContext
-from rpbi.urdf.joints import JointTarget
 
 NEAR_M, NEAR_RAD = 0.01, 0.02
 """A link that was moved has arrived within these: joints within 0.01 rad of their goals may add up to as much."""
@@ -34,7 +35,7 @@ def inverse_kinematics(
 ) -> tuple[bool, str, JointState]:
     """Returns joint positions that bring a link to a pose; moves nothing.
 
-    They are those of all joints that a motor can move. Out of reach they bring it as near as it comes, which is a
+    They are those of all joints that a motor can move. Out of reach they bring it as near as possible, which is a
     success unless the robot is `strict`.
 
     Raises:
@@ -67,7 +68,7 @@ def move_by_ik(context: BodyContext, problem: CalculateInverseKinematicsProblem)
     if not solution.success:
         _warn(rospy.resolve_name(f"rpbi/{context.name}/ik"), message)
     velocity = dict(zip(solution.joint_names, _velocities(problem, solution)))
-    target = JointTarget(
+    target = JointCommand(
         solution.chain, solution.chain_positions, [velocity[name] for name in solution.chain] if velocity else ()
     )
     context.world.put(f"{context.name}/target", target)
@@ -84,16 +85,14 @@ def arrival(context: BodyContext, message: CalculateInverseKinematicsProblem) ->
     pose = base @ robot.kinematics.forward(list(positions.values()), message.link_name)
     off_m, off_rad, angle = math.dist(pose.position, message.targetPosition), 0.0, ""
     if message.targetOrientation:
-        target = message.targetOrientation
-        cosine = abs(sum(a * b for a, b in zip(pose.quat_xyzw, target))) / math.hypot(*target)
-        off_rad = 2.0 * math.acos(min(1.0, cosine))
+        off_rad = angle_between(pose.quat_xyzw, normalized(message.targetOrientation))
         angle = f" and {off_rad:.3g} rad"
     is_near = off_m <= NEAR_M and off_rad <= NEAR_RAD
     return is_near, f"link '{message.link_name}' is {off_m * 1e3:.3g} mm{angle} from its target"
 
 
 def solve_for_robot(context: BodyContext, message: CalculateInverseKinematicsProblem) -> PybulletSolution:
-    """Solves a problem of which the target is in the world, for where the robot is now.
+    """Solves a problem with a target in the world, for the present state of the robot.
 
     The search starts at the message's `currentPosition`, or else where the robot's joints are. Any thread but that of
     the simulation may call it; the simulation goes on meanwhile.
@@ -126,7 +125,7 @@ def _judged(context: BodyContext, solution: PybulletSolution) -> tuple[bool, str
 
 
 def _velocities(problem: CalculateInverseKinematicsProblem, solution: PybulletSolution) -> list[float]:
-    """Returns the velocities [rad/s or m/s] that lead to the solution in the time given, none without a start or time.
+    """Returns the velocities [rad/s or m/s] to the solution in the given time, none without a start or time.
 
     Raises:
         ValueError: If the time is too short.

@@ -1,4 +1,4 @@
-"""What ROS learns of a robot: the parameter with its URDF, and the service that returns its joints."""
+"""Robots in ROS: the parameter with the URDF, and the service that returns the joints."""
 
 import argparse
 import sys
@@ -10,12 +10,12 @@ from geometry_msgs.msg import Point, Quaternion
 
 from custom_ros_tools.errors import ConfigError
 from custom_ros_tools.ros.lifecycle.parameters import kept_parameters
+from robot_model.asset_files import find_file
 from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import RobotInfoRequest, RobotInfoResponse
 from rpbi.bodies.robots.jointed import JointedBody
-from rpbi.config.asset_files import find_file
+from rpbi.ros.body_context import BodyContext
 from rpbi.ros.publishers.sample_topics import joint_state_message
-from rpbi.ros.services.body_context import BodyContext
 from rpbi.sensors.joint_state import JointStateSensor
 from rpbi.urdf.copies import description_for_ros
 from rpbi.urdf.joints import Joint

@@ -1,4 +1,4 @@
-"""Services that move a robot, in a given time or at once, and that change how it is controlled."""
+"""Services that move a robot, in a given time or at once, and that change its control mode and gains."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -13,12 +13,12 @@ from ros_pybullet_interface.srv import (
     SetMotorGainsRequest,
 )
 from rpbi.config.pybullet_args import CONTROL_MODES
+from rpbi.control.joint_command import JointCommand
 from rpbi.control.motion import Motion, MotionResult
 from rpbi.control.motors import MODE_NAMES, MotorGains
-from rpbi.engine.actions import TimedGoal
+from rpbi.ros.body_context import BodyContext
 from rpbi.ros.endpoints import Answer
-from rpbi.ros.services.body_context import BodyContext
-from rpbi.urdf.joints import JointTarget
+from rpbi.world.actions import TimedGoal
 
 from .ik import arrival, solve_for_robot
 
@@ -29,7 +29,7 @@ def move_to_joint_state(context: BodyContext, request: ResetJointStateRequest) -
     Those that are asked to go beyond their limits stop there, and `success` is false.
     """
     state = request.joint_state
-    target = JointTarget(state.name, state.position, state.velocity, state.effort)
+    target = JointCommand(state.name, state.position, state.velocity, state.effort)
     positions = target.values_of("position", "the goal of a motion is a position")
     return Answer(*_move(context, context.body.model.resolve_driven(target.names, positions), request.duration))
 
@@ -100,7 +100,7 @@ def set_joint_state(context: BodyContext, request: SetJointStateRequest) -> Answ
     state = request.joint_state
     if not state.name:
         raise ValueError("expected one joint or more, got none")
-    target = JointTarget(state.name, state.position, state.velocity)
+    target = JointCommand(state.name, state.position, state.velocity)
     context.act("set_joint_state", target)
     return Answer(True, f"{', '.join(state.name)} put there")
 

@@ -19,22 +19,22 @@ from custom_ros_tools.errors import InterfaceError
 from rpbi.bodies.robots.robot import Robot
 from rpbi.control.trajectories.motion import TrajectoryMotion
 from rpbi.control.trajectories.request import ErrorCode, TrajectoryRefusedError
-from rpbi.control.trajectories.trajectory import ControllerState
-from rpbi.engine.actions import RecordedTrajectory
+from rpbi.control.trajectories.trajectory import TrajectoryStateSample
 from rpbi.engine.clock import Clock
+from rpbi.ros.body_context import BodyContext
 from rpbi.ros.endpoints import Service
 from rpbi.ros.headers import to_ros_time
-from rpbi.ros.publishers.topics import FastTopic
-from rpbi.ros.services.body_context import BodyContext
-
-from .trajectory_commands import followers_with_control_msgs
-from .trajectory_messages import (
+from rpbi.ros.messages.topics import FastTopic
+from rpbi.ros.messages.trajectories import (
     CONTROLLER,
     FollowJointTrajectoryAction,
     fill_state,
     goal_tolerances,
     trajectory_request,
 )
+from rpbi.world.actions import RecordedTrajectory
+
+from .trajectory_commands import followers_with_control_msgs
 
 log = logging.getLogger(__name__)
 
@@ -44,25 +44,25 @@ ACTION = Service(
     None,
     followers_with_control_msgs,
 )
-MOST_TASKS = 100
-"""Tasks that may wait before feedback is left out, as it would pile up in a world that runs much too fast."""
+MAX_TASKS = 100
+"""Largest number of waiting tasks; beyond it, feedback is dropped."""
 LONGEST_END_S = 5.0
-"""How long closing waits for the last answers [s]."""
+"""Longest wait for the last answers when closing [s]."""
 
 
 class StampedActionServer(ActionServer):
     """An action server for a node that does not use ROS time.
 
-    actionlib takes all stamps and its timer from rospy, which in the simulator is the wall clock whatever
-    `use_sim_time` says: right for the timer, not for the stamps. It also hands messages to threads that may lose the
-    last ones when the server closes; here they leave at once.
+    actionlib has all stamps and its timer from rospy, which in the simulator is the wall clock regardless of
+    `use_sim_time`: right for the timer, not for the stamps. It also passes messages to threads that may lose the last
+    ones when the server closes; here they are sent at once.
 
     Args:
         name: Name of the action.
         action_type: Its ROS type.
         clock: The world's clock.
-        take_goal: Takes the handle of a new goal; it must return at once.
-        take_cancel: Takes the handle of a goal that is to be cancelled; it must return at once.
+        on_goal: Called with the handle of a new goal; it must return at once.
+        on_cancel: Called with the handle of a goal to cancel; it must return at once.
     """
 
     def __init__(
@@ -70,10 +70,10 @@ class StampedActionServer(ActionServer):
         name: str,
         action_type: type,
         clock: Clock,
-        take_goal: Callable[[ServerGoalHandle], None],
-        take_cancel: Callable[[ServerGoalHandle], None],
+        on_goal: Callable[[ServerGoalHandle], None],
+        on_cancel: Callable[[ServerGoalHandle], None],
     ) -> None:
-        super().__init__(name, action_type, take_goal, take_cancel, auto_start=False)
+        super().__init__(name, action_type, on_goal, on_cancel, auto_start=False)
         self._clock = clock
 
     def initialize(self) -> None:
@@ -108,7 +108,7 @@ def open_trajectory_action(context: BodyContext) -> Callable[[], None] | None:
     if FollowJointTrajectoryAction is None:
         log.warning(
             "%s: rpbi/%s/%s has its topics only: the action follow_joint_trajectory and the service query_state need "
-            "control_msgs, which is not installed (docs/trajectories.md tells how)",
+            "control_msgs, which is not installed (see docs/trajectories.md)",
             context.name,
             context.name,
             CONTROLLER,
@@ -134,8 +134,8 @@ def _answer_before_shutdown() -> None:
 class TrajectoryAction:
     """Serves `follow_joint_trajectory` of one robot.
 
-    actionlib holds its lock while it calls back, and takes it to answer. So neither the simulation thread answers a
-    goal nor a callback waits for the simulation thread: both leave what is to be done to a thread of the action's own.
+    actionlib holds one lock during callbacks and answers. To avoid a deadlock, neither the simulation thread answers
+    goals nor do callbacks wait for the simulation thread: both leave tasks to a thread of the action's own.
     """
 
     def __init__(self, context: BodyContext) -> None:
@@ -147,8 +147,8 @@ class TrajectoryAction:
             ACTION.name.format(name=context.name),
             ACTION.service_type,
             context.world.clock,
-            take_goal=lambda goal: self._tasks.put(lambda: self._begin(goal)),
-            take_cancel=lambda goal: self._tasks.put(lambda: self._cancel(goal)),
+            on_goal=lambda goal: self._tasks.put(lambda: self._begin(goal)),
+            on_cancel=lambda goal: self._tasks.put(lambda: self._cancel(goal)),
         )
         self._thread.start()
         self._server.start()
@@ -179,9 +179,9 @@ class TrajectoryAction:
             goal.set_canceled(self._result(ErrorCode.SUCCESSFUL, "cancelled before it began"))
             return
 
-        def feed(state: ControllerState) -> None:
+        def feed(state: TrajectoryStateSample) -> None:
             stamp_ns = self._context.world.clock.stamp_ns
-            if self._tasks.qsize() < MOST_TASKS:
+            if self._tasks.qsize() < MAX_TASKS:
                 self._tasks.put(lambda: goal.publish_feedback(self._feedback(state, stamp_ns)))
 
         clock, message = self._context.world.clock, goal.get_goal()
@@ -239,7 +239,7 @@ class TrajectoryAction:
             log.warning("%s: goal aborted: %s", self._context.name, message)
             goal.set_aborted(result, message)
 
-    def _feedback(self, state: ControllerState, stamp_ns: int) -> Any:
+    def _feedback(self, state: TrajectoryStateSample, stamp_ns: int) -> Any:
         return fill_state(self._server.ActionFeedback().feedback, state, stamp_ns)
 
     def _result(self, code: ErrorCode, message: str) -> Any:

@@ -7,12 +7,11 @@ from trajectory_msgs.msg import JointTrajectory
 
 from rpbi.bodies import Body
 from rpbi.bodies.robots.robot import Robot
-from rpbi.control.trajectories.trajectory import State
-from rpbi.engine.actions import RecordedTrajectory
+from rpbi.control.trajectories.trajectory import DesiredState
 from rpbi.engine.clock import NS_PER_S
-from rpbi.ros.services.body_context import BodyContext
-
-from .trajectory_messages import QueryTrajectoryState, trajectory_request
+from rpbi.ros.body_context import BodyContext
+from rpbi.ros.messages.trajectories import QueryTrajectoryState, trajectory_request
+from rpbi.world.actions import RecordedTrajectory
 
 
 def followers(body: Body) -> Sequence[str]:
@@ -43,7 +42,7 @@ def query_state(context: BodyContext, request: Any) -> Any:
     follower, clock = context.body.follower, context.world.clock
     stamp_ns = request.time.to_nsec()
 
-    def desired() -> State:
+    def desired() -> DesiredState:
         return follower.desired(clock.time_s + (stamp_ns - clock.stamp_ns) / NS_PER_S)
 
     state = context.ask_body(desired)

@@ -1,1 +1,1 @@
-"""What the simulator is asked for: services of the node and of each body."""
+"""Services of the node and of each body."""

@@ -27,7 +27,9 @@ from rpbi.bodies.robots.jointed import JointedBody
 from rpbi.bodies.robots.robot import Robot
 from rpbi.engine.inputs import PoseInput, check_pose
 from rpbi.geometry import Pose
+from rpbi.ros.body_context import BodyContext
 from rpbi.ros.endpoints import Answer, Service, Topic, of, serve, subscribe
+from rpbi.ros.messages.trajectories import CONTROLLER, QueryTrajectoryState
 from rpbi.ros.requests import Requests
 from rpbi.ros.robots.controllers import controllers, robots_with_controllers, set_gains, switch_controllers
 from rpbi.ros.robots.ik import inverse_kinematics, move_by_ik, moved_by_ik
@@ -43,27 +45,22 @@ from rpbi.ros.robots.motion import (
 )
 from rpbi.ros.robots.trajectory_action import open_trajectory_action
 from rpbi.ros.robots.trajectory_commands import follow_command, followers, followers_with_control_msgs, query_state
-from rpbi.ros.robots.trajectory_messages import CONTROLLER, QueryTrajectoryState
 from rpbi.ros.simulation import Simulation
 from rpbi.sensors.filters import Zeroing
 
-from .body_context import BodyContext
-
 SAMPLES = 100
-"""How many samples of a force-torque sensor are averaged."""
+"""Number of samples of a force-torque sensor that are averaged."""
 LOOK_AGAIN_AFTER_S = 0.2
-"""How often it is seen whether samples still come [s] of wall time."""
+"""Period of checks whether samples still come [s] of wall time."""
 LONGEST_ZEROING_S = 60.0
 """Wall time within which all samples come [s]; beyond it, the old zero stays."""
 
 
 def set_pose(context: BodyContext, request: SetTransformRequest) -> Answer:
-    """Puts the base link at a pose in the world, at rest.
-
-    Its URDF frame is put there, whatever is in the way.
+    """Sets the URDF frame of the base link to a pose in the world, at rest, even where other bodies are.
 
     Raises:
-        ValueError: If the pose is not finite, or the body follows a TF frame, which would take it back.
+        ValueError: If the pose is not finite, or the body follows a TF frame.
     """
     position, quat = request.transform.translation, request.transform.rotation
     pose = check_pose(Pose((position.x, position.y, position.z), (quat.x, quat.y, quat.z, quat.w)))
@@ -80,7 +77,7 @@ def force_torque_sensors(body: Body) -> list[str]:
 
 
 def zero_force_torque(context: BodyContext, _: Any) -> tuple[()]:
-    """Takes the mean of the next 100 samples of that force-torque sensor for zero.
+    """Zeroes that force-torque sensor to the mean of its next 100 samples.
 
     Raises:
         InterfaceError: If the simulation is stopped or the sensor is off, before or meanwhile, the robot goes, or the
@@ -154,7 +151,7 @@ BODY_PARTS: tuple[Callable[[BodyContext], Callable[[], None] | None], ...] = (
     publish_description,
     open_trajectory_action,
 )
-"""What is neither a service nor a topic: opens it for a body that has it, and returns what closes it."""
+"""Functions that open everything else for a body that has it, and return its close function."""
 
 
 class BodyEndpoints:

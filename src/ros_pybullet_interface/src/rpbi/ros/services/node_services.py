@@ -14,6 +14,7 @@ from std_srvs.srv import Trigger
 from custom_ros_tools.config import load_config, load_configs
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
 from custom_ros_tools.schema.type_names import shown
+from robot_model.asset_files import find_file
 from ros_pybullet_interface.msg import ObjectDynamics, PybulletObject
 from ros_pybullet_interface.srv import (
     AddPybulletObject,
@@ -37,7 +38,7 @@ from ros_pybullet_interface.srv import (
 )
 from ros_pybullet_interface.srv import ChangeDynamics as ChangeDynamicsService
 from ros_pybullet_interface.srv import SetGravity as SetGravityService
-from rpbi.bodies import kind_of
+from rpbi.bodies import BODY_TYPES
 from rpbi.bodies.collision import CollisionObject
 from rpbi.bodies.dynamic import DynamicObject
 from rpbi.bodies.dynamics import LinkDynamics, difference
@@ -45,25 +46,24 @@ from rpbi.bodies.robots.robot import Robot
 from rpbi.bodies.soft import SoftObject
 from rpbi.bodies.urdf_object import UrdfObject
 from rpbi.bodies.visual import VisualObject
-from rpbi.config.asset_files import find_file
-from rpbi.config.loading import load_object, type_of
 from rpbi.config.object_entry import FILE, parse_object_entry
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.config.pybullet_world_models import SetGravity, SetPhysicsEngineParameter
 from rpbi.config.sensors import RgbdSensorConfig
 from rpbi.engine.clock import NS_PER_S
-from rpbi.ros.endpoints import MOST_BYTES, Answer, Service
+from rpbi.ros.endpoints import MAX_BYTES, Answer, Service
 from rpbi.ros.headers import to_ros_time
-from rpbi.ros.object_lifecycle import ObjectLifecycle
 from rpbi.ros.publishers.sample_topics import address
 from rpbi.ros.requests import Requests
 from rpbi.ros.simulation import Simulation
+from rpbi.world.loading import load_object, type_of
 
-from .hands import apply_wrench, attach, detach
+from .attachments import apply_wrench, attach, detach
+from .object_lifecycle import ObjectLifecycle
 
 log = logging.getLogger(__name__)
 
-MOST_STEPS = 1_000_000
+MAX_STEPS = 1_000_000
 """Ticks of one request, which is answered when they are done."""
 YAML_SUFFIXES = (".yaml", ".yml")
 NO_FOLDER = "~config"
@@ -84,9 +84,9 @@ class NodeContext(NamedTuple):
 
     Attributes:
         simulation: The loop that runs the world.
-        ask: Reaches the simulation thread.
-        objects: What comes and goes.
-        loading: What reading an object's file needs to know of the world, see `load_object`.
+        ask: Calls a function in the simulation thread.
+        objects: Objects that are added and removed.
+        loading: Context for the files of objects, see `load_object`.
     """
 
     simulation: Simulation
@@ -108,17 +108,17 @@ def _stop(node: NodeContext, _: Any) -> Answer:
 
 
 def _step(node: NodeContext, _: Any) -> Answer:
-    """Goes one tick on, if the world stands still; the message is `tick N, stamp S` [s]."""
+    """Advances by a tick, if the world stands still; the message is `tick N, stamp S` [s]."""
     tick, stamp_ns = node.ask(node.simulation.step)
     seconds, nanoseconds = divmod(stamp_ns, NS_PER_S)
     return Answer(True, f"tick {tick}, stamp {seconds}.{nanoseconds:09d}")
 
 
 def _step_n(node: NodeContext, request: StepNRequest) -> tuple[bool, str, int, genpy.Time]:
-    """Goes many ticks on, a million at most, as fast as it goes, if the world stands still."""
+    """Advances by many ticks, a million at most, as fast as possible, if the world stands still."""
     try:
-        if request.steps > MOST_STEPS:
-            raise InterfaceError(f"steps: expected at most {MOST_STEPS}, got {request.steps}; ask again for more")
+        if request.steps > MAX_STEPS:
+            raise InterfaceError(f"steps: expected at most {MAX_STEPS}, got {request.steps}; ask again for more")
         tick, stamp_ns = node.ask.wait_for(node.ask(lambda: node.simulation.step_n(request.steps)))
         return True, f"{request.steps} ticks done", tick, to_ros_time(stamp_ns)
     except InterfaceError as error:
@@ -166,7 +166,7 @@ def _read_object(node: NodeContext, asked: PybulletObject) -> tuple[dict[str, An
     """
     if asked.filename:
         path = _find(node, asked.filename, "filename")
-        return load_config(path, MOST_BYTES), asked.filename, path
+        return load_config(path, MAX_BYTES), asked.filename, path
     if asked.config:
         return _read_text(node, asked.config, "config")
     raise InterfaceError("expected a filename or a config; got neither")
@@ -174,7 +174,7 @@ def _read_object(node: NodeContext, asked: PybulletObject) -> tuple[dict[str, An
 
 def _read_text(node: NodeContext, text: str, key: str) -> tuple[dict[str, Any], str, str]:
     """Does the same with YAML text under a key: all of it, or `file` and the keys that differ."""
-    data = load_configs(text, key, MOST_BYTES)
+    data = load_configs(text, key, MAX_BYTES)
     if FILE not in data:
         return data, key, NO_FOLDER
     try:
@@ -182,7 +182,7 @@ def _read_text(node: NodeContext, text: str, key: str) -> tuple[dict[str, Any], 
     except ValueError as error:
         raise InterfaceError(f"{FILE}: {error}") from None
     path = _find(node, entry.file, FILE)
-    return entry.apply_overrides(load_config(path, MOST_BYTES)), entry.file, path
+    return entry.apply_overrides(load_config(path, MAX_BYTES)), entry.file, path
 
 
 def _add_camera(node: NodeContext, request: SetStringRequest) -> Answer:
@@ -194,7 +194,7 @@ def _add_camera(node: NodeContext, request: SetStringRequest) -> Answer:
 
 
 def _find(node: NodeContext, name: str, key: str) -> str:
-    """Returns the path of the YAML file that a key names; a service tells nothing of others."""
+    """Returns the path of the YAML file that a key names; a service reveals no other files."""
     if not name.lower().endswith(YAML_SUFFIXES):
         raise InterfaceError(f"{key}: expected the name of a YAML file ({', '.join(YAML_SUFFIXES)}), got {shown(name)}")
     try:
@@ -213,7 +213,7 @@ def _list_objects(node: NodeContext, _: Any) -> tuple[list[str], list[str]]:
     """Returns names and types of all objects and cameras."""
     world = node.simulation.world
     bodies, cameras = node.ask(lambda: (dict(world.bodies), list(world.cameras)))
-    types = [kind_of(body) for body in bodies.values()] + ["rgbd_sensor"] * len(cameras)
+    types = [BODY_TYPES.name_of(body) for body in bodies.values()] + ["rgbd_sensor"] * len(cameras)
     return [*bodies, *cameras], types
 
 
@@ -240,7 +240,7 @@ def _change_object_dynamics(node: NodeContext, request: ChangeObjectDynamicsRequ
 
 def _change_dynamics(node: NodeContext, request: ChangeDynamicsRequest) -> Answer:
     """Changes the keys of `changeDynamics` that the YAML text in it has."""
-    change = ChangeDynamics.parse(load_configs(request.config, "config", MOST_BYTES), "config")
+    change = ChangeDynamics.parse(load_configs(request.config, "config", MAX_BYTES), "config")
     keys = ", ".join(change.kwargs())
     if not keys:
         raise InterfaceError("config: expected keys of changeDynamics, such as lateralFriction; got none")
@@ -252,7 +252,7 @@ def _set_real_time_factor(node: NodeContext, request: SetRealTimeFactorRequest) 
     """Changes how fast the world runs; a reset leaves that as it is."""
     before = node.simulation.real_time_factor
     node.ask(lambda: node.simulation.set_real_time_factor(request.real_time_factor))
-    stamps = "" if node.simulation.world.clock.simulated else "; stamps are wall time and tell nothing of it"
+    stamps = "" if node.simulation.world.clock.simulated else "; stamps are wall time and do not show it"
     return Answer(True, f"{request.real_time_factor:g}, was {before:g}{stamps}")
 
 
@@ -266,7 +266,7 @@ def _set_gravity(node: NodeContext, request: SetGravityRequest) -> Answer:
 
 def _set_engine_parameter(node: NodeContext, request: SetStringRequest) -> Answer:
     """Changes the keys of `setPhysicsEngineParameter` that the YAML text in it has, until the next reset."""
-    data = load_configs(request.data, "data", MOST_BYTES)
+    data = load_configs(request.data, "data", MAX_BYTES)
     if "fixedTimeStep" in data:
         raise InterfaceError("data: fixedTimeStep: cannot change while the world runs; write timeStep in the main file")
     change = SetPhysicsEngineParameter.parse(data, "data")

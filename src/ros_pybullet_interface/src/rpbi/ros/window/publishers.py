@@ -1,4 +1,4 @@
-"""What happens in PyBullet's window, and what it shows, as topics."""
+"""Events and image of PyBullet's window as topics."""
 
 import struct
 import time
@@ -16,7 +16,7 @@ from ros_pybullet_interface.msg import MouseEvent as MouseMessage
 from rpbi.engine.clock import Clock
 from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import to_ros_time
-from rpbi.window import DOWN, PRESSED, RELEASED, KeyEvent, MouseEvent, Window
+from rpbi.window import DOWN, PRESSED, RELEASED, MouseEvent, Window, WindowKeyEvent
 
 KEYBOARD = Topic(
     "rpbi/keyboard", KeyboardEvent, meaning="Keys; with `enable_keyboard_publisher`.", key="enable_keyboard_publisher"
@@ -27,7 +27,7 @@ MOUSE = Topic(
 IMAGE = Topic(
     "rpbi/visualizer_image",
     Image,
-    meaning="What the window shows, `rgb8`; at most `publish_visualizer_image_hz`.",
+    meaning="Image of the window, `rgb8`; at most `publish_visualizer_image_hz`.",
     key="publish_visualizer_image_hz",
 )
 NUMBERS = Topic(
@@ -37,9 +37,9 @@ NUMBERS = Topic(
     key="publish_visualizer_image_hz",
 )
 LARGEST_SHARE = 0.25
-"""Of wall time, that drawing may take from physics: images come less often rather than that."""
+"""Largest share of wall time for drawing; images come less often rather than exceed it."""
 HELD_HZ = 60.0
-"""How often a key that is held is published [s] of wall time; what happens to keys is published at once."""
+"""Rate at which a held key is published [Hz] of wall time; presses and releases are published at once."""
 KEY_WORDS = {DOWN: "key_is_down", PRESSED: "", RELEASED: "key_was_released"}
 MOUSE_WORDS = {1: "mouse_move_event", 2: "mouse_button_event"}
 NO_BUTTON = 255
@@ -80,7 +80,7 @@ class GuiEvents:
             if is_due or event.state != DOWN:
                 publisher.publish(self._key_message(event))
 
-    def _key_message(self, event: KeyEvent) -> KeyboardEvent:
+    def _key_message(self, event: WindowKeyEvent) -> KeyboardEvent:
         message = KeyboardEvent(key=event.key, state=event.state, state_str=KEY_WORDS[event.state])
         message.header.stamp = to_ros_time(self._clock.stamp_ns)
         return message
@@ -141,7 +141,7 @@ class VisualizerImage:
 
 
 class _Numbers(Int64MultiArray):
-    """Red, green, blue and alpha of each pixel; written at once, since one by one takes a tenth of a second."""
+    """Red, green, blue and alpha of each pixel; serialised in one piece, since one by one takes 0.1 s."""
 
     def __init__(self, rgba: npt.NDArray[np.uint8]) -> None:
         super().__init__()

@@ -19,11 +19,11 @@ log = logging.getLogger(__name__)
 
 
 WINDOW_TOPICS = (CAMERA, KEYBOARD, MOUSE, IMAGE, NUMBERS)
-"""What it publishes."""
+"""Topics of the window."""
 
 
 class WindowTopics:
-    """Opens the topics of the window that the configuration asks for, and says so if there is no window."""
+    """Opens the configured topics of the window, and warns if there is no window."""
 
     def __init__(self, world: World) -> None:
         self._camera = DebugCamera(world.window, world.config.resetDebugVisualizerCamera)

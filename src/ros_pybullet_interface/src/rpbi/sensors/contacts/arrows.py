@@ -1,10 +1,10 @@
 """Contact forces as arrows, for RViz."""
 
-from rpbi.bodies.body import Body
+from robot_model.geometry import plus, scaled
 from rpbi.config.sensors import ContactsConfig
-from rpbi.geometry import plus, scaled
 from rpbi.samples import ContactArrowsSample
-from rpbi.sensors.sensor import SensedWorld, Sensor
+from rpbi.sensors.sensed import SensedBody, SensedWorld
+from rpbi.sensors.sensor import Sensor
 
 from .contacts import ContactReader, ContactsSensor
 from .mean import MeanContactsSensor
@@ -14,15 +14,16 @@ class ContactArrowsSensor(Sensor):
     """An arrow for each force on a body in the last tick."""
 
     sample_type = ContactArrowsSample
+    ros_topic = "rpbi.ros.publishers.sample_topics:CONTACT_ARROWS"
 
-    def __init__(self, body: Body, hz: float, metres_per_newton: float) -> None:
+    def __init__(self, body: SensedBody, hz: float, metres_per_newton: float) -> None:
         super().__init__(body.name, hz)
         self._body = body
         self._reader: ContactReader | None = None
         self._metres_per_newton = metres_per_newton
 
     def enter(self, world: SensedWorld) -> None:
-        """Takes what the world knows of all contacts."""
+        """Stores the world's contacts."""
         self._reader = world.contacts
 
     def read(self, tick: int) -> ContactArrowsSample:
@@ -35,7 +36,7 @@ class ContactArrowsSensor(Sensor):
         return ContactArrowsSample(self.name, tuple((start, end) for start, end in arrows if start != end))
 
 
-def contact_sensors(body: Body, config: ContactsConfig | None) -> tuple[Sensor, ...]:
+def contact_sensors(body: SensedBody, config: ContactsConfig | None) -> tuple[Sensor, ...]:
     """Returns the sensors of a body's contacts; none if they are not asked for."""
     if config is None:
         return ()

@@ -7,11 +7,11 @@ from math import dist, isfinite
 from typing import Any
 
 from custom_ros_tools.errors import PhysicsError
-from rpbi.bodies.body import Body
+from robot_model.geometry import scaled
 from rpbi.engine.client import Client
-from rpbi.geometry import scaled
 from rpbi.samples import ContactPoint, ContactsSample
-from rpbi.sensors.sensor import SensedWorld, Sensor
+from rpbi.sensors.sensed import SensedBody, SensedWorld
+from rpbi.sensors.sensor import Sensor
 
 Touch = tuple[Any, ...]
 """A contact point as PyBullet's `getContactPoints` returns it."""
@@ -20,20 +20,20 @@ Touch = tuple[Any, ...]
 class ContactReader:
     """Contacts of the last tick, by body; PyBullet is asked once a tick, for all of them."""
 
-    def __init__(self, pb: Client, bodies: Mapping[str, Body]) -> None:
+    def __init__(self, pb: Client, bodies: Mapping[str, SensedBody]) -> None:
         self._pb, self._bodies = pb, bodies
         self._touches: dict[int, list[list[Touch]]] | None = None
         """Contact points by body id, as either end, those between the same two links together; None if PyBullet has
         to be asked."""
-        self._by_id: dict[int, Body] = {}
+        self._by_id: dict[int, SensedBody] = {}
         self._factor = 1.0
         self._are_finite = True
 
-    def outdate(self) -> None:
+    def invalidate(self) -> None:
         """Has PyBullet asked again: the world has moved on or has other bodies."""
         self._touches = None
 
-    def sample(self, body: Body, tick: int) -> ContactsSample:
+    def sample(self, body: SensedBody, tick: int) -> ContactsSample:
         """Returns where a body touches others or, with one of its links, another of its own, in the last tick.
 
         Raises:
@@ -68,15 +68,15 @@ class ContactReader:
 
 
 def _finite(touches: Iterable[Touch]) -> bool:
-    """Tells whether all numbers of contact points are finite: `dist` is, if those of both its vectors are."""
+    """Returns whether all numbers of contact points are finite: `dist` is, if those of both its vectors are."""
     sizes = [dist(t[5], t[6]) + dist(t[7], t[11]) + dist(t[7], t[13]) + t[8] + t[9] + t[10] + t[12] for t in touches]
     return isfinite(sum(sizes))
 
 
 def _points(
-    body: Body, touches: list[list[Touch]], by_id: Mapping[int, Body], factor: float
+    body: SensedBody, touches: list[list[Touch]], by_id: Mapping[int, SensedBody], factor: float
 ) -> tuple[ContactPoint, ...]:
-    """Returns contacts as one of their bodies sees them; PyBullet tells what the second one does to the first."""
+    """Returns contacts as seen from one of their bodies; PyBullet reports the effect of the second on the first."""
     points = []
     for together in touches:
         _, first, second, first_link, second_link, *_ = together[0]
@@ -103,14 +103,15 @@ class ContactsSensor(Sensor):
     """All contact points of a body in the last tick."""
 
     sample_type = ContactsSample
+    ros_topic = "rpbi.ros.publishers.sample_topics:CONTACTS"
 
-    def __init__(self, body: Body, hz: float) -> None:
+    def __init__(self, body: SensedBody, hz: float) -> None:
         super().__init__(body.name, hz)
         self._body = body
         self._reader: ContactReader | None = None
 
     def enter(self, world: SensedWorld) -> None:
-        """Takes what the world knows of all contacts."""
+        """Stores the world's contacts."""
         self._reader = world.contacts
 
     def read(self, tick: int) -> ContactsSample:

@@ -4,9 +4,9 @@ from collections.abc import Iterable
 from functools import partial, reduce
 from math import hypot
 
-from rpbi.bodies.body import Body
-from rpbi.geometry import Vector, cross, minus, plus, scaled
+from robot_model.geometry import Vector, cross, minus, plus, scaled
 from rpbi.samples import ContactPoint, ContactsSample
+from rpbi.sensors.sensed import SensedBody
 
 from .contacts import ContactsSensor
 
@@ -14,7 +14,7 @@ from .contacts import ContactsSensor
 class MeanContactsSensor(ContactsSensor):
     """Contacts of a body as means over all ticks since the last sample, one for each two links that touched."""
 
-    def __init__(self, body: Body, hz: float) -> None:
+    def __init__(self, body: SensedBody, hz: float) -> None:
         super().__init__(body, hz)
         self._ticks: list[ContactsSample] = []
         self._latest: ContactsSample | None = None

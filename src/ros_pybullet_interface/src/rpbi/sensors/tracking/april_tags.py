@@ -23,29 +23,31 @@ from custom_ros_tools.schema import (
     TopicName,
     optional,
 )
-from rpbi.geometry import Pose, Vector, dot, plus, rotated
+from robot_model.geometry import Vector, dot, plus
+from rpbi.geometry import Pose, rotated
 from rpbi.samples import AprilTagsSample, SeenTag
 from rpbi.sensors.link_pose import index_of_link
 from rpbi.sensors.rgbd import RgbdSensor
-from rpbi.sensors.sensor import BodySensor, SensedWorld
+from rpbi.sensors.sensed import SensedWorld
+from rpbi.sensors.sensor import BodySensor
 
-from .imperfections import Delay, Occlusion, PoseNoise, TrackingConfig
+from .imperfections import Delay, Occlusion, PoseNoise, TrackingSensorConfig
 
 log = logging.getLogger(__name__)
 
 SURFACE_M = 0.005
-"""How far below a body's surface a tag may lie and still be seen [m]."""
+"""Largest depth of a visible tag below a body's surface [m]; deeper ones are hidden."""
 
 
 class TagConfig(ConfigModel):
-    """A tag on a body; its frame has x to the right, y up and z towards who looks at it."""
+    """A tag on a body; its frame has x to the right, y up and z towards the viewer."""
 
     id: Count = Field(description="Number of the tag in its family.")
     size: PositiveMetres = Field(description="Side of its black square.")
     body: Name | None = optional("Body that it is on; without it, the one that has the sensor.")
     link: Text | None = optional("Link that it is on; without it, the root link.")
     position: Position = Field((0.0, 0.0, 0.0), description="Its centre in the link's frame.")
-    orientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="How it is turned there, x, y, z, w.")
+    orientation: Quat = Field((0.0, 0.0, 0.0, 1.0), description="Its orientation there, x, y, z, w.")
 
     @property
     def pose(self) -> Pose:
@@ -53,8 +55,8 @@ class TagConfig(ConfigModel):
         return Pose(self.position, self.orientation)
 
 
-class AprilTagsConfig(TrackingConfig):
-    """Which tags a detector knows, and what camera it looks through."""
+class AprilTagsConfig(TrackingSensorConfig):
+    """Tags of a detector, and its camera."""
 
     camera: Name = Field(description="RGB-D camera of the world; its images need not be drawn.")
     topic: TopicName = Field("tag_detections", description="Topic of its detections; each detector has another one.")
@@ -81,7 +83,7 @@ class AprilTagsConfig(TrackingConfig):
 class AprilTagsSensor(BodySensor):
     """Poses of tags in the optical frame of a camera, of those that it sees: before it, large enough, and uncovered.
 
-    What covers a tag is what can be felt, see `occlusion` for what else may hide it.
+    Collision shapes cover tags; for random occlusion see `occlusion`.
     """
 
     Config = AprilTagsConfig
@@ -94,7 +96,7 @@ class AprilTagsSensor(BodySensor):
         self._missing: set[str] = set()
 
     def enter(self, world: SensedWorld) -> None:
-        """Gets to know the world in which the tags and the camera are."""
+        """Stores the world of the tags and the camera."""
         config, dt_ns = self.config, world.clock.dt_ns
         self._world, self._dt_ns = world, dt_ns
         seeds = {tag.id: config.seed_of(f"{self.name}/{tag.id}") + tag.id for tag in config.tags}
@@ -110,7 +112,7 @@ class AprilTagsSensor(BodySensor):
             self._warn_once(self.config.camera, f"no camera '{self.config.camera}'; there is {known}")
         if camera is None or camera.pose is None:
             return None
-        self._delay.take(tick, tuple(self._seen_by(camera, camera.pose, tick)))
+        self._delay.push(tick, tuple(self._seen_by(camera, camera.pose, tick)))
         newest = self._delay.newest(tick)
         if newest is None:
             return None

@@ -1,8 +1,7 @@
-"""What tracking systems do not do well: they are late and noisy, and see not everything."""
+"""Imperfections of tracking systems: latency, noise and occlusion."""
 
 from __future__ import annotations
 
-import math
 import zlib
 from collections import deque
 from typing import Annotated, Generic, TypeVar
@@ -11,8 +10,9 @@ import numpy as np
 from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel, Count, Fraction, NonNegative, Seconds, Unit, optional
+from robot_model.geometry import plus, quaternion_of
 from rpbi.config.sensors import Deviation, SensorConfig
-from rpbi.geometry import Pose, Quaternion, Vector, plus
+from rpbi.geometry import Pose
 from rpbi.sensors.filters import SeededNoise
 
 Measured = TypeVar("Measured")
@@ -25,12 +25,12 @@ class OcclusionConfig(ConfigModel):
     length_s: Seconds = Field(0.5, description="Time is divided into parts of this length, each hidden or not.")
 
 
-class TrackingConfig(SensorConfig):
+class TrackingSensorConfig(SensorConfig):
     """Keys of all sensors that report poses as a tracking system does."""
 
     latency_s: Annotated[NonNegative, Unit("s")] = Field(
         0.0,
-        description="How late poses are reported, in whole samples; their stamps say when they were seen.",
+        description="Delay of reported poses, in whole samples; their stamps are those of the detections.",
     )
     noise_m: Annotated[Deviation, Unit("m")] = Field(
         (0.0, 0.0, 0.0),
@@ -51,7 +51,7 @@ class Occlusion:
     """Hides something by chance; the same at the same tick, whatever was asked before.
 
     Args:
-        config: How often and how long; None is never.
+        config: Its share and length; None is never.
         seed: Seed, 0 or greater.
         dt_s: Length of a tick [s].
     """
@@ -62,7 +62,7 @@ class Occlusion:
         self._seed = seed
 
     def hides(self, tick: int) -> bool:
-        """Tells whether it is hidden at a tick."""
+        """Returns whether it is hidden at a tick."""
         if not self._share:
             return False
         return bool(np.random.default_rng((self._seed, tick // self._ticks)).random() < self._share)
@@ -76,42 +76,36 @@ class PoseNoise:
         seed: Seed, 0 or greater.
     """
 
-    def __init__(self, config: TrackingConfig, seed: int) -> None:
+    def __init__(self, config: TrackingSensorConfig, seed: int) -> None:
         self._noise = SeededNoise(seed, (*config.noise_m, *[config.noise_rad] * 3), [0.0] * 6)
 
     def on(self, pose: Pose, tick: int) -> Pose:
         """Returns a pose with the noise of a tick on it."""
         x, y, z, *turn = self._noise.at(tick).tolist()
-        rotated = Pose((0.0, 0.0, 0.0), _quaternion(turn)) @ Pose((0.0, 0.0, 0.0), pose.quat_xyzw)
+        rotated = Pose((0.0, 0.0, 0.0), quaternion_of((turn[0], turn[1], turn[2]))) @ Pose(
+            (0.0, 0.0, 0.0), pose.quat_xyzw
+        )
         return Pose(plus(pose.position, (x, y, z)), rotated.quat_xyzw)
 
 
-def _quaternion(turn: list[float]) -> Quaternion:
-    """Returns the quaternion of a rotation vector [rad]."""
-    angle = math.hypot(*turn)
-    half = 0.5 if angle < 1e-9 else math.sin(angle / 2.0) / angle
-    vector: Vector = (half * turn[0], half * turn[1], half * turn[2])
-    return (*vector, math.cos(angle / 2.0))
-
-
 class Delay(Generic[Measured]):
-    """Keeps measurements until they are old enough.
+    """Delays measurements.
 
     Args:
-        ticks: How old they are to be at least.
+        ticks: Smallest age of a measurement that is returned [ticks].
     """
 
     def __init__(self, ticks: int) -> None:
         self._ticks = ticks
         self._waiting: deque[tuple[int, Measured]] = deque()
 
-    def take(self, tick: int, measured: Measured) -> None:
-        """Takes what was measured at a tick, the first time for each tick."""
+    def push(self, tick: int, measured: Measured) -> None:
+        """Appends the measurement of a tick; a second one for the same tick is ignored."""
         if not self._waiting or self._waiting[-1][0] != tick:
             self._waiting.append((tick, measured))
 
     def newest(self, tick: int) -> tuple[int, Measured] | None:
-        """Returns the newest one that is old enough at a tick, and when it was measured; None if there is none yet."""
+        """Returns the newest one that is old enough at a tick with its own tick; None if there is none yet."""
         while len(self._waiting) > 1 and tick - self._waiting[1][0] >= self._ticks:
             self._waiting.popleft()
         first = self._waiting[0] if self._waiting else None

@@ -10,12 +10,13 @@ from custom_ros_tools.schema import Text, optional
 from rpbi.geometry import Pose
 from rpbi.samples import ViconSample
 from rpbi.sensors.link_pose import index_of_link
-from rpbi.sensors.sensor import BodySensor, SensedWorld
+from rpbi.sensors.sensed import SensedWorld
+from rpbi.sensors.sensor import BodySensor
 
-from .imperfections import Delay, Occlusion, PoseNoise, TrackingConfig
+from .imperfections import Delay, Occlusion, PoseNoise, TrackingSensorConfig
 
 
-class ViconConfig(TrackingConfig):
+class ViconConfig(TrackingSensorConfig):
     """A segment of a subject, the body: a rigid part that carries markers."""
 
     link: Text | None = optional("Link that is the segment; without it, the root link.")
@@ -25,7 +26,7 @@ class ViconSensor(BodySensor):
     """Pose of a link of a body in the world, as a motion capture system sees it; while it is hidden, nothing.
 
     Attributes:
-        frames: The TF frame that is reported.
+        tf_frames: The TF frame that is reported.
 
     Raises:
         ConfigError: If the body has no such link.
@@ -42,11 +43,11 @@ class ViconSensor(BodySensor):
             links = [body.link_name(index) for index in (-1, *body.link_indices)]
             message = str(UnknownNameError("link", str(config.link), links))
             raise ConfigError([Problem(body.name, f"sensors.{config.name}.link", message)])
-        self.frames = (f"vicon/{self.name}",)
+        self.tf_frames = (f"vicon/{self.name}",)
         self._noise = PoseNoise(config, config.seed_of(self.name))
 
     def enter(self, world: SensedWorld) -> None:
-        """Gets to know the length of a tick."""
+        """Reads the length of a tick."""
         config, dt_ns = self.config, world.clock.dt_ns
         self._dt_ns = dt_ns
         self._occlusion = Occlusion(config.occlusion, config.seed_of(self.name), dt_ns * 1e-9)
@@ -54,12 +55,12 @@ class ViconSensor(BodySensor):
 
     def read(self, tick: int) -> ViconSample | None:
         """Measures the body, and returns what was measured long enough ago; None if it was hidden then."""
-        self._delay.take(tick, None if self._occlusion.hides(tick) else self._noise.on(self._pose(tick), tick))
+        self._delay.push(tick, None if self._occlusion.hides(tick) else self._noise.on(self._pose(tick), tick))
         newest = self._delay.newest(tick)
         seen_at, pose = newest or (tick, None)
         if pose is None:
             return None
-        return ViconSample(self.name, self.frames[0], pose, (tick - seen_at) * self._dt_ns)
+        return ViconSample(self.name, self.tf_frames[0], pose, (tick - seen_at) * self._dt_ns)
 
     def _pose(self, tick: int) -> Pose:
         pose: Pose = self.body.base_pose() if self._index == -1 else self.body.link_pose(self._index)

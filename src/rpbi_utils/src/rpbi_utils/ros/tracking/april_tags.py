@@ -16,7 +16,7 @@ from custom_ros_tools.ros.lifecycle.parameters import private_config
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.ros.transform_messages import transform_message
-from rpbi.geometry import Pose
+from robot_model.geometry import Pose
 from rpbi_utils.tracking.config import AprilTagNodeConfig
 from rpbi_utils.tracking.tags import Image, TagDetector, tag_poses
 
@@ -59,17 +59,17 @@ class AprilTagNode:
         self._publisher = rospy.Publisher("tag_detections", AprilTagDetectionArray, queue_size=QUEUE_SIZE)
         self._tf = rospy.Publisher("/tf", TFMessage, queue_size=QUEUE_SIZE) if config.publish_tf else None
         self._image_topic = rospy.resolve_name("image_rect")
-        rospy.Subscriber("camera_info", CameraInfo, self._take_calibration, queue_size=1)
-        rospy.Subscriber(self._image_topic, ImageMessage, self._take_image, queue_size=1, buff_size=2**24)
+        rospy.Subscriber("camera_info", CameraInfo, self._on_calibration, queue_size=1)
+        rospy.Subscriber(self._image_topic, ImageMessage, self._on_image, queue_size=1, buff_size=2**24)
 
-    def _take_calibration(self, message: CameraInfo) -> None:
+    def _on_calibration(self, message: CameraInfo) -> None:
         matrix = np.array(message.P).reshape(3, 4)[:, :3]
         if not np.isfinite(matrix).all() or matrix[0, 0] <= 0.0 or matrix[1, 1] <= 0.0:
             self._warn(rospy.resolve_name("camera_info"), f"message refused: no focal length in P, got {message.P}")
             return
         self._camera_matrix = matrix
 
-    def _take_image(self, message: ImageMessage) -> None:
+    def _on_image(self, message: ImageMessage) -> None:
         if self._camera_matrix is None:
             self._warn(self._image_topic, f"images wait for {rospy.resolve_name('camera_info')}")
             return

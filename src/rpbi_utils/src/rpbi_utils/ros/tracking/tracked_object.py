@@ -1,4 +1,4 @@
-"""`tracked_object_node.py`: what Vicon or an AprilTag detector sees, as smooth TF frames that objects follow."""
+"""`tracked_object_node.py`: detections of Vicon or an AprilTag detector as smooth TF frames that objects follow."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
 from custom_ros_tools.ros.tf_listener import TfListener
 from custom_ros_tools.ros.transform_messages import as_pose, transform_message
+from robot_model.geometry import Pose
 from rpbi.engine.inputs import check_pose
-from rpbi.geometry import Pose
 from rpbi_utils.tracking.config import TrackedObjectConfig, TrackingNodeConfig
 from rpbi_utils.tracking.tracker import PoseTracker
 
 QUEUE_SIZE = 100
 LOOKS_HZ = 10.0
-"""How often it is looked whether an object is lost [Hz]."""
+"""Rate of the check for lost objects [Hz]."""
 
 
 class TrackedObject:
@@ -48,7 +48,7 @@ class TrackedObject:
             rospy.loginfo("%s: is seen", self.config.name)
 
     def tell_if_lost(self) -> None:
-        """Tells once that nothing has come of it for too long."""
+        """Reports once that no pose has arrived for too long."""
         if self._is_seen and time.monotonic() - self._seen_s > self._timeout_s:
             self._is_seen = False
             rospy.logwarn("%s: is lost: no pose for %g s; nothing is broadcast", self.config.name, self._timeout_s)
@@ -76,35 +76,35 @@ class TrackedObjectNode:
         for each in self._objects:
             if each.config.vicon is not None:
                 topic = f"vicon/{each.config.vicon.strip('/')}"
-                self._subscribe(topic, TransformStamped, lambda message, each=each: self._take_vicon(each, message))
+                self._subscribe(topic, TransformStamped, lambda message, each=each: self._on_vicon(each, message))
         for topic, by_ids in by_tags.items():
-            self._subscribe(topic, AprilTagDetectionArray, partial(self._take_tags, by_ids))
-        WallTimer(LOOKS_HZ, self._tell_what_is_lost)
+            self._subscribe(topic, AprilTagDetectionArray, partial(self._on_tags, by_ids))
+        WallTimer(LOOKS_HZ, self._report_lost)
 
-    def _subscribe(self, topic: str, message_type: type, take: object) -> None:
-        rospy.Subscriber(topic, message_type, take, queue_size=QUEUE_SIZE, tcp_nodelay=True)
+    def _subscribe(self, topic: str, message_type: type, on_message: object) -> None:
+        rospy.Subscriber(topic, message_type, on_message, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
-    def _tell_what_is_lost(self) -> None:
+    def _report_lost(self) -> None:
         for each in self._objects:
             each.tell_if_lost()
 
-    def _take_vicon(self, tracked: TrackedObject, message: TransformStamped) -> None:
-        self._take(tracked, message.header, as_pose(message.transform))
+    def _on_vicon(self, tracked: TrackedObject, message: TransformStamped) -> None:
+        self._observe(tracked, message.header, as_pose(message.transform))
 
-    def _take_tags(self, by_ids: Mapping[tuple[int, ...], TrackedObject], message: AprilTagDetectionArray) -> None:
+    def _on_tags(self, by_ids: Mapping[tuple[int, ...], TrackedObject], message: AprilTagDetectionArray) -> None:
         for detection in message.detections:
             tracked = by_ids.get(_key(detection.id))
             if tracked is not None:
                 stamped = detection.pose
-                self._take(tracked, stamped.header if stamped.header.frame_id else message.header, stamped.pose.pose)
+                self._observe(tracked, stamped.header if stamped.header.frame_id else message.header, stamped.pose.pose)
 
-    def _take(self, tracked: TrackedObject, header: Header, message: PoseMessage) -> None:
+    def _observe(self, tracked: TrackedObject, header: Header, message: PoseMessage) -> None:
         config = tracked.config
         try:
-            frame_id = config.frame_id or header.frame_id.strip("/")  # as vicon_bridge sends it, tf2 does not take it
+            frame_id = config.frame_id or header.frame_id.strip("/")  # a message of vicon_bridge is not valid for tf2
             stamp = header.stamp or rospy.Time.now()
             pose = self._in_world(frame_id, stamp) @ _pose_in(message, config.unit) @ config.offset
-            smoothed = tracked.tracker.take(pose, stamp.to_sec())
+            smoothed = tracked.tracker.observe(pose, stamp.to_sec())
         except tf2_ros.TransformException as error:
             self._warn(config.name, f"left out: no TF from '{self._frame_id}' to '{frame_id}': {error}")
             return

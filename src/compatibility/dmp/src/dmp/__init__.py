@@ -1,0 +1,1 @@
+"""The names of the release's package `dmp`; see `motion_primitives`."""

@@ -1,0 +1,226 @@
+"""A command of `./rpbi`, made of a function: its parser, its section of the page, its completion."""
+
+import argparse
+import inspect
+import re
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
+
+from custom_ros_tools.errors import InterfaceError
+
+from .argument import Argument, UsageError
+
+PROGRAM = "./rpbi"
+NAME_WIDTH = 16
+"""Characters for the name of an argument on the page; longer ones are followed by three spaces."""
+_NEGATIVE = re.compile(r"-[\d.]")
+_SECTION = re.compile(r"^(Usage|Args):\n((?:    .*\n|\n)*)", re.MULTILINE)
+
+
+class Parameter(NamedTuple):
+    """A parameter of the function of a command.
+
+    Attributes:
+        name: Its name in Python.
+        argument: Its metadata.
+        kind: Its kind, as `inspect` has it.
+        default: Its default, `inspect.Parameter.empty` without one.
+    """
+
+    name: str
+    argument: Argument
+    kind: Any
+    default: Any
+
+    @property
+    def is_option(self) -> bool:
+        """Whether it is an option, else it stands for words by their place."""
+        return self.kind is inspect.Parameter.KEYWORD_ONLY
+
+    @property
+    def is_switch(self) -> bool:
+        """Whether it is an option without a value."""
+        return self.is_option and self.default is False
+
+    @property
+    def flag(self) -> str:
+        """Name of the option."""
+        return self.argument.flag or f"--{self.name.replace('_', '-')}"
+
+    @property
+    def label(self) -> str:
+        """Name and placeholders on the page."""
+        return (
+            " ".join(filter(None, (self.flag, *self.placeholders))) if self.is_option else " ".join(self.placeholders)
+        )
+
+    @property
+    def placeholders(self) -> tuple[str, ...]:
+        """Placeholders of its words, each once."""
+        return tuple(self.argument.shown.strip("[]").removesuffix(" ...").split())
+
+    @property
+    def words(self) -> int | str | None:
+        """Number of words, as argparse has it."""
+        shown = self.argument.shown
+        if "..." in shown:
+            return "*" if shown.startswith("[") else "+"
+        if not self.is_option and self.default is not inspect.Parameter.empty:
+            return "?"
+        count = len(shown.split())
+        return count if count > 1 else None
+
+
+class Command:
+    """A command.
+
+    The function has an `Argument` in the annotation of each parameter. It returns the text to print, or the exit code.
+    Its docstring has the summary in its first line. Then come paragraphs and examples in any order, a section `Usage:`
+    if the usage does not follow from the signature, and a section `Args:`, whose entries are names of parameters or
+    literal names of arguments.
+
+    Attributes:
+        name: Its name, that of the function.
+        summary: First line of its help.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+        self.name = function.__name__
+        doc = f"{inspect.getdoc(function)}\n"
+        sections = {match[1]: match[2] for match in _SECTION.finditer(doc)}
+        self._usage, self._args = (inspect.cleandoc(sections.get(name, "")) for name in ("Usage", "Args"))
+        self.summary, _, text = _SECTION.sub("", doc).partition("\n")
+        self._text = text.strip("\n")
+
+    @cached_property
+    def parameters(self) -> list[Parameter]:
+        """The parameters of its function."""
+        hints = get_type_hints(self._function, include_extras=True)
+        found = []
+        for name, each in inspect.signature(self._function).parameters.items():
+            if get_origin(hints[name]) is not Annotated:
+                raise TypeError(f"{self.name}: {name}: expected Annotated[..., Argument(...)], got {hints[name]}")
+            argument = next(one for one in get_args(hints[name]) if isinstance(one, Argument))
+            found.append(Parameter(name, argument, each.kind, each.default))
+        return found
+
+    @property
+    def section(self) -> str:
+        """Its section of the page, without the heading, which is its help too."""
+        usage = self._usage or " ".join((PROGRAM, self.name, *self._usage_words()))
+        blocks = [_indented(usage), self.summary, _indented("\n".join(self._rows())), self._text]
+        return "\n\n".join(filter(None, blocks)) + "\n"
+
+    def completions(self) -> Iterator[str]:
+        """Yields a line for each argument that completion knows more of than its name: the command, where, and what.
+
+        Where is the number of the word, `*` for the last one that is no option, or the option before it.
+        """
+        places = [each for each in self.parameters if not each.is_option]
+        for each in self.parameters:
+            argument = each.argument
+            where = each.flag if each.is_option else "*" if each is places[-1] else str(places.index(each) + 1)
+            if argument.choices is not None:
+                yield f"{self.name} {where} words {' '.join(argument.choices())}"
+            if argument.offers:
+                yield f"{self.name} {where} {argument.offers}"
+            if argument.files:
+                yield f"{self.name} {where} files {argument.files}"
+
+    def run(self, words: Sequence[str]) -> int:
+        """Runs the command with its words.
+
+        Returns:
+            The exit code: 0, 1 if something went wrong, with the message on stderr, or that of the function.
+        """
+        if {"-h", "--help"} & set(words):
+            print(self.section, end="")
+            return 0
+        try:
+            result = self._function(*words) if self._is_raw else self._call(words)
+        except (InterfaceError, OSError) as error:
+            if isinstance(error, UsageError):
+                self._parser().error(str(error))
+            print(f"{self.name}: {error}", file=sys.stderr)
+            return 1
+        if isinstance(result, str):
+            print(result)
+        return result if isinstance(result, int) else 0
+
+    @property
+    def _is_raw(self) -> bool:
+        return any(each.argument.is_raw for each in self.parameters)
+
+    def _call(self, words: Sequence[str]) -> Any:
+        # Words of ROS such as __name:=x are not ours; to argparse, a word with a space before it is no option
+        ours = [f" {word}" if _NEGATIVE.match(word) else word for word in words if not word.startswith("__")]
+        parsed = vars(self._parser().parse_args(ours))
+        arguments: list[Any] = []
+        for each in self.parameters:
+            if not each.is_option:
+                value = parsed.pop(each.name)
+                arguments += value if each.kind is inspect.Parameter.VAR_POSITIONAL else [value]
+        return self._function(*arguments, **parsed)
+
+    def _parser(self) -> argparse.ArgumentParser:
+        parser = argparse.ArgumentParser(prog=f"{PROGRAM} {self.name}", description=self.summary)
+        groups: dict[str, Any] = {"": parser}
+        for each in self.parameters:
+            argument = each.argument
+            group = groups.setdefault(argument.excludes, None) or parser.add_mutually_exclusive_group()
+            groups[argument.excludes] = group
+            if each.is_switch:
+                group.add_argument(each.flag, dest=each.name, action="store_true")
+                continue
+            given: dict[str, Any] = {"nargs": each.words, "type": _parse(argument)}
+            given["metavar"] = each.placeholders if isinstance(each.words, int) else each.placeholders[0]
+            if each.is_option:
+                group.add_argument(each.flag, dest=each.name, default=each.default, **given)
+            else:
+                default = [] if each.words == "*" else None if each.words in (None, "+") else each.default
+                group.add_argument(each.name, default=default, **given)
+        return parser
+
+    def _usage_words(self) -> Iterator[str]:
+        for each in self.parameters:
+            shown = each.argument.shown
+            if each.is_option:
+                yield f"[{' '.join(filter(None, (each.flag, shown)))}]"
+            else:
+                yield f"[{shown}]" if each.words == "?" else shown
+
+    def _rows(self) -> Iterator[str]:
+        """Yields a line for each entry of the section `Args:`, with further lines as they are."""
+        by_name = {each.name: each for each in self.parameters}
+        for entry in re.split(r"\n(?! )", self._args) if self._args else ():
+            name, _, text = entry.partition(": ")
+            each = by_name.get(name)
+            label = each.label if each else name
+            if each and each.argument.choices is not None:
+                *some, last = each.argument.choices()
+                text = text.replace("{choices}", f"{', '.join(some)} or {last}")
+            gap = " " if len(label) <= NAME_WIDTH else "   "
+            lines = [line.strip() for line in text.splitlines()]
+            yield f"{label:<{NAME_WIDTH}}{gap}" + f"\n{'':<{NAME_WIDTH}} ".join(lines)
+
+
+def _parse(argument: Argument) -> Callable[[str], Any]:
+    """Returns the parser of a word, which checks it against the choices."""
+    choices = argument.choices
+    if choices is None:
+        return argument.parse
+
+    def choose(word: str) -> str:
+        known = list(choices())
+        if word in known:
+            return word
+        raise argparse.ArgumentTypeError(f"invalid choice: {word!r} (choose from {', '.join(map(repr, known))})")
+
+    return choose
+
+
+def _indented(text: str) -> str:
+    return "\n".join(f"    {line}" for line in text.splitlines())

@@ -1,0 +1,53 @@
+"""The page of the commands, and the file by which bash completes their arguments."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from .command import PROGRAM, Command
+from .modules import commands
+
+FIRST = (
+    *("demo", "launch", "check", "list", "spawn", "remove", "move", "send", "attach", "detach", "gravity", "replay"),
+    *("test", "docs", "bench", "shell", "setup"),
+)
+"""Commands at the beginning of the page, in this order; all others follow by name."""
+_HEAD = f"""\
+<!-- Written by `{PROGRAM} docs` from the code: change it there, not here. -->
+
+# Commands
+
+`{PROGRAM} COMMAND --help` prints the section of that command, `{PROGRAM}` alone the list of all commands. Each command
+first [sets up](installation.md) what is missing. Ctrl-C ends any of them, at any moment.
+
+[Completion](#completion) in bash knows commands, options, examples, their arguments, files, and what is in the running
+world.
+"""
+_TAIL = f"""\
+## Completion
+
+In `~/.bashrc`, with the path of your checkout:
+
+```
+source ~/rpbi/tools/completion.bash
+```
+
+`{PROGRAM} shell` has it already. It works for every checkout, called as `{PROGRAM}`, `rpbi` or by its path.
+
+```
+$ {PROGRAM} la<Tab> bas<Tab>_ku<Tab> real<Tab>0.5
+$ {PROGRAM} launch basic_example_kuka_lwr real_time_factor:=0.5
+```
+"""
+
+
+def page(listed: Iterable[Command]) -> str:
+    """Returns the page of some commands."""
+    return "\n".join([_HEAD, *(f"## {each.name}\n\n{each.section}" for each in listed), _TAIL])
+
+
+def console_files(root: Path) -> dict[Path, str]:
+    """Returns the text of each file that follows from the commands of a workspace."""
+    order = {name: place for place, name in enumerate(FIRST)}
+    listed = sorted(commands(root), key=lambda each: order.get(each.name, len(order)))
+    lines = [line for each in listed for line in each.completions()]
+    return {root / "docs/commands.md": page(listed), root / "tools/completion.txt": "\n".join(lines) + "\n"}

@@ -1,0 +1,109 @@
+"""Classes of other packages, named as `module:Class`."""
+
+import importlib
+import pkgutil
+import traceback
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from custom_ros_tools.errors import hint, shortened
+
+own_folders = [str(Path(__file__).parents[1])]
+"""Folders of the packages that look classes up and call them; `cause_of` reports a place outside of them."""
+_found: set[str] = set()
+"""Names that `find_class` has found."""
+_trust: tuple[frozenset[str], str] | None = None
+"""Packages that `find_class` may import from, and advice for the message of a refusal; None allows any package."""
+
+
+class UntrustedError(ValueError):
+    """A name from outside belongs to a package that may not be imported."""
+
+
+def trust_only(packages: Iterable[str], how: str) -> None:
+    """Restricts `find_class` from now on to these top-level packages and to names that it has found before.
+
+    Importing a module runs its code. Names read at the start come from the user. Names that arrive later, by services
+    or from a bag, may come from anybody.
+
+    Args:
+        how: Advice for the message on how to trust another package.
+    """
+    global _trust
+    _trust = frozenset(packages), how
+
+
+def check_trusted(name: str) -> None:
+    """Checks a `module:Class` from outside.
+
+    Raises:
+        UntrustedError: If its package may not be imported.
+    """
+    package = name.partition(":")[0].partition(".")[0]
+    if _trust is not None and name not in _found and package not in _trust[0]:
+        raise UntrustedError(f"'{shortened(name)}' is not trusted, so it is not imported: {_trust[1]}")
+
+
+def find(name: str) -> Any:
+    """Returns the object of another package under a name, such as `my_robot_lab.conveyor:Conveyor`.
+
+    Raises:
+        ValueError: If there is no such thing, or its module cannot be imported.
+    """
+    module_name, _, attribute = name.partition(":")
+    if not attribute or not all(part.isidentifier() for part in module_name.split(".")):
+        raise ValueError(f"expected a name like 'my_package.my_module:MyClass', got '{name}'")
+    try:
+        module = importlib.import_module(module_name)
+    except (Exception, SystemExit) as error:  # SystemExit: a script that runs when it is imported
+        missing = error.name if isinstance(error, ModuleNotFoundError) else None
+        if missing is not None and f"{module_name}.".startswith(f"{missing}."):
+            raise ValueError(_is_missing(missing)) from None
+        raise ValueError(f"'{module_name}' cannot be imported: {cause_of(error)}") from error
+    if not hasattr(module, attribute):
+        known = [each for each in vars(module) if not each.startswith("_")]
+        raise ValueError(f"'{module_name}' has no '{attribute}'{hint(attribute, known)}")
+    return getattr(module, attribute)
+
+
+def find_class(name: str, base: type) -> Any:
+    """Returns a class of another package by its `module:Class`.
+
+    Raises:
+        UntrustedError: If it may not be imported, see `trust_only`.
+        ValueError: If there is no such class, or it is no subclass of `base`.
+    """
+    check_trusted(name)
+    found = find(name)
+    if isinstance(found, type) and issubclass(found, base):
+        _found.add(name)
+        return found
+    raise ValueError(f"expected a subclass of {full_name(base)}, got '{name}'")
+
+
+def full_name(thing: Any) -> str:
+    """Returns the name by which `find` finds a class or function, or the class of anything else."""
+    named = thing if hasattr(thing, "__qualname__") else type(thing)
+    return f"{named.__module__}:{named.__qualname__}"
+
+
+def cause_of(error: BaseException) -> str:
+    """Returns type and message of an error, and its place in the package of the class, in one line."""
+    text = f"{type(error).__name__}: {error}"
+    places = [frame for frame in traceback.extract_tb(error.__traceback__) if _is_elsewhere(frame.filename)]
+    if not places or isinstance(error, SyntaxError):  # whose text has the place
+        return text
+    return f"{text} ({places[-1].filename}, line {places[-1].lineno})"
+
+
+def _is_elsewhere(file: str) -> bool:
+    return not file.startswith((*own_folders, "<frozen importlib")) and "/importlib/" not in file
+
+
+def _is_missing(module: str) -> str:
+    outer, _, inner = module.rpartition(".")
+    if not outer:
+        return f"no module '{module}': is its package built, and its workspace sourced?"
+    folders = getattr(importlib.import_module(outer), "__path__", ())
+    return f"'{outer}' has no module '{inner}'{hint(inner, [each.name for each in pkgutil.iter_modules(folders)])}"

@@ -1,0 +1,17 @@
+"""Errors of episodes."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from custom_ros_tools.errors import InterfaceError
+
+
+@dataclass(eq=False)
+class EpisodeError(InterfaceError):
+    """An episode, or a folder of episodes, is not as expected."""
+
+    path: Path
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.message}"

@@ -1,0 +1,233 @@
+"""A folder of episodes: its layout, and what is stored with each episode."""
+
+from __future__ import annotations
+
+import platform
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field, fields
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rospkg
+import yaml
+
+from custom_ros_tools.console.modules import workspace
+
+from .errors import EpisodeError
+
+BAG, FACTS, EARLIER = "episode.bag", "episode.yaml", "earlier_commands.bag"
+"""Files of an episode: the recording, its description, and commands that the topic no longer sends."""
+FILES, DISCARDED = "files", "discarded"
+_COMPLETE = re.compile(r"episode_(\d{6,})")
+_PARTIAL = re.compile(r"\.episode_(\d{6,})\.part")
+
+
+@dataclass
+class Episode:
+    """Description of an episode, as in its `episode.yaml`.
+
+    Attributes:
+        number: Its number in the folder.
+        state: `recording`, `complete`, `incomplete` (ended by a fault, which `note` names) or `recovered` (the recorder
+            was killed).
+        label: Word of the user for the outcome, such as `success`.
+        note: Reason of a state other than `complete`, and whatever else a user should read.
+        started: Wall time of the start, ISO 8601.
+        seconds: Length in wall time [s].
+        namespace: Namespace of the simulator.
+        seeds: Seeds, as the node's parameter gives them.
+        versions: Versions of this workspace, PyBullet, Python and numpy.
+        git: Commit of the workspace, and whether files were changed since; empty without git.
+        files: Files that the world names, see `episodes.files`.
+        published: Messages that publishers sent to the recorder, by topic.
+        topics: By topic the type, messages, mean rate [Hz] and longest gap [s] in the bag.
+    """
+
+    number: int
+    state: str = "recording"
+    label: str = ""
+    note: str = ""
+    started: str = ""
+    seconds: float = 0.0
+    namespace: str = "/"
+    seeds: str = ""
+    versions: dict[str, str] = field(default_factory=dict)
+    git: str = ""
+    files: list[dict[str, Any]] = field(default_factory=list)
+    published: dict[str, int] = field(default_factory=dict)
+    topics: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Name of its folder."""
+        return f"episode_{self.number:06d}"
+
+    @property
+    def messages(self) -> int:
+        """Number of messages in the bag."""
+        return sum(each["messages"] for each in self.topics.values())
+
+    @property
+    def lost(self) -> dict[str, int]:
+        """Messages by topic that were sent to the recorder and are not in the bag; topics without loss are left out."""
+        recorded = {topic: each["messages"] for topic, each in self.topics.items()}
+        lost = {topic: sent - recorded.get(topic, 0) for topic, sent in self.published.items()}
+        return {topic: count for topic, count in lost.items() if count > 0}
+
+    def joint_rhythm(self) -> tuple[float, float] | None:
+        """Returns the lowest rate [Hz] and longest gap [s] of joint states; None without any."""
+        found = [each for topic, each in self.topics.items() if topic.endswith("/joint_states")]
+        if not found:
+            return None
+        return min(each["rate_hz"] for each in found), max(each["max_gap_s"] for each in found)
+
+
+class EpisodeFolder:
+    """A folder of episodes: `episode_000000/` and so on, `files/` that they share, and `discarded/`.
+
+    An episode that is being recorded is in `.episode_000000.part` and gets its name when it is complete.
+
+    Args:
+        path: The folder; it need not exist.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+
+    @property
+    def files(self) -> Path:
+        """Folder of copies of files by content."""
+        return self.path / FILES
+
+    def numbers(self) -> list[int]:
+        """Returns the numbers of all finished episodes, ascending.
+
+        Raises:
+            EpisodeError: If there is no such folder.
+        """
+        if not self.path.is_dir():
+            raise EpisodeError(self.path, "expected a folder of episodes, there is none")
+        return sorted(_numbers(self.path, _COMPLETE))
+
+    def all(self) -> Iterator[Episode]:
+        """Yields all finished episodes."""
+        return map(self.read, self.numbers())
+
+    def read(self, number: int) -> Episode:
+        """Returns an episode.
+
+        Raises:
+            EpisodeError: If it does not exist, or its description cannot be read.
+        """
+        if number not in self.numbers():
+            known = ", ".join(map(str, self.numbers())) or "none"
+            raise EpisodeError(self.path, f"no episode {number}; there are {known}")
+        return read_facts(self.folder_of(number))
+
+    def folder_of(self, number: int) -> Path:
+        """Returns the folder of a finished episode."""
+        return self.path / f"episode_{number:06d}"
+
+    def begin(self, **facts: Any) -> tuple[Episode, Path]:
+        """Makes the temporary folder of a new episode.
+
+        Returns:
+            The episode and the folder. Numbers of discarded episodes are not used again.
+        """
+        self.path.mkdir(parents=True, exist_ok=True)
+        used = [-1, *_numbers(self.path, _COMPLETE), *_numbers(self.path, _PARTIAL)]
+        used += _numbers(self.path / DISCARDED, _COMPLETE)
+        episode = Episode(max(used) + 1, **facts)
+        part = self.path / f".{episode.name}.part"
+        part.mkdir()
+        write_facts(part, episode)
+        return episode, part
+
+    def complete(self, part: Path, episode: Episode) -> Path:
+        """Gives an episode its final name and returns its folder."""
+        write_facts(part, episode)
+        return part.rename(self.folder_of(episode.number))
+
+    def partial(self) -> list[Path]:
+        """Returns the temporary folders, of an episode that is being recorded or whose recorder was killed."""
+        return sorted(self.path / f".episode_{number:06d}.part" for number in _numbers(self.path, _PARTIAL))
+
+    def discard(self, number: int) -> Path:
+        """Moves an episode into `discarded` and returns its new folder; raises an EpisodeError if it does not exist."""
+        self.read(number)
+        target = self.path / DISCARDED / self.folder_of(number).name
+        target.parent.mkdir(exist_ok=True)
+        return self.folder_of(number).rename(target)
+
+    def relabel(self, number: int, label: str) -> Episode:
+        """Changes the label of an episode and returns it; raises an EpisodeError if it does not exist."""
+        episode = self.read(number)
+        episode.label = label
+        write_facts(self.folder_of(number), episode)
+        return episode
+
+    def free_mb(self) -> float:
+        """Returns the free space of the disk that the folder is on, or will be on [MB]."""
+        folder = next(each for each in (self.path.absolute(), *self.path.absolute().parents) if each.is_dir())
+        return shutil.disk_usage(folder).free / 1e6
+
+
+def read_facts(folder: Path) -> Episode:
+    """Reads the description of an episode in its folder.
+
+    Raises:
+        EpisodeError: If it cannot be read.
+    """
+    path = folder / FACTS
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise EpisodeError(path, f"cannot be read: {' '.join(str(error).split())}") from error
+    known = {each.name for each in fields(Episode)}
+    if not isinstance(data, Mapping) or "number" not in data or set(data) - known:
+        raise EpisodeError(path, f"expected a mapping with 'number' and of {', '.join(sorted(known))}")
+    return Episode(**data)
+
+
+def write_facts(folder: Path, episode: Episode) -> None:
+    """Writes the description of an episode into its folder; the former one stays until the new one is complete."""
+    written = folder / f".{FACTS}.new"
+    written.write_text(yaml.safe_dump(asdict(episode), sort_keys=False, allow_unicode=True), encoding="utf-8")
+    written.rename(folder / FACTS)
+
+
+def _numbers(folder: Path, pattern: re.Pattern[str]) -> list[int]:
+    if not folder.is_dir():
+        return []
+    return [int(match[1]) for each in folder.iterdir() if (match := pattern.fullmatch(each.name))]
+
+
+def versions() -> dict[str, str]:
+    """Returns the versions of this workspace, PyBullet, Python and numpy."""
+    return {
+        "workspace": rospkg.RosPack().get_manifest("episodes").version,
+        "pybullet": version("pybullet"),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+    }
+
+
+def git_state(folder: Path | None = None) -> str:
+    """Returns the commit of a workspace, with ` changed` if files differ from it; empty without git."""
+
+    def git(*words: str) -> str:
+        done = subprocess.run(
+            ["git", "-C", str(folder or workspace()), *words], capture_output=True, text=True, timeout=20.0
+        )
+        return done.stdout.strip() if done.returncode == 0 else ""
+
+    try:
+        commit = git("rev-parse", "HEAD")
+        return f"{commit} changed" if commit and git("status", "--porcelain", "--untracked-files=no") else commit
+    except (OSError, subprocess.TimeoutExpired):
+        return ""

@@ -1,0 +1,1 @@
+"""Episodes in ROS: the recorder, repairs, tables and verification."""

@@ -1,0 +1,74 @@
+"""Bags of episodes: their topics, and bags whose recorder was killed."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import rosbag
+
+from episodes.folder import BAG, Episode, EpisodeFolder, read_facts
+from rpbi_utils.bags.errors import BagError
+from rpbi_utils.ros.bags.bag_reader import BagReader
+from rpbi_utils.ros.bags.topic_report import topic_report
+
+
+def measure_topics(bag: Path) -> dict[str, dict[str, Any]]:
+    """Returns type, messages, mean rate [Hz] and longest gap [s] of each topic of a bag; a rate of 0 is unknown.
+
+    Raises:
+        BagError: If it cannot be read.
+    """
+    report = topic_report(bag, any_size=True)
+    return {
+        str(topic): {
+            "type": str(row["type"]),
+            "messages": int(row["messages"]),
+            "rate_hz": 0.0 if math.isnan(row["rate_hz"]) else float(row["rate_hz"]),
+            "max_gap_s": float(row["max_gap_s"]),
+        }
+        for topic, row in report.iterrows()
+    }
+
+
+def repair(folder: EpisodeFolder, part: Path) -> Episode:
+    """Completes the episode in a temporary folder whose recorder was killed, and gives it its name.
+
+    Returns:
+        The episode, `recovered` with the number of messages, or `incomplete` if there is no message.
+    """
+    episode = read_facts(part)
+    bag, active = part / BAG, part / f"{BAG}.active"
+    if active.exists():
+        active.rename(bag)
+    episode.state = "recovered"
+    try:
+        if not bag.exists():
+            raise BagError(bag, "there is none")
+        if not _is_complete(bag):
+            _reindex(bag)
+        episode.topics = measure_topics(bag)
+        episode.note = f"the recorder was killed, {episode.messages} messages recovered"
+        sent = sum(episode.published.values())
+        if sent:
+            episode.note += f" of {sent} sent to it until at most 1 s before"
+    except Exception as error:  # rosbag has errors of all kinds for a broken file
+        episode.state = "incomplete"
+        episode.note = f"the recorder was killed, no message recovered: {' '.join(str(error).split())}"
+    folder.complete(part, episode)
+    return episode
+
+
+def _is_complete(bag: Path) -> bool:
+    try:
+        with BagReader(bag, any_size=True):
+            return True
+    except BagError:
+        return False
+
+
+def _reindex(bag: Path) -> None:
+    with rosbag.Bag(str(bag), "a", allow_unindexed=True) as opened:
+        for _ in opened.reindex():
+            pass

@@ -1,0 +1,47 @@
+"""The command `episodes`."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from custom_ros_tools.console.argument import Argument, UsageError
+from episodes.folder import EpisodeFolder
+from episodes.listing import details_of, table_of
+from episodes.ros.bags import repair as repair_bag
+
+
+def episodes(
+    folder: Annotated[Path, Argument("DIR", parse=Path)],
+    *,
+    show: Annotated[int | None, Argument("N", parse=int, excludes="action")] = None,
+    discard: Annotated[int | None, Argument("N", parse=int, excludes="action")] = None,
+    relabel: Annotated[Sequence[str], Argument("N LABEL", excludes="action")] = (),
+    repair: Annotated[bool, Argument("", excludes="action")] = False,
+) -> str:
+    """Lists the episodes of a folder; shows, discards, relabels or repairs them.
+
+    Args:
+        folder: of the episodes
+        show: all that is stored of an episode, with its topics
+        discard: moves an episode into DIR/discarded
+        relabel: gives an episode another label
+        repair: completes episodes whose recorder was killed; not while a node records into DIR
+    """
+    given = EpisodeFolder(folder)
+    if show is not None:
+        return details_of(given.read(show))
+    if discard is not None:
+        return f"episode {discard} is in {given.discard(discard)}"
+    if relabel:
+        if not relabel[0].isdecimal():
+            raise UsageError(f"--relabel: expected the number of an episode, got {relabel[0]}")
+        episode = given.relabel(int(relabel[0]), relabel[1])
+        return f"episode {episode.number}: {episode.label}"
+    if repair:
+        repaired = [repair_bag(given, part) for part in given.partial()]
+        return (
+            "\n".join(f"episode {each.number}: {each.state}: {each.note}" for each in repaired) or "nothing to repair"
+        )
+    text = table_of(given.all())
+    left = len(given.partial())
+    return f"{text}\n{left} more: being recorded, or its recorder was killed (--repair)" if left else text

@@ -1,0 +1,38 @@
+"""The command `verify`."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from custom_ros_tools.console.argument import Argument, UsageError
+from episodes.folder import EpisodeFolder
+from episodes.ros.verification import verify_all
+
+
+def verify(
+    folder: Annotated[Path, Argument("DIR", parse=Path)],
+    *,
+    jobs: Annotated[int, Argument("N", parse=int)] = 1,
+    trust: Annotated[Sequence[str], Argument("PACKAGE ...")] = (),
+) -> int:
+    """Simulates recorded episodes again and compares their states, with the files that are stored with them.
+
+    It prints a line an episode: the same, or the first tick that differs, and files that were changed. It ends with 1
+    unless all are the same; needs no ROS master.
+
+    Args:
+        folder: of the episodes
+        jobs: episodes at once, each in a process of its own; 1 without it
+        trust: Python packages that the episodes may import, for types of your own
+    """
+    if jobs < 1:
+        raise UsageError(f"--jobs: expected at least 1, got {jobs}")
+    episodes = EpisodeFolder(folder)
+    numbers = episodes.numbers()
+    same = 0
+    for verdict in verify_all(episodes, numbers, jobs, trust):
+        label = episodes.read(verdict.number).label
+        print(f"episode {verdict.number}{f' ({label})' if label else ''}: {verdict.text}", flush=True)
+        same += verdict.is_same
+    print(f"{same} of {len(numbers)} episodes are the same")
+    return 0 if numbers and same == len(numbers) else 1

@@ -1,0 +1,112 @@
+"""Simulates episodes again and compares them with their recordings."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.plugins import trust_only
+from episodes.errors import EpisodeError
+from episodes.files import changed_files, with_stored_files
+from episodes.folder import BAG, EARLIER, Episode, EpisodeFolder
+from rpbi.replay.session import Replay, ReplayResult
+from rpbi_utils.ros.replay.recorded_session import read_recording
+
+_PROGRAM = "import sys; from episodes.ros.verification import main; main(sys.argv[1:])"
+
+
+class Verdict(NamedTuple):
+    """Result of the verification of an episode.
+
+    Attributes:
+        number: The episode.
+        is_same: Whether all states agree and all files are as stored.
+        text: The comparison in words.
+    """
+
+    number: int
+    is_same: bool
+    text: str
+
+
+def verify_all(folder: EpisodeFolder, numbers: Sequence[int], jobs: int, trust: Sequence[str]) -> Iterator[Verdict]:
+    """Simulates episodes again, each in a process of its own, and yields the results in order.
+
+    Args:
+        folder: The folder.
+        numbers: The episodes.
+        jobs: Number of processes at once.
+        trust: Python packages that the episodes may import, for types of the user's own.
+    """
+    with ThreadPoolExecutor(jobs) as pool:
+        yield from pool.map(partial(_verify_in_process, folder, trust), numbers)
+
+
+def _verify_in_process(folder: EpisodeFolder, trust: Sequence[str], number: int) -> Verdict:
+    command = [sys.executable, "-c", _PROGRAM, str(folder.path), str(number), *trust]
+    done = subprocess.run(command, capture_output=True, text=True)
+    try:
+        return Verdict(*json.loads(done.stdout.splitlines()[-1]))
+    except (IndexError, ValueError, TypeError):
+        words = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+        return Verdict(number, False, f"the simulation ended early: {words}")
+
+
+def main(words: Sequence[str]) -> None:
+    """Verifies one episode and prints the result as JSON.
+
+    Args:
+        words: Folder, number, and packages to trust.
+    """
+    path, number, *trust = words
+    trust_only({"rpbi", *trust}, "--trust PACKAGE, if you know who recorded the episode")
+    print(f"\n{json.dumps(verify(EpisodeFolder(path), int(number)))}", flush=True)
+
+
+def verify(folder: EpisodeFolder, number: int) -> Verdict:
+    """Simulates an episode again in this process, with the files that are stored with it."""
+    try:
+        episode = folder.read(number)
+        changed = list(changed_files(episode.files, folder.files))
+        is_same, text = _replay(folder, episode)
+    except (InterfaceError, OSError) as error:
+        return Verdict(number, False, "; ".join(str(error).splitlines()))
+    except Exception as error:  # a bag may have anything in it
+        return Verdict(number, False, f"cannot be simulated: {type(error).__name__}: {error}")
+    return Verdict(number, is_same and not changed, "; ".join([*changed, text]))
+
+
+def _replay(folder: EpisodeFolder, episode: Episode) -> tuple[bool, str]:
+    place = folder.folder_of(episode.number)
+    if not (place / BAG).exists():
+        raise EpisodeError(place, episode.note or "has no bag")
+    earlier = place / EARLIER
+    with tempfile.TemporaryDirectory(prefix="verify-") as files:
+        recording = read_recording(
+            place / BAG,
+            episode.namespace,
+            any_size=True,
+            earlier=earlier if earlier.exists() else None,
+            relocate=lambda text: with_stored_files(text, episode.files, folder.files, Path(files)),
+        )
+        result = Replay(recording).run()
+    warnings = recording.description.warnings
+    return result.difference is None and not result.left_out, "; ".join([*warnings, _words(result)])
+
+
+def _words(result: ReplayResult) -> str:
+    if result.difference is not None:
+        each, last = result.difference.checkpoint, result.difference.last_agreement
+        since = "the first state" if last is None else f"the same until tick {last.tick}"
+        return f"differs at {each} ({since}): recorded {each.state_hash}, now {result.difference.state_hash}"
+    if result.left_out:
+        return "; ".join(f"not simulated {text}" for text in result.left_out)
+    return f"same: {result.agreed} states over {result.ticks} ticks"

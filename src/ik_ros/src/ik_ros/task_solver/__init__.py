@@ -1,0 +1,1 @@
+"""Problems of tasks and costs, and their solution by Gauss and Newton."""

@@ -1,0 +1,88 @@
+"""Couplings: accelerations that change a motion while it is executed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from custom_ros_tools.transforms import Array, finite_vector
+
+from .dynamics import SpringDamper, State
+
+STEEPNESS = 20.0 / math.pi
+"""Decay of the evasion with the angle between the motion and the obstacle [1/rad] (Hoffmann 2009)."""
+SLOWEST_M_S = 1e-6
+"""Speed below which a motion heads nowhere [m/s]."""
+
+
+@dataclass
+class ForceCoupling:
+    """Gives way to a force as a spring: a constant force moves the motion by force / stiffness.
+
+    Attributes:
+        stiffness: The stiffness of each number of a velocity [N/m or N m/rad]; one number for all.
+        force: The force that acts on the moved thing [N or N m], shape (dof,); set it whenever it is measured.
+    """
+
+    stiffness: ArrayLike
+    force: ArrayLike = 0.0
+
+    def __post_init__(self) -> None:
+        if not (np.asarray(self.stiffness, dtype=float) > 0.0).all():
+            raise ValueError(f"stiffness: expected numbers above 0, got {self.stiffness!r}")
+
+    def __call__(self, state: State, spring: SpringDamper) -> Array:
+        """Returns the acceleration."""
+        given_way = np.asarray(self.force, dtype=float) / np.asarray(self.stiffness, dtype=float)
+        return np.asarray(spring.stiffness * np.broadcast_to(given_way, state.velocity.shape))
+
+
+@dataclass
+class Obstacle:
+    """Steers the first three positions around a ball (Hoffmann 2009, equation 8).
+
+    The motion is turned away from the ball's edge as seen from it, more so the straighter it heads there, and within
+    `range_m` of its surface.
+
+    Attributes:
+        center: Its centre x, y, z [m]; set it whenever it moves.
+        radius_m: Its radius [m].
+        range_m: Distance from its surface at which the evasion has fallen to 37 % [m].
+        gain: Strength of the evasion, 1000 in the paper.
+    """
+
+    center: ArrayLike
+    radius_m: float = 0.05
+    range_m: float = 0.1
+    gain: float = 1000.0
+    _side: Array = field(default_factory=lambda: np.zeros(3), repr=False)
+
+    def __post_init__(self) -> None:
+        self.center = finite_vector(self.center, 3, "center")
+        for name in ("radius_m", "range_m", "gain"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise ValueError(f"{name}: expected a number above 0, got {getattr(self, name)}")
+
+    def __call__(self, state: State, spring: SpringDamper) -> Array:
+        """Returns the acceleration."""
+        evasion = np.zeros_like(state.velocity)
+        velocity, to_center = state.velocity[:3], np.asarray(self.center, dtype=float) - state.point[:3]
+        speed, distance = float(np.linalg.norm(velocity)), float(np.linalg.norm(to_center))
+        if speed < SLOWEST_M_S or distance < SLOWEST_M_S:
+            return evasion
+        heading = velocity / speed
+        angle = math.acos(min(max(float(heading @ to_center) / distance, -1.0), 1.0))
+        if angle > 0.5 * math.pi:  # it has passed
+            return evasion
+        away = heading * float(heading @ to_center) - to_center  # across the motion
+        if np.linalg.norm(away) < 1e-6 * distance:  # straight into the centre: any side will do, the same until the end
+            away = np.cross(heading, np.eye(3)[int(np.argmin(np.abs(heading)))])
+        seen = math.asin(min(self.radius_m / distance, 1.0))
+        beside = max(angle - seen, 1.0 / STEEPNESS)
+        strength = self.gain / spring.duration_s * speed * beside * math.exp(-STEEPNESS * beside)
+        strength *= math.exp(-max(distance - self.radius_m, 0.0) / self.range_m)
+        evasion[:3] = strength * away / np.linalg.norm(away)
+        return evasion

@@ -1,0 +1,73 @@
+"""Files of learned primitives: YAML that people read, and that is checked when it is read."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import Field
+
+from custom_ros_tools.config import load_config
+from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
+from custom_ros_tools.schema import ConfigModel, ListOf, Switch, Text
+
+from .primitive import Primitive
+from .primitives import PRIMITIVES
+from .space import Space
+
+
+class PrimitiveFile(ConfigModel):
+    """A learned primitive."""
+
+    type: Text = Field(description="Its type, a name of the table or `module:Class`.")
+    options: dict[Text, Any] = Field({}, description="Options of the type.")
+    names: ListOf[Text] = Field(min_length=1, description="Names of the positions.")
+    orientation: Switch = Field(False, description="Whether an orientation goes with them.")
+    learned: dict[Text, Any] = Field(description="What it has learned.")
+
+
+def save(primitive: Primitive, path: str | Path) -> None:
+    """Writes a learned primitive; a file of this name is replaced at once, or stays as it was.
+
+    Raises:
+        NotLearnedError: If it has learned nothing.
+        OSError: If the file cannot be written.
+    """
+    content = PrimitiveFile(
+        type=PRIMITIVES.name_of(primitive),
+        options=primitive.config.model_dump(mode="json"),
+        names=primitive.space.names,
+        orientation=primitive.space.has_orientation,
+        learned=primitive.learned().model_dump(mode="json"),
+    )
+    unfinished = Path(f"{path}.unfinished")
+    try:
+        text = yaml.safe_dump(content.model_dump(mode="json"), sort_keys=False, default_flow_style=None, width=120)
+        unfinished.write_text(text, encoding="utf-8")
+        os.replace(unfinished, path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def load(path: str | Path) -> Primitive:
+    """Reads a learned primitive.
+
+    Raises:
+        ConfigError: If the file cannot be read, or is wrong; it names file and key of each fault.
+        UnknownNameError: If there is no primitive of this type.
+    """
+    file = str(path)
+    content = PrimitiveFile.parse(load_config(file), file)
+    primitive = PRIMITIVES.make(content.type, content.options, file)
+    try:
+        learned = primitive.Learned.parse(content.learned, file)
+        primitive.restore(Space(tuple(content.names), content.orientation), learned)
+    except ConfigError as error:
+        raise ConfigError(
+            [Problem(each.file, f"learned.{each.key}", each.message) for each in error.problems]
+        ) from None
+    except (InterfaceError, ValueError) as error:
+        raise ConfigError([Problem(file, "learned", str(error))]) from None
+    return primitive

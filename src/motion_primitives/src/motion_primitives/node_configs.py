@@ -1,0 +1,177 @@
+"""Parameters of the node, and the schema of the YAML files that have them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from custom_ros_tools.schema import (
+    ConfigModel,
+    FrameId,
+    Hz,
+    KeyedError,
+    ListOf,
+    Positive,
+    PositiveMetres,
+    Switch,
+    Text,
+    TopicName,
+    Unit,
+    optional,
+)
+from custom_ros_tools.schema.json_schema import explained, json_schema, schema_text
+
+from .coupling import ForceCoupling, Obstacle
+from .space import POSE, Space
+
+Bounds = Annotated[tuple[float, float], Field(strict=False)]
+
+
+class FrameSource(ConfigModel):
+    """Pose of a TF frame that demonstrations show."""
+
+    parent: FrameId = Field(description="The frame that poses are in.")
+    child: FrameId = Field(description="The frame whose poses they are.")
+    orientation: Switch = Field(True, description="Whether orientations are part of the motion.")
+
+
+class JointSource(ConfigModel):
+    """Joints whose positions demonstrations show."""
+
+    topic: TopicName = Field("joint_states", description="Topic of the joint states, in bags too.")
+    names: ListOf[Text] = Field(min_length=1, description="The joints, in the order of points.")
+
+
+class SourceConfig(ConfigModel):
+    """Signals that demonstrations show: either a frame or joints."""
+
+    tf: FrameSource | None = optional("A TF frame.")
+    joints: JointSource | None = optional("Joints of a robot.")
+
+    @model_validator(mode="after")
+    def _is_one(self) -> SourceConfig:
+        if (self.tf is None) == (self.joints is None):
+            raise KeyedError("tf", "a source is either tf or joints, one of them")
+        return self
+
+    @property
+    def space(self) -> Space:
+        """The signals."""
+        if self.joints is not None:
+            return Space(tuple(self.joints.names))
+        return Space(POSE, self.tf is not None and self.tf.orientation)
+
+
+class FrameOutput(ConfigModel):
+    """TF frame that is broadcast."""
+
+    parent: FrameId = Field(description="The frame that poses are in.")
+    child: FrameId = Field(description="The frame whose poses they are.")
+
+
+class JointOutput(ConfigModel):
+    """Topic on which joint targets are published."""
+
+    topic: TopicName = Field("joint_states/target", description="Topic of the targets.")
+
+
+class SignalOutput(ConfigModel):
+    """Topic on which bare numbers are published."""
+
+    topic: TopicName = Field("primitive/signal", description="Topic of the numbers.")
+    content: Literal["position", "velocity"] = Field(
+        "position", description="The point, or its velocity; a velocity is 0 after the end."
+    )
+
+
+class OutputConfig(ConfigModel):
+    """Outputs of executed motions; several at once are possible."""
+
+    tf: FrameOutput | None = optional("A TF frame, if the source is one.")
+    joints: JointOutput | None = optional("Joint targets, if the source are joints.")
+    signal: SignalOutput | None = optional("Numbers.")
+
+
+class ObstacleConfig(ConfigModel):
+    """Ball that motions avoid."""
+
+    frame_id: FrameId = Field(description="TF frame of its centre.")
+    radius: PositiveMetres = Field(0.05, description="Its radius.")
+    range: PositiveMetres = Field(0.1, description="Distance from its surface at which the evasion falls to 37 %.")
+    gain: Positive = Field(1000.0, description="Strength of the evasion.")
+
+    def obstacle(self) -> Obstacle:
+        """Returns the obstacle, at the origin."""
+        return Obstacle((0.0, 0.0, 0.0), self.radius, self.range, self.gain)
+
+
+class CouplingConfig(ConfigModel):
+    """Changes of a motion while it is executed."""
+
+    force_stiffness: Annotated[Positive, Unit("N/m")] | None = optional(
+        "Stiffness with which positions give way to forces on `primitive/wrench`, in the axes of the source's parent."
+    )
+    torque_stiffness: Annotated[Positive, Unit("N m/rad")] | None = optional(
+        "Stiffness with which orientations give way to its torques."
+    )
+    obstacles: ListOf[ObstacleConfig] = Field((), description="Balls that are avoided.")
+
+    def force(self, space: Space) -> ForceCoupling | None:
+        """Returns the coupling to forces, None without one."""
+        if self.force_stiffness is None:
+            return None
+        stiffness = [self.force_stiffness] * len(space.names)
+        rotational = float("inf") if self.torque_stiffness is None else self.torque_stiffness
+        return ForceCoupling(stiffness + [rotational] * (space.dof - len(space.names)))
+
+
+class PrimitivesNodeConfig(ConfigModel):
+    """Motions that are learned, planned and executed."""
+
+    primitive: dict[Text, Any] = Field(
+        {"type": "dmp"}, description="Type of the primitive, a name or `module:Class`, and its options."
+    )
+    source: SourceConfig = Field(description="Signals of demonstrations.")
+    output: OutputConfig = Field(OutputConfig(), description="Outputs of executed motions.")
+    coupling: CouplingConfig = Field(CouplingConfig(), description="Changes of a motion while it is executed.")
+    bounds: dict[Text, Bounds] = Field(
+        {}, description="Least and largest position by name; a plan that leaves them is refused [m or rad]."
+    )
+    hz: Hz = Field(100.0, description="Rate at which TF is recorded and motions are executed, in wall time.")
+    folder: Text = Field("~/.ros/primitives", description="Folder of saved primitives.")
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> PrimitivesNodeConfig:
+        if not isinstance(self.primitive.get("type"), str):
+            raise KeyedError("primitive.type", "expected the name of a primitive")
+        if self.output.tf is not None and self.source.tf is None:
+            raise KeyedError("output.tf", "the source are joints; use joints or signal")
+        if self.output.joints is not None and self.source.joints is None:
+            raise KeyedError("output.joints", "the source is a TF frame; use tf or signal")
+        if self.coupling.torque_stiffness is not None and self.coupling.force_stiffness is None:
+            raise KeyedError("coupling.force_stiffness", "missing; torque_stiffness goes with it")
+        has_coupling = self.coupling.force_stiffness is not None or self.coupling.obstacles
+        if has_coupling and self.source.tf is None:
+            raise KeyedError("coupling", "forces and obstacles are for a source tf")
+        for name, (lower, upper) in self.bounds.items():
+            if name not in self.source.space.names:
+                known = ", ".join(self.source.space.names)
+                raise KeyedError(f"bounds.{name}", f"unknown position; known are {known}")
+            if lower >= upper:
+                raise KeyedError(f"bounds.{name}", f"expected least and largest, got {lower:g} and {upper:g}")
+        return self
+
+
+SCHEMA = "primitives_node"
+
+
+def schema_files(root: Path) -> dict[Path, str]:
+    """Returns the text of each file.
+
+    Args:
+        root: The workspace.
+    """
+    path = root / f"src/motion_primitives/schema/{SCHEMA}.schema.json"
+    return {path: schema_text(explained(json_schema(PrimitivesNodeConfig, SCHEMA)))}

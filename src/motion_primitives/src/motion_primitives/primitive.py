@@ -1,0 +1,296 @@
+"""The interface of movement primitives."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel, Positive
+from custom_ros_tools.transforms import Array
+
+from .demonstration import Demonstration, common_space
+from .dynamics import TOLERANCE, TOLERANCE_RAD, Coupling, Execution
+from .errors import GoalNotReachedError, NotLearnedError, PlanError
+from .space import Space
+
+DT_S = 0.01
+"""Time between two points of a plan by default [s]."""
+MAX_LONGER = 3.0
+"""Multiple of the requested duration after which a goal that was not reached counts as out of reach."""
+MIN_STEPS, MAX_STEPS = 20, 1_000_000
+"""Numbers of steps of a plan; durations and time steps beyond are rejected."""
+
+
+class ViaPoint(NamedTuple):
+    """A point that a motion passes.
+
+    Attributes:
+        progress: Share of the duration, from 0 to 1.
+        point: The point, see `Space`.
+        std: Standard deviation with which it is passed [m or rad].
+    """
+
+    progress: float
+    point: Any
+    std: float = 1e-5
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A planned motion.
+
+    Attributes:
+        space: Names of its signals.
+        times: m times [s] from 0 on.
+        points: m points, see `Space`.
+        velocities: m velocities [m/s or rad/s], shape (m, dof); the last three are angular if there are orientations.
+    """
+
+    space: Space
+    times: Array
+    points: Array
+    velocities: Array
+
+    @property
+    def duration_s(self) -> float:
+        """Time of its last point [s]."""
+        return float(self.times[-1])
+
+    @property
+    def positions(self) -> Array:
+        """m x n positions [m or rad]."""
+        return self.points[:, : len(self.space.names)]
+
+    @property
+    def quats_xyzw(self) -> Array | None:
+        """m unit quaternions x, y, z, w, None without orientations."""
+        return self.points[:, len(self.space.names) :] if self.space.has_orientation else None
+
+
+class PrimitiveConfig(ConfigModel):
+    """Options that every primitive has."""
+
+    alpha: Positive = Field(
+        25.0,
+        description="Damping of the spring that pulls to the motion, for a duration of 1 s; its stiffness is a quarter "
+        "of the square. Larger values follow more closely and give way less.",
+    )
+
+
+class Primitive(ABC):
+    """A motion that is learned from demonstrations, and repeated with other starts, goals and durations.
+
+    Attributes:
+        Config: Model of its options.
+        Learned: Model of what it has learned, for files.
+        config: Its options.
+        space: Its signals, once it has learned.
+    """
+
+    Config: ClassVar[type[PrimitiveConfig]] = PrimitiveConfig
+    Learned: ClassVar[type[ConfigModel]]
+
+    def __init__(self, config: Any = None) -> None:
+        self.config: Any = self.Config() if config is None else config
+        self._space: Space | None = None
+
+    @property
+    def is_learned(self) -> bool:
+        """Whether it has learned, or was loaded."""
+        return self._space is not None
+
+    @property
+    def space(self) -> Space:
+        """Its signals.
+
+        Raises:
+            NotLearnedError: If it has not learned yet.
+        """
+        if self._space is None:
+            raise NotLearnedError()
+        return self._space
+
+    def learn(self, demonstrations: Demonstration | Sequence[Demonstration]) -> Primitive:
+        """Learns from demonstrations, in place of what it knew, and returns itself.
+
+        Raises:
+            DemonstrationError: If they do not go together, or do not suffice.
+        """
+        given = [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
+        space = common_space(given)
+        self._learn(space, given)
+        self._space = space
+        return self
+
+    def begin(
+        self,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration_s: float | None = None,
+        via_points: Sequence[ViaPoint] = (),
+        velocity: ArrayLike | None = None,
+    ) -> Execution:
+        """Returns a motion at its start.
+
+        Args:
+            start: First point; by default the mean of the demonstrations.
+            goal: Last point; by default the mean of the demonstrations. For a rhythmic primitive, the centre.
+            duration_s: Duration [s]; by default the mean of the demonstrations.
+            via_points: Points on the way, for primitives that support them.
+            velocity: Velocity at the start [m/s or rad/s], shape (dof,); by default rest.
+
+        Raises:
+            NotLearnedError: If it has not learned yet.
+            PlanError: If an argument does not fit.
+        """
+        space = self.space
+        if duration_s is not None and not 0.0 < duration_s < math.inf:
+            raise PlanError("duration", "a finite time above 0 s", f"{duration_s}")
+        speed = np.zeros(space.dof) if velocity is None else _checked_velocity(velocity, space)
+        return self._begin(
+            None if start is None else space.point(start, "start"),
+            None if goal is None else space.point(goal, "goal"),
+            duration_s,
+            _checked_via_points(via_points, space),
+            speed,
+        )
+
+    def plan(
+        self,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration_s: float | None = None,
+        via_points: Sequence[ViaPoint] = (),
+        velocity: ArrayLike | None = None,
+        dt_s: float = DT_S,
+        couplings: Sequence[Coupling] = (),
+        tolerance: float = TOLERANCE,
+        tolerance_rad: float = TOLERANCE_RAD,
+    ) -> Trajectory:
+        """Returns a whole motion; for the other arguments see `begin`.
+
+        It takes the duration, and longer only if couplings, or the type of the primitive, keep it from its goal.
+
+        Args:
+            dt_s: Time between two points [s]; it is reduced so that the duration is a multiple of it.
+            couplings: Functions of state and spring that return further accelerations.
+            tolerance: Largest distance from the goal that counts as reached [m or rad].
+            tolerance_rad: Largest angle from the goal that counts as reached [rad].
+
+        Raises:
+            NotLearnedError: If it has not learned yet.
+            PlanError: If an argument does not fit.
+            GoalNotReachedError: If it is not at the goal after three times the duration.
+        """
+        execution = self.begin(start, goal, duration_s, via_points, velocity)
+        if not 0.0 < dt_s < math.inf or execution.end_s / dt_s > MAX_STEPS:
+            least = execution.end_s / MAX_STEPS
+            raise PlanError("dt", f"a time step above {least:.3g} s", f"{dt_s}")
+        count = max(math.ceil(execution.end_s / dt_s - 1e-9), MIN_STEPS)
+        dt_s, end_s = execution.end_s / count, execution.end_s
+        states = [execution.state, *(execution.step(dt_s, couplings) for _ in range(count))]
+        while not execution.is_at_goal(tolerance, tolerance_rad):
+            if execution.state.time_s > MAX_LONGER * end_s:
+                raise GoalNotReachedError(*execution.miss(), execution.state.time_s, tolerance, tolerance_rad)
+            states.append(execution.step(dt_s, couplings))
+        times, points, velocities = (np.array(each) for each in zip(*states))
+        return Trajectory(self.space, times, points, velocities)
+
+    def learned(self) -> ConfigModel:
+        """Returns what it has learned, for files.
+
+        Raises:
+            NotLearnedError: If it has not learned yet.
+        """
+        if self._space is None:
+            raise NotLearnedError()
+        return self._learned()
+
+    def restore(self, space: Space, learned: Any) -> None:
+        """Sets what it has learned, as read from a file.
+
+        Raises:
+            ValueError: If sizes do not fit the space or the options.
+        """
+        self._restore(space, learned)
+        self._space = space
+
+    # --- For subclasses
+
+    @abstractmethod
+    def _learn(self, space: Space, demonstrations: Sequence[Demonstration]) -> None:
+        """Learns from demonstrations of one space; see `learn`."""
+
+    @abstractmethod
+    def _begin(
+        self,
+        start: Array | None,
+        goal: Array | None,
+        duration_s: float | None,
+        via_points: Sequence[ViaPoint],
+        velocity: Array,
+    ) -> Execution:
+        """Returns a motion for checked arguments; see `begin`."""
+
+    @abstractmethod
+    def _learned(self) -> ConfigModel:
+        """Returns what it has learned; see `learned`."""
+
+    @abstractmethod
+    def _restore(self, space: Space, learned: Any) -> None:
+        """Sets what it has learned; see `restore`."""
+
+
+def check_shape(values: Any, shape: Mapping[str, int], subject: str) -> Array:
+    """Returns numbers of a file as an array.
+
+    Args:
+        shape: Expected size of each dimension by its name.
+
+    Raises:
+        ValueError: If sizes differ.
+    """
+    try:
+        array = np.array(values, dtype=float)
+    except ValueError:
+        array = np.zeros(0)
+    if array.shape != tuple(shape.values()):
+        expected = " x ".join(f"{size} {name}" for name, size in shape.items())
+        raise ValueError(f"{subject}: expected {expected}, got shape {array.shape or 'of rows of different lengths'}")
+    return array
+
+
+def no_via_points(via_points: Sequence[ViaPoint]) -> None:
+    """Rejects via-points; for primitives that do not support them.
+
+    Raises:
+        PlanError: If there is one.
+    """
+    if via_points:
+        raise PlanError("via_points", "none, since this primitive does not support them", f"{len(via_points)}")
+
+
+def _checked_velocity(velocity: ArrayLike, space: Space) -> Array:
+    array = np.array(velocity, dtype=float)
+    if array.shape != (space.dof,) or not np.isfinite(array).all():
+        raise PlanError("velocity", f"{space.dof} finite numbers", str(velocity))
+    return array
+
+
+def _checked_via_points(via_points: Sequence[ViaPoint], space: Space) -> list[ViaPoint]:
+    checked = []
+    for index, each in enumerate(via_points):
+        subject = f"via_points[{index}]"
+        if not 0.0 <= each.progress <= 1.0:
+            raise PlanError(f"{subject}.progress", "a share of the duration from 0 to 1", f"{each.progress}")
+        if not 0.0 <= each.std < math.inf:
+            raise PlanError(f"{subject}.std", "a standard deviation of at least 0", f"{each.std}")
+        checked.append(ViaPoint(each.progress, space.point(each.point, subject), each.std))
+    return checked

@@ -1,0 +1,15 @@
+"""The primitives; a new one is a class in a file of its own and a line here."""
+
+from custom_ros_tools.plugins.table import PluginTable
+from motion_primitives.primitive import Primitive
+
+PRIMITIVES: PluginTable[Primitive] = PluginTable(
+    "primitive",
+    "motion_primitives.primitive:Primitive",
+    {
+        "dmp": "motion_primitives.primitives.dmp:DMP",
+        "rhythmic_dmp": "motion_primitives.primitives.rhythmic_dmp:RhythmicDMP",
+        "promp": "motion_primitives.primitives.promp:ProMP",
+    },
+)
+"""All primitives by name."""

@@ -1,0 +1,245 @@
+"""Probabilistic movement primitives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel, ListOf, Positive, Seconds
+from custom_ros_tools.transforms import Array
+from motion_primitives.basis import TimeBasis, fitted
+from motion_primitives.demonstration import Demonstration
+from motion_primitives.dynamics import Execution, PathExecution, SpringDamper
+from motion_primitives.errors import DemonstrationError, PlanError
+from motion_primitives.primitive import Primitive, PrimitiveConfig, ViaPoint, check_shape
+from motion_primitives.space import Space, angular_velocity
+
+MAX_ANGLE_RAD = 0.95 * math.pi
+"""Largest angle between a demonstrated orientation and the mean [rad]; beyond it, rotation vectors are ambiguous."""
+PRIOR_SHARE = 0.1
+"""Standard deviation before any demonstration, as a share of the extent of the motion."""
+PRIOR_LENGTH = 0.2
+"""Share of the duration over which a deviation from the mean persists, before any demonstration."""
+MIN_EXTENT = 0.01
+"""Least extent of a motion for the share above [m or rad]."""
+SAMPLES_OF_MEAN = 50
+"""Number of samples of each demonstration for the mean orientation."""
+EXACT_STD = 1e-6
+"""Standard deviation with which start and goal are kept [m or rad]."""
+LAST_CHANGE = 0.9
+"""Share of the duration after which the goal cannot be changed any more."""
+
+
+class ProMPConfig(PrimitiveConfig):
+    """Options of a probabilistic movement primitive."""
+
+    bases: int = Field(20, ge=4, le=200, description="Number of basis functions of each signal.")
+    prior: Positive = Field(
+        1.0,
+        description="Number of demonstrations as much as which it counts, that motions may deviate smoothly from their "
+        "mean. Larger values follow new points more gently where demonstrations did not differ.",
+    )
+
+
+class LearnedProMP(ConfigModel):
+    """A learned probabilistic movement primitive."""
+
+    origin: ListOf[float] = Field(description="Point whose orientation is the mean; positions are 0.")
+    duration_s: Seconds = Field(description="Mean duration of the demonstrations.")
+    weights: ListOf[ListOf[ListOf[float]]] = Field(
+        description="Weights of the basis functions, for each demonstration a row for each signal."
+    )
+
+
+class WeightDistribution(NamedTuple):
+    """Normal distribution of the weights of d signals with k basis functions each, signal by signal.
+
+    Attributes:
+        mean: d k means.
+        covariance: Their covariance, d k x d k.
+    """
+
+    mean: Array
+    covariance: Array
+
+    def given(self, rows: Array, values: Array, variances: Array) -> WeightDistribution:
+        """Returns the distribution once some linear functions of the weights are known (Paraschos 2013, equation 5).
+
+        Args:
+            rows: The functions, c x d k.
+            values: Their c values.
+            variances: Their c variances.
+        """
+        across = self.covariance @ rows.T
+        gain = np.linalg.solve(rows @ across + np.diag(variances), across.T).T
+        mean = self.mean + gain @ (values - rows @ self.mean)
+        return WeightDistribution(mean, self.covariance - gain @ across.T)
+
+
+class MeanPath:
+    """The mean of a distribution of motions.
+
+    Args:
+        free: The distribution before its goal is known; another goal is found in it.
+        goal: The last point, None for the mean of the distribution.
+    """
+
+    def __init__(self, primitive: ProMP, free: WeightDistribution, duration_s: float, goal: Array | None) -> None:
+        self._primitive, self._free, self.end_s = primitive, free, duration_s
+        self._distribution = free if goal is None else primitive.given(free, [primitive.known_at(1.0, goal)])
+
+    def at(self, time_s: float) -> tuple[Array, Array]:
+        """Returns point and velocity, shape (dof,)."""
+        point, velocity = self._primitive.mean_at(self._distribution, time_s / self.end_s)
+        return point, velocity / self.end_s
+
+    def set_goal(self, goal: Array, time_s: float) -> None:
+        """Sets another goal: the mean, given where it is now, and that it ends there.
+
+        Raises:
+            PlanError: If it is too late.
+        """
+        primitive, progress = self._primitive, time_s / self.end_s
+        if progress > LAST_CHANGE:
+            got = f"one after {min(progress, 1.0):.0%}"
+            raise PlanError("goal", f"a change before {LAST_CHANGE:.0%} of the duration", got)
+        now = primitive.rows(progress), primitive.rows(progress, is_rate=True)
+        self._free = primitive.given(self._free, [(rows, rows @ self._distribution.mean, EXACT_STD) for rows in now])
+        self._distribution = primitive.given(self._free, [primitive.known_at(1.0, goal)])
+
+
+class ProMP(Primitive):
+    """A probabilistic movement primitive: demonstrations and their variation, given start, goal and via-points.
+
+    Paraschos 2013; orientations are rotation vectors from the mean orientation.
+    """
+
+    Config = ProMPConfig
+    Learned = LearnedProMP
+
+    def _learn(self, space: Space, demonstrations: Sequence[Demonstration]) -> None:
+        n = len(space.names)
+        samples = [each.points[:: max(len(each.points) // SAMPLES_OF_MEAN, 1)] for each in demonstrations]
+        origin = space.mean(list(np.vstack(samples)))
+        origin[:n] = 0.0
+        basis, weights = TimeBasis.of(self.config.bases), []
+        for index, each in enumerate(demonstrations):
+            path = np.array([space.minus(point, origin) for point in each.points])
+            largest = float(np.linalg.norm(path[:, n:], axis=1).max())
+            if largest > MAX_ANGLE_RAD:
+                expected = f"at most {MAX_ANGLE_RAD:.3g} rad from their mean"
+                raise DemonstrationError("orientations", expected, f"{largest:.3g} rad in [{index}]")
+            weights.append(fitted(basis.values(each.times / each.duration_s), path))
+        duration_s = float(np.mean([each.duration_s for each in demonstrations]))
+        self._set(space, origin, duration_s, np.array(weights))
+
+    def _set(self, space: Space, origin: Array, duration_s: float, weights: Array) -> None:
+        """Sets what was learned; `weights` has the shape (N, dof, k)."""
+        self._origin, self._duration_s, self._weights = origin, duration_s, weights
+        self._basis = TimeBasis.of(self.config.bases)
+        self._dof = space.dof
+        count, rows = len(weights), weights.reshape(len(weights), -1)
+        mean = rows.mean(axis=0)
+        spread = (rows - mean).T @ (rows - mean)
+        centers = self._basis.centers
+        kernel = np.exp(-0.5 * ((centers[:, None] - centers) / PRIOR_LENGTH) ** 2)
+        kernel += 1e-6 * np.eye(len(centers))
+        prior = self.config.prior
+        scales = np.diag(self._prior_stds(space, mean.reshape(space.dof, -1)) ** 2)
+        self.distribution = WeightDistribution(mean, (spread + prior * np.kron(scales, kernel)) / (count + prior))
+
+    def _prior_stds(self, space: Space, weights: Array) -> Array:
+        """Returns a standard deviation for each signal; all positions share one, and all angles."""
+        extents, n = np.ptp(weights, axis=1), len(space.names)
+        parts = (part for part in (extents[:n], extents[n:]) if len(part))
+        return np.concatenate([np.full(len(part), PRIOR_SHARE * max(part.max(), MIN_EXTENT)) for part in parts])
+
+    def _begin(
+        self,
+        start: Array | None,
+        goal: Array | None,
+        duration_s: float | None,
+        via_points: Sequence[ViaPoint],
+        velocity: Array,
+    ) -> Execution:
+        duration = self._duration_s if duration_s is None else duration_s
+        if start is None and velocity.any():
+            raise PlanError("velocity", "a start with it", "none")
+        rate = velocity if start is None else duration * self.space.shift_rate(self.coordinates(start), velocity)
+        known = [(self.rows(each.progress), self.coordinates(each.point), each.std) for each in via_points]
+        known.append((self.rows(0.0, is_rate=True), rate, EXACT_STD))
+        known.append((self.rows(1.0, is_rate=True), np.zeros(self._dof), EXACT_STD))
+        if start is not None:
+            known.append(self.known_at(0.0, start))
+        spring, rest = SpringDamper(self.config.alpha, duration), np.zeros(self._dof)
+        path = MeanPath(self, self.given(self.distribution, known), duration, goal)
+        return PathExecution(self.space, spring, path, lambda _: rest, path.at(duration)[0] if goal is None else goal)
+
+    def known_at(self, progress: float, point: Array) -> tuple[Array, Array, float]:
+        """Returns rows, values and standard deviation of a point that is passed exactly."""
+        return self.rows(progress), self.coordinates(point), EXACT_STD
+
+    def given(
+        self, distribution: WeightDistribution, known: Sequence[tuple[Array, Array, float]]
+    ) -> WeightDistribution:
+        """Returns a distribution, given rows, values and standard deviations."""
+        rows, values, stds = zip(*known)
+        variances = np.repeat(np.maximum(stds, EXACT_STD) ** 2, self._dof)
+        return distribution.given(np.vstack(rows), np.concatenate(values), variances)
+
+    def rows(self, progress: float, is_rate: bool = False) -> Array:
+        """Returns the linear functions of all weights that are the coordinates at a share of the duration, or rates."""
+        basis = self._basis.rates if is_rate else self._basis.values
+        return np.kron(np.eye(self._dof), basis(np.array(progress)))
+
+    def coordinates(self, point: Array) -> Array:
+        """Returns the coordinates of a point: positions, and a rotation vector from the mean orientation."""
+        return self.space.minus(point, self._origin)
+
+    def mean_at(self, distribution: WeightDistribution, progress: float) -> tuple[Array, Array]:
+        """Returns point and velocity, for a duration of 1 s, of the mean of a distribution."""
+        weights, u = distribution.mean.reshape(self._dof, -1), np.array(min(progress, 1.0))
+        coordinates, rates = weights @ self._basis.values(u), weights @ self._basis.rates(u)
+        if progress > 1.0:
+            rates = np.zeros(self._dof)
+        n = len(self.space.names)
+        if self.space.has_orientation:
+            rates[n:] = angular_velocity(coordinates[n:], rates[n:])
+        return self.space.plus(self._origin, coordinates), rates
+
+    def stds(self, progress: ArrayLike, distribution: WeightDistribution | None = None) -> Array:
+        """Returns standard deviations at m shares of the duration, shape (m, dof), of all motions that it may make.
+
+        Args:
+            distribution: By default that of the demonstrations; see `conditioned`.
+        """
+        k = len(self._basis.centers)
+        covariance = (distribution or self.distribution).covariance.reshape(self._dof, k, self._dof, k)
+        blocks = np.array([covariance[i, :, i] for i in range(self._dof)])
+        values = self._basis.values(np.asarray(progress, dtype=float))
+        return np.asarray(np.sqrt(np.maximum(np.einsum("mk,dkl,ml->md", values, blocks, values), 0.0)))
+
+    def conditioned(self, via_points: Sequence[ViaPoint]) -> WeightDistribution:
+        """Returns the distribution of the motions that pass some points.
+
+        Raises:
+            PlanError: If one is no point of the space.
+        """
+        points = [self.space.point(each.point, f"via_points[{index}]") for index, each in enumerate(via_points)]
+        known = [(self.rows(each.progress), self.coordinates(at), each.std) for each, at in zip(via_points, points)]
+        return self.given(self.distribution, known)
+
+    def _learned(self) -> LearnedProMP:
+        return LearnedProMP(origin=self._origin.tolist(), duration_s=self._duration_s, weights=self._weights.tolist())
+
+    def _restore(self, space: Space, learned: Any) -> None:
+        shape = {"demonstrations": len(learned.weights), "signals": space.dof, "bases": self.config.bases}
+        weights = check_shape(learned.weights, shape, "weights")
+        if not len(weights):
+            raise ValueError("weights: expected at least one demonstration, got none")
+        self._set(space, space.point(learned.origin, "origin"), learned.duration_s, weights)

@@ -1,0 +1,83 @@
+"""Learning and planning by the release's services, as its `dmp.dmp_proc` has it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import rospy
+from dmp.msg import DMPPoint, DMPTraj
+from dmp.srv import GetDMPPlan, LearnDMPFromDemo, LearnDMPFromDemoResponse, SetActiveDMP
+from numpy.typing import ArrayLike
+
+from custom_ros_tools.ros.services import get_srv_handler
+from custom_ros_tools.transforms import Array
+
+Gains = float | Sequence[float]
+"""A gain of each dimension, or one for all."""
+
+
+class DMPProcessor:
+    """Calls the services of `dmp_server`, and waits until they are there."""
+
+    def __init__(self) -> None:
+        self._learn = get_srv_handler("learn_dmp_from_demo", LearnDMPFromDemo)
+        self._set_active = get_srv_handler("set_active_dmp", SetActiveDMP)
+        self._plan = get_srv_handler("get_dmp_plan", GetDMPPlan)
+
+    def learn_dmp(
+        self, t: ArrayLike, traj: ArrayLike, k: Gains, d: Gains, num_bases: int
+    ) -> LearnDMPFromDemoResponse | None:
+        """Learns a primitive of each dimension; returns the answer of the service, None if it was refused.
+
+        Args:
+            t: N times [s].
+            traj: Positions, shape (dims, N).
+            k: Stiffness.
+            d: Damping.
+            num_bases: Number of weights.
+        """
+        samples = np.asarray(traj, dtype=float).T
+        points = [DMPPoint(positions=row) for row in samples.tolist()]
+        demo, count = DMPTraj(points, np.asarray(t, dtype=float).tolist()), samples.shape[-1]
+        try:
+            return self._learn(demo, _gains(k, count), _gains(d, count), num_bases)
+        except rospy.ServiceException as error:
+            rospy.logerr("learn_dmp_from_demo: %s", error)
+            return None
+
+    def generate_plan(
+        self,
+        dmp: LearnDMPFromDemoResponse,
+        pos0: ArrayLike,
+        vel0: ArrayLike,
+        t0: float,
+        goal: ArrayLike,
+        goal_thresh: ArrayLike,
+        seg_length: float,
+        tau: float,
+        dt: float,
+        integrate_iter: int,
+    ) -> tuple[bool, Array | None, Array | None, Array | None]:
+        """Makes a learned primitive active, and plans; for the arguments see `release_dmp.plan`.
+
+        Returns:
+            Whether the plan ends at the goal, N times [s], positions and velocities of the shape (dims, N); None for
+            these three if the request was refused.
+        """
+        lists = (np.asarray(each, dtype=float).tolist() for each in (pos0, vel0, goal, goal_thresh))
+        x_0, x_dot_0, end, near = lists
+        try:
+            if not self._set_active(dmp.dmp_list).success:
+                rospy.logerr("set_active_dmp: refused; the log of dmp_server has the reason")
+                return False, None, None, None
+            answer = self._plan(x_0, x_dot_0, t0, end, near, seg_length, tau, dt, integrate_iter)
+        except rospy.ServiceException as error:
+            rospy.logerr("get_dmp_plan: %s", error)
+            return False, None, None, None
+        positions = np.array([point.positions for point in answer.plan.points]).T
+        velocities = np.array([point.velocities for point in answer.plan.points]).T
+        return bool(answer.at_goal), np.array(answer.plan.times), positions, velocities
+
+
+def _gains(gains: Gains, count: int) -> list[float]:
+    array = np.asarray(gains, dtype=float)
+    return np.full(count, array).tolist() if array.ndim == 0 else array.tolist()

@@ -1,0 +1,144 @@
+"""Spaces of motions: positions of n signals, and with them, if wanted, one orientation.
+
+A point is an array of n positions, followed by the unit quaternion x, y, z, w if the space has an orientation. A
+difference of points, and a velocity, is an array of n numbers, followed by a rotation vector, or an angular velocity,
+about the fixed axes. Positions and orientation thus share one formula, and one phase.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from custom_ros_tools.transforms import Array, finite_vector
+from robot_model.geometry import normalized, quaternion_of, quaternion_product, rotation_between
+
+from .errors import PlanError
+
+QUATERNION = ("qx", "qy", "qz", "qw")
+"""Names of the numbers of an orientation."""
+POSE = ("x", "y", "z")
+"""Names of the positions of a pose."""
+ROUNDING = 1e-12
+MIN_NORM, MAX_NORM = 0.9, 1.1
+"""Lengths of a quaternion that count as rounding [1]; others are rejected."""
+
+
+class Space(NamedTuple):
+    """Names of n positions, and whether an orientation goes with them."""
+
+    names: tuple[str, ...]
+    has_orientation: bool = False
+
+    @property
+    def dof(self) -> int:
+        """Length of a difference, and of a velocity."""
+        return len(self.names) + 3 * self.has_orientation
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """Names of the numbers of a point."""
+        return (*self.names, *QUATERNION) if self.has_orientation else self.names
+
+    def point(self, values: ArrayLike, subject: str) -> Array:
+        """Returns a checked point; its quaternion gets length 1.
+
+        Args:
+            subject: Name of the point in messages, such as `goal`.
+
+        Raises:
+            PlanError: If the number of values differs, one is not finite or the quaternion has not length 1.
+        """
+        try:
+            point = finite_vector(values, len(self.point_names), subject).copy()
+        except (TypeError, ValueError):
+            got = str(values).replace("\n", "")
+            raise PlanError(
+                subject, f"{len(self.point_names)} finite numbers {', '.join(self.point_names)}", got
+            ) from None
+        if self.has_orientation:
+            length = float(np.linalg.norm(point[-4:]))
+            if not MIN_NORM <= length <= MAX_NORM:
+                raise PlanError(subject, "a quaternion of length 1", f"length {length:.3g}")
+            if abs(length - 1.0) > ROUNDING:  # normalising again would change the last bit
+                point[-4:] /= length
+        return point
+
+    def minus(self, end: Array, start: Array) -> Array:
+        """Returns the difference that leads from one point to another; orientations the shorter way."""
+        if not self.has_orientation:
+            return end - start
+        n = len(self.names)
+        rotation = rotation_between(tuple(start[n:].tolist()), tuple(end[n:].tolist()))
+        return np.array([*(end[:n] - start[:n]).tolist(), *rotation])
+
+    def plus(self, start: Array, difference: Array) -> Array:
+        """Returns the point to which a difference leads."""
+        if not self.has_orientation:
+            return start + difference
+        n = len(self.names)
+        turn = quaternion_of(tuple(difference[n:].tolist()))
+        quat = normalized(quaternion_product(turn, tuple(start[n:].tolist())))
+        return np.array([*(start[:n] + difference[:n]).tolist(), *quat])
+
+    def shift_rate(self, shift: Array, velocity: Array) -> Array:
+        """Returns how fast a difference from a fixed point changes at a velocity, shape (dof,)."""
+        n = len(self.names)
+        if not self.has_orientation or not shift[n:].any():
+            return velocity
+        half = 0.5 * float(np.linalg.norm(shift[n:]))
+        factor = 1.0 / 12.0 if half < 1e-4 else 0.25 * (1.0 - half / math.tan(half)) / half**2
+        around = _cross(shift[n:], velocity[n:])
+        turning = velocity[n:] - 0.5 * around + factor * _cross(shift[n:], around)
+        return np.concatenate([velocity[:n], turning])
+
+    def rates(self, times: Array, points: Array) -> Array:
+        """Returns velocities by finite differences, shape (m, dof), of m points at m times [s]."""
+        steps = np.array([self.minus(after, before) for before, after in zip(points, points[1:])])
+        path = np.vstack([np.zeros(self.dof), np.cumsum(steps, axis=0)])
+        return np.asarray(np.gradient(path, times, axis=0))
+
+    def distance(self, a: Array, b: Array) -> tuple[float, float]:
+        """Returns the largest distance of two positions [m or rad], and the angle between orientations [rad]."""
+        difference, n = self.minus(a, b), len(self.names)
+        return float(np.abs(difference[:n]).max(initial=0.0)), math.hypot(*difference[n:].tolist())
+
+    def mean(self, points: Sequence[Array]) -> Array:
+        """Returns the mean of some points, of their orientations the one with the least squared angles."""
+        mean = points[0]
+        for _ in range(MEAN_ITERATIONS if self.has_orientation else 1):
+            mean = self.plus(mean, np.mean([self.minus(each, mean) for each in points], axis=0))
+        return mean
+
+
+MEAN_ITERATIONS = 10
+"""Steps to the mean of orientations; each reduces the error by a large factor, unless they are half a turn apart."""
+
+
+def angular_velocity(rotation: Array, rate: Array) -> Array:
+    """Returns the angular velocity [rad/s] at a rotation vector [rad] that changes at a rate [rad/s]."""
+    angle = float(np.linalg.norm(rotation))
+    small = angle < 1e-4
+    first = 0.5 if small else (1.0 - math.cos(angle)) / angle**2
+    second = 1.0 / 6.0 if small else (angle - math.sin(angle)) / angle**3
+    around = _cross(rotation, rate)
+    return np.asarray(rate + first * around + second * _cross(rotation, around))
+
+
+def turned(rotation: Array, vector: Array) -> Array:
+    """Returns a vector, turned by a rotation vector [rad] (Rodrigues' formula)."""
+    angle = float(np.linalg.norm(rotation))
+    small = angle < 1e-4
+    first = 1.0 if small else math.sin(angle) / angle
+    second = 0.5 if small else (1.0 - math.cos(angle)) / angle**2
+    around = _cross(rotation, vector)
+    return np.asarray(vector + first * around + second * _cross(rotation, around))
+
+
+def _cross(a: Array, b: Array) -> Array:
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()  # many times as fast as numpy's
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])

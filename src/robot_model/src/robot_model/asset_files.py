@@ -1,0 +1,132 @@
+"""Files that a configuration names: where they are looked for, and field types that insist on them."""
+
+import os
+import sys
+from collections.abc import Sequence
+from functools import lru_cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import AfterValidator, ValidationInfo
+
+from custom_ros_tools.config import replace_package
+from custom_ros_tools.errors import ConfigError, MissingDependency, shortened
+from custom_ros_tools.schema import Expects, Text
+
+ROBOT_DESCRIPTION = "robot_description"
+"""The word that stands for the robot description on the parameter server in place of a file name."""
+PYBULLET_DATA_PATH = "pybullet_data_path"
+"""The word that stands for the folder of PyBullet's data in search paths."""
+LONGEST_PATH = 1000
+"""Characters of a path; PyBullet copies them into 1024 bytes."""
+OF_KERNEL = ("/proc/", "/sys/", "/dev/")
+"""Folders whose files may be without end, or never begin."""
+ASSETS = "example-robot-data"
+"""Robots of the extra `assets`: they are named as if this were a ROS package, `{example-robot-data}/robots/...`."""
+
+
+def find_file(name: str, file: str, search_paths: Sequence[str] = ()) -> str:
+    """Returns the absolute path of a file that a YAML file names.
+
+    Looked for beside the YAML file, in the search paths and in PyBullet's data, in this order.
+
+    Args:
+        name: Path in the YAML file; `{package}/path` and `package://package/path` are resolved.
+        file: The YAML file; without folder if it came from the parameter server (`~config`).
+        search_paths: Further folders.
+
+    Raises:
+        ValueError: If there is no such file, or the package is unknown.
+    """
+    _refuse_long(name)
+    path = _resolve_package(name)
+    folders = [*search_paths, *pybullet_data()]
+    if not file.startswith("~"):
+        folders.insert(0, str(Path(file).resolve().parent))
+    candidates = [path] if path.is_absolute() else [Path(folder) / path for folder in folders]
+    try:
+        candidate = next((each for each in candidates if each.is_file()), None)
+        is_of_kernel = candidate is not None and str(candidate.resolve()).startswith(OF_KERNEL)
+    except OSError as error:
+        raise ValueError(f"{shortened(name)}: {(error.strerror or str(error)).lower()}") from None
+    if candidate is not None:
+        found = str(candidate.resolve() if ".." in candidate.parts else candidate.absolute())
+        _refuse_long(found)
+        if is_of_kernel:
+            raise ValueError(f"expected an ordinary file, got {found}")
+        return found
+    if any(candidate.is_dir() for candidate in candidates):
+        raise ValueError(f"expected a file, got the folder {name}")
+    where = "" if path.is_absolute() else f" (looked in {', '.join(map(str, folders))})"
+    if where and file.startswith("~"):
+        where += "; what is on the parameter server has no folder: write {package}/PATH or the full path"
+    raise ValueError(f"no such file: {path if path.is_absolute() else name}{where}")
+
+
+def _existing(name: str, info: ValidationInfo) -> str:
+    context = info.context or {}
+    return find_file(name, context.get("file", "~"), context.get("search_paths", ()))
+
+
+def _existing_or_description(name: str, info: ValidationInfo) -> str:
+    if name == ROBOT_DESCRIPTION:
+        return str((info.context or {}).get(ROBOT_DESCRIPTION) or name)
+    return _existing(name, info)
+
+
+def find_folder(name: str, file: str) -> str:
+    """Returns the absolute path of a folder that a YAML file names, as `find_file` does.
+
+    `pybullet_data_path` is the folder of PyBullet's data.
+
+    Raises:
+        ValueError: If there is no such folder, or the package is unknown.
+    """
+    _refuse_long(name)
+    if name == PYBULLET_DATA_PATH:
+        if not (folders := pybullet_data()):
+            raise ValueError(str(MissingDependency("pybullet_data", "./rpbi setup")))
+        return folders[0]
+    folder = _resolve_package(name)
+    if not folder.is_absolute() and not file.startswith("~"):
+        folder = Path(file).resolve().parent / folder
+    if not folder.is_dir():
+        raise ValueError(f"no such folder: {folder}")
+    return str(folder.absolute())
+
+
+@lru_cache(maxsize=1)
+def pybullet_data() -> tuple[str, ...]:
+    """Returns the folder of PyBullet's data, which need not be installed."""
+    spec = find_spec("pybullet_data")
+    return tuple(spec.submodule_search_locations or ()) if spec else ()
+
+
+def _refuse_long(path: str) -> None:
+    if len(os.fsencode(path)) > LONGEST_PATH:
+        raise ValueError(f"expected a path of at most {LONGEST_PATH} bytes, got {shortened(path)}")
+
+
+def _resolve_package(name: str) -> Path:
+    for prefix in (f"{{{ASSETS}}}/", f"package://{ASSETS}/"):
+        if name.startswith(prefix):
+            return _assets() / name.removeprefix(prefix)
+    try:
+        return Path(replace_package(name))
+    except ConfigError as error:
+        raise ValueError(str(error)) from None
+
+
+def _assets() -> Path:
+    folders = (Path(entry) / "cmeel.prefix" / "share" / ASSETS for entry in sys.path)
+    found = next((folder for folder in folders if folder.is_dir()), None)
+    if found is None:
+        raise ValueError(str(MissingDependency(ASSETS, "./rpbi setup assets")))
+    return found
+
+
+ExistingFile = Annotated[Text, AfterValidator(_existing), Expects("a file name")]
+"""A file that exists, as an absolute path; `file` and `search_paths` come from the validation's context."""
+RobotFile = Annotated[Text, AfterValidator(_existing_or_description), Expects("a file name")]
+"""The same, or the word `robot_description`, which becomes the file that the context has for it, if any."""

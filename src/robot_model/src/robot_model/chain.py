@@ -1,0 +1,111 @@
+"""The chain of joints between two links of a robot."""
+
+import math
+from collections.abc import Sequence
+from functools import cached_property, reduce
+
+import numpy as np
+
+from custom_ros_tools.errors import UnknownNameError
+
+from .frames import origin_of
+from .joints import AffineMap, followed
+from .limits import Limits
+from .model import read_robot
+from .reach import Reach
+from .urdf.copies import chain_urdf
+from .urdf.document import UrdfDocument
+from .urdf.elements import UrdfJoint
+
+
+class Chain:
+    """The joints between two links, read from a URDF.
+
+    Args:
+        urdf_filename: The robot's URDF; the meshes it names need not be there.
+        base: The link where the chain begins.
+        tip: The link where it ends; the base is above it.
+
+    Attributes:
+        joints: All joints in between, fixed ones too, from the base to the tip.
+        moving: Those of them that are not fixed.
+        joint_names: The n joints that are solved for: those that move, and in the place of joints that mimic another
+            that other one.
+        to_moving: The map from them to those that move.
+        limits: Their limits, within which joints that mimic them are within theirs too.
+        velocity_limits: Their largest speeds [rad/s or m/s], inf where there is none.
+        robot_joints: All joints of the robot.
+        mimics: Names of the chain's joints that mimic others.
+
+    Raises:
+        ConfigError: If the file cannot be read, or a joint makes no sense.
+        UnknownNameError: If a link is not known.
+        ValueError: If the chain cannot be solved for; it names the joint or link.
+    """
+
+    def __init__(self, urdf_filename: str, base: str, tip: str) -> None:
+        document = read_robot(urdf_filename, "expected well-formed XML")
+        for name in (base, tip):
+            if name not in document.links:
+                raise UnknownNameError("link", name, document.links)
+        robot = document.joints
+        self.base, self.tip = base, tip
+        self.joints = _between(document, base, tip)
+        self.moving = tuple(joint for joint in self.joints if joint.is_moving)
+        self.joint_names = tuple(dict.fromkeys(_leader(document, joint) for joint in self.moving))
+        self.to_moving = AffineMap.of([joint.name for joint in self.moving], self.joint_names, document.mimics)
+        self.limits = _limits([robot[name] for name in self.joint_names], self.moving, self.to_moving)
+        self.velocity_limits = tuple(robot[name].max_velocity for name in self.joint_names)
+        self.robot_joints = frozenset(robot)
+        self.mimics = [joint.name for joint in self.joints if joint.mimic is not None]
+
+    @cached_property
+    def reach(self) -> Reach:
+        """The ball around the first joint that moves, in the base, that the tip never leaves."""
+        first = self.joints.index(self.moving[0])
+        x, y, z = reduce(np.matmul, map(origin_of, self.joints[: first + 1]))[:3, 3].tolist()
+        return Reach.of((x, y, z), [math.hypot(*joint.xyz) for joint in self.joints[first + 1 :]], self.moving)
+
+    @property
+    def urdf(self) -> str:
+        """A URDF of the chain alone, of bare links and joints."""
+        return chain_urdf(self.joints)
+
+
+def _between(document: UrdfDocument, base: str, tip: str) -> tuple[UrdfJoint, ...]:
+    joints: list[UrdfJoint] = []
+    above = document.joints_above(tip)
+    while (joints[-1].parent if joints else tip) != base:
+        name, kind, _ = next(above, ("", "", ""))
+        if not name:
+            passed = ", ".join(joint.parent for joint in joints) or "no links"
+            raise ValueError(f"'{tip}' does not hang on '{base}'; above it are {passed}")
+        joints.append(document.joints[name])
+        if not joints[-1].is_moving and kind != "fixed":
+            kinds = "only revolute, continuous, prismatic and fixed ones are solved for"
+            raise ValueError(f"'{tip}' hangs on '{name}', a {kind} joint; {kinds}")
+    if not any(joint.is_moving for joint in joints):
+        raise ValueError(f"no joint moves '{tip}' in '{base}'")
+    return tuple(joints[::-1])
+
+
+def _leader(document: UrdfDocument, joint: UrdfJoint) -> str:
+    """Returns the joint that is solved for in the place of a joint."""
+    if joint.mimic is None:
+        return joint.name
+    leader = followed(joint.name, document.mimics).joint
+    if leader not in document.joints or not document.joints[leader].is_moving:
+        raise ValueError(f"joint '{joint.name}' mimics '{leader}', which is no joint that moves by itself")
+    return leader
+
+
+def _limits(leaders: Sequence[UrdfJoint], moving: Sequence[UrdfJoint], to_moving: AffineMap) -> Limits:
+    lower, upper = [joint.lower for joint in leaders], [joint.upper for joint in leaders]
+    for joint, factors, offset in zip(moving, to_moving.factors.tolist(), to_moving.offsets.tolist()):
+        ((i, multiplier),) = ((i, factor) for i, factor in enumerate(factors) if factor)
+        ends = sorted((limit - offset) / multiplier for limit in (joint.lower, joint.upper))
+        lower[i], upper[i] = max(lower[i], ends[0]), min(upper[i], ends[1])
+        if lower[i] > upper[i]:
+            name = leaders[i].name
+            raise ValueError(f"joint '{joint.name}' leaves '{name}', which it mimics, no position within limits")
+    return Limits(lower, upper, [joint.is_revolute for joint in leaders])

@@ -1,0 +1,139 @@
+"""Tests for pytest that every library that moves robots passes; derive from `BackendConformance` to try one."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from .geometry import Pose, rotation_between
+from .joints import Array
+from .limits import Limits
+from .model import RobotModel
+
+TRIED = 10
+"""Number of random configurations of each robot."""
+SKEW = """<robot name="skew">
+  <link name="root"/><link name="foot"/><link name="thigh"/><link name="plate"/><link name="rod"/><link name="tip"/>
+  <joint name="stand" type="fixed">
+    <parent link="root"/><child link="foot"/><origin xyz="0 0.2 0.1" rpy="0.3 0 1"/></joint>
+  <joint name="hip" type="revolute">
+    <parent link="foot"/><child link="thigh"/><origin xyz="0.1 0 0.2" rpy="0.5 -0.4 0.2"/>
+    <axis xyz="1 2 -2"/><limit lower="-1.5" upper="2" effort="1" velocity="3"/></joint>
+  <joint name="bolt" type="fixed">
+    <parent link="thigh"/><child link="plate"/><origin xyz="0.3 0 0" rpy="0 1 0"/></joint>
+  <joint name="push" type="prismatic">
+    <parent link="plate"/><child link="rod"/><origin xyz="0 0 0.1" rpy="0 0 0.7"/>
+    <axis xyz="0 0.6 0.8"/><limit lower="-0.1" upper="0.4" effort="1" velocity="0.5"/></joint>
+  <joint name="roll" type="continuous">
+    <parent link="rod"/><child link="tip"/><origin xyz="0 0.05 0.1"/><axis xyz="0 -1 0"/></joint>
+</robot>"""
+"""A robot with axes that are askew, a joint that slides, one without limits, and links that are fixed to others."""
+MIMIC = SKEW.replace('<axis xyz="0 -1 0"/>', '<axis xyz="0 -1 0"/><mimic joint="hip" multiplier="-0.5" offset="0.2"/>')
+"""The same; its last joint follows its first one."""
+
+
+class Backend(ABC):
+    """A robot in a library.
+
+    Attributes:
+        joint_names: Its n joints, in any order.
+        limits: Their limits.
+    """
+
+    joint_names: Sequence[str]
+    limits: Limits
+
+    @abstractmethod
+    def pose(self, q: Sequence[float], link: str) -> Pose:
+        """Returns the pose of a link in the root at n positions [rad or m]."""
+
+    @abstractmethod
+    def jacobian(self, q: Sequence[float], link: str) -> Array:
+        """Returns the Jacobian of the origin of a link in the axes of the root, 6 x n, linear above angular."""
+
+
+class BackendConformance(ABC):
+    """Tests that any library passes; robots are those of `robot_model`.
+
+    Attributes:
+        robots: URDFs of robots, beside those of this module.
+        follows_mimics: Whether it moves joints that mimic others.
+        tolerance: Largest difference between poses [m and rad].
+        step: Step of finite differences [rad or m]; their error grows with its square and with `tolerance / step`.
+    """
+
+    robots: ClassVar[Sequence[str]] = ()
+    follows_mimics: ClassVar[bool] = True
+    tolerance: ClassVar[float] = 1e-9
+    step: ClassVar[float] = 1e-5
+
+    @abstractmethod
+    def make(self, urdf_path: str) -> Backend:
+        """Returns a robot in the library."""
+
+    @pytest.fixture
+    def pairs(self, tmp_path: Path) -> list[tuple[RobotModel, Backend, list[int]]]:
+        """Returns each robot, the same in the library, and where joints of the latter are among those of the former."""
+        paths = list(self.robots)
+        for name, text in (("skew", SKEW), *((("mimic", MIMIC),) if self.follows_mimics else ())):
+            path = tmp_path / f"{name}.urdf"
+            path.write_text(text)
+            paths.append(str(path))
+        robots = [(RobotModel(path), self.make(path)) for path in paths]
+        return [
+            (robot, backend, [robot.joint_names.index(name) for name in backend.joint_names])
+            for robot, backend in robots
+        ]
+
+    def configurations(self, robot: RobotModel) -> list[list[float]]:
+        """Returns random configurations within limits."""
+        generator = np.random.default_rng(1)
+        return [robot.limits.random(generator, robot.limits.middle) for _ in range(TRIED)]
+
+    def test_joints_and_their_limits_are_those_of_the_urdf(
+        self, pairs: list[tuple[RobotModel, Backend, list[int]]]
+    ) -> None:
+        """Joints that mimic others are none of them; continuous ones have no limits."""
+        for robot, backend, order in pairs:
+            assert sorted(backend.joint_names) == sorted(robot.joint_names)
+            expected = robot.limits.of(order)
+            assert backend.limits.lower == pytest.approx(expected.lower)
+            assert backend.limits.upper == pytest.approx(expected.upper)
+            assert backend.limits.is_revolute == expected.is_revolute
+
+    def test_links_are_where_the_urdf_says(self, pairs: list[tuple[RobotModel, Backend, list[int]]]) -> None:
+        """All links that a joint moves have the same poses."""
+        for robot, backend, order in pairs:
+            for q in self.configurations(robot):
+                for link in _moved_links(robot):
+                    expected, found = robot.pose(q, link), backend.pose([q[i] for i in order], link)
+                    assert found.position == pytest.approx(expected.position, abs=self.tolerance), link
+                    off = rotation_between(expected.quat_xyzw, found.quat_xyzw)
+                    assert off == pytest.approx((0.0, 0.0, 0.0), abs=self.tolerance), link
+
+    def test_jacobians_are_the_finite_differences_of_poses(
+        self, pairs: list[tuple[RobotModel, Backend, list[int]]]
+    ) -> None:
+        """Joints that mimic others count for those that they follow."""
+        for robot, backend, order in pairs:
+            q = np.array(self.configurations(robot)[0])[order]
+            for link in _moved_links(robot):
+                found = backend.jacobian(q.tolist(), link)
+                for column, step in zip(found.T, self.step * np.eye(len(q))):
+                    before, after = (backend.pose((q + each).tolist(), link) for each in (-step, step))
+                    expected = _difference(before, after) / (2.0 * self.step)
+                    np.testing.assert_allclose(column, expected, atol=self.step**2 + self.tolerance / self.step)
+
+
+def _moved_links(robot: RobotModel) -> list[str]:
+    return [link for link in robot.links if any(joint.is_moving for joint in robot.chain(link))]
+
+
+def _difference(before: Pose, after: Pose) -> Array:
+    moved = np.subtract(after.position, before.position)
+    return np.concatenate((moved, rotation_between(before.quat_xyzw, after.quat_xyzw)))

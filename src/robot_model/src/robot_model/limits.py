@@ -1,0 +1,119 @@
+"""Limits of joints, and positions within them where a search starts."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable, Iterator, Sequence
+from typing import Protocol
+
+import numpy as np
+
+MAX_MAGNITUDE = 1e9
+"""Largest position, velocity or effort that is accepted, in any unit; squares of larger ones overflow soon."""
+LIMIT_ROUNDING = 1e-6
+"""Distance beyond a limit [rad or m] up to which a position counts as within."""
+TURN = 2.0 * math.pi
+Generator = random.Random | np.random.Generator
+
+
+class Axis(Protocol):
+    """A joint that turns about one axis or slides along it, within limits [rad or m]."""
+
+    @property
+    def lower(self) -> float: ...
+
+    @property
+    def upper(self) -> float: ...
+
+    @property
+    def is_revolute(self) -> bool: ...
+
+
+class Limits:
+    """Limits of n joints; plain numbers, since arrays of seven take longer.
+
+    Args:
+        lower: n lower limits [rad or m], -inf where there is none.
+        upper: n upper limits [rad or m], inf where there is none.
+        is_revolute: Which joints turn.
+
+    Attributes:
+        middle: n positions half-way between the limits, 0 or the limit next to it where there are not both.
+    """
+
+    def __init__(self, lower: Sequence[float], upper: Sequence[float], is_revolute: Sequence[bool]) -> None:
+        self.lower, self.upper, self.is_revolute = tuple(lower), tuple(upper), tuple(is_revolute)
+        self._joints = tuple(zip(self.lower, self.upper, self.is_revolute))
+        self.middle = tuple(
+            (low + high) / 2.0 if math.isfinite(high - low) else min(max(0.0, low), high)
+            for low, high in zip(lower, upper)
+        )
+
+    @classmethod
+    def of_joints(cls, joints: Sequence[Axis]) -> Limits:
+        """Returns the limits of some joints."""
+        lower, upper = [joint.lower for joint in joints], [joint.upper for joint in joints]
+        return cls(lower, upper, [joint.is_revolute for joint in joints])
+
+    def of(self, members: Sequence[int]) -> Limits:
+        """Returns the limits of some of the joints, by their places among the n."""
+        lower, upper = [self.lower[i] for i in members], [self.upper[i] for i in members]
+        return Limits(lower, upper, [self.is_revolute[i] for i in members])
+
+    def wrap_to_limits(self, q: Sequence[float], near: Sequence[float]) -> tuple[list[float], list[bool]]:
+        """Returns positions within the limits, and which of them stopped at one.
+
+        Joints that turn are turned by whole turns to get there. A position that is beyond a limit by no more than
+        rounding is put on it, and does not count as stopped.
+
+        Args:
+            q: n positions [rad or m].
+            near: n positions; of several turns that fit, joints that turn take the one nearest to these.
+        """
+        inside, stopped = [], []
+        for position, close, (lower, upper, is_revolute) in zip(q, near, self._joints):
+            if is_revolute:
+                position -= TURN * round((position - close) / TURN)
+            fits = lower <= position <= upper
+            if not fits:
+                turned = _turned(position, lower, upper) if is_revolute else position
+                fits = lower - LIMIT_ROUNDING <= turned <= upper + LIMIT_ROUNDING
+                position = min(max(turned if fits else position, lower), upper)
+            inside.append(position)
+            stopped.append(not fits)
+        return inside, stopped
+
+    def clip(self, q: Sequence[float]) -> list[float]:
+        """Returns positions, each moved to the limit that it is beyond [rad or m]."""
+        return [min(max(position, lower), upper) for position, lower, upper in zip(q, self.lower, self.upper)]
+
+    def random(self, generator: Generator, near: Sequence[float]) -> list[float]:
+        """Returns random positions within the limits; half a turn or 1 m around `near` where there are none."""
+        positions = []
+        for close, (lower, upper, is_revolute) in zip(near, self._joints):
+            half = math.pi if is_revolute else 1.0
+            low = lower if math.isfinite(lower) else min(close, upper) - half
+            high = upper if math.isfinite(upper) else max(close, lower) + half
+            positions.append(generator.uniform(low, high))
+        return positions
+
+    def starts(self, first: list[float], restarts: int, seed: Callable[[], Generator]) -> Iterator[list[float]]:
+        """Yields n positions to start a search at [rad or m].
+
+        Args:
+            first: The first ones.
+            restarts: Number of random ones after it.
+            seed: Returns what they are drawn from; only called if they are asked for, since that takes a while.
+        """
+        yield first
+        generator = seed()
+        for _ in range(restarts):
+            yield self.random(generator, first)
+
+
+def _turned(position: float, lower: float, upper: float) -> float:
+    """Returns an angle outside limits, turned towards them until it is not beyond the one that it was beyond."""
+    if position > upper:
+        return position - TURN * math.ceil((position - upper - LIMIT_ROUNDING) / TURN)
+    return position + TURN * math.ceil((lower - position - LIMIT_ROUNDING) / TURN)

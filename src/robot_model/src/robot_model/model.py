@@ -1,0 +1,135 @@
+"""A robot as its URDF describes it: joints, limits and kinematics."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from functools import cached_property
+
+from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
+from custom_ros_tools.transforms import finite_vector, pose_of
+
+from .frames import LinkFrames
+from .geometry import Pose
+from .joints import AffineMap
+from .limits import Limits
+from .urdf.document import UrdfDocument
+from .urdf.elements import UrdfJoint
+from .urdf.structure import check_structure
+
+MAX_JOINTS = 500
+"""Largest number of joints that are not fixed; memory and time of kinematics grow with its square."""
+
+
+def read_robot(urdf_path: str, not_xml: str = "is not XML") -> UrdfDocument:
+    """Returns a URDF whose structure is sound.
+
+    Raises:
+        ConfigError: If the file cannot be read, is not well-formed, describes no robot, or one with more than
+            `MAX_JOINTS` joints that are not fixed, or a joint makes no sense.
+    """
+    document = UrdfDocument(urdf_path, not_xml=not_xml)
+    check_structure(document)
+    if (moving := sum(kind != "fixed" for kind in document.joint_types.values())) > MAX_JOINTS:
+        message = f"expected at most {MAX_JOINTS} joints that are not fixed, got {moving}"
+        raise ConfigError([Problem(urdf_path, "", message)])
+    try:
+        _ = document.joints
+    except ValueError as error:
+        raise ConfigError([Problem(urdf_path, "", str(error))]) from None
+    return document
+
+
+class RobotModel:
+    """Joints, limits and kinematics of a robot, a tree of links.
+
+    Configurations have one number for each of n driven joints, in a fixed order. Joints that mimic others follow them;
+    all others stand at 0, or at the limit that is nearest to it.
+
+    Args:
+        urdf_path: The URDF; the meshes that it names need not be there.
+        joint_names: The n driven joints; without any, all that have one axis and mimic no other.
+
+    Attributes:
+        urdf_path: The URDF.
+        document: The URDF, read.
+        all_joints: All joints by name.
+        joint_names: The n driven joints.
+        joints: Their descriptions.
+        limits: Their limits.
+        links: Names of all links.
+        root: Name of the link that hangs on no joint.
+
+    Raises:
+        ConfigError: If the description cannot be read, or a joint makes no sense.
+        UnknownNameError: If a joint is not known, or does not move by itself.
+    """
+
+    def __init__(self, urdf_path: str, joint_names: Sequence[str] = ()) -> None:
+        self.urdf_path = urdf_path
+        self.document = document = read_robot(urdf_path, "expected well-formed XML")
+        self.all_joints = document.joints
+        for name, mimic in document.mimics.items():
+            if mimic.joint not in self.all_joints:
+                message = f"joint '{name}' mimics '{mimic.joint}', which there is not"
+                raise ConfigError([Problem(urdf_path, "", message)])
+        movable = [name for name, joint in self.all_joints.items() if joint.is_moving and joint.mimic is None]
+        for name in joint_names:
+            if name not in movable:
+                raise UnknownNameError("joint that moves by itself", name, movable)
+        self.joint_names = tuple(joint_names) or tuple(movable)
+        if not self.joint_names:
+            raise ConfigError([Problem(urdf_path, "", "expected a joint that moves, got none")])
+        self.joints = [self.all_joints[name] for name in self.joint_names]
+        self.limits = Limits.of_joints(self.joints)
+        self.links: Collection[str] = document.links
+        self.root = document.root_link()
+        self._above = {joint.child: joint for joint in self.all_joints.values()}
+
+    @cached_property
+    def frames(self) -> LinkFrames:
+        """Frames of all links."""
+        return LinkFrames(self.all_joints.values(), self.map_to)
+
+    def map_to(self, names: Sequence[str]) -> AffineMap:
+        """Returns the map from the n driven joints to some joints, by their names."""
+        driven = frozenset(self.joint_names)
+        still = {name: joint.rest for name, joint in self.all_joints.items() if name not in driven}
+        return AffineMap.of(names, self.joint_names, self.document.mimics, still)
+
+    def pose(self, positions: Sequence[float], link: str, base: str | None = None) -> Pose:
+        """Returns the pose of a link in another one, by default the root.
+
+        Args:
+            positions: n positions [rad or m].
+            link: The link.
+            base: The other link.
+
+        Raises:
+            UnknownNameError: If there is no such link.
+            ValueError: If there are not n finite positions.
+        """
+        q = finite_vector(positions, len(self.joint_names), "positions")[None]
+        poses = []
+        for name in (self.root if base is None else base, link):
+            frame, in_frame = self.frames.place(self.check_link(name))
+            position, quat = pose_of(self.frames.at(q)[0, frame] @ in_frame)
+            poses.append(Pose(tuple(position.tolist()), tuple(quat.tolist())))
+        return poses[0].inverse() @ poses[1]
+
+    def check_link(self, name: str) -> str:
+        """Returns the name of a link.
+
+        Raises:
+            UnknownNameError: If there is no such link.
+        """
+        if name not in self.links:
+            raise UnknownNameError("link", name, self.links)
+        return name
+
+    def chain(self, link: str) -> list[UrdfJoint]:
+        """Returns the joints from the root to a link."""
+        joints = []
+        while link != self.root:
+            joints.append(self._above[link])
+            link = joints[-1].parent
+        return joints[::-1]

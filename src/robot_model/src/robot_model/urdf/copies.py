@@ -1,0 +1,96 @@
+"""Changed copies of a URDF."""
+
+import copy
+from collections.abc import Sequence
+
+from robot_model.geometry import scaled
+
+from .document import UrdfDocument
+from .elements import (
+    Element,
+    UrdfJoint,
+    as_read,
+    end_of,
+    inertial,
+    joint_element,
+    new_element,
+    read_vector,
+    text_of,
+    words,
+)
+
+
+def without_shapes(document: UrdfDocument, links: Sequence[str] | None = None) -> str:
+    """Returns a URDF without shapes, of all or some links and the joints between them.
+
+    It loads in half a millisecond where meshes take up to some hundred. Every link has unit mass at its own frame, so
+    that PyBullet's frames of mass centres are the links' frames.
+    """
+    root = document.root_link()
+    kept = sorted((name for name in document.links if links is None or name in links), key=lambda name: name != root)
+    ends = {*kept}
+    every = document.joint_elements
+    tied = (one for one in every if links is None or {end_of(one, "parent"), end_of(one, "child")} <= ends)
+    joints = map(as_read, tied)
+    bare = [new_element("link", inertial("1"), name=name) for name in kept]
+    return text_of(new_element("robot", *bare, *joints, **document.root.attrib))
+
+
+def with_limited_joints(document: UrdfDocument, base: str | None = None) -> str:
+    """Returns a URDF with limits from 0 to 0, which mean none, for joints that turn without end.
+
+    Each of them then has one number in Pinocchio, instead of sine and cosine.
+
+    Args:
+        base: The link that all hangs on instead of the root.
+
+    Raises:
+        ValueError: If a joint between it and the root makes no sense; it names the joint.
+    """
+    root = copy.deepcopy(document.root)
+    if base is not None:
+        _hang_on(root, base)
+    for joint in root.findall("joint"):
+        if joint.get("type") == "continuous":
+            joint.set("type", "revolute")
+            if joint.find("limit") is None:
+                joint.append(new_element("limit", effort="0", velocity="0"))
+            for limit in joint.iterfind("limit"):
+                limit.attrib.update(lower="0", upper="0")
+    return text_of(root)
+
+
+def chain_urdf(joints: Sequence[UrdfJoint]) -> str:
+    """Returns a URDF of a chain of joints with bare links, from its base to its tip."""
+    links = [new_element("link", name=name) for name in (joints[0].parent, *(joint.child for joint in joints))]
+    return text_of(new_element("robot", *links, *map(joint_element, joints), name="chain"))
+
+
+def _hang_on(robot: Element, base: str) -> None:
+    """Turns the joints between a link and the root around, with further links; their positions mean what they did."""
+    above = {end_of(joint, "child"): joint for joint in robot.findall("joint")}
+    link = base
+    while (joint := above.pop(link, None)) is not None:
+        name, parent = joint.get("name", ""), end_of(joint, "parent")
+        x, y, z = read_vector(joint, "origin", "xyz", "0 0 0")
+        roll, pitch, yaw = read_vector(joint, "origin", "rpy", "0 0 0")
+        backwards = scaled(-1.0, read_vector(joint, "axis", "xyz", "1 0 0"))
+        for part in ("origin", "axis", "parent", "child"):
+            for element in joint.findall(part):
+                joint.remove(element)
+        # A joint moves where its origin puts it, so the origin comes back afterwards, one turn after the other.
+        steps = (
+            ("rpy", (-roll, 0.0, 0.0)),
+            ("rpy", (0.0, -pitch, 0.0)),
+            ("rpy", (0.0, 0.0, -yaw)),
+            ("xyz", (-x, -y, -z)),
+        )
+        ends = [*(f"{name}/{number}" for number in range(len(steps))), parent]
+        joint.extend([new_element("parent", link=link), new_element("child", link=ends[0])])
+        joint.append(new_element("axis", xyz=words(backwards)))
+        for (kind, vector), start, end in zip(steps, ends, ends[1:]):
+            between = [new_element("parent", link=start), new_element("child", link=end)]
+            origin = new_element("origin", **{kind: words(vector)})
+            robot.append(new_element("link", name=start))
+            robot.append(new_element("joint", *between, origin, name=f"{start}/fixed", type="fixed"))
+        link = parent

@@ -1,0 +1,218 @@
+"""URDF files, read into plain data."""
+
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import NamedTuple
+from xml.parsers import expat
+
+from custom_ros_tools.config import read_file
+from custom_ros_tools.errors import ConfigError, Problem, shortened
+
+from .elements import READ, Element, Mimic, UrdfJoint, end_of, parse, read_joint, read_mimic
+from .files import mesh_file
+
+MAX_BYTES = 2_000_000
+"""Largest length of a file [bytes]; a longer one is refused."""
+
+
+class Edge(NamedTuple):
+    """A joint, as far as it ties links."""
+
+    joint: str
+    parent: str
+    child: str
+
+
+class Attribute(NamedTuple):
+    """A text in a URDF.
+
+    Attributes:
+        owner: The link or joint that it is of, for messages.
+        tag: The element that has it.
+        key: Its name.
+        text: The text.
+        is_read: Whether PyBullet reads that element.
+    """
+
+    owner: str
+    tag: str
+    key: str
+    text: str
+    is_read: bool
+
+
+class UrdfDocument:
+    """The links and joints of a URDF file.
+
+    As PyBullet does, it ignores text around the robot and characters that XML does not allow. Documents of the same
+    content share their elements and are equal.
+
+    Args:
+        path: The file, for messages; the meshes it names need not be there.
+        source: The file to read in its place.
+        not_xml: Message for a file that is not well-formed.
+
+    Attributes:
+        tag: The element at the top, `robot` in a URDF.
+        links: Names of all links. Callers must not change this or any other attribute.
+        joint_types: Type of each joint by name, such as `revolute` or `fixed`.
+        edges: All joints, with the links that they tie, in the file's order.
+        meshes: The meshes of links, as the file names them.
+        source: The file that was read.
+        root: The element at the top, not to be changed.
+        joint_elements: The elements of the joints, not to be changed.
+
+    Raises:
+        ConfigError: If it cannot be read or is not well-formed.
+    """
+
+    def __init__(self, path: str, source: str | None = None, not_xml: str = "is not XML") -> None:
+        self.path, self.source = path, Path(source or path)
+        try:
+            self.root = _robot_in(read_file(self.source, MAX_BYTES))
+        except OSError as error:
+            raise ConfigError([Problem(path, "", (error.strerror or str(error)).lower())]) from None
+        except (expat.ExpatError, RecursionError) as error:
+            raise ConfigError([Problem(path, "", f"{not_xml}: {error}")]) from None
+        self.tag = self.root.tag
+        self.joint_elements, self.links, self.joint_types, self.meshes, self.edges = _parts_of(self.root)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, UrdfDocument) and self.root is other.root
+
+    def __hash__(self) -> int:
+        return id(self.root)
+
+    @cached_property
+    def joints(self) -> dict[str, UrdfJoint]:
+        """All joints by name.
+
+        Raises:
+            ValueError: If a value makes no sense; it names the joint.
+        """
+        return {joint.name: joint for joint in map(read_joint, self.joint_elements)}
+
+    @cached_property
+    def mimics(self) -> dict[str, Mimic]:
+        """Joints that follow others, by name.
+
+        Raises:
+            ValueError: If a value makes no sense; it names the joint.
+        """
+        found = {joint.get("name", ""): read_mimic(joint) for joint in self.joint_elements}
+        return {name: mimic for name, mimic in found.items() if mimic is not None}
+
+    def meshes_of(self, part: str) -> list[str]:
+        """Returns the meshes of a part of links, `visual` or `collision`, as the file names them."""
+        found = self.root.iterfind(f"link/{part}//mesh")
+        return list(dict.fromkeys(mesh.get("filename", "") for mesh in found))
+
+    def attributes(self) -> Iterator[Attribute]:
+        """Yields all that stands in it."""
+        for key, text in self.root.attrib.items():
+            yield Attribute(self.tag, "robot", key, text, True)
+        for owner in self.root:
+            name = f"{owner.tag} '{shortened(owner.get('name', ''))}'"
+            is_read = owner.tag in READ
+            for element in owner.iter():
+                for key, text in element.attrib.items():
+                    yield Attribute(name, element.tag, key, text, is_read and element.tag in READ)
+
+    @cached_property
+    def frames(self) -> set[str]:
+        """Names of the links that have neither inertia nor shape."""
+        parts = ("inertial", "visual", "collision")
+        links = (link for link in self.root.findall("link") if all(link.find(part) is None for part in parts))
+        return {link.get("name", "") for link in links}
+
+    @cached_property
+    def massless(self) -> set[str]:
+        """Names of the links whose mass is 0."""
+        masses = ((link.get("name", ""), link.find("inertial/mass")) for link in self.root.findall("link"))
+        return {name for name, mass in masses if mass is not None and not float(mass.get("value") or 0.0)}
+
+    @property
+    def is_soft(self) -> bool:
+        """Whether it describes a soft body."""
+        return self.root.find("deformable") is not None
+
+    def deformable_meshes(self) -> list[str]:
+        """Returns the files that its soft body is made of; none if it describes none.
+
+        Raises:
+            ConfigError: If a mesh does not exist.
+        """
+        names = [part.get("filename") for deformable in self.root.findall("deformable") for part in deformable]
+        return [str(mesh_file(name, self.source)) for name in dict.fromkeys(names) if name]
+
+    def joints_above(self, link: str) -> Iterator[tuple[str, str, str]]:
+        """Yields name, type and parent link of each joint between a link and the root, from the link upwards."""
+        above = {end_of(joint, "child"): joint for joint in self.joint_elements}
+        while (joint := above.pop(link, None)) is not None:
+            link = end_of(joint, "parent")
+            yield joint.get("name", ""), joint.get("type", ""), link
+
+    def root_link(self) -> str:
+        """Returns the name of the link that everything else hangs on.
+
+        Raises:
+            ConfigError: If there is not one link that is no joint's child.
+        """
+        children = {end_of(joint, "child") for joint in self.joint_elements}
+        roots = [link for link in self.links if link not in children]
+        if len(roots) != 1:
+            message = f"expected one link that is no joint's child, found {', '.join(roots) or 'none'}"
+            raise ConfigError([Problem(self.path, "", message)])
+        return roots[0]
+
+
+@lru_cache(maxsize=32)
+def _robot_in(data: bytes) -> Element:
+    """Returns the robot in a file's content; that of files that were read lately is there already."""
+    return parse(data.decode(errors="replace"))
+
+
+class _Parts(NamedTuple):
+    joint_elements: list[Element]
+    links: list[str]
+    joint_types: dict[str, str]
+    meshes: list[str]
+    edges: list[Edge]
+
+
+@lru_cache(maxsize=32)
+def _parts_of(root: Element) -> _Parts:
+    joints = root.findall("joint")
+    return _Parts(
+        joints,
+        [link.get("name", "") for link in root.findall("link")],
+        {joint.get("name", ""): joint.get("type", "") for joint in joints},
+        list(dict.fromkeys(mesh.get("filename", "") for mesh in root.iter("mesh"))),
+        [Edge(joint.get("name", ""), end_of(joint, "parent"), end_of(joint, "child")) for joint in joints],
+    )
+
+
+def mimics_of(path: str) -> dict[str, Mimic]:
+    """Returns the joints of a URDF file that follow others, by name; none if it cannot be read as PyBullet may do.
+
+    Raises:
+        ValueError: If a value makes no sense; it names the joint.
+    """
+    with suppress(ConfigError):
+        return UrdfDocument(path).mimics
+    return {}
+
+
+def disabled_collisions(path: str) -> set[frozenset[str]]:
+    """Returns the pairs of links whose collisions an SRDF file disables.
+
+    Raises:
+        ConfigError: If it cannot be read or is not well-formed.
+    """
+    try:
+        root = _robot_in(read_file(path, MAX_BYTES))
+    except (OSError, expat.ExpatError, RecursionError) as error:
+        raise ConfigError([Problem(path, "", f"expected a SRDF file: {error}")]) from None
+    return {frozenset((pair.get("link1", ""), pair.get("link2", ""))) for pair in root.iter("disable_collisions")}

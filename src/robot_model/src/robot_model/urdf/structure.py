@@ -1,0 +1,183 @@
+"""Faults in the structure of a URDF, which PyBullet may accept, or crash on."""
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterator
+from functools import lru_cache
+from itertools import islice
+
+from custom_ros_tools.errors import ConfigError, Problem, shortened
+from custom_ros_tools.schema import HEAVIEST_KG, MAX_COORDINATE_M
+from robot_model.limits import MAX_MAGNITUDE
+
+from .document import Attribute, UrdfDocument
+
+LONGEST_NAME = 250
+"""Largest length of a name [bytes]; PyBullet copies names into 1024 bytes on the stack."""
+LONGEST_TEXT = 1000
+"""Largest length of any other text, names of files included [bytes]."""
+MAX_LINKS = 2000
+"""Largest number of links, those on fixed joints included; a larger robot is refused."""
+MAX_SHAPES = 1000
+"""Largest number of visual and collision shapes of all links."""
+MAX_ATTRIBUTES = 100_000
+"""Largest number of attributes in a file; the rest is not checked."""
+MAX_PROBLEMS = 20
+"""Largest number of faults reported of one file."""
+_NAMES = {("robot", "name"), ("link", "name"), ("joint", "name"), ("material", "name"), ("joint", "type")}
+_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "spherical")
+_UNSAFE = re.compile(r"[%\x00-\x1f\x7f-\x9f]")
+"""Characters that PyBullet's log, which takes texts of a URDF for printf formats, must not get."""
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*(e[-+]?\d+)?|\.\d+(e[-+]?\d+)?|nan|inf(inity)?)", re.IGNORECASE)
+_NUMBERS = {
+    **dict.fromkeys((("origin", "xyz"), ("box", "size"), ("sphere", "radius")), MAX_COORDINATE_M),
+    **{(tag, key): MAX_COORDINATE_M for tag in ("cylinder", "capsule") for key in ("radius", "length")},
+    **dict.fromkeys((("origin", "rpy"), ("axis", "xyz"), ("mesh", "scale")), MAX_MAGNITUDE),
+    ("mass", "value"): HEAVIEST_KG,
+    **{("inertia", key): MAX_MAGNITUDE for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")},
+    **{("dynamics", key): MAX_MAGNITUDE for key in ("damping", "friction")},
+    **{("limit", key): math.inf for key in ("lower", "upper", "effort", "velocity")},
+    **dict.fromkeys((("color", "rgba"), ("specular", "rgb")), MAX_MAGNITUDE),
+    **{
+        (tag, "value"): MAX_MAGNITUDE
+        for tag in (
+            *("lateral_friction", "rolling_friction", "spinning_friction", "restitution", "inertia_scaling"),
+            *("stiffness", "damping", "collision_margin", "friction", "repulsion_stiffness", "gravity_factor"),
+        )
+    },
+}
+"""The largest number by element and attribute."""
+_VECTORS = {("origin", "xyz"), ("origin", "rpy"), ("axis", "xyz"), ("box", "size")}
+"""Attributes of three numbers."""
+
+
+def check_structure(document: UrdfDocument) -> None:
+    """Checks that a URDF describes a robot that PyBullet, and any other reader, survives.
+
+    Raises:
+        ConfigError: If it does not; it has the first faults.
+    """
+    if problems := structure_problems(document):
+        raise ConfigError([Problem(document.path, "", problem) for problem in problems])
+
+
+@lru_cache(maxsize=32)
+def structure_problems(document: UrdfDocument) -> tuple[str, ...]:
+    """Returns a sentence for each of the first faults: in what hangs on what, in names, in numbers and other texts."""
+    return tuple(islice(_problems(document), MAX_PROBLEMS))
+
+
+def _problems(document: UrdfDocument) -> Iterator[str]:
+    if len(document.links) > MAX_LINKS or len(document.edges) > MAX_LINKS:
+        counts = f"{len(document.links)} links and {len(document.edges)} joints"
+        yield f"expected at most {MAX_LINKS} links and as many joints, got {counts}"
+        return
+    if (shapes := sum(1 for _ in document.root.iter("geometry"))) > MAX_SHAPES:
+        yield f"expected at most {MAX_SHAPES} shapes, got {shapes}"
+    yield from _name_problems(document)
+    yield from _type_problems(document)
+    yield from _tree_problems(document)
+    yield from _mimic_problems(document)
+    yield from _text_problems(document)
+
+
+def _name_problems(document: UrdfDocument) -> Iterator[str]:
+    for kind, names in (("link", document.links), ("joint", [edge.joint for edge in document.edges])):
+        for name, count in Counter(names).items():
+            if not name:
+                yield f"a {kind} has no name"
+            elif count > 1:
+                yield f"{count} {kind}s are called '{shortened(name)}'; names are unique"
+
+
+def _type_problems(document: UrdfDocument) -> Iterator[str]:
+    """Yields a sentence for each joint of no type: PyBullet's message of that is a format without arguments."""
+    for joint in document.joint_elements:
+        if (kind := joint.get("type", "")) not in _TYPES:
+            name = shortened(joint.get("name", ""))
+            yield f"joint '{name}': type: expected one of {', '.join(_TYPES)}, got {shortened(ascii(kind))}"
+
+
+def _tree_problems(document: UrdfDocument) -> Iterator[str]:
+    links, parents = set(document.links), {}
+    for joint, parent, child in document.edges:
+        if parent not in links or child not in links:
+            missing = parent if parent not in links else child
+            yield f"joint '{shortened(joint)}' ties link '{shortened(missing)}', which there is not"
+        elif parent == child:
+            yield f"joint '{shortened(joint)}' ties link '{shortened(child)}' to itself"
+        elif child in parents:
+            yield f"link '{shortened(child)}' hangs on two joints; the second is '{shortened(joint)}'"
+        else:
+            parents[child] = parent
+    roots = [shortened(link) for link in document.links if link not in parents]
+    if len(roots) > 1:
+        yield f"expected one link that hangs on no joint, got {', '.join(roots[:5])}: is a joint missing?"
+    reaching: set[str] = {link for link in links if link not in parents}
+    for link in document.links:
+        way: dict[str, None] = {}
+        while link not in reaching and link in parents and link not in way:
+            way[link] = None
+            link = parents[link]
+        if link in way:
+            yield f"link '{shortened(link)}' hangs on itself in the end"
+        reaching.update(way)
+
+
+def _mimic_problems(document: UrdfDocument) -> Iterator[str]:
+    leaders = {
+        joint.get("name", ""): mimic.get("joint", "")
+        for joint in document.joint_elements
+        if (mimic := joint.find("mimic")) is not None
+    }
+    for joint in leaders:
+        line, leader = {joint}, leaders[joint]
+        while leader in leaders and leader not in line:
+            line.add(leader)
+            leader = leaders[leader]
+        if leader == joint:
+            yield f"joint '{shortened(joint)}' mimics itself in the end"
+
+
+def _text_problems(document: UrdfDocument) -> Iterator[str]:
+    for count, attribute in enumerate(document.attributes()):
+        owner, tag, key, text, is_read = attribute
+        what = f"{owner}: {shortened(tag)}.{shortened(key)}"
+        if count == MAX_ATTRIBUTES:
+            yield f"expected at most {MAX_ATTRIBUTES} attributes, got more"
+            return
+        if tag.startswith("xacro:") or "${" in text:
+            left = f"<{shortened(tag)}>" if tag.startswith("xacro:") else f"'{shortened(text)}'"
+            yield f"{what}: {left} is left of xacro: expected a URDF, as the program xacro makes it"
+        elif is_read and (problem := _text_problem(attribute)):
+            yield f"{what}: {problem}"
+        elif (tag, key) in _NUMBERS and (problem := _number_problem(tag, key, text)):
+            yield f"{what}: {problem}, got '{shortened(text)}'"
+
+
+def _text_problem(attribute: Attribute) -> str:
+    """Returns why PyBullet must not get a text, which may end up on its stack and in its log."""
+    _, tag, key, text, _ = attribute
+    longest = LONGEST_NAME if (tag, key) in _NAMES or key == "link" else LONGEST_TEXT
+    if (size := len(text.encode())) > longest:
+        return f"expected at most {longest} bytes, got {size}: '{shortened(text)}'"
+    if _UNSAFE.search(text):
+        return f"expected a text without % and control characters, got {shortened(ascii(text))}"
+    return ""
+
+
+def _number_problem(tag: str, key: str, text: str) -> str:
+    largest, found = _NUMBERS[tag, key], [_NUMBER.match(word) for word in text.split()]
+    numbers = [float(match[0]) for match in found if match]  # PyBullet reads what a word begins with
+    if not found or len(numbers) < len(found):
+        return "expected numbers"
+    if any(map(math.isnan, numbers)):
+        return "expected finite numbers"
+    if any(abs(number) > largest for number in numbers):
+        return f"must be within +-{largest:g}"
+    if (tag, key) in _VECTORS and len(numbers) < 3:
+        return "expected three numbers"
+    if (tag, key) == ("mass", "value") and numbers[0] < 0.0:
+        return "must be >= 0 [kg]"
+    return ""

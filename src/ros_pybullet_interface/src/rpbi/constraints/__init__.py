@@ -1,1 +1,0 @@
-"""What holds bodies and joints together beside contact: attachments, and joints that follow others."""

@@ -1,0 +1,1 @@
+"""Streams of joint targets: their playout delay, and the motion between targets."""

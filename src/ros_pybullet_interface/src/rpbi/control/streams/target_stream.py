@@ -1,0 +1,248 @@
+"""Streams of position targets as smooth motions.
+
+Targets come some times a second, ticks many times. A motor closes each step within a few ticks, with all its effort. A
+target that follows another one soon is therefore a knot: the set points go there on a line that takes as long as the
+targets are apart, and a moving average over one period rounds the corners. For a regular stream that is a quadratic
+B-spline, which lags by one and a half periods. Targets with velocities are joined by cubics, which lag by one period.
+The delay of the jitter buffer comes on top.
+
+A target that is too late even for the buffer must not stop the robot from full speed. The set points go on at the last
+velocity for a while, then slow down and come back to the last target.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
+
+from rpbi.control.motors import POSITION_MODES, Motors, ResolvedCommand, coalesce
+
+from .jitter_buffer import JitterBuffer
+from .segment import StreamSegment, agree
+
+ADAPTATION_PERIODS = 4.0
+"""Time constant with which the window of the moving average follows the period [periods]."""
+SAME_TIME = 1e-9
+"""Difference of times that is an error of rounding [ticks]."""
+RETURN_PERIODS = 5.0
+"""Time in which a stream that went on beyond its last target comes back to it [periods]."""
+
+
+class TargetStream:
+    """The targets of some joints that always come together.
+
+    Args:
+        held: Where the joints are held now by index [rad or m].
+        smooth: Whether lines are averaged.
+        limited: Returns a position of a joint by index within its limits.
+    """
+
+    def __init__(
+        self,
+        buffer: JitterBuffer,
+        held: Mapping[int, float],
+        smooth: bool,
+        limited: Callable[[int, float], float] = lambda index, value: value,
+    ) -> None:
+        self.joints = frozenset(held)
+        self._buffer, self._smooth, self._limited = buffer, smooth, limited
+        self._segments: deque[StreamSegment] = deque()
+        self._base = self._goal = held
+        self._slopes: Mapping[int, float] = {}
+        self._velocities: deque[Mapping[int, float]] = deque(maxlen=3)
+        """Velocities at the last targets by joint index [rad or m per tick]."""
+        self._period = 0.0
+        self._window = self._lagging_window = self._wanted_window = 0.0
+        self.set_points = held
+        """Where the joints are to be now."""
+        self.rests = True
+        """Whether there is nothing to do until the next target."""
+
+    def push(self, tick: int, goal: Mapping[int, float], slopes: Mapping[int, float], stamp_ns: int) -> None:
+        """Adds a target that comes before a tick.
+
+        Args:
+            goal: Positions by joint index [rad or m].
+            slopes: Velocities by joint index [rad or m per tick]; may be empty.
+            stamp_ns: Time of sending by the sender's clock [ns], 0 if unknown.
+        """
+        playout = self._buffer.add(tick, stamp_ns, goal)
+        if playout.is_immediate:
+            self._segments.clear()
+            self._velocities.clear()
+            self._base = goal
+            has_lead = playout.period > 0.0 and slopes
+            self.set_points = {index: value - slopes[index] for index, value in goal.items()} if has_lead else goal
+            self._period = 0.0
+        else:
+            slopes = {index: velocity * playout.speed for index, velocity in slopes.items()}
+            segment = self._append(max(playout.start, float(tick)), playout.end, goal, slopes)
+            self._wanted_window = playout.period if self._smooth and segment.slopes is None else 0.0
+            if not self._period:
+                self._window = self._lagging_window = self._wanted_window
+            self._period = playout.period
+        self._goal, self._slopes, self.rests = goal, slopes, False
+
+    def _append(
+        self, start: float, end: float, goal: Mapping[int, float], slopes: Mapping[int, float]
+    ) -> StreamSegment:
+        """Appends the way to a target, in place of all that is beyond its start."""
+        segments = self._segments
+        leaving, before = self._goal, self._slopes or None
+        while segments and segments[-1].end > start + SAME_TIME:
+            segment = segments.pop()
+            before = before and segment.slopes and segment.velocity(start)
+            done = segment.cut(start)
+            leaving = done.goal
+            if done.length > 0.0:
+                segments.append(done)
+        way = {index: value - leaving[index] for index, value in goal.items()}
+        ends = (before, slopes) if before and slopes and agree(way, end - start, before, slopes) else None
+        segments.append(StreamSegment(start, end - start, goal, way, ends))
+        self._velocities.append(segments[-1].velocity(end))
+        return segments[-1]
+
+    def advance(self, tick: float) -> Mapping[int, float]:
+        """Advances to a time, and returns the positions then by joint index [rad or m]."""
+        segments = self._segments
+        if segments and segments[-1].end <= tick and not segments[-1].is_beyond:
+            self._go_beyond()
+        if self._window != self._wanted_window:
+            self._adapt_window()
+        while segments and segments[0].end + self._window <= tick:
+            self._base = segments.popleft().goal
+        self.rests = not segments and self.set_points == self._base
+        positions = dict(self._base)
+        for segment in segments:
+            basis = segment.basis(tick, self._window)
+            for index in positions:
+                positions[index] += segment.covered(index, basis)
+        if any(segment.slopes is not None for segment in segments):  # cubics may leave the hull of their targets
+            positions = {index: self._limited(index, value) for index, value in positions.items()}
+        self.set_points = positions
+        return positions
+
+    def _adapt_window(self) -> None:
+        """Changes the window slowly, since its changes move the set points: a low-pass of second order."""
+        share = 1.0 / max(ADAPTATION_PERIODS * self._period, 1.0)
+        self._lagging_window += share * (self._wanted_window - self._lagging_window)
+        self._window += share * (self._lagging_window - self._window)
+        if abs(self._wanted_window - self._window) + abs(self._wanted_window - self._lagging_window) < 1e-6:
+            self._window = self._lagging_window = self._wanted_window
+
+    def _go_beyond(self) -> None:
+        """Extrapolates from the last target at its velocity, slows down and returns to it."""
+        last, length = self._segments[-1], self._buffer.extrapolation
+        if last.slopes is None:
+            first = then = {index: self._next_velocity(index) for index in last.way}
+        else:
+            first, bends = dict(last.slopes[1]), last.acceleration_at_end()
+            means = {index: (value - last.slopes[0][index]) / last.length for index, value in first.items()}
+            then = {index: value + length * _lesser(bends[index], means[index]) for index, value in first.items()}
+        if length <= 0.0 or not any((*first.values(), *then.values())):
+            return
+        rest = dict.fromkeys(first, 0.0)
+        self._extend(
+            length, {index: length * (value + then[index]) / 2.0 for index, value in first.items()}, first, then
+        )
+        if not self._wanted_window:
+            self._extend(self._period, {i: self._period * value / 2.0 for i, value in then.items()}, then, rest)
+        beyond = self._segments[-1].goal
+        back = {index: value - beyond[index] for index, value in last.goal.items()}
+        self._extend(RETURN_PERIODS * self._period, back, rest, rest)
+
+    def _extend(
+        self, length: float, way: Mapping[int, float], first: Mapping[int, float], last: Mapping[int, float]
+    ) -> None:
+        """Appends a cubic beyond the last target; joints stop at their limits."""
+        before = self._segments[-1]
+        goal = {index: self._limited(index, value + way[index]) for index, value in before.goal.items()}
+        stopped = {index for index, value in before.goal.items() if goal[index] != value + way[index]}
+        slopes = tuple({i: 0.0 if i in stopped else value for i, value in each.items()} for each in (first, last))
+        within = {index: value - before.goal[index] for index, value in goal.items()}
+        self._segments.append(StreamSegment(before.end, length, goal, within, (slopes[0], slopes[1]), True))
+
+    def _next_velocity(self, index: int) -> float:
+        """Returns the velocity of a line to the next target as far as the last three ways agree on it, else 0."""
+        if len(self._velocities) < 3:
+            return 0.0
+        first, second, third = (each[index] for each in self._velocities)
+        change = _lesser(third - second, second - first)
+        return third + change if abs(third - second) <= 2.0 * abs(change) else _lesser(second, third)
+
+
+def _lesser(a: float, b: float) -> float:
+    """Returns the smaller one of two numbers of the same sign, else 0."""
+    return 0.0 if a * b <= 0.0 else min(a, b, key=abs)
+
+
+class TargetStreams:
+    """Follows the position targets of one robot; joints whose targets come together are a stream.
+
+    Args:
+        dt_s: Length of a tick [s].
+        smooth: Whether corners are rounded.
+        buffer_s: Delay in which late targets are still in time [s].
+    """
+
+    def __init__(self, motors: Motors, dt_s: float, smooth: bool, buffer_s: float) -> None:
+        self._motors, self._dt_s, self._smooth, self._buffer_s = motors, dt_s, smooth, buffer_s
+        self._waiting: tuple[ResolvedCommand, ...] = ()
+        self._streams: dict[frozenset[int], TargetStream] = {}
+
+    def follow(self, commands: Iterable[ResolvedCommand]) -> None:
+        """Follows targets from the coming tick on."""
+        for command in commands:
+            self._waiting = coalesce(self._waiting, (command,))
+
+    def drop(self, joints: Iterable[int]) -> None:
+        """Forgets the streams of joints that something else drives from now on; what else moves by them holds."""
+        dropped = set(joints)
+        for key in [key for key in self._streams if key & dropped]:
+            self._motors.release(self._streams.pop(key).joints - dropped)
+
+    def clear(self) -> None:
+        """Forgets all targets; the joints hold."""
+        self._waiting = ()
+        self.drop(frozenset().union(*self._streams))
+
+    def advance(self, tick: int, driven: frozenset[int]) -> None:
+        """Sets the motors for a tick.
+
+        Args:
+            driven: Joints that a motion drives; targets for them are dropped.
+        """
+        if self._waiting:
+            for command in self._waiting:
+                self._begin(tick, command, driven)
+            self._waiting = ()
+        for stream in self._streams.values():
+            if not stream.rests:
+                self._drive(tick, stream)
+
+    def _begin(self, tick: int, command: ResolvedCommand, driven: frozenset[int]) -> None:
+        if command.mode not in POSITION_MODES or self._motors.mode != command.mode:
+            return
+        goal = {
+            index: self._motors.limited(index, value) for index, value in command.values.items() if index not in driven
+        }
+        joints = frozenset(goal)
+        if not joints:
+            return
+        if joints not in self._streams:
+            self.drop(joints)
+            held = {index: self._motors.targets[index] for index in joints}
+            self._streams[joints] = TargetStream(
+                JitterBuffer(self._dt_s, self._buffer_s), held, self._smooth, self._motors.nearest_allowed
+            )
+        slopes = {index: command.velocities[index] * self._dt_s for index in joints} if command.velocities else {}
+        self._streams[joints].push(tick, goal, slopes, command.stamp_ns)
+
+    def _drive(self, tick: int, stream: TargetStream) -> None:
+        before = stream.set_points
+        after = stream.advance(tick + 1.0)
+        if stream.rests:
+            self._motors.hold(after)
+            return
+        for index, position in after.items():
+            self._motors.track(index, before[index], (position - before[index]) / self._dt_s)

@@ -1,0 +1,78 @@
+"""The command `check`."""
+
+import logging
+import signal
+import sys
+from typing import Annotated
+
+import pybullet
+
+from custom_ros_tools.console.argument import Argument
+from custom_ros_tools.errors import InterfaceError
+from rpbi.bodies import BODY_TYPES
+from rpbi.ros.reference.interface_table import Endpoint, endpoints
+from rpbi.world import World
+from rpbi.world.loading import load_world
+from rpbi.world_warnings import world_warnings
+
+
+def check(path: Annotated[str, Argument("WORLD.yaml", files="*.yaml")]) -> int:
+    """Reports all problems of a world at once, or lists its topics and services; needs no ROS master.
+
+    It ends with 1 if there are problems. `{package}/PATH` is resolved.
+    """
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # so that it may be piped into `head`
+    warnings = _Warnings()
+    logging.getLogger().addHandler(warnings)
+    try:
+        world = World(load_world(path), connection_mode=pybullet.DIRECT)
+        listed = endpoints(world)
+    except InterfaceError as error:
+        problems = str(error).splitlines()
+        print("\n".join(f"error: {problem}" for problem in problems), file=sys.stderr)
+        print(f"{path}: {_counted(len(problems), 'error')}{warnings.counted()}", file=sys.stderr)
+        return 1
+    except MemoryError as error:
+        print(f"{path}: out of memory: {error or 'is there a limit, such as ulimit -v?'}", file=sys.stderr)
+        return 1
+    for warning in world_warnings(world):
+        warnings.report(str(warning))
+    _print(path, world, listed, warnings.counted())
+    world.close()
+    return 0
+
+
+class _Warnings(logging.Handler):
+    """Prints warnings, also those that are logged, and counts them."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self._count = 0
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.report(record.getMessage())
+
+    def report(self, message: str) -> None:
+        """Prints a warning."""
+        self._count += 1
+        print(f"warning: {message}", file=sys.stderr)
+
+    def counted(self) -> str:
+        """Returns their number, for the end of a line."""
+        return f", {_counted(self._count, 'warning')}" if self._count else ""
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def _print(path: str, world: World, listed: list[Endpoint], warnings: str) -> None:
+    print(f"{path}: fine; {1.0 / world.clock.dt_s:g} ticks a second{warnings}")
+    for name, body in world.bodies.items():
+        joints = f", {len(body.link_indices)} joints" if body.link_indices else ""
+        print(f"  {BODY_TYPES.name_of(body):<12} {name}{joints}")
+    for name in world.cameras:
+        print(f"  {'camera':<12} {name}")
+    kind_width, name_width, type_width = (max(map(len, column)) for column in list(zip(*listed))[:3])
+    for kind, name, type_name, note, meaning in listed:
+        print(f"  {kind:<{kind_width}}  {name:<{name_width}}  {type_name:<{type_width}}  {note or meaning}".rstrip())

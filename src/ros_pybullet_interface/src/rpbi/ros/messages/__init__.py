@@ -1,0 +1,1 @@
+"""Messages of topics, made from samples and read."""

@@ -1,0 +1,179 @@
+"""Objects that come and go while the node runs, in the world and in ROS."""
+
+import threading
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any
+
+from custom_ros_tools.errors import ConfigError, InterfaceError, Problem, UnknownNameError
+from rpbi.bodies import BODY_TYPES
+from rpbi.bodies.file_checks import check_files
+from rpbi.config.sensors import RgbdSensorConfig
+from rpbi.plugins import plugin_errors
+from rpbi.ros.initial_state import with_initial_state
+from rpbi.ros.inputs import Inputs
+from rpbi.ros.messages.topics import FastTopic
+from rpbi.ros.publishers.sample_publishers import SamplePublishers
+from rpbi.ros.requests import Requests
+from rpbi.ros.services.body_endpoints import BodyEndpoints
+from rpbi.ros.simulation import Simulation
+from rpbi.sensors.rgbd import RgbdSensor
+
+
+class ObjectLifecycle:
+    """Adds, removes and resets, one at a time; any thread but the simulation's may ask for it.
+
+    It opens the topics and services of all that is in the world at the start.
+    """
+
+    def __init__(self, simulation: Simulation, ask: Requests, publishers: SamplePublishers) -> None:
+        self._world, self._simulation, self._ask = simulation.world, simulation, ask
+        self._publishers = publishers
+        self._inputs = Inputs(self._world)
+        self._endpoints = BodyEndpoints(simulation, ask)
+        self._lock = threading.Lock()
+        self._open_bodies: set[str] = set()
+        self._placed_cameras: Mapping[str, RgbdSensor] = {}
+        self._place_cameras()
+        for name in self._world.bodies:
+            self._open(name)
+
+    def add(self, kind: str, config: Any, file: str) -> None:
+        """Adds a body.
+
+        Raises:
+            InterfaceError: If it does not fit, or its topics cannot be opened; then there is nothing of it.
+        """
+        with self._lock:
+            config = with_initial_state(config, file)
+            self._prepare(kind, config, file)  # in this thread, since the simulation's has no time for large files
+            self._ask(lambda: self._add_body(kind, config, file))
+            try:
+                self._open(config.name)
+            except Exception as error:
+                self._withdraw(config.name)
+                raise InterfaceError(f"{config.name}: its topics could not be opened: {error}") from error
+
+    def add_camera(self, config: RgbdSensorConfig, file: str) -> None:
+        """Adds a camera.
+
+        Raises:
+            ConfigError: If its name is taken.
+        """
+        with self._lock:
+            self._ask(lambda: self._world.add_camera(config, file))
+            self._place_cameras()
+
+    def remove(self, name: str) -> None:
+        """Removes a body or a camera.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        with self._lock:
+            if name in self._world.cameras:
+                self._ask(lambda: self._world.remove(name))
+                self._place_cameras()
+            elif name in self._world.bodies:
+                self._withdraw(name)
+            else:
+                raise UnknownNameError("object", name, [*self._world.bodies, *self._world.cameras])
+
+    def reset(self) -> None:
+        """Makes the world what it was; what ROS has of bodies that were there all the time stays open.
+
+        Raises:
+            InterfaceError: If something cannot be loaded any more.
+        """
+        with self._lock:
+            for name in self._ask(self._world.changed_names):
+                self._inputs.close(name)
+            closed, topics, error = self._ask(self._start_again)
+            for topic in topics:
+                topic.close()
+            for name in closed:
+                self._close(name)
+            for name in self._world.bodies:
+                if name not in self._open_bodies:
+                    self._open(name)
+            self._place_cameras()
+            if error is not None:
+                raise error
+
+    def end(self, timeout_s: float) -> None:
+        """Waits until nobody is coming or going, and lets nobody from then on."""
+        self._lock.acquire(timeout=timeout_s)
+
+    def _prepare(self, kind: str, config: Any, file: str) -> None:
+        try:
+            check_files(config)
+        except ConfigError as error:
+            raise ConfigError([Problem(file, each.key, each.message) for each in error.problems]) from None
+        body_type = BODY_TYPES.find(kind)
+        with plugin_errors(body_type, f"preparing '{config.name}'"), suppress(ConfigError):  # which making it reports
+            body_type.prepare(config, self._world.window is not None)
+
+    def _add_body(self, kind: str, config: Any, file: str) -> None:
+        """Does the simulation thread's part of adding."""
+        self._world.add(kind, config, file)
+        try:
+            self._publishers.find_topics(config.name)
+        except InterfaceError:
+            self._world.remove(config.name)
+            raise
+
+    def _start_again(self) -> tuple[set[str], list[FastTopic], InterfaceError | None]:
+        """Does the simulation thread's part of a reset.
+
+        Returns:
+            The bodies that have gone or may be others now, their topics to close, and what went wrong.
+        """
+        changed = self._world.changed_names()
+        for name in changed & self._world.bodies.keys():
+            self._world.remove(name)
+        topics = [topic for name in changed for topic in self._publishers.forget(name)]
+        error = None
+        try:
+            self._simulation.reset(self._inputs.repeat_poses)
+        except InterfaceError as problem:
+            error = problem
+        lost = self._open_bodies - changed - self._world.bodies.keys()
+        topics += [topic for name in lost for topic in self._publishers.forget(name)]
+        return changed | lost, topics, error
+
+    def _place_cameras(self) -> None:
+        """Follows the TF frames of the cameras that there are now, and no others."""
+        cameras = self._world.cameras
+        for name, camera in self._placed_cameras.items():
+            if cameras.get(name) is not camera:
+                self._inputs.close(name)
+        for name, camera in cameras.items():
+            if self._placed_cameras.get(name) is not camera:
+                self._inputs.open(name, camera.inputs())
+        self._placed_cameras = cameras
+
+    def _open(self, name: str) -> None:
+        """Opens the topics and services of a body."""
+        body = self._world.bodies[name]
+        self._open_bodies.add(name)
+        self._publishers.open(name)  # first, as it notes what is to be forgotten if one of the others fails
+        self._inputs.open(name, body.inputs())
+        self._endpoints.open(body)
+
+    def _close(self, name: str) -> None:
+        """Closes the inputs and services of a body."""
+        self._open_bodies.discard(name)
+        self._inputs.close(name)
+        self._endpoints.close(name)
+
+    def _withdraw(self, name: str) -> None:
+        """Removes a body from the world, and its ROS interfaces; its inputs first."""
+        self._inputs.close(name)
+        for topic in self._ask(lambda: self._remove_body(name)):
+            topic.close()
+        self._close(name)
+
+    def _remove_body(self, name: str) -> list[FastTopic]:
+        """Does the simulation thread's part of it; returns the topics that are left to close."""
+        self._world.remove(name)
+        return self._publishers.forget(name)

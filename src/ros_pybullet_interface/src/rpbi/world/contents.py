@@ -1,0 +1,248 @@
+"""Content of a world, with the log of how it was built."""
+
+import hashlib
+import struct
+from collections.abc import Mapping
+from typing import Any
+
+from custom_ros_tools.errors import ConfigError, InterfaceError, PhysicsError, PluginError, Problem, UnknownNameError
+from rpbi.bodies import Body, BodyConfig
+from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.config.pybullet_world_models import PhysicsChange
+from rpbi.config.sensors import FIRST_TOPIC_NAME, RgbdSensorConfig
+from rpbi.config.world import WorldConfig
+from rpbi.control.pose_follower import PoseFollower
+from rpbi.engine.client import Client
+from rpbi.engine.clock import Clock
+from rpbi.engine.inputs import Input
+from rpbi.plugins import plugin_errors
+from rpbi.sensors import SENSOR_TYPES
+from rpbi.sensors.contacts.contacts import ContactReader
+from rpbi.sensors.rgbd import RgbdSensor
+from rpbi.sensors.sensed import SensedWorld
+from rpbi.sensors.sensor import Sensor
+
+from .attachments import Attachments
+from .load_log import LogEntry, apply
+from .loading import LoadedWorld
+from .sensor_schedule import SensorSchedule
+
+DIGEST_BYTES = 16
+
+
+def state_hash(tick: int, bodies: Mapping[str, Body]) -> str:
+    """Returns the BLAKE2b hash of the positions and velocities of all bodies and joints at a tick.
+
+    It is the same in any process, since it depends on nothing but names, in their order, and the bytes of the numbers.
+    Motor targets are left out, since they show in the motion. Soft bodies are left out, since their motion is not
+    reproducible.
+    """
+    digest = hashlib.blake2b(struct.pack("<Q", tick), digest_size=DIGEST_BYTES)
+    for name in sorted(bodies):
+        numbers = bodies[name].motion_state()
+        digest.update(name.encode() + b"\0" + struct.pack(f"<{len(numbers)}d", *numbers))
+    return digest.hexdigest()
+
+
+def sensors_and_inputs(body: Body, config: BodyConfig) -> tuple[tuple[Sensor, ...], Mapping[str, Input]]:
+    """Returns the sensors of a body, those of other packages last, and its inputs by name.
+
+    Raises:
+        PluginError: If a class of another package fails.
+    """
+    with plugin_errors(body, f"sensors and inputs of '{body.name}'"):
+        sensors, inputs = body.sensors(), body.inputs()
+    return (*sensors, *(_make(body, each) for each in config.sensors)), inputs
+
+
+def _make(body: Body, config: Any) -> Sensor:
+    found: Any = SENSOR_TYPES.find(config.type)
+    with plugin_errors(found, f"making '{body.name}/{config.name}'"):
+        return found(body, config)
+
+
+class WorldContents:
+    """The bodies and cameras of a world with their sensors and inputs, and the log from which it can be rebuilt.
+
+    Attributes:
+        bodies: By name.
+        stepping: The bodies that act before each tick, and the followers of poses.
+        cameras: By name; a new dictionary with every change.
+        inputs: By slot, `NAME/INPUT`; a new dictionary with every change.
+        sensors: Schedule of the sensors.
+        contacts: Contacts between bodies.
+        attachments: Attachments between bodies.
+        log: Log of all changes of the world.
+    """
+
+    def __init__(self, pb: Client, clock: Clock, world: SensedWorld) -> None:
+        self._pb = pb
+        self._clock = clock
+        self._world = world
+        self.bodies: dict[str, Body] = {}
+        self.stepping: list[Body | PoseFollower] = []
+        self.cameras: dict[str, RgbdSensor] = {}
+        self.inputs: dict[str, Input] = {}
+        self.sensors = SensorSchedule(clock)
+        self.contacts = ContactReader(pb, self.bodies)
+        self.attachments = Attachments(pb, self.bodies)
+        self.log: list[LogEntry] = []
+        self._config = WorldConfig()
+        self._filled_entries = 0
+        """Number of entries of the log from filling it."""
+
+    def body(self, name: str) -> Body:
+        """Returns the body of a name.
+
+        Raises:
+            UnknownNameError: If there is none.
+        """
+        if name not in self.bodies:
+            raise UnknownNameError("object", name, list(self.bodies))
+        return self.bodies[name]
+
+    def add(self, kind: str, config: BodyConfig, file: str | None = None) -> Body:
+        """Adds a body, see `World.add`."""
+        name = config.name
+        self._require_new(name, file)
+        try:
+            self._append(LogEntry(name, "add", (kind, config)))
+            body = self.bodies[name]
+            try:
+                self._register(name, *sensors_and_inputs(body, config))
+            except Exception:
+                self._append(LogEntry(name, "remove"))
+                raise
+        except ConfigError as error:
+            raise ConfigError([Problem(file or name, each.key, each.message) for each in error.problems]) from None
+        if body.object_tf is not None and (pose := self._config.pose_of(body.object_tf.tf_id)) is not None:
+            body.teleport(pose)
+        if body.pose_follower is not None:
+            self.stepping.append(body.pose_follower)
+        if type(body).before_step is not Body.before_step:
+            self.stepping.append(body)
+        return body
+
+    def add_camera(self, config: RgbdSensorConfig, file: str | None = None) -> RgbdSensor:
+        """Adds a camera, see `World.add_camera`."""
+        self._require_new(config.name, file)
+        taken = {camera.topic_name for camera in self.cameras.values()}
+        topic_name = config.name if FIRST_TOPIC_NAME in taken else FIRST_TOPIC_NAME
+        if topic_name in taken:
+            message = f"'{topic_name}' is what the topics of the first camera are called; use another name"
+            raise ConfigError([Problem(file or config.name, "name", message)])
+        camera = RgbdSensor(config, self.bodies, self._clock, topic_name)
+        self._insert_camera(camera)
+        return camera
+
+    def remove(self, name: str) -> None:
+        """Removes a body or a camera.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        if name in self.cameras:
+            self.cameras = {other: camera for other, camera in self.cameras.items() if other != name}
+        else:
+            self.attachments.release_body(name)
+            self._append(LogEntry(name, "remove"))
+            self.stepping[:] = [each for each in self.stepping if each.name != name]
+        self.sensors.remove(name)
+        self.inputs = {slot: taken for slot, taken in self.inputs.items() if slot.split("/")[0] != name}
+
+    def change_dynamics(self, name: str, link: str, change: ChangeDynamics) -> None:
+        """Changes how a link behaves, the root if its name is empty; see `World.change_dynamics`."""
+        self._append(LogEntry(name, "dynamics", (link, change)))
+
+    def change_physics(self, change: PhysicsChange) -> None:
+        """Changes gravity or how contacts and joints are solved; see `World.change_physics`."""
+        self._append(LogEntry("", "physics", change))
+
+    def clear(self) -> None:
+        """Removes everything but the cameras and the inputs, which wait for `fill`."""
+        self.attachments.clear()
+        for body in self.bodies.values():
+            body.remove()
+        self.bodies.clear()
+        self.stepping.clear()
+        self.sensors.clear()
+        self.log.clear()
+        self.contacts.invalidate()
+
+    def fill(self, loaded: LoadedWorld) -> None:
+        """Puts in what is configured; cameras that are there already stay, with the pose that they have.
+
+        Raises:
+            ConfigError: If something cannot be loaded; then all of the rest is there.
+        """
+        inputs_before = self.inputs
+        self._config = loaded.config
+        self._append(LogEntry("", "world", loaded.config))
+        problems: list[Problem] = []
+        for item in loaded.objects:
+            try:
+                self.add(item.type, item.config, item.file)
+            except ConfigError as error:
+                problems += error.problems
+            except (PhysicsError, PluginError) as error:
+                problems.append(Problem(item.file, "", str(error)))
+        problems += self._fill_in_attachments(loaded)
+        problems += self._fill_in_cameras(loaded)
+        self._filled_entries = len(self.log)
+        # Those that were there before stay till their like has come, for who puts into them meanwhile
+        self.inputs = {slot: taken for slot, taken in self.inputs.items() if taken is not inputs_before.get(slot)}
+        if problems:
+            raise ConfigError(problems)
+
+    def changed_names(self) -> set[str]:
+        """Returns the names of all bodies that came or went since it was filled."""
+        return {entry.name for entry in self.log[self._filled_entries :] if entry.what in ("add", "remove")}
+
+    def _fill_in_attachments(self, loaded: LoadedWorld) -> list[Problem]:
+        problems: list[Problem] = []
+        for index, config in enumerate(loaded.config.attachments):
+            try:
+                self.attachments.add(config)
+            except (InterfaceError, ValueError) as error:
+                problems.append(Problem(loaded.file, f"attachments[{index}]", str(error)))
+        return problems
+
+    def _fill_in_cameras(self, loaded: LoadedWorld) -> list[Problem]:
+        before, self.cameras = self.cameras, {}
+        configs = [item.config for item in loaded.cameras]
+        for camera in before.values():
+            if any(camera.config is config for config in configs):
+                camera.hz = camera.config.hz
+                self._insert_camera(camera)
+        problems: list[Problem] = []
+        for config, file in loaded.cameras:
+            if config.name not in self.cameras:
+                try:
+                    self.add_camera(config, file)
+                except ConfigError as error:
+                    problems += error.problems
+        return problems
+
+    def _insert_camera(self, camera: RgbdSensor) -> None:
+        self.cameras = {**self.cameras, camera.name: camera}
+        self._register(camera.name, (camera,), camera.inputs())
+        if camera.pose is None:
+            camera.pose = self._config.pose_of(camera.config.object_tf.tf_id)
+
+    def _require_new(self, name: str, file: str | None) -> None:
+        if name in self.sensors:
+            message = f"'{name}' is taken already; names are unique in a world"
+            raise ConfigError([Problem(file or name, "name", message)])
+
+    def _append(self, entry: LogEntry) -> None:
+        """Applies an entry and logs it; the only way into the world."""
+        self.contacts.invalidate()
+        apply(self._pb, self.bodies, entry)
+        self.log.append(entry)
+
+    def _register(self, name: str, sensors: tuple[Sensor, ...], inputs: Mapping[str, Input]) -> None:
+        for sensor in sensors:
+            with plugin_errors(sensor, f"enter of '{sensor.name}'"):
+                sensor.enter(self._world)
+        self.sensors.add(name, sensors)
+        self.inputs = {**self.inputs, **{f"{name}/{key}": value for key, value in inputs.items()}}

@@ -1,0 +1,193 @@
+"""The log of all that came into a world, and its replay."""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
+from typing import Any, NamedTuple
+
+import pybullet
+
+from custom_ros_tools.errors import PhysicsError, UnknownNameError
+from rpbi.bodies import BODY_TYPES, Body
+from rpbi.bodies.body import MULTI_BODY
+from rpbi.bodies.dynamics import change_dynamics
+from rpbi.bodies.file_checks import check_files
+from rpbi.config.pybullet_world_models import PhysicsChange, SetGravity
+from rpbi.config.world import WorldConfig
+from rpbi.engine.client import Client
+from rpbi.plugins import plugin_errors, raise_plugin_error
+
+
+def refuse_non_finite(body: Body) -> None:
+    """Refuses a rigid body with numbers that are not finite, which would spread to all that it touches.
+
+    They come from URDFs with `nan` in them, which PyBullet loads without a word, and from sizes that are too large.
+
+    Raises:
+        PhysicsError: If there is one; it names the link.
+    """
+    for fault in _problems(body):
+        raise PhysicsError(f"{body.name}: {fault} not finite: is something nan, inf or too large?")
+
+
+def _problems(body: Body) -> Iterator[str]:
+    pb, body_id = body.pb, body.body_id
+    links = {index: f"link '{body.link_name(index)}'" for index in (-1, *body.joint_indices)}
+    for index, link in links.items():
+        mass, _, inertia, position, quat = body.dynamics_info(index)[:5]
+        if not _are_finite((mass, *inertia, *position, *quat)):
+            yield f"{link}: its mass, inertia or centre of mass is"
+    for index in body.joint_indices:
+        info = pb.getJointInfo(body_id, index)
+        joint = f"joint '{info[1].decode()}'"
+        if not _are_finite((*info[6:8], *info[13], *info[14], *info[15])):
+            yield f"{joint}: its place, axis, damping or friction is"
+        if any(map(math.isnan, info[8:12])):  # a limit may be infinite
+            yield f"{joint}: one of its limits is"
+    for index, link in links.items():
+        if not _are_finite(chain(*pb.getAABB(body_id, index))):
+            yield f"{link}: its place or size is"
+
+
+def _are_finite(numbers: Iterable[float]) -> bool:
+    return all(map(math.isfinite, numbers))
+
+
+_SAME_EVERY_TIME: dict[str, Any] = {
+    "deterministicOverlappingPairs": 1,  # else the order of contacts depends on what the broad phase has seen before
+    "contactBreakingThreshold": 0.02,  # [m] PyBullet's default; one global of the process that outlives its client
+    "numSubSteps": 0,  # the default, too; it outlives a reset
+    "enableFileCaching": 1,  # the same
+}
+
+
+class LogEntry(NamedTuple):
+    """One thing that was done to a world; picklable.
+
+    Attributes:
+        name: The body it was done to, empty for the world itself.
+        what: `world` (set it up), `physics` (change them), `add`, `dynamics` (change them) or `remove`.
+        arguments: The WorldConfig of `world`; the PhysicsChange of `physics`; type and configuration of a body for
+            `add`; link (empty for the root) and ChangeDynamics for `dynamics`; None for `remove`.
+    """
+
+    name: str
+    what: str
+    arguments: Any = None
+
+
+class LoadLogReader:
+    """Reads a load log bit by bit.
+
+    Args:
+        log: The log, which may grow at any time, and begins anew when its world is reset.
+    """
+
+    def __init__(self, log: Sequence[LogEntry]) -> None:
+        self._log = log
+        self._first: LogEntry | None = None
+        self._count = 0
+
+    def drain(self) -> tuple[LogEntry, ...]:
+        """Returns the entries since the last call; all entries of a restarted log."""
+        if self._log and self._log[0] is not self._first:
+            self._first, self._count = self._log[0], 0
+        new = tuple(self._log[self._count :])
+        self._count += len(new)
+        return new
+
+
+def apply(pb: Client, bodies: dict[str, Body], entry: LogEntry) -> None:
+    """Applies an entry to a world; when it raises, the world is unchanged.
+
+    Args:
+        pb: The client.
+        bodies: The world's bodies by name, which is changed.
+        entry: The entry.
+
+    Raises:
+        ConfigError: If a configuration does not fit.
+        PhysicsError: If PyBullet refuses.
+        PluginError: If a class of another package fails.
+        UnknownNameError: If there is no body or link of that name.
+        ValueError: If a change of dynamics is invalid.
+    """
+    if entry.what in ("remove", "dynamics") and entry.name not in bodies:
+        raise UnknownNameError("object", entry.name, list(bodies))
+    if entry.what == "world":
+        _set_up(pb, entry.arguments)
+    elif entry.what == "physics":
+        change_physics(pb, bodies.values(), entry.arguments)
+    elif entry.what == "remove":
+        body = bodies.pop(entry.name)
+        for other in bodies.values():
+            other.detach(entry.name)
+        with plugin_errors(body, f"remove of '{entry.name}'"):
+            body.remove()
+    elif entry.what == "dynamics":
+        change_dynamics(bodies[entry.name], *entry.arguments)
+    else:
+        kind, config = entry.arguments
+        check_files(config)
+        before = _body_ids(pb)
+        try:
+            make: Any = BODY_TYPES.find(kind)  # each with a constructor of its own
+            body = make(pb, config)
+            if not body.is_soft:
+                refuse_non_finite(body)
+            body.attach(bodies)
+            bodies[entry.name] = body
+        except BaseException as error:
+            for body_id in _body_ids(pb) - before:
+                pb.removeBody(body_id)
+            if isinstance(error, Exception):
+                raise_plugin_error(BODY_TYPES.find(kind), f"making '{entry.name}'", error)
+            if isinstance(error, (pybullet.error, OverflowError, SystemError)):  # the last is a fault of PyBullet's
+                raise PhysicsError(f"{entry.name}: {error}") from error
+            raise
+
+
+def replay(pb: Client, entries: Iterable[LogEntry]) -> dict[str, Body]:
+    """Rebuilds a world on a client.
+
+    Returns:
+        Its bodies by name.
+    """
+    bodies: dict[str, Body] = {}
+    for entry in entries:
+        apply(pb, bodies, entry)
+    return bodies
+
+
+def _set_up(pb: Client, config: WorldConfig) -> None:
+    """Clears the client and sets gravity, time step and the engine's parameters."""
+    pb.resetSimulation(**config.resetSimulation.kwargs())
+    pb.is_deformable = bool((config.resetSimulation.flags or 0) & pybullet.RESET_USE_DEFORMABLE_WORLD)
+    for path in config.setAdditionalSearchPath:
+        pb.setAdditionalSearchPath(path)
+    pb.setTimeStep(round(config.timeStep * 1e9) / 1e9)
+    pb.setPhysicsEngineParameter(**_SAME_EVERY_TIME)
+    change_physics(pb, (), config.setGravity)
+    change_physics(pb, (), config.setPhysicsEngineParameter)
+
+
+def change_physics(pb: Client, bodies: Iterable[Body], change: PhysicsChange) -> None:
+    """Changes gravity, or parameters of the engine.
+
+    Sleeping bodies would not notice gravity, so they wake up; but in maximal coordinates PyBullet would let them sleep
+    thereafter even if they may not.
+    """
+    arguments = change.kwargs()
+    if isinstance(change, SetGravity):
+        for body in bodies:
+            if pb.getDynamicsInfo(body.body_id, -1)[10] == MULTI_BODY:
+                pb.changeDynamics(body.body_id, -1, activationState=pybullet.ACTIVATION_STATE_WAKE_UP)
+        pb.setGravity(**arguments)
+        pb.gravity = (change.gravX, change.gravY, change.gravZ)
+    elif arguments:
+        pb.setPhysicsEngineParameter(**arguments)
+    pb.sub_steps = pb.getPhysicsEngineParameters()["numSubSteps"]
+
+
+def _body_ids(pb: Client) -> set[int]:
+    return {pb.getBodyUniqueId(index) for index in range(pb.getNumBodies())}

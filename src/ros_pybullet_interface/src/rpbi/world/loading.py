@@ -1,0 +1,182 @@
+"""Reading a world: the main YAML file and all files that it names, with all of their problems at once."""
+
+import contextlib
+import logging
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from custom_ros_tools.config import load_config, replace_package
+from custom_ros_tools.errors import ConfigError, Problem
+from robot_model.asset_files import ROBOT_DESCRIPTION, find_file, find_folder
+from rpbi.bodies.file_checks import file_problems, parts_with_files
+from rpbi.config.object_entry import ObjectEntry, parse_object_entry
+from rpbi.config.sensors import FIRST_TOPIC_NAME, RgbdSensorConfig
+from rpbi.config.world import WorldConfig, main_file_model
+
+from .legacy import MAIN
+from .objects import ObjectConfig, load_object, name_in, object_sections, parse_section, type_of
+
+__all__ = ["LoadedWorld", "ObjectConfig", "WorldConfig", "load_object", "load_world", "load_world_dict", "type_of"]
+
+log = logging.getLogger(__name__)
+
+CAMERAS = "rgbd_sensors"
+"""List of the main file that names the files of cameras."""
+
+
+class CameraConfig(NamedTuple):
+    """A camera to be put into a world.
+
+    Attributes:
+        config: Its configuration.
+        file: The file it came from, as the user wrote it.
+    """
+
+    config: RgbdSensorConfig
+    file: str
+
+
+@dataclass(frozen=True)
+class LoadedWorld:
+    """A world that has been read and found valid; picklable.
+
+    Attributes:
+        config: Keys of the main file.
+        objects: The objects, in the order in which they are loaded.
+        cameras: The cameras, the first one first.
+        file: The main file, `"~config"` if it came from the parameter server.
+    """
+
+    config: WorldConfig
+    objects: tuple[ObjectConfig, ...]
+    file: str
+    cameras: tuple[CameraConfig, ...] = ()
+
+
+def load_world(
+    path: str, robot_description: str | None = None, overrides: Mapping[str, Any] = MappingProxyType({})
+) -> LoadedWorld:
+    """Reads a main YAML file and all files that it names.
+
+    Args:
+        path: The main file; `{package}/path` and `package://package/path` are resolved.
+        robot_description: File that the word `robot_description` stands for; without it, the word stays.
+        overrides: Keys and values that replace those of the main file; mappings are merged key by key.
+
+    Raises:
+        ConfigError: With all problems of all files.
+    """
+    data = ObjectEntry(path, overrides).apply_overrides(load_config(path))
+    return _Reader(data, path, replace_package(path), robot_description).read()
+
+
+def load_world_dict(data: Mapping[str, Any], file: str, robot_description: str | None = None) -> LoadedWorld:
+    """Does the same as `load_world` with a main file that has been read already; its content is not changed.
+
+    A file of the name `"~config"`, which has no folder, came from the parameter server.
+    """
+    return _Reader(data, file, file, robot_description).read()
+
+
+class _Reader:
+    """Reads one world and collects the problems."""
+
+    def __init__(self, data: Mapping[str, Any], file: str, path: str, robot_description: str | None) -> None:
+        self._data = data
+        self._file = file
+        self._path = path
+        self._robot_description = robot_description
+        self._problems: list[Problem] = []
+        self._owner_of: dict[str, str] = {}
+        self._parts: list[tuple[str, Mapping[str, Any]]] = []
+        """Parts of objects that may name files, with the file that they are in."""
+
+    def read(self) -> LoadedWorld:
+        """Returns the world, or raise a ConfigError with all problems."""
+        try:
+            model = main_file_model(object_sections())
+            content = parse_section(MAIN, self._data, self._file, model, {"file": self._path})
+        except ConfigError as error:
+            self._problems += error.problems
+        objects = tuple(self._objects()) if isinstance(self._data, Mapping) else ()
+        further = tuple(self._further_cameras()) if isinstance(self._data, Mapping) else ()
+        if self._problems:
+            # Else the world finds these itself, when it is built
+            for file, parts in self._parts:
+                self._problems += [Problem(file, key, message) for key, message in file_problems(parts)]
+            raise ConfigError(self._problems)
+        config = WorldConfig.from_main_file(content)
+        first = () if config.rgbd_sensor is None else (CameraConfig(config.rgbd_sensor, self._file),)
+        if config.step_pybullet_manually:
+            log.info("%s: step_pybullet_manually: has no effect: every step is explicit", self._file)
+        return LoadedWorld(config, objects, self._file, first + further)
+
+    def _objects(self) -> Iterator[ObjectConfig]:
+        for section in object_sections():
+            for data, file, context in self._files(section):
+                with self._noting_problems(file):
+                    self._parts.append((file, parts_with_files(data, file, context)))
+                    kind = type_of(section, data)
+                    yield ObjectConfig(kind, load_object(kind, data, file, context), file, context["file"])
+        self._claim_name(self._data.get("rgbd_sensor"), self._file, "rgbd_sensor.name")
+
+    def _further_cameras(self) -> Iterator[CameraConfig]:
+        is_first = self._data.get("rgbd_sensor") is None
+        for data, file, _ in self._files(CAMERAS):
+            if not is_first and name_in(data) == FIRST_TOPIC_NAME:
+                message = f"'{FIRST_TOPIC_NAME}' is what the topics of the first camera are called; use another name"
+                self._problems.append(Problem(file, "name", message))
+            is_first = False
+            with self._noting_problems(file):
+                yield CameraConfig(RgbdSensorConfig.parse(data, file), file)
+
+    def _files(self, section: str) -> Iterator[tuple[dict[str, Any], str, dict[str, Any]]]:
+        """Yields content, name and context of each file of a list; checks that object names are unique."""
+        search_paths = self._search_paths()
+        for index, entry in _object_entries(self._data.get(section)):
+            key = f"{section}[{index}]"
+            try:
+                path = find_file(entry.file, self._path, search_paths)
+            except ValueError as error:
+                self._problems.append(Problem(self._file, key, str(error)))
+                continue
+            file = f"{entry.file} (changed by {key})" if entry.overrides else entry.file
+            with self._noting_problems(file):
+                data = entry.apply_overrides(load_config(path))
+                self._claim_name(data, file, "name")
+                context = {"file": path, "search_paths": search_paths, ROBOT_DESCRIPTION: self._robot_description}
+                yield data, file, context
+
+    @contextlib.contextmanager
+    def _noting_problems(self, file: str) -> Iterator[None]:
+        try:
+            yield
+        except ConfigError as error:
+            self._problems += [Problem(file, problem.key, problem.message) for problem in error.problems]
+
+    def _claim_name(self, data: Any, file: str, key: str) -> None:
+        """Notes the name of an object, so that no other has it."""
+        name = name_in(data)
+        if name in self._owner_of:
+            message = f"'{name}' is taken by {self._owner_of[name]}; names are unique in a world"
+            self._problems.append(Problem(file, key, message))
+        elif name is not None:
+            self._owner_of[name] = file
+
+    def _search_paths(self) -> tuple[str, ...]:
+        """Returns the search paths that exist, also when something else in the main file is wrong."""
+        given = self._data.get("setAdditionalSearchPath")
+        found: list[str] = []
+        for name in [given] if isinstance(given, str) else given if isinstance(given, (list, tuple)) else ():
+            with contextlib.suppress(ValueError):  # it is reported with the main file
+                found += [find_folder(name, self._path)] if isinstance(name, str) and name else []
+        return tuple(found)
+
+
+def _object_entries(given: Any) -> Iterator[tuple[int, ObjectEntry]]:
+    """Yields the entries of a list of objects with their indices; others are reported by the model."""
+    for index, entry in enumerate(given if isinstance(given, (list, tuple)) else ()):
+        with contextlib.suppress(ValueError):
+            yield index, parse_object_entry(entry)

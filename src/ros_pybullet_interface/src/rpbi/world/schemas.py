@@ -1,0 +1,153 @@
+"""JSON Schemas of all YAML files that a world is made of."""
+
+import copy
+
+from custom_ros_tools.schema import ConfigModel
+from custom_ros_tools.schema.json_schema import (
+    DEFINITIONS,
+    Schema,
+    json_schemas,
+    mapping_in,
+    resolved,
+    with_definitions,
+)
+from rpbi.bodies import BODY_TYPES
+from rpbi.config.object_entry import FILE
+from rpbi.config.sensors import RgbdSensorConfig
+from rpbi.config.world import main_file_model
+
+from .legacy import FOLLOWERS, LEGACY_KEYS, MAIN, old_keys
+from .loading import CAMERAS
+from .objects import OWN_TYPES, TYPE, object_sections
+
+WORLD = "world"
+"""Name of the main file among the kinds of YAML files."""
+_FILE_NAME = {"type": "string", "minLength": 1}
+_ENTRY = "entry"
+"""Name of the definition of what a list of the main file has."""
+
+
+def sections() -> dict[str, type[ConfigModel]]:
+    """Returns the models of the files that the lists of the main file name, by list."""
+    return {**object_sections(), CAMERAS: RgbdSensorConfig}
+
+
+def kind_of(section: str) -> str:
+    """Returns what a file of a list is called, such as `robot` for `robots`."""
+    return section.removesuffix("s")
+
+
+def file_schemas() -> dict[str, Schema]:
+    """Returns the schemas by kind of file (`world`, `robot`, `dynamic_object` and so on), without keys of older worlds.
+
+    Rules beyond a schema, such as unique names or existing files, are left to the models: a schema accepts all that
+    they accept.
+    """
+    files = json_schemas(
+        {WORLD: main_file_model(sections())} | {kind_of(section): model for section, model in sections().items()}
+    )
+    for section in sections():
+        file = files[kind_of(section)]
+        types = [kind for kind, body_type in BODY_TYPES.items() if body_type.section == section]
+        if section == OWN_TYPES:
+            files[kind_of(section)] = _of_any_type(file)
+        elif types:
+            about = "Its type; as a rule that follows from the list of the main file and the other keys."
+            file["properties"] = {**file["properties"], TYPE: {"description": about, "enum": [*types, None]}}
+    return files
+
+
+def schemas() -> dict[str, Schema]:
+    """Returns the schemas for editors, by kind of file: `file_schemas` with keys of older worlds and with overrides.
+
+    An entry of a list of the main file may override any key of its file and requires none: its schema is the definition
+    `entry` in the file beside it, such as `robot.schema.json#/$defs/entry`.
+    """
+    files = file_schemas()
+    world = _with_old_keys(files[WORLD], MAIN)
+    result = {WORLD: world}
+    for section in sections():
+        kind = kind_of(section)
+        entry = {"$ref": f"{kind}.schema.json#/{DEFINITIONS}/{_ENTRY}"}
+        world["properties"][section]["items"]["anyOf"] = [_FILE_NAME, entry]
+        result[kind] = _with_entry(_with_old_keys(files[kind], section))
+    return result
+
+
+def _of_any_type(schema: Schema) -> Schema:
+    """Returns the schema of files that name their type, and with it their further keys."""
+    known = {"type": "string", "enum": list(BODY_TYPES)}
+    own = {"type": "string", "pattern": r"^[\w.]+:\w+$"}
+    kind = {"description": "Its class, as `module:Class`, or the name of a type.", "anyOf": [own, known]}
+    return {
+        **schema,
+        "description": "An object whose file names its type, such as one of your own.",
+        "additionalProperties": True,
+        "properties": {TYPE: kind, **schema["properties"]},
+        "required": [TYPE, *schema["required"]],
+    }
+
+
+def _with_entry(schema: Schema) -> Schema:
+    """Returns a schema extended by the definition of an entry with `file` and the keys that differ."""
+    path = {"description": "File that has the keys which are not here.", **_FILE_NAME}
+    entry = {
+        "description": "A file, and what is different for this one.",
+        "type": "object",
+        "additionalProperties": schema["additionalProperties"],
+        "properties": {FILE: path, **{key: {"$ref": f"#/properties/{key}"} for key in schema["properties"]}},
+        "required": [FILE],
+    }
+    definitions = {name: _optional(each, schema) for name, each in schema.get(DEFINITIONS, {}).items()}
+    inner = _required(schema, schema).get("properties")
+    return {
+        **_optional(schema, schema),
+        "required": schema["required"],
+        **({"allOf": [{"properties": inner}]} if inner else {}),
+        DEFINITIONS: {_ENTRY: entry, **definitions},
+    }
+
+
+def _optional(schema: Schema, root: Schema) -> Schema:
+    """Returns a schema of the same keys of which none is required, nor any in mappings inside of them but for lists."""
+    result = {key: value for key, value in schema.items() if key != "required"}
+    if "properties" in schema:
+        result["properties"] = {key: _optional(value, root) for key, value in schema["properties"].items()}
+    if "anyOf" in schema:
+        result["anyOf"] = [_optional(each, root) for each in schema["anyOf"]]
+    if isinstance(schema.get("items"), dict):
+        required = _required(schema["items"], root)
+        result["items"] = {"allOf": [schema["items"], required]} if required else schema["items"]
+    return result
+
+
+def _required(schema: Schema, root: Schema) -> Schema:
+    """Returns the required keys of a schema of mappings, without the rest."""
+    mapping = mapping_in(schema, root) if "items" not in schema else None
+    if mapping is None:
+        return {}
+    content = resolved(mapping, root)
+    inner = {key: _required(value, root) for key, value in content["properties"].items()}
+    result = {"required": content.get("required"), "properties": {key: each for key, each in inner.items() if each}}
+    return {key: value for key, value in result.items() if value}
+
+
+def _with_old_keys(schema: Schema, section: str) -> Schema:
+    """Returns a schema with the keys of older worlds that still load."""
+    result = copy.deepcopy(schema)
+    properties = result["properties"]
+    for key, advice in old_keys(section).items():
+        outer, _, inner = key.partition(".")
+        same = properties.get(LEGACY_KEYS.get(section, {}).get(key), {})
+        old = {**same, "description": advice, "deprecated": True, "deprecationMessage": advice}
+        mapping = mapping_in(properties[outer], result) if outer in properties else None
+        if mapping is None:
+            properties[key] = old
+        else:
+            content = resolved(mapping, result)
+            mapping.pop("$ref", None)
+            mapping |= {**content, **mapping, "description": properties[outer]["description"]}
+            mapping["properties"] = {**content["properties"], inner: old}
+            if outer == "object_tf" and section in FOLLOWERS:
+                mapping.pop("required", None)
+    return with_definitions(result, result.get(DEFINITIONS, {}))

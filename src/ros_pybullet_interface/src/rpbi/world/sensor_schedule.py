@@ -1,0 +1,162 @@
+"""All sensors of a world, and when each is due."""
+
+import heapq
+import logging
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from rpbi.engine.clock import Clock, Schedule
+from rpbi.plugins import check_sample, is_foreign, raise_plugin_error
+from rpbi.sensors.sensor import Sensor
+
+log = logging.getLogger(__name__)
+
+
+class _Scheduled:
+    """A sensor and when it is due."""
+
+    def __init__(self, sensor: Sensor, dt_ns: int, tick: int, order: int) -> None:
+        self.sensor = sensor
+        self._is_foreign = is_foreign(sensor)
+        self.order = order
+        self.read_tick = -1
+        """Tick of the last sample, -1 before the first."""
+        self.schedule_from(tick, dt_ns)
+
+    def schedule_from(self, tick: int, dt_ns: int) -> None:
+        """Has it due by the sensor's rate after a tick; one that is off stays with the old times."""
+        if self.sensor.hz:
+            self.schedule = Schedule(self.sensor.hz, dt_ns)
+            self.next_tick = self.schedule.next_due(tick)
+
+    def read(self, tick: int) -> Any:
+        try:
+            sample = self.sensor.read(tick)
+            if sample is None:
+                return None
+            if self._is_foreign:
+                check_sample(sample, self.sensor.sample_type, self.sensor.name)
+        except Exception as error:
+            raise_plugin_error(self.sensor, f"read of '{self.sensor.name}' at tick {tick}", error)
+            raise
+        self.read_tick = tick
+        return sample
+
+
+class SensorSchedule:
+    """Reads each sensor of a world when it is due."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._scheduled: dict[str, list[_Scheduled]] = {}
+        self.watching: list[Sensor] = []
+        """Sensors that act at every tick."""
+        self._queue: list[tuple[int, int, _Scheduled]] = []
+        """A heap of when each sensor is due, in which order it came, and the sensor."""
+        self._count = 0
+        self._warned: set[tuple[str, float]] = set()
+        """Names and rates of sensors that were warned of; a reset is no reason to do so again."""
+
+    def __contains__(self, name: str) -> bool:
+        """Whether a body or camera of that name was added, with sensors or without."""
+        return name in self._scheduled
+
+    def __getitem__(self, name: str) -> list[Sensor]:
+        """Returns the sensors of a body, or the camera of that name."""
+        return [each.sensor for each in self._scheduled[name]]
+
+    def add(self, name: str, sensors: Sequence[Sensor]) -> None:
+        """Adds the sensors of a body."""
+        dt_ns, tick = self._clock.dt_ns, self._clock.tick
+        self._scheduled[name] = [_Scheduled(one, dt_ns, tick, order) for order, one in enumerate(sensors, self._count)]
+        self._count += len(sensors)
+        for each in self._scheduled[name]:
+            self._warn_if_clamped(each)
+        self._rebuild()
+
+    def set_rate(self, name: str, number: int, hz: float) -> None:
+        """Changes how often a sensor is read from this tick on, see `World.set_sensor_rate`."""
+        scheduled = self._scheduled[name]
+        if not 0 <= number < len(scheduled):
+            raise ValueError(f"'{name}' has {len(scheduled)} sensors, got number {number}")
+        if not 0.0 <= hz < math.inf:
+            raise ValueError(f"hz: must be finite and >= 0 [Hz], got {hz:g}")
+        each = scheduled[number]
+        each.sensor.hz = hz
+        each.schedule_from(self._clock.tick, self._clock.dt_ns)
+        self._warn_if_clamped(each)
+        self._rebuild()
+
+    def remove(self, name: str) -> None:
+        """Forgets the sensors of a body."""
+        del self._scheduled[name]
+        self._rebuild()
+
+    def clear(self) -> None:
+        """Forgets all."""
+        self._scheduled.clear()
+        self._rebuild()
+
+    def _warn_if_clamped(self, scheduled: _Scheduled) -> None:
+        sensor = scheduled.sensor
+        if sensor.hz and scheduled.schedule.clamped and (sensor.name, sensor.hz) not in self._warned:
+            self._warned.add((sensor.name, sensor.hz))
+            log.warning("%s: %s Hz is more than a sample a tick; it gets one a tick", sensor.name, sensor.hz)
+
+    def act(self, method: str) -> None:
+        """Calls `before_step` or `after_step` of the sensors that act at every tick."""
+        for sensor in self.watching:
+            try:
+                getattr(sensor, method)(self._clock.tick)
+            except Exception as error:
+                raise_plugin_error(sensor, f"{method} of '{sensor.name}' at tick {self._clock.tick}", error)
+                raise
+
+    def read_due(self) -> list[Any]:
+        """Returns samples of the sensors that are due at this tick."""
+        tick = self._clock.tick
+        queue = self._queue
+        if not queue or queue[0][0] > tick:
+            return []
+        samples: list[Any] = []
+        while queue and queue[0][0] <= tick:
+            _, order, each = queue[0]
+            each.next_tick = each.schedule.next_due(tick)
+            heapq.heapreplace(queue, (each.next_tick, order, each))
+            if each.sensor.wanted:
+                samples.append(each.read(tick))
+        return _present(samples)
+
+    def read_rest(self) -> list[Any]:
+        """Returns samples of the sensors that were not read at this tick yet."""
+        tick = self._clock.tick
+        return _present(each.read(tick) for each in self._rated() if each.read_tick != tick)
+
+    def read_idle(self, tick: int, since: int) -> list[Any]:
+        """Returns the samples that would have come due between two ticks, had the world not stood still."""
+        now = self._clock.tick
+        return _present(each.read(now) for each in self._rated() if each.schedule.is_due(tick, since))
+
+    def _rebuild(self) -> None:
+        self._queue = [(each.next_tick, each.order, each) for each in self._all() if each.sensor.hz]
+        heapq.heapify(self._queue)
+        self.watching = [each.sensor for each in self._all() if _acts_at_ticks(type(each.sensor))]
+
+    def _all(self) -> Iterator[_Scheduled]:
+        for scheduled in self._scheduled.values():
+            yield from scheduled
+
+    def _rated(self) -> Iterator[_Scheduled]:
+        """Yields the sensors that are to be read now and then."""
+        return (each for each in self._all() if each.sensor.hz and each.sensor.wanted)
+
+
+def _acts_at_ticks(sensor_type: type[Sensor]) -> bool:
+    """Returns whether a type of sensors does anything before or after the physics of each tick."""
+    return sensor_type.before_step is not Sensor.before_step or sensor_type.after_step is not Sensor.after_step
+
+
+def _present(samples: Any) -> list[Any]:
+    """Returns the samples without None."""
+    return [sample for sample in samples if sample is not None]

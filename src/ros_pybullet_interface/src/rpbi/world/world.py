@@ -1,0 +1,425 @@
+"""A simulated world: it owns one PyBullet client, the bodies in it and the tick."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pybullet
+
+from custom_ros_tools.errors import UnknownNameError
+from rpbi.bodies import Body, BodyConfig
+from rpbi.bodies.dynamics import LinkDynamics, read_dynamics
+from rpbi.config.attachments import AttachmentConfig
+from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.config.pybullet_world_models import PhysicsChange
+from rpbi.config.sensors import RgbdSensorConfig
+from rpbi.config.world import WORLD_FRAME
+from rpbi.engine.client import Client
+from rpbi.engine.clock import Clock
+from rpbi.engine.inputs import Input
+from rpbi.engine.mailbox import Mailbox
+from rpbi.plugins import plugin_errors, raise_plugin_error
+from rpbi.sensors.rgbd import RgbdSensor
+from rpbi.sensors.sensor import Sensor
+from rpbi.window import Window, check_recording
+
+from .actions import ACTIONS, MOVES_AT_ONCE
+from .command_log import CommandLog, WorldCommand
+from .contents import WorldContents, state_hash
+from .loading import LoadedWorld, load_object, load_world
+
+log = logging.getLogger(__name__)
+
+
+class World:
+    """A world of bodies and sensors that moves by ticks.
+
+    Only the thread that made the world calls its methods; the exceptions are `put` and the mailbox, through which
+    other threads reach it.
+
+    Args:
+        loaded: The validated configuration of the world and of all that is in it at the start.
+        simulated_time: Whether stamps are simulated time, else wall time.
+        connection_mode: PyBullet's connection mode; by default that of the configuration.
+
+    Raises:
+        ConfigError: If a configuration does not fit, for instance names a joint that the robot lacks.
+        PhysicsError: If PyBullet does not connect or cannot load something.
+    """
+
+    def __init__(self, loaded: LoadedWorld, simulated_time: bool = True, connection_mode: int | None = None) -> None:
+        self.config = loaded.config
+        self.clock = Clock(self.config.timeStep, simulated_time)
+        self.mailbox = Mailbox()
+        self.commands = CommandLog()
+        """Commands since it was built or reset."""
+        self.resets = 0
+        """Number of resets."""
+        self.physics_s = 0.0
+        """Wall time that PyBullet's steps took [s]."""
+        self.loaded = loaded
+        """Configuration that it was built from, and is again at a reset."""
+        connect = self.config.connect.kwargs()
+        configured_mode = connect.pop("connection_mode")
+        mode = configured_mode if connection_mode is None else connection_mode
+        if mode != pybullet.DIRECT:
+            check_recording(connect.get("options", ""))
+        self.pb = Client(mode, **connect)
+        self.window = Window(self.pb) if self.pb.has_window else None
+        self._contents = WorldContents(self.pb, self.clock, self)
+        self.bodies = self._contents.bodies
+        self.contacts = self._contents.contacts
+        self.attachments = self._contents.attachments
+        self._pushed: dict[str, Body] = {}
+        """Bodies that external wrenches act on, or acted on in the last tick."""
+        self.log = self._contents.log
+        self._sensors = self._contents.sensors
+        self._stepping = self._contents.stepping
+        try:
+            if mode == pybullet.GUI:
+                self._set_up_window()
+            self._contents.fill(loaded)
+        except BaseException:
+            self.close()
+            raise
+
+    @classmethod
+    def from_file(cls, path: str, **options: Any) -> World:
+        """Builds the world that a main YAML file describes; the options are further arguments of the constructor.
+
+        Raises:
+            ConfigError: If anything in the file, or in a file that it names, is wrong; it lists all problems.
+        """
+        return cls(load_world(path), **options)
+
+    def add(self, kind: str, config: BodyConfig | Mapping[str, Any], file: str | None = None) -> Body:
+        """Adds a body; when it raises, the world is as it was.
+
+        Args:
+            kind: A key of BODY_TYPES, or `module:Class`.
+            config: Configuration of that type, or a mapping of its keys.
+            file: Where it came from, for messages; without it, they have the body's name.
+
+        Raises:
+            ConfigError: If the name is taken or the configuration does not fit.
+            PhysicsError: If PyBullet refuses.
+            PluginError: If a class of another package fails.
+        """
+        if isinstance(config, Mapping):
+            config = load_object(kind, config, file or str(config.get("name", kind)))
+        body = self._contents.add(kind, config, file)
+        self._note(config.name, "add", (kind, config))
+        return body
+
+    def add_camera(self, config: RgbdSensorConfig | Mapping[str, Any], file: str | None = None) -> RgbdSensor:
+        """Adds a camera; when it raises, the world is as it was.
+
+        The first one, and the next to come once that has gone, has the topics `rpbi/camera/...`.
+
+        Args:
+            config: Its configuration, or a mapping of its keys.
+            file: Its file, for messages; without it, they have the camera's name.
+
+        Raises:
+            ConfigError: If the name exists already, or the mapping does not fit.
+        """
+        if isinstance(config, Mapping):
+            config = RgbdSensorConfig.parse(config, file or str(config.get("name", "camera")))
+        return self._contents.add_camera(config, file)
+
+    def remove(self, name: str) -> None:
+        """Removes a body or a camera.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        is_body = name in self.bodies
+        self._contents.remove(name)
+        self._pushed.pop(name, None)
+        self.clock.bump_stamp()  # another object of its name, perhaps elsewhere, may come within this tick
+        if is_body:
+            self._note(name, "remove", None)
+        self.apply_inputs()  # what still waits for it must not meet a later body of the same name
+
+    def dynamics(self, object_name: str) -> LinkDynamics:
+        """Returns how an object or a link behaves in contact and motion.
+
+        Args:
+            object_name: `NAME`, or `NAME/LINK` for one of its links.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        name, _, link = object_name.partition("/")
+        return read_dynamics(self._contents.body(name), link)
+
+    def change_dynamics(self, object_name: str, change: ChangeDynamics | Mapping[str, Any]) -> None:
+        """Changes the dynamics of an object or a link; when it raises, nothing has changed.
+
+        Args:
+            object_name: `NAME`, or `NAME/LINK` for one of its links.
+            change: The change, or a mapping of its keys.
+
+        Raises:
+            ConfigError: If the mapping does not fit.
+            UnknownNameError: If there is none of that name.
+            ValueError: If it is invalid for that link.
+            PhysicsError: If PyBullet refuses.
+        """
+        if isinstance(change, Mapping):
+            change = ChangeDynamics.parse(change, object_name)
+        name, _, link = object_name.partition("/")
+        self._contents.change_dynamics(name, link, change)
+        self._note(object_name, "dynamics", change)
+
+    def attach(self, config: AttachmentConfig | Mapping[str, Any]) -> None:
+        """Attaches a body to another; when it raises, nothing has changed.
+
+        Args:
+            config: The attachment, or a mapping of its keys.
+
+        Raises:
+            ConfigError: If the mapping does not fit.
+            UnknownNameError: If there is no such body or link.
+            ValueError: If its name is taken, or the two cannot be attached.
+            PhysicsError: If PyBullet refuses.
+        """
+        if isinstance(config, Mapping):
+            config = AttachmentConfig.parse(config, "attachment")
+        self.attachments.add(config)
+        self._note(config.name, "attach", config)
+
+    def detach(self, name: str) -> None:
+        """Ends an attachment.
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        self.attachments.remove(name)
+        self._note(name, "detach", None)
+
+    def change_physics(self, change: PhysicsChange) -> None:
+        """Changes gravity, or the solver of contacts and joints; a reset undoes it."""
+        self._contents.change_physics(change)
+        self._note("", "physics", change)
+
+    def set_sensor_rate(self, name: str, number: int, hz: float) -> None:
+        """Changes the rate of a sensor; a reset undoes it.
+
+        Args:
+            name: The body that has it, or the camera.
+            number: Its index in `sensors_of(name)`.
+            hz: Its rate [Hz] of the world's time from this tick on; 0 is off.
+
+        Raises:
+            UnknownNameError: If there is no body or camera of that name.
+            ValueError: If there is no such sensor, or the rate is negative or not finite.
+        """
+        if name not in self._sensors:
+            raise UnknownNameError("object", name, [*self.bodies, *self.cameras])
+        self._sensors.set_rate(name, number, hz)
+        if name in self.bodies:
+            self._note(name, "sensor_rate", (number, hz))
+
+    def act(self, name: str, what: str, value: Any, do: Callable[[Any], Any] | None = None) -> Any:
+        """Applies an action to a body, and logs it as a command; when it raises, nothing is logged.
+
+        Args:
+            name: The body.
+            what: A key of ACTIONS.
+            value: Its value; for a named tuple also a mapping of its fields.
+            do: Does the same to the body in another way, for instance with something prepared by another thread.
+
+        Returns:
+            What the action returns.
+
+        Raises:
+            UnknownNameError: If there is no such body or action.
+            ValueError: If the value is refused.
+        """
+        body = self._contents.body(name)
+        if what not in ACTIONS:
+            raise UnknownNameError("action", what, list(ACTIONS))
+        action = ACTIONS[what]
+        value = action.value(value)
+        if what in MOVES_AT_ONCE:
+            self.attachments.refuse_moving(name)
+        result = action.do(body, self.clock, value) if do is None else do(body)
+        self._note_pushed(body)
+        self._note(name, what, value)
+        return result
+
+    def put(self, slot: str, value: Any) -> None:
+        """Passes a value to a body or sensor before the next tick; any thread may call it.
+
+        Args:
+            slot: `NAME/INPUT`, such as `kuka_lwr/target`.
+            value: Value of that input. For a target of joints also a mapping of them to numbers, for a named tuple one
+                of its fields.
+
+        Raises:
+            UnknownNameError: If there is no such input, or the value names something unknown.
+            ValueError: If the value is refused, for instance because it is not finite.
+        """
+        generation = self.mailbox.generation
+        inputs = self.inputs
+        if slot not in inputs:
+            raise UnknownNameError("input", slot, list(inputs))
+        taken = inputs[slot]
+        self.mailbox.put(slot, taken.check(value), taken.merge, generation)
+
+    @property
+    def inputs(self) -> dict[str, Input]:
+        """Inputs of the world by slot."""
+        return self._contents.inputs
+
+    @property
+    def cameras(self) -> dict[str, RgbdSensor]:
+        """The cameras by name; a new dictionary with every change."""
+        return self._contents.cameras
+
+    def sensors_of(self, name: str) -> list[Sensor]:
+        """Returns the sensors of a body, or the camera of that name."""
+        return self._sensors[name]
+
+    def frames(self) -> set[str]:
+        """Returns the TF frames that it publishes, without prefix: its own, of sensors, and under `poses`."""
+        poses = (pose.tf_id for pose in self.config.poses)
+        sensors = (sensor for name in self.bodies for sensor in self.sensors_of(name))
+        return {WORLD_FRAME, *poses, *(frame for sensor in sensors for frame in sensor.tf_frames)}
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether PyBullet is still there: its window may have been closed, or its server have ended."""
+        return bool(self.pb.isConnected())
+
+    def apply_inputs(self) -> None:
+        """Acts on what came since the last time, unless it was meant for a body that has gone.
+
+        Every step does so first; a world that stands still needs it for the poses that come from TF.
+        """
+        for slot, value in self.mailbox.drain().items():
+            if slot in self.inputs:
+                self.apply_input(slot, value)
+
+    def apply_input(self, slot: str, value: Any) -> None:
+        """Acts on a value that was checked, and notes it if it is for a body."""
+        body = self.bodies.get(slot.split("/")[0])
+        with plugin_errors(body or self, f"applying '{slot}' at tick {self.clock.tick}"):
+            self.inputs[slot].apply(value)
+        if body is not None:
+            self._note_pushed(body)
+            self._note(slot, "input", value)
+
+    def step(self) -> list[Any]:
+        """Advances by a tick.
+
+        Returns:
+            The samples that are due at the new tick.
+
+        Raises:
+            PhysicsError: If something in the world is not finite any more.
+            PluginError: If a class of another package fails.
+        """
+        self.apply_inputs()
+        for body in self._stepping:
+            try:
+                body.before_step(self.clock.tick)
+            except Exception as error:
+                raise_plugin_error(body, f"before_step of '{body.name}' at tick {self.clock.tick}", error)
+                raise
+        if self._pushed:
+            self._push()
+        watching = self._sensors.watching
+        if watching:
+            self._sensors.act("before_step")
+        begin_s = time.perf_counter()
+        self.pb.stepSimulation()
+        self.physics_s += time.perf_counter() - begin_s
+        self.contacts.invalidate()
+        self.clock.advance()
+        if watching:
+            self._sensors.act("after_step")
+        if self.attachments.limited:
+            self.attachments.break_overloaded(self.clock.tick)
+        return self._sensors.read_due()
+
+    def read_rest(self) -> list[Any]:
+        """Returns samples of the sensors that were not read at this tick yet."""
+        return self._sensors.read_rest()
+
+    def read_idle(self, tick: int, since: int) -> list[Any]:
+        """Returns the samples that would have come due between two ticks, had the world not stood still."""
+        return self._sensors.read_idle(tick, since)
+
+    def halt(self, reason: str) -> None:
+        """Breaks off what bodies were about to do over the coming ticks, such as timed motions."""
+        for body in self.bodies.values():
+            body.halt(reason)
+        self._note("", "halt", reason)
+
+    def pause(self, reason: str) -> None:
+        """Breaks off what cannot wait until the world, which is stopped, runs again."""
+        for body in self.bodies.values():
+            body.pause(reason)
+        self._note("", "pause", reason)
+
+    def reset(self) -> None:
+        """Makes the world what it was when it was built, to the last bit; stamps go on.
+
+        Objects that came later go, those that were removed come back. Motions end with a reason; inputs that wait are
+        dropped. Cameras stay, with the pose that they have. Bodies and their sensors are new objects; gravity, the
+        engine's parameters and rates are those of the configuration.
+
+        Raises:
+            ConfigError: If something cannot be loaded any more, for instance because its file has gone; then the
+                world lacks it.
+        """
+        self.halt("the world was reset")
+        self._contents.clear()
+        self._pushed.clear()
+        self.clock.restart()
+        self.resets += 1
+        try:
+            self._contents.fill(self.loaded)
+        finally:
+            self.commands.clear()
+            self.mailbox.drop()
+
+    def changed_names(self) -> set[str]:
+        """Returns the names of all objects that came or went since the world was built or reset."""
+        return self._contents.changed_names()
+
+    def state_hash(self) -> str:
+        """Returns a text that is the same for worlds in the same state at the same tick, see `state_hash`."""
+        return state_hash(self.clock.tick, self.bodies)
+
+    def close(self) -> None:
+        """Disconnects from PyBullet and fails the requests that wait."""
+        self.mailbox.close()
+        try:
+            self.halt("the simulation ended")
+            self.pb.disconnect()
+        except pybullet.error:
+            log.debug("PyBullet had disconnected before")
+
+    def _set_up_window(self) -> None:
+        for arguments in self.config.configureDebugVisualizer.calls():
+            self.pb.configureDebugVisualizer(**arguments)
+        self.pb.resetDebugVisualizerCamera(**self.config.resetDebugVisualizerCamera.kwargs())
+
+    def _note_pushed(self, body: Body) -> None:
+        if "external_wrenches" in vars(body) and body.external_wrenches.acts:
+            self._pushed[body.name] = body
+
+    def _push(self) -> None:
+        for name, body in list(self._pushed.items()):
+            body.external_wrenches.apply(body.link_pose)
+            if not body.external_wrenches.loads:
+                del self._pushed[name]
+
+    def _note(self, name: str, what: str, value: Any) -> None:
+        self.commands.note(WorldCommand(self.clock.tick, name, what, value))

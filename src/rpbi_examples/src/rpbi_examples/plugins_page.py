@@ -1,0 +1,51 @@
+"""The page that lists the plug-ins of all tables."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from custom_ros_tools.plugins.table import PluginTable
+from ik_ros.solvers import SOLVERS
+from ik_ros.tasks import TASKS
+from motion_primitives.primitives import PRIMITIVES
+from operator_node.devices import DEVICES
+from operator_node.haptics.devices import HAPTIC_DEVICES
+from operator_node.mappings import MAPPINGS
+from rpbi.bodies import BODY_TYPES
+from rpbi.control.controllers import CONTROLLERS
+from rpbi.reference.markdown import WRITTEN_BY, code, page, table
+from rpbi.sensors import SENSOR_TYPES
+from safe_robot.checks import CHECKS
+
+TABLES: tuple[tuple[str, PluginTable, str], ...] = (
+    ("Objects", BODY_TYPES, "[worlds](worlds.md)"),
+    ("Sensors", SENSOR_TYPES, "[worlds](worlds.md)"),
+    ("Controllers", CONTROLLERS, "[controllers](controllers.md)"),
+    ("Solvers", SOLVERS, "[solvers](ik_solvers.md)"),
+    ("Tasks", TASKS, "[tasks](ik_tasks.md)"),
+    ("Devices", DEVICES, "[devices](devices.md)"),
+    ("Haptic devices", HAPTIC_DEVICES, "[haptics](haptics.md)"),
+    ("Mappings", MAPPINGS, "[teleoperation](teleoperation.md)"),
+    ("Checks", CHECKS, "[safety](safety.md)"),
+    ("Primitives", PRIMITIVES, "[learning](learning.md)"),
+)
+"""Heading, table and page of each kind of plug-in."""
+HEAD = """\
+The names below are valid as a `type` in YAML, or as a parameter of a node. Wherever one of them is valid, the class of
+a package of your own is valid too, as `my_package.my_module:MyClass`; see [extending.md](extending.md)."""
+
+
+def plugins_page() -> str:
+    """Returns the page."""
+    return page([WRITTEN_BY, "# Plug-ins", HEAD, *_sections()])
+
+
+def plugin_files(root: Path) -> dict[Path, str]:
+    """Returns the text of the page, by its path in a workspace."""
+    return {root / "docs/plugins.md": plugins_page()}
+
+
+def _sections() -> Iterator[str]:
+    for heading, plugins, link in TABLES:
+        yield f"## {heading}"
+        yield f"More about them: {link}."
+        yield table(("name", "class"), ((code(name), text) for name, text in plugins.summaries().items()))

@@ -1,0 +1,1 @@
+"""Commands of the console for examples and for the workspace."""

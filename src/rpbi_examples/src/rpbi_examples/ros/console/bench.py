@@ -1,0 +1,30 @@
+"""The command `bench`."""
+
+import importlib
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from custom_ros_tools.console.argument import Argument, UsageError
+from custom_ros_tools.console.modules import workspace
+
+
+def bench(
+    *names: Annotated[str, Argument("[NAME ...]", offers="benchmarks", files="*")],
+    quick: Annotated[bool, Argument("")] = False,
+    json: Annotated[Path | None, Argument("FILE", parse=Path, files="*")] = None,
+) -> int:
+    """Runs the benchmarks, each beside its floor.
+
+    Args:
+        NAME: by default all but dressing, guard_faults, haptics, passivity, press, soak, streams and teleop
+        quick: measures for a shorter time, less exactly
+        json: file for the figures
+    """
+    sys.path.insert(0, str(workspace() / "benchmarks"))
+    benchmarks = importlib.import_module("run")
+    known = benchmarks.BENCHMARKS + benchmarks.WHEN_NAMED
+    for name in names:
+        if name not in known:
+            raise UsageError(f"there is no benchmark '{name}'; there are {', '.join(known)}")
+    return int(benchmarks.run(names, quick, json))

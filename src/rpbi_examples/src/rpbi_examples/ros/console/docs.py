@@ -1,0 +1,32 @@
+"""The command `docs`."""
+
+import pkgutil
+from pathlib import Path
+
+from custom_ros_tools.console.modules import workspace
+
+WRITERS = (
+    "ik_ros.schemas:schema_files",
+    "motion_primitives.node_configs:schema_files",
+    "rpbi_utils.schemas:schema_files",
+    "safe_robot.schemas:schema_files",
+    "rpbi.ros.reference.write:reference_files",
+    "custom_ros_tools.console.page:console_files",
+    "rpbi_examples.plugins_page:plugin_files",
+)
+"""Functions that return the text of each file, given the workspace."""
+
+
+def files(root: Path) -> dict[Path, str]:
+    """Returns the text of each file of a workspace that follows from the code."""
+    return {path: text for writer in WRITERS for path, text in pkgutil.resolve_name(writer)(root).items()}
+
+
+def docs() -> None:
+    """Writes the schemas for editors and the reference pages anew, from the code."""
+    root = workspace()
+    for path, text in files(root).items():
+        path.parent.mkdir(exist_ok=True)
+        is_new = not path.exists() or path.read_text(encoding="utf-8") != text
+        path.write_text(text, encoding="utf-8")
+        print(f"{'written' if is_new else 'as it was'}: {path.relative_to(root)}")

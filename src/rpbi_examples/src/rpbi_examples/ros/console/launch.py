@@ -1,0 +1,155 @@
+"""The command `launch`."""
+
+import argparse
+import re
+import sys
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated
+
+import roslaunch
+from roslaunch.arg_dump import get_args
+
+from custom_ros_tools.config import load_config
+from custom_ros_tools.console.argument import Argument
+from custom_ros_tools.console.modules import workspace
+from custom_ros_tools.errors import InterfaceError, UnknownNameError
+from custom_ros_tools.ros.lifecycle.timed_master import unused_port
+from robot_model.asset_files import find_file
+from rpbi_examples.ros.running_simulators import clocks, master_of, running_simulators
+
+WORLDS = (".yaml", ".yml")
+WORLD = "world"
+"""Launch file that runs a world of the user's."""
+PRINTS = ("--files", "--args", "--nodes", "--find-node", "--dump-params", "--ros-args")
+"""Options of `roslaunch` with which it prints something and starts nothing."""
+_COMMENT = re.compile(r"<!--\s*(.*?)\s*-->", re.DOTALL)
+
+
+def launch(
+    example: Annotated[str, Argument("EXAMPLE", offers="examples", files="*.@(launch|yaml)", is_raw=True)] = "",
+    *arguments: Annotated[str, Argument("[ARGUMENT ...]", offers="launch_arguments", is_raw=True)],
+) -> int:
+    """Runs an example, a world of your own or a launch file, until Ctrl-C; without a name, it lists the examples.
+
+    An argument that the launch file lacks is refused, with those that it has.
+
+    ROS stops a running simulator when another one of the same name starts, so that is refused. Either give the second a
+    master of its own, or give both a namespace. Only `world.launch`, by which worlds of your own run, has a prefix for
+    TF; TF frames of two examples on one master have the same names, so take a master for each:
+
+        ./rpbi launch grasp_example -p 11312
+        export ROS_MASTER_URI=http://localhost:11312      # in the terminals that are to see it
+        ./rpbi launch world.yaml --ns left                # two of your own, on one master
+        ./rpbi launch world.yaml --ns right
+
+    Usage:
+        ./rpbi launch [EXAMPLE | WORLD.yaml | FILE.launch [NAME:=VALUE ...]]
+
+    Args:
+        NAME:=VALUE: an argument of the launch file; examples have headless, rviz, gui, real_time_factor, start;
+            worlds have controls, too
+        --ns NAMESPACE: of all its nodes, beside another simulator; its TF frames get the prefix NAMESPACE,
+            its clock is the wall's
+        --replace: stops the simulator that runs under the same name, with its launch, and waits for that
+        -p PORT: of a ROS master of its own, on this machine
+        --ros-args: lists the arguments that it has, with their meaning
+        --screen: shows the output of all nodes; further options are those of roslaunch
+    """
+    given = [example, *arguments] if example else []
+    examples = {path.stem: path for path in sorted((workspace() / "src/rpbi_examples/launch").glob("*.launch"))}
+    if not given:
+        print("Examples, for ./rpbi launch EXAMPLE [name:=value ...]; --ros-args instead of values lists the names:")
+        for name, path in examples.items():
+            print(f"  {name:<28} {_purpose(path)}")
+        return 0
+    options, (name, *rest) = _options().parse_known_args(given)
+    try:
+        if name.endswith(WORLDS):
+            name, rest = WORLD, [f"config:={name}", *_controls_of(name, rest), *rest]
+        is_file = name.endswith(".launch") and Path(name).is_file()
+        file = Path(name) if is_file else examples.get(name.removesuffix(".launch"))
+        if file is None:
+            raise UnknownNameError("example", name, list(examples))
+        known = sorted(get_args([str(file)]))
+        _check_arguments(file, rest, known)
+        rest += _arguments_of(options, rest, known)
+        sys.argv = ["roslaunch", str(file), *rest]  # roslaunch takes values of arguments from there
+        if not any(argument.partition("=")[0] in PRINTS for argument in rest):
+            _make_way(file, options)
+    except (InterfaceError, roslaunch.RLException) as error:
+        print(f"launch: {error}", file=sys.stderr)
+        return 2
+    roslaunch.main(sys.argv)
+    return 0
+
+
+def _controls_of(world: str, given: Iterable[str]) -> list[str]:
+    """Returns the arguments for the key `controls` of a world's file, unless they are given; a fault is the node's."""
+    try:
+        config = load_config(find_file(world, str(Path.cwd() / world)))
+    except (InterfaceError, ValueError):
+        return []
+    controls = config.get("controls")
+    if not isinstance(controls, Mapping) or any(argument.startswith("controls:=") for argument in given):
+        return []
+    robot = controls.get("robot_name")
+    return ["controls:=true", *([f"controls_robot:={robot}"] if robot else [])]
+
+
+def _purpose(path: Path) -> str:
+    """Returns the first comment of a launch file."""
+    comment = _COMMENT.search(path.read_text(encoding="utf-8"))
+    return " ".join(comment[1].split()) if comment else ""
+
+
+def _options() -> argparse.ArgumentParser:
+    """Returns the parser of the options that are not roslaunch's alone."""
+    parser = argparse.ArgumentParser(prog="launch", add_help=False, allow_abbrev=False)
+    parser.add_argument("--ns")
+    parser.add_argument("--replace", action="store_true")
+    parser.add_argument("-p", "--port", type=int)
+    return parser
+
+
+def _check_arguments(path: Path, arguments: Iterable[str], known: Iterable[str]) -> None:
+    """Raises an UnknownNameError for an argument that a launch file lacks, which roslaunch would ignore."""
+    for argument in arguments:
+        name, is_given, _ = argument.partition(":=")
+        if is_given and name not in known and not name.startswith("_"):  # those are ROS's own, such as __ns
+            raise UnknownNameError(f"argument of {path.stem}", name, known)
+
+
+def _arguments_of(options: argparse.Namespace, given: Iterable[str], known: Iterable[str]) -> list[str]:
+    """Returns the arguments of roslaunch that stand for the options."""
+    added = [] if options.port is None else ["-p", str(options.port)]
+    if options.ns is None:
+        return added
+    namespace = options.ns.strip("/")
+    # a master has one clock, and TF no namespaces
+    values = {"tf_prefix": namespace, "use_sim_time": "false"}
+    names = {argument.partition(":=")[0] for argument in given}
+    missing = [f"{name}:={value}" for name, value in values.items() if name in known and name not in names]
+    return [*added, f"__ns:=/{namespace}", *missing]
+
+
+def _make_way(file: Path, options: argparse.Namespace) -> None:
+    """Sees to it that the launch file stops no simulator that runs, unless it is to replace that.
+
+    Raises:
+        InterfaceError: If it would stop one, or run beside one that is the clock of their master.
+    """
+    master = master_of(options.port)
+    if options.ns is not None and (clock := clocks(master)):
+        raise InterfaceError(
+            f"{clock[0].name} is the clock of the ROS master at {master}: for --ns, run both with use_sim_time:=false, "
+            f"or use a master of its own with -p {unused_port()}"
+        )
+    for simulator in running_simulators(str(file), master):
+        if not options.replace:
+            raise InterfaceError(
+                f"{simulator.name} runs already on the ROS master at {master}, and this would stop it: run this on a "
+                f"master of its own with -p {unused_port()}, or in a namespace with --ns NAME if both have "
+                "use_sim_time:=false; --replace stops the one that runs"
+            )
+        simulator.stop(master)

@@ -1,0 +1,15 @@
+"""The command `setup`."""
+
+import sys
+from typing import Annotated
+
+from custom_ros_tools.console.argument import Argument
+
+
+def setup(*extras: Annotated[str, Argument("[EXTRA ...]", offers="extras")]) -> None:
+    """Does only what every command does first: installs and builds what is missing.
+
+    Args:
+        EXTRA: ik, mpc, tags, assets or notebook, see docs/installation.md; stays wanted from then on
+    """
+    print("Ready.", file=sys.stderr)  # `rpbi` has done all of it by now

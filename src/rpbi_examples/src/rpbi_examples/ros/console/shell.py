@@ -1,0 +1,19 @@
+"""The command `shell`."""
+
+import os
+import signal
+from typing import Annotated
+
+from custom_ros_tools.console.argument import Argument
+from custom_ros_tools.console.modules import workspace
+
+
+def shell(*words: Annotated[str, Argument("[-c COMMAND]", is_raw=True)]) -> None:
+    """Opens a shell with the workspace sourced, or runs one command in it.
+
+    Usage:
+        ./rpbi shell [-c COMMAND]
+    """
+    arguments = words if words[:1] == ("-c",) else ("--rcfile", str(workspace() / "tools/shell.bash"))
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # which Python ignores, and its successor would
+    os.execvp("bash", ["bash", *arguments])

@@ -1,0 +1,39 @@
+"""The command `test`."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import pytest
+
+from custom_ros_tools.console.argument import Argument
+from custom_ros_tools.console.modules import workspace
+
+PARALLEL = ("-n", "auto", "--max-worker-restart=0")
+
+
+def test(*words: Annotated[str, Argument("[--quick] [PATH | OPTION OF PYTEST ...]", files="*", is_raw=True)]) -> int:
+    """Runs all tests, or those chosen as for pytest, in parallel workers.
+
+    All tests together install all extras first, 1.4 GB; chosen ones install nothing but what every command needs, and
+    those that miss an extra are skipped with its name.
+
+    A run ends with the time of each folder, of the slowest files and of the slowest tests.
+
+    Up to three failed tests are run once more, each by itself, after all others. If all of them pass, the run passes,
+    counts them as `flaky` and prints both outputs. A second failure, or more than three failed tests, make the run
+    fail.
+
+    Args:
+        --quick: all that need no ROS but the two longest files, and one test of each ROS path
+        --strict: no failed test is run again
+        -n N: N workers; -n 0 is one process
+        PATH: a folder, a file or FILE::TEST
+    """
+    root = workspace()
+    is_chosen = any(Path(word.partition("::")[0]).exists() for word in words)
+    is_serial = any(word.startswith(("-n", "--numprocesses")) or word.endswith("no:xdist") for word in words)
+    chosen = "--skip-missing-extras" if is_chosen else str(root / "tests")
+    options = ("-c", str(root / "pyproject.toml"), "--rootdir", str(root), *(() if is_serial else PARALLEL))
+    sys.argv = ["pytest", *options, *words, chosen]
+    return int(pytest.console_main())

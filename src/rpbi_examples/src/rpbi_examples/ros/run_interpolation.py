@@ -1,0 +1,132 @@
+"""Sends an arm's tip through three coloured balls, reports how near it passes, and draws its motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import PoseStamped, TransformStamped
+from nav_msgs.msg import Path as PathMessage
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.tf_interface import TfInterface
+from custom_ros_tools.ros.transform_messages import as_pose, position_in
+from custom_ros_tools.transforms import Array
+
+BASE, TIP, TARGET = "rpbi/kuka_lwr/lwr_arm_0_link", "rpbi/kuka_lwr/end_effector_ball", "interpol_target"
+HZ = 50.0
+DRAWN = 5
+"""Every so many samples of the target, one is drawn in RViz."""
+AFTER_S = 1.0
+"""Time for which the motion is drawn after its end [s]."""
+TF_PATIENCE_S = 60.0
+
+
+class Visit(NamedTuple):
+    """A ball that the tip visits: its colour, when [s], and where, in the frame of the arm's foot [m]."""
+
+    colour: str
+    time_s: float
+    position: tuple[float, float, float]
+
+
+VISITS = (
+    Visit("green", 4.0, (-0.4, 0.0, 0.1)),
+    Visit("blue", 9.0, (-0.5, 0.2, 0.3)),
+    Visit("red", 14.0, (-0.15, 0.4, 0.2)),
+)
+
+
+class RunInterpolation:
+    """Publishes waypoints from the tip's present pose through the balls, and watches."""
+
+    def __init__(self) -> None:
+        self._tf = TfInterface()
+        topic = rospy.get_param("~topic_name_4_waypoints", "ros_pybullet_interface/waypt_traj")
+        self._waypoints = rospy.Publisher(topic, Float64MultiArray, queue_size=1, latch=True)
+        self._path = rospy.Publisher("interpolation/path", PathMessage, queue_size=1, latch=True)
+        self._drawn = PathMessage()
+        self._drawn.header.frame_id = BASE
+        self._rows: list[tuple[float, Array, Array]] = []
+        """Time since the start [s], and the positions of target and tip [m]."""
+
+    def run(self) -> None:
+        """Plans, and watches until ROS shuts down.
+
+        Raises:
+            InterfaceError: If TF has no tip, or the picture cannot be written.
+        """
+        start = self._tf.wait_for_tf(BASE, TIP, timeout=TF_PATIENCE_S)
+        if start[0] is None:
+            raise InterfaceError(f"no TF from '{BASE}' to '{TIP}' for {TF_PATIENCE_S:g} s: is the simulator running?")
+        times_s = [0.0, *(visit.time_s for visit in VISITS)]
+        positions = np.array([start[0], *(visit.position for visit in VISITS)]).T
+        quats = np.tile(np.reshape(start[1], (4, 1)), len(times_s))
+        self._waypoints.publish(as_message(np.vstack([times_s, positions, quats])))
+        rospy.loginfo("the tip goes to %s", ", ".join(f"{each.colour} at {each.time_s:g} s" for each in VISITS))
+        start_s, pending, rate = None, list(VISITS), rospy.Rate(HZ)
+        while not rospy.is_shutdown():
+            rate.sleep()
+            target, tip = (self._tf.get_tf_msg(BASE, frame) for frame in (TARGET, TIP))
+            if target is None or tip is None:
+                continue
+            start_s = target.header.stamp.to_sec() if start_s is None else start_s
+            now_s = tip.header.stamp.to_sec() - start_s
+            if now_s > VISITS[-1].time_s + AFTER_S:
+                break
+            place = position_in(tip.transform)
+            self._rows.append((now_s, position_in(target.transform), place))
+            if len(self._rows) % DRAWN == 1:
+                self._draw(target)
+            if pending and now_s >= pending[0].time_s:
+                visit = pending.pop(0)
+                off_mm = 1000.0 * float(np.linalg.norm(place - visit.position))
+                rospy.loginfo("%s at %g s: the tip is %.1f mm from it", visit.colour, now_s, off_mm)
+        self._plot(times_s, positions)
+
+    def _draw(self, target: TransformStamped) -> None:
+        self._drawn.poses.append(PoseStamped(target.header, as_pose(target.transform)))
+        self._path.publish(self._drawn)
+
+    def _plot(self, times_s: list[float], positions: Array) -> None:
+        """Writes the picture, if one is wanted: x, y and z of waypoints, plan and actual motion."""
+        name = rospy.get_param("~plot", "")
+        if not name or not self._rows:
+            return
+        import matplotlib  # half a second that only a picture needs
+
+        matplotlib.use("Agg")
+        from matplotlib import pyplot as plt
+
+        figure, axes = plt.subplots(1, 3, figsize=(12.0, 3.6), constrained_layout=True)
+        seconds = [row[0] for row in self._rows]
+        for i, axis in enumerate(axes):
+            axis.plot(seconds, [row[1][i] for row in self._rows], color="#1f5fb4", label="plan")
+            axis.plot(seconds, [row[2][i] for row in self._rows], color="#e67814", linestyle="--", label="tip")
+            axis.plot(times_s, positions[i], "o", color="#222222", label="waypoints")
+            axis.set(title="xyz"[i], xlabel="time [s]", ylabel="position [m]")
+            axis.grid(alpha=0.3)
+        axes[0].legend()
+        path = Path(rospy.get_param("~working_directory", ".").strip(), name)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            figure.savefig(path, dpi=100)
+        except (OSError, ValueError) as error:
+            raise InterfaceError(f"plot: expected a picture file that can be written, got '{path}': {error}") from error
+        rospy.loginfo("the motion is drawn in %s", path)
+
+
+def as_message(rows: Array) -> Float64MultiArray:
+    """Returns a matrix as `interpolation_node.py` reads it: row by row, with labelled dimensions."""
+    count, columns = rows.shape
+    dimensions = [MultiArrayDimension("rows", count, rows.size), MultiArrayDimension("columns", columns, columns)]
+    return Float64MultiArray(MultiArrayLayout(dimensions, 0), rows.ravel().tolist())
+
+
+def main() -> None:
+    """Runs the node."""
+    run_node("run_interpolation", RunInterpolation, RunInterpolation.run)

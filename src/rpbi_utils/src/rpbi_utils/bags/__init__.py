@@ -1,0 +1,1 @@
+"""Bags: their files, the layout of their messages, tables of them, and limits for hostile ones."""

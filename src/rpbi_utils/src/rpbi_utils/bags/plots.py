@@ -1,0 +1,124 @@
+"""Figures of the tables of a bag."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from .row_plan import RECORD_TIME
+from .tables import file_stems
+from .transforms import TRANSLATION
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MAX_LINES = 20
+"""Largest number of lines of a panel with a legend; with more there is none."""
+MAX_POINTS = 20_000
+"""Largest number of points of a line; of more, evenly spaced ones are drawn."""
+_AXES = "xyz"
+
+
+def plot_tables(tables: Mapping[str, pd.DataFrame], new_figure: Callable[..., Figure]) -> Iterator[tuple[str, Figure]]:
+    """Yields figures of a bag's tables, each with a file name without ending.
+
+    Joint states have positions, velocities and efforts; wrenches forces and torques; transforms the paths of their
+    frames; contacts the normal forces by pair of bodies. The last figures are the times between messages of all
+    topics, and the delays from stamps to the time of recording.
+
+    Args:
+        tables: By topic, as `bag_to_dataframes` returns them. The time axis starts at their first row.
+        new_figure: `matplotlib.figure.Figure`, or `matplotlib.pyplot.figure` for windows.
+    """
+    filled = {topic: table for topic, table in tables.items() if len(table)}
+    start_s = min((table.index[0] for table in filled.values()), default=0.0)
+    relative = {topic: table.set_index(table.index - start_s) for topic, table in filled.items()}
+    stems = file_stems(relative)
+    for topic, table in relative.items():
+        for suffix, panels in _panels(table):
+            yield f"{stems[topic]}{suffix}", _figure(new_figure, topic, panels)
+    if relative:
+        yield "rates", _figure(new_figure, "time between messages", {"[ms]": _intervals(relative)}, scale="log")
+    delays = _delays(filled, start_s)
+    if delays:
+        yield "latencies", _figure(new_figure, "time of recording less stamp", {"[ms]": delays})
+
+
+Lines = Mapping[str, pd.Series]
+"""Values over time [s] by the names of the lines."""
+
+
+def _panels(table: pd.DataFrame) -> Iterator[tuple[str, Mapping[str, Lines]]]:
+    """Yields the end of a file name, and panels by the labels of their y axes."""
+    joints = {
+        label: _by_last_name(table.filter(regex=f"^{field}/"))
+        for field, label in (("position", "position [rad, m]"), ("velocity", "velocity"), ("effort", "effort [N m, N]"))
+    }
+    if any(joints.values()):
+        yield "", {label: lines for label, lines in joints.items() if lines}
+    if {"link", "other_body", "normal_force"} <= set(table.columns):
+        forces = table.groupby([table.index, "other_body"])["normal_force"].sum().unstack(fill_value=0.0)
+        every = forces.reindex(table.index.unique(), fill_value=0.0)
+        yield "", {"normal force [N]": {f"on {body}": every[body] for body in every}}
+        return
+    force = _vector(table, ("wrench/force", "force"))
+    torque = _vector(table, ("wrench/torque", "torque"))
+    if force and torque:
+        yield "", {"force [N]": force, "torque [N m]": torque}
+    if {"child", "parent", *TRANSLATION} <= set(table.columns):
+        for (parent, child), rows in table.groupby(["parent", "child"], sort=True):
+            if len(rows) > 1 and (np.ptp(rows[TRANSLATION].to_numpy(), axis=0) > 0).any():
+                name = file_stems([child])[child]
+                yield f".{name}", {f"{child} in {parent} [m]": _vector(rows, ("translation",))}
+
+
+def _by_last_name(table: pd.DataFrame) -> Lines:
+    """Returns the columns of joints that have values; those of fixed joints, always 0, are left out."""
+    return {name.partition("/")[2]: table[name] for name in table if table[name].fillna(0.0).any()}
+
+
+def _vector(table: pd.DataFrame, prefixes: Sequence[str]) -> Lines:
+    """Returns the components of a vector at the first prefix that has them."""
+    for prefix in prefixes:
+        if {f"{prefix}/{axis}" for axis in _AXES} <= set(table.columns):
+            return {axis: table[f"{prefix}/{axis}"] for axis in _AXES}
+    return {}
+
+
+def _intervals(tables: Mapping[str, pd.DataFrame]) -> Lines:
+    times = {topic: table.index.unique().to_numpy() for topic, table in tables.items()}
+    return {topic: pd.Series(1e3 * np.diff(each), each[1:]) for topic, each in times.items() if len(each) > 1}
+
+
+def _delays(tables: Mapping[str, pd.DataFrame], start_s: float) -> Lines:
+    """Returns the delays of topics with stamps [ms]; others have their time of recording as the index."""
+    delays = {topic: 1e3 * (table[RECORD_TIME] - table.index.to_numpy()) for topic, table in tables.items()}
+    return {topic: each.set_axis(each.index - start_s) for topic, each in delays.items() if each.any()}
+
+
+def _figure(
+    new_figure: Callable[..., Figure], title: str, panels: Mapping[str, Lines], scale: str = "linear"
+) -> Figure:
+    figure = new_figure(figsize=(9, 1.2 + 2.4 * len(panels)), layout="constrained")
+    figure.suptitle(title)
+    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    for each, (label, lines) in zip(axes, panels.items(), strict=True):
+        _draw(each, lines)
+        each.set_ylabel(label)
+        each.set_yscale(scale)
+    axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def _draw(axes: Axes, lines: Lines) -> None:
+    for name, line in lines.items():
+        values = line.dropna()
+        values = values.iloc[:: len(values) // MAX_POINTS + 1]
+        axes.plot(values.index, values, label=name, linewidth=1.0)
+    axes.grid(alpha=0.3)
+    if len(lines) <= MAX_LINES:
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")

@@ -1,0 +1,212 @@
+"""Tables of different rates on one clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from custom_ros_tools.errors import UnknownNameError
+
+from .row_plan import INDEX
+
+Array = NDArray[Any]
+
+TIME_ERROR = "time_error"
+"""Column with the time between a row and the nearest sample that it was computed from [s]."""
+_QUATERNION = "xyzw"
+
+
+class Aligned(NamedTuple):
+    """Several tables on one clock.
+
+    Attributes:
+        table: Columns `NAME/COLUMN` of all tables; the index is `time` [s].
+        max_time_error_s: Largest time error by name [s]; NaN for a table without a sample in the range.
+    """
+
+    table: pd.DataFrame
+    max_time_error_s: pd.Series
+
+
+def align(
+    tables: Mapping[str, pd.DataFrame],
+    *,
+    to: str | None = None,
+    hz: float | None = None,
+    times: ArrayLike | None = None,
+    method: str | Mapping[str, str] = "linear",
+    max_time_error_s: float = np.inf,
+) -> Aligned:
+    """Resamples tables at common times; exactly one of `to`, `hz` and `times` states which.
+
+    Args:
+        tables: Tables of one clock by names of your choice, for instance those of `bag_to_dataframes`.
+        to: Name of the table with the times.
+        hz: Rate of the times, over the range that all tables cover [Hz].
+        times: The times [s], ascending.
+        method: See `resample`; one for all, or by name (the default for those left out is `linear`).
+        max_time_error_s: See `resample`.
+
+    Raises:
+        ValueError: If there is no table, the times are not stated once, or the tables have no range in common.
+        UnknownNameError: If there is no table or method of that name.
+    """
+    if not tables:
+        raise ValueError("expected at least one table, got none")
+    if sum(each is not None for each in (to, hz, times)) != 1:
+        raise ValueError("expected exactly one of 'to', 'hz' and 'times'")
+    methods = dict.fromkeys(tables, method) if isinstance(method, str) else dict(method)
+    for name in [*methods, *([to] if to is not None else [])]:
+        if name not in tables:
+            raise UnknownNameError("table", name, tables)
+    if to is not None:
+        wanted = np.unique(tables[to].index.to_numpy())
+    elif hz is not None:
+        wanted = _common_times(tables, hz)
+    else:
+        wanted = np.asarray(times, float)
+    resampled = {
+        name: resample(table, wanted, methods.get(name, "linear"), max_time_error_s) for name, table in tables.items()
+    }
+    errors = pd.Series({name: table[TIME_ERROR].max() for name, table in resampled.items()}, name="max_time_error_s")
+    return Aligned(pd.concat([table.add_prefix(f"{name}/") for name, table in resampled.items()], axis=1), errors)
+
+
+def resample(
+    table: pd.DataFrame, times: ArrayLike, method: str = "linear", max_time_error_s: float = np.inf
+) -> pd.DataFrame:
+    """Returns the values of a table at other times.
+
+    Each column is computed from its own samples, without the rows where it is NaN or None. Of several samples of one
+    time the last counts. There is no extrapolation: before the first sample, and with `linear` after the last one,
+    there is no value.
+
+    Args:
+        table: A table with the index `time` [s], ascending.
+        times: Times of the new rows, shape (n,), ascending [s].
+        method: `nearest`, `previous` or `linear`. With `linear`, groups of columns `PATH/x`, `PATH/y`, `PATH/z`,
+            `PATH/w` are quaternions, interpolated by slerp, and text and truth values are the previous ones.
+        max_time_error_s: Rows have no value in a column whose nearest sample in use is further away than this [s].
+
+    Returns:
+        The same columns; numbers are floats. The last column, `time_error` [s], has the largest time between the row
+        and the nearest sample that one of its values was computed from.
+
+    Raises:
+        UnknownNameError: If there is no such method.
+        ValueError: If times are not ascending and finite, or a quaternion is zero.
+    """
+    if method not in _METHODS:
+        raise UnknownNameError("method", method, _METHODS)
+    wanted, known = _checked_times(times, "times"), _checked_times(table.index, "index of the table")
+    values: dict[str, Array] = {}
+    largest = np.full(len(wanted), np.nan)
+    for names in _groups(table.columns, method):
+        samples = table[names].to_numpy()
+        is_there = ~table[names].isna().to_numpy().any(axis=1)
+        is_there[:-1] &= ~((known[:-1] == known[1:]) & is_there[1:])  # of one time, the last one
+        if len(names) > 1 and not samples[is_there].any(axis=1).all():
+            raise ValueError(f"{', '.join(names)}: expected unit quaternions, got one of zeros")
+        new, error = _METHODS[method](known[is_there], samples[is_there], wanted)
+        is_far = ~(error <= max_time_error_s)
+        new[is_far] = None if new.dtype == object else np.nan
+        largest = np.fmax(largest, np.where(is_far, np.nan, error))
+        values |= zip(names, new.T, strict=True)
+    columns = {name: values[name] for name in table.columns}
+    return pd.DataFrame({**columns, TIME_ERROR: largest}, index=pd.Index(wanted, name=INDEX))
+
+
+def _checked_times(times: ArrayLike | pd.Index, name: str) -> Array:
+    checked = np.asarray(times, float)
+    if checked.ndim != 1 or not np.isfinite(checked).all() or (np.diff(checked) < 0).any():
+        raise ValueError(f"{name}: expected ascending, finite seconds in one dimension")
+    return checked
+
+
+def _common_times(tables: Mapping[str, pd.DataFrame], hz: float) -> Array:
+    """Returns times of a rate over the range that all tables cover, from its beginning on."""
+    if not (np.isfinite(hz) and hz > 0):
+        raise ValueError(f"hz: expected a positive rate, got {hz}")
+    empty = [name for name, table in tables.items() if not len(table)]
+    if empty:
+        raise ValueError(f"'{empty[0]}' has no rows")
+    start = max(table.index[0] for table in tables.values())
+    end = min(table.index[-1] for table in tables.values())
+    if end < start:
+        raise ValueError(f"the tables have no time in common: one begins at {start} s, another ends at {end} s")
+    return start + np.arange(int((end - start) * hz * (1 + 1e-12)) + 1) / hz
+
+
+def _groups(columns: Sequence[str], method: str) -> Iterator[list[str]]:
+    """Yields the columns that are interpolated together: those of a quaternion, or each by itself."""
+    every = set(columns)
+    for name in columns:
+        prefix, _, last = name.rpartition("/")
+        group = [f"{prefix}/{axis}" for axis in _QUATERNION]
+        if method != "linear" or last not in _QUATERNION or not every.issuperset(group):
+            yield [name]
+        elif last == "x":
+            yield group
+
+
+Resampled = tuple[Array, Array]
+"""New values, shape (n, columns), and the time to the nearest sample that was used, shape (n,) [s]; NaN for none."""
+
+
+def _previous(known: Array, samples: Array, wanted: Array) -> Resampled:
+    index = np.searchsorted(known, wanted, side="right") - 1
+    return _picked(known, samples, wanted, index)
+
+
+def _nearest(known: Array, samples: Array, wanted: Array) -> Resampled:
+    index = np.searchsorted((known[1:] + known[:-1]) / 2, wanted)
+    return _picked(known, samples, wanted, index if len(known) else index - 1)
+
+
+def _picked(known: Array, samples: Array, wanted: Array, index: Array) -> Resampled:
+    """Returns samples by their indices; -1 is none."""
+    is_there = index >= 0
+    is_number = samples.dtype.kind in "iuf"
+    new = np.full((len(wanted), samples.shape[1]), np.nan if is_number else None, float if is_number else object)
+    error = np.full(len(wanted), np.nan)
+    new[is_there] = samples[index[is_there]]
+    error[is_there] = np.abs(wanted[is_there] - known[index[is_there]])
+    return new, error
+
+
+def _linear(known: Array, samples: Array, wanted: Array) -> Resampled:
+    if samples.dtype.kind not in "iuf":
+        return _previous(known, samples, wanted)
+    new, error = np.full((len(wanted), samples.shape[1]), np.nan), np.full(len(wanted), np.nan)
+    inside = (known[0] <= wanted) & (wanted <= known[-1]) if len(known) else np.zeros(len(wanted), bool)
+    at = wanted[inside]
+    left = np.clip(np.searchsorted(known, at, side="right") - 1, 0, max(len(known) - 2, 0))
+    right = np.minimum(left + 1, len(known) - 1)
+    before, after = at - known[left], known[right] - at
+    share = np.divide(before, before + after, out=np.zeros(len(at)), where=before + after > 0)
+    if samples.shape[1] == len(_QUATERNION):
+        new[inside] = _slerp(samples[left], samples[right], share)
+    else:
+        new[inside] = (1.0 - share[:, None]) * samples[left] + share[:, None] * samples[right]
+    error[inside] = np.minimum(before, np.abs(after))
+    return new, error
+
+
+def _slerp(start: Array, end: Array, share: Array) -> Array:
+    """Rotates on the shortest way between unit quaternions, shape (n, 4); the signs are those of `start`."""
+    first = Rotation.from_quat(start)
+    whole = (first.inv() * Rotation.from_quat(end)).as_rotvec()
+    quats = (first * Rotation.from_rotvec(share[:, None] * whole)).as_quat()
+    return quats * np.where((quats * start).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
+
+
+_METHODS: dict[str, Callable[[Array, Array, Array], Resampled]] = {
+    "nearest": _nearest,
+    "previous": _previous,
+    "linear": _linear,
+}

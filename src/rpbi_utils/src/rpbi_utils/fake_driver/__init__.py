@@ -1,0 +1,1 @@
+"""Emulated driver of a robot: its controller, with limits and reflexes, without ROS."""

@@ -1,0 +1,132 @@
+"""Configuration of `stand_in_node.py`, and the limits of robots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import Field, model_validator
+
+from custom_ros_tools.config import load_config, replace_package
+from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
+from custom_ros_tools.node_configs import RemapConfig
+from custom_ros_tools.schema import (
+    ConfigModel,
+    Count,
+    Fraction,
+    Hz,
+    KeyedError,
+    Name,
+    NonNegative,
+    Positive,
+    Seconds,
+    Text,
+    Unit,
+    optional,
+)
+
+ROBOTS = ("kuka_iiwa", "kuka_lwr", "panda")
+"""Robots whose limits are in `{rpbi_utils}/configs/stand_in`."""
+
+Angle = Annotated[float, Unit("rad or m")]
+PositiveAngle = Annotated[Positive, Unit("rad or m")]
+NoNegativeTime = Annotated[NonNegative, Unit("s")]
+
+
+class DriverJointLimits(ConfigModel):
+    """Limits of a joint in a robot's controller."""
+
+    lower: Angle = Field(description="Lowest position.")
+    upper: Angle = Field(description="Highest position.")
+    velocity: Annotated[Positive, Unit("rad/s or m/s")] = Field(description="Highest commanded speed.")
+    acceleration: Annotated[Positive, Unit("rad/s^2 or m/s^2")] = Field(
+        description="Highest commanded acceleration; a reflex stop brakes with it."
+    )
+    jerk: Annotated[Positive, Unit("rad/s^3 or m/s^3")] = Field(description="Highest commanded jerk.")
+    torque: Annotated[Positive, Unit("N m or N")] = Field(description="Effort of its motor that is a reflex.")
+    step: PositiveAngle | None = optional(
+        "Longest way between two commands; without it, what three times `velocity` covers in one cycle."
+    )
+    following_error: PositiveAngle = Field(0.2, description="Largest distance of the joint from its set point.")
+
+    @model_validator(mode="after")
+    def _lower_is_below_upper(self) -> DriverJointLimits:
+        if self.lower >= self.upper:
+            raise KeyedError("upper", f"must be above lower, {self.lower:g}, got {self.upper:g}")
+        return self
+
+
+class NoiseConfig(ConfigModel):
+    """Noise and delay of measured states."""
+
+    position: Annotated[NonNegative, Unit("rad or m")] = Field(0.0, description="Standard deviation of positions.")
+    velocity: Annotated[NonNegative, Unit("rad/s or m/s")] = Field(0.0, description="That of velocities.")
+    effort: Annotated[NonNegative, Unit("N m or N")] = Field(0.0, description="That of efforts.")
+    delay_s: NoNegativeTime = Field(0.0, description="Age of states when they are published.")
+    seed: Count = Field(0, description="The same seed makes the same noise.")
+
+
+class FakeDriverConfig(ConfigModel):
+    """A robot's controller as it behaves at its topics."""
+
+    robot: Name = Field(description="The robot in the simulator beside it, `rpbi/NAME`.")
+    limits: Text = Field(description=f"Whose limits it has: {', '.join(ROBOTS)}, or a YAML file of such limits.")
+    joint_limits: dict[Text, dict[Text, Any]] = Field({}, description="Limits that differ from those, by joint.")
+    driver: RemapConfig = Field(
+        RemapConfig(), description="Names, units and order of its joints, as the nodes that remap to it have them."
+    )
+    command_hz: Hz = Field(100.0, description="Rate of the controller; it expects one command per cycle.")
+    rate_tolerance: Annotated[Fraction, Field(gt=0)] = Field(
+        0.3, description="Share by which the rate of commands over one second may differ."
+    )
+    timeout_s: Seconds = Field(0.1, description="Time without a command during motion after which it stops.")
+    start_tolerance: PositiveAngle = Field(
+        0.02, description="Largest distance of the first command from the present position."
+    )
+    torque_time_s: NoNegativeTime = Field(
+        0.05, description="Longest time for which a motor may exert its largest effort."
+    )
+    command_delay_s: NoNegativeTime = Field(0.0, description="Delay of commands on their way to the motors.")
+    noise: NoiseConfig = Field(NoiseConfig(), description="Noise and delay of the published states.")
+
+    def load_limits(self) -> dict[str, DriverJointLimits]:
+        """Returns the limits of each joint, by its name in the simulator, in the order of the driver.
+
+        Raises:
+            ConfigError: If they cannot be read or are wrong; it has everything that is.
+        """
+        if "." not in self.limits and self.limits not in ROBOTS:
+            raise ConfigError([Problem("~config", "limits", str(UnknownNameError("robot", self.limits, ROBOTS)))])
+        file = f"{{rpbi_utils}}/configs/stand_in/{self.limits}.yaml" if self.limits in ROBOTS else self.limits
+        data = load_config(file)
+        joints = data.get("joints")
+        for joint, changes in self.joint_limits.items():
+            if not isinstance(joints, dict) or joint not in joints:
+                known = joints if isinstance(joints, dict) else ()
+                what = str(UnknownNameError("joint", joint, known))
+                raise ConfigError([Problem("~config", f"joint_limits.{joint}", what)])
+            if isinstance(joints[joint], Mapping):
+                joints[joint] = {**joints[joint], **changes}
+        with_changes = " with ~config.joint_limits" if self.joint_limits else ""
+        limits = RobotLimits.parse(data, f"{replace_package(file)}{with_changes}").joints
+        for index, each in enumerate(self.driver.joints):
+            if each.joint not in limits:
+                what = str(UnknownNameError("joint", each.joint, limits))
+                raise ConfigError([Problem("~config", f"driver.joints[{index}].joint", what)])
+        order = limits if self.driver.joint_names is None else self.driver.joint_names
+        if sorted(order) != sorted(limits):
+            what = f"expected all of {', '.join(limits)}, got {', '.join(order)}"
+            raise ConfigError([Problem("~config", "driver.joint_names", what)])
+        return {joint: limits[joint] for joint in order}
+
+
+class RobotLimits(ConfigModel):
+    """A YAML file of limits."""
+
+    joints: dict[Text, DriverJointLimits] = Field(description="Limits of each joint, by its name in the simulator.")
+
+    @model_validator(mode="after")
+    def _has_joints(self) -> RobotLimits:
+        if not self.joints:
+            raise KeyedError("joints", "expected at least one joint")
+        return self

@@ -1,0 +1,235 @@
+"""Configuration of `interpolation_node.py`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, model_validator
+from scipy.spatial.transform import Rotation
+
+from custom_ros_tools.schema import (
+    ConfigModel,
+    Count,
+    Degrees,
+    Direction,
+    FrameId,
+    KeyedError,
+    ListOf,
+    Metres,
+    Seconds,
+    Switch,
+    Text,
+    TopicName,
+    optional,
+)
+from robot_model.geometry import Pose, Quaternion, normalized
+
+AXES = ("x", "y", "z")
+MIN_NORM = 1e-6
+"""Least length of a quaternion; shorter ones count as zero."""
+MAX_CONSUMING_HZ = 200.0
+"""Largest rate of targets [Hz]."""
+ROWS_OF = {"theta": 1, "euler": 3, "quat": 4, "axis_angle": 3}
+"""Number of rows of a planned rotation."""
+
+_LowerCase = BeforeValidator(lambda value: value.lower() if isinstance(value, str) else value)
+
+
+class WaypointError(ValueError):
+    """Waypoints that cannot be followed; the message names the key, what was expected and what came."""
+
+
+class InterpolationParameters(ConfigModel):
+    """Private parameters of `interpolation_node.py`."""
+
+    traj_config: Text = Field(description="YAML file of the motion: a path, or `{package}/path`.")
+    consuming_freq: Annotated[float, Field(gt=0, le=MAX_CONSUMING_HZ)] = Field(
+        100.0, description="Largest rate of targets [Hz of ROS time]."
+    )
+    namespace: str = Field("", description="Prefix of the target's TF frame.")
+
+
+class TranslationConfig(ConfigModel):
+    """Position of the frame: each axis is constant or a row of the waypoints."""
+
+    translation_x: Metres | None = optional("Constant x; without it, x is planned.")
+    translation_x_index: Count | None = optional("Row of x, not counting the time, if it is planned.")
+    translation_y: Metres | None = optional("Constant y; without it, y is planned.")
+    translation_y_index: Count | None = optional("Row of y.")
+    translation_z: Metres | None = optional("Constant z; without it, z is planned.")
+    translation_z_index: Count | None = optional("Row of z.")
+
+    def axis(self, name: str) -> tuple[float | None, int | None]:
+        """Returns constant [m] and row of an axis."""
+        return getattr(self, f"translation_{name}"), getattr(self, f"translation_{name}_index")
+
+
+class RotationConfig(ConfigModel):
+    """Orientation of the frame: constant, or rows of the waypoints."""
+
+    rotation_repr: Annotated[Literal["none", "theta", "euler", "quat", "axis_angle"], _LowerCase] = Field(
+        "none",
+        description="`none`: constant; `theta`: angle about `rotation_vec` [rad]; `euler`: intrinsic rotations about "
+        "z, y, x [rad]; `quat`: x, y, z, w; `axis_angle`: rotation vector [rad].",
+    )
+    rotation_vec: Direction | None = optional("Axis of the rotation, for `none` and `theta`.")
+    rotation_angle: Degrees | None = optional("Angle about that axis, for `none`.")
+    rotation_vec_index: ListOf[Count] | None = optional(
+        "Rows: `[i]` for `theta`; first row and the one after the last for the others."
+    )
+    shortest_path: Switch = Field(
+        False, description="Whether `theta` and `euler` turn the shorter way, rather than as far as their numbers say."
+    )
+
+    @property
+    def rows(self) -> range:
+        """The rows of the waypoints that have it."""
+        if self.rotation_repr == "none" or not self.rotation_vec_index:
+            return range(0)
+        return range(self.rotation_vec_index[0], self.rotation_vec_index[0] + ROWS_OF[self.rotation_repr])
+
+    @property
+    def is_path(self) -> bool:
+        """Whether orientations are interpolated, rather than angles."""
+        return self.rotation_repr in ("quat", "axis_angle") or (self.rotation_repr != "none" and self.shortest_path)
+
+    def quat(self, values: Sequence[float]) -> Quaternion:
+        """Returns the orientation x, y, z, w of the values of its rows.
+
+        Raises:
+            WaypointError: If a quaternion is zero.
+        """
+        match self.rotation_repr:
+            case "none":
+                rotation = Rotation.from_rotvec(math.radians(self.rotation_angle or 0.0) * self._axis)
+            case "theta":
+                rotation = Rotation.from_rotvec(values[0] * self._axis)
+            case "euler":
+                rotation = Rotation.from_euler("ZYX", values)
+            case "axis_angle":
+                rotation = Rotation.from_rotvec(values)
+            case _:
+                if math.hypot(*values) < MIN_NORM:
+                    raise WaypointError(
+                        f"expected a quaternion that is not zero, got {', '.join(f'{value:g}' for value in values)}"
+                    )
+                return normalized(values)
+        return normalized(rotation.as_quat().tolist())
+
+    @property
+    def _axis(self) -> NDArray[np.float64]:
+        axis = np.array(self.rotation_vec or (0.0, 0.0, 1.0))
+        return axis / np.linalg.norm(axis)
+
+    @model_validator(mode="after")
+    def _has_what_it_needs(self) -> RotationConfig:
+        if self.rotation_repr == "theta" or (self.rotation_repr == "none" and self.rotation_angle):
+            if self.rotation_vec is None:
+                raise KeyedError("rotation_vec", f"expected an axis for rotation_repr '{self.rotation_repr}', got none")
+        if self.rotation_repr == "none":
+            return self
+        count, index = ROWS_OF[self.rotation_repr], tuple(self.rotation_vec_index or ())
+        if not index or index not in ((index[0],) if count == 1 else (), (index[0], index[0] + count)):
+            form = "[i]" if count == 1 else f"[i, i + {count}]"
+            got = list(index) or "none"
+            raise KeyedError("rotation_vec_index", f"expected {form} for '{self.rotation_repr}', got {got}")
+        return self
+
+
+class MotionDimensions(ConfigModel):
+    """Meaning of the rows of the waypoints: a frame's pose, or joints."""
+
+    number: Annotated[Count, Field(ge=1)] = Field(description="Number n of planned rows, without the time.")
+    trans: TranslationConfig | None = optional("Position of a frame.")
+    rotation: RotationConfig = Field(RotationConfig(), description="Orientation of a frame.")
+    joint_names: ListOf[Text] | None = optional("Names of n joints instead of a frame, in the order of the rows.")
+
+    @model_validator(mode="after")
+    def _rows_exist(self) -> MotionDimensions:
+        if (self.trans is None) == (self.joint_names is None):
+            raise KeyedError("trans", "expected either trans or joint_names, one of them")
+        if self.joint_names is not None:
+            if len(self.joint_names) != self.number or len(set(self.joint_names)) != self.number:
+                what = f"expected {self.number} names that differ, as many as number, got {len(self.joint_names)}"
+                raise KeyedError("joint_names", what)
+            return self
+        assert self.trans is not None
+        for axis in AXES:
+            constant, row = self.trans.axis(axis)
+            if constant is None and (row is None or row >= self.number):
+                key = f"trans.translation_{axis}_index"
+                got = "none" if row is None else row
+                raise KeyedError(key, f"expected a row below number, {self.number}, for a planned axis, got {got}")
+        if self.rotation.rows and self.rotation.rows[-1] >= self.number:
+            rows = list(self.rotation.rotation_vec_index or ())
+            raise KeyedError("rotation.rotation_vec_index", f"expected rows below number, {self.number}, got {rows}")
+        return self
+
+    @property
+    def scalar_rows(self) -> tuple[int, ...]:
+        """Rows that are interpolated as numbers, each by itself."""
+        path = self.rotation.rows if self.rotation.is_path else ()
+        return tuple(row for row in range(self.number) if row not in path)
+
+    def pose(self, scalars: Sequence[float], quat_xyzw: Quaternion | None) -> Pose:
+        """Returns the frame's pose from the values of `scalar_rows` and the orientation on the path, if it is one."""
+        assert self.trans is not None
+        values = dict(zip(self.scalar_rows, scalars))
+        axes = (self.trans.axis(axis) for axis in AXES)
+        x, y, z = (constant if constant is not None else values[row or 0] for constant, row in axes)
+        if quat_xyzw is None:
+            quat_xyzw = self.rotation.quat([values[row] for row in self.rotation.rows])
+        return Pose((x, y, z), quat_xyzw)
+
+
+class InterpolationConfig(ConfigModel):
+    """Interpolation between waypoints."""
+
+    use_interpolation: Switch = Field(
+        True, description="Otherwise waypoints are published as they are, at their times."
+    )
+    inter_dt: Seconds = Field(0.01, description="Time between two samples.")
+    nochange_window_length: Count = Field(0, description="Number of coming samples that new waypoints do not change.")
+    method: Literal["linear", "cubic", "quintic"] = Field("cubic", description="Curve between two waypoints.")
+    time_origin: Literal["arrival", "ros_time"] = Field(
+        "arrival", description="Meaning of time 0 of the waypoints: when they arrive, or 0 of ROS time."
+    )
+    hold: Switch = Field(False, description="Whether the last target is repeated when the waypoints end.")
+    accept_repetitions: Switch = Field(
+        False, description="Whether a message equal to the one before is a new motion, rather than a repetition."
+    )
+
+
+class PublisherConfig(ConfigModel):
+    """Destination of the targets."""
+
+    header_frame_id: FrameId | None = optional("Parent frame of the target.")
+    msg_child_frame_id: FrameId | None = optional("TF frame of the target.")
+    joint_topic: TopicName = Field("joint_states/target", description="Topic of targets of joints.")
+
+
+class CommunicationConfig(ConfigModel):
+    """Topics and frames."""
+
+    publisher: PublisherConfig = Field(PublisherConfig(), description="Destination of the targets.")
+
+
+class TrajectoryConfig(ConfigModel):
+    """A motion through waypoints."""
+
+    motion_dimensions: MotionDimensions = Field(description="Meaning of the rows of the waypoints.")
+    interpolation: InterpolationConfig = Field(InterpolationConfig(), description="Interpolation between waypoints.")
+    communication: CommunicationConfig = Field(CommunicationConfig(), description="Topics and frames.")
+
+    @model_validator(mode="after")
+    def _has_frames(self) -> TrajectoryConfig:
+        publisher = self.communication.publisher
+        if self.motion_dimensions.joint_names is None:
+            for key in ("header_frame_id", "msg_child_frame_id"):
+                if getattr(publisher, key) is None:
+                    raise KeyedError(f"communication.publisher.{key}", "expected a TF frame, got none")
+        return self

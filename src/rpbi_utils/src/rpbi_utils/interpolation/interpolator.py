@@ -1,0 +1,235 @@
+"""Motion of a target through waypoints, replanned while it moves."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from robot_model.geometry import Pose
+from rpbi.control.trajectories.trajectory import Knot, State, Trajectory
+
+from .config import TrajectoryConfig, WaypointError
+from .rotation import RotationKnot, RotationPath, angular_rates
+from .waypoints import Array, Waypoints, estimated_rates
+
+ROUNDING_S = 1e-9
+"""Time by which a sample may be later than the present, for rounding [s]."""
+
+
+class Sample(NamedTuple):
+    """The target at one time.
+
+    Attributes:
+        time_s: Its time [s].
+        state: Values of the rows that are numbers, with their derivatives.
+        pose: Pose of the frame; None for joints.
+    """
+
+    time_s: float
+    state: State
+    pose: Pose | None
+
+
+class Plan(NamedTuple):
+    """A motion.
+
+    Attributes:
+        scalars: The rows that are numbers.
+        path: The orientation, if it is a path.
+        knots_s: Times of its waypoints [s].
+    """
+
+    scalars: Trajectory
+    path: RotationPath | None
+    knots_s: tuple[float, ...]
+
+    def spliced(self, new: Plan, at_s: float) -> Plan:
+        """Returns this plan until a time [s], and another one from then on."""
+        path = None if self.path is None or new.path is None else self.path.spliced(new.path, at_s)
+        kept = tuple(time_s for time_s in self.knots_s if time_s <= at_s)
+        return Plan(self.scalars.spliced(new.scalars, at_s), path, (*kept, *(t for t in new.knots_s if t > at_s)))
+
+    def since(self, time_s: float) -> Plan:
+        """Returns the same plan without what is over at a time [s]."""
+        path = None if self.path is None else self.path.since(time_s)
+        return Plan(self.scalars.since(time_s), path, tuple(each for each in self.knots_s if each >= time_s))
+
+
+class Interpolator:
+    """Samples of a motion that new waypoints change while it lasts.
+
+    Samples are at the times of a grid with steps of `inter_dt`, from the first waypoint on, and at the very end. New
+    waypoints take over after the protected samples, with the position and velocity of that moment; waypoints before
+    the next sample are left out. Without interpolation, samples are the waypoints.
+
+    All times are seconds of one clock, which must not go back.
+
+    Attributes:
+        delay_s: Time that pauses have taken [s]; the plan is later than its waypoints by it.
+    """
+
+    def __init__(self, config: TrajectoryConfig) -> None:
+        self._dimensions, self._config = config.motion_dimensions, config.interpolation
+        self._plan: Plan | None = None
+        self._grid_s = 0.0
+        """A time on the grid."""
+        self._sent_s = -math.inf
+        """Time of the newest sample that was returned."""
+        self.delay_s = 0.0
+        self._paused_s: float | None = None
+
+    @property
+    def plan(self) -> Plan | None:
+        """The present plan, None if there is none."""
+        return self._plan
+
+    def add(self, waypoints: Waypoints, now_s: float) -> None:
+        """Plans a motion through waypoints, whose times are those of the clock.
+
+        Raises:
+            WaypointError: If all of them are over, or before the end of the protected samples; the old plan stays.
+        """
+        lead_s = self._own_s(now_s) - now_s
+        now_s += lead_s
+        times_s = tuple(each + lead_s for each in waypoints.times_s)
+        old = self._plan if self._sent_s > -math.inf else None
+        if old is None:
+            if times_s[-1] < now_s - ROUNDING_S:
+                raise WaypointError(
+                    f"data: expected a waypoint to come, the last one is {now_s - times_s[-1]:.6g} s old"
+                )
+            self._plan, self._grid_s = self._through(waypoints, times_s), times_s[0]
+            return
+        if self._sent_s >= old.scalars.end_s:  # at rest
+            self._grid_s = now_s
+        step_s, protected = self._config.inter_dt, self._config.nochange_window_length
+        from_s = self._on_grid(now_s) + step_s * protected
+        first = int(np.searchsorted(times_s, from_s + step_s - ROUNDING_S))
+        if first == len(times_s):
+            expected = f"expected a waypoint {from_s + step_s - now_s:.6g} s from now or later"
+            got = f"the last one is {times_s[-1] - now_s:.6g} s from now"
+            raise WaypointError(f"data: {expected}, after nochange_window_length, {protected}, and one sample; {got}")
+        new = self._through(waypoints, times_s, first, (from_s, old))
+        self._plan = old.spliced(new, from_s).since(self._sent_s)
+
+    def newest(self, now_s: float) -> Sample | None:
+        """Returns the newest sample up to a time [s] if there is one that has not been returned, else None."""
+        plan = self._plan
+        if plan is None or self._paused_s is not None:
+            return None
+        time_s = self._sample_time(plan, self._own_s(now_s))
+        if time_s is None or time_s <= self._sent_s:
+            return None
+        self._sent_s = time_s
+        return self._at(plan, time_s)
+
+    def pause(self, now_s: float) -> None:
+        """Stops the motion where it is."""
+        if self._paused_s is None:
+            self._paused_s = now_s
+
+    def resume(self, now_s: float) -> None:
+        """Continues the motion where it stopped."""
+        if self._paused_s is not None:
+            self.delay_s += now_s - self._paused_s
+            self._paused_s = None
+
+    def forget(self) -> None:
+        """Ends the motion; the next one begins at its first waypoint, wherever the target is."""
+        self._plan, self._sent_s = None, -math.inf
+
+    def _own_s(self, now_s: float) -> float:
+        """Returns the time of the plan, which stands still during pauses."""
+        return (now_s if self._paused_s is None else self._paused_s) - self.delay_s
+
+    def _on_grid(self, time_s: float) -> float:
+        """Returns the newest time of the grid."""
+        steps = math.floor((time_s - self._grid_s + ROUNDING_S) / self._config.inter_dt)
+        return self._grid_s + steps * self._config.inter_dt
+
+    def _sample_time(self, plan: Plan, now_s: float) -> float | None:
+        """Returns the time of the newest sample; None before the first one."""
+        if not self._config.use_interpolation:
+            return max((each for each in plan.knots_s if each <= now_s + ROUNDING_S), default=None)
+        end_s, time_s = plan.scalars.end_s, self._on_grid(now_s)
+        if now_s + ROUNDING_S >= end_s:
+            return max(time_s, end_s) if self._config.hold else end_s
+        return time_s if time_s >= plan.scalars.start_s else None
+
+    def _at(self, plan: Plan, time_s: float) -> Sample:
+        state = plan.scalars.sample(time_s)
+        pose = None
+        if self._dimensions.joint_names is None:
+            quat = None if plan.path is None else plan.path.sample(time_s).quat_xyzw
+            pose = self._dimensions.pose(state.position, quat)
+        return Sample(time_s + self.delay_s, state, pose)
+
+    def _through(
+        self,
+        waypoints: Waypoints,
+        times_s: tuple[float, ...],
+        first: int = 0,
+        after: tuple[float, Plan] | None = None,
+    ) -> Plan:
+        """Returns the plan through waypoints from the first one on.
+
+        Args:
+            times_s: Their times [s].
+            after: A time before the first one [s], and the plan that is followed until then.
+        """
+        method = self._config.method if self._config.use_interpolation else "linear"
+        scalars = _scalar_knots(waypoints, times_s, method)[first:]
+        path = _path_knots(waypoints, times_s, method)[first:]
+        knots_s = times_s[first:]
+        if after is None:
+            return Plan(Trajectory.through(scalars), RotationPath.through(path) if path else None, knots_s)
+        from_s, old = after
+        if method == "linear":  # so that the velocity does not jump here either
+            scalars[0] = scalars[0]._replace(velocity=Trajectory.through(scalars).sample(knots_s[0]).velocity)
+            if path:
+                path[0] = path[0]._replace(rate=RotationPath.through(path).sample(knots_s[0]).rate)
+        if path and old.path is not None:
+            path.insert(0, RotationKnot(from_s, *old.path.sample(from_s)))
+        new = Trajectory.through([Knot(from_s, *old.scalars.sample(from_s)), *scalars])
+        return Plan(new, RotationPath.through(path) if path else None, knots_s)
+
+
+def _scalar_knots(waypoints: Waypoints, times_s: tuple[float, ...], method: str) -> list[Knot]:
+    values = waypoints.scalars
+    rates = accelerations = None
+    if method != "linear":
+        rates = estimated_rates(times_s, values) if waypoints.rates is None else waypoints.rates
+    if method == "quintic" and rates is not None:
+        accelerations = waypoints.accelerations
+        if accelerations is None:
+            accelerations = _estimated_accelerations(times_s, values, rates)
+    rows = (None if each is None else [tuple(row) for row in each.tolist()] for each in (values, rates, accelerations))
+    positions, velocities, bends = rows
+    assert positions is not None
+    return [
+        Knot(time_s, positions[i], velocities and velocities[i], bends and bends[i]) for i, time_s in enumerate(times_s)
+    ]
+
+
+def _estimated_accelerations(times_s: tuple[float, ...], values: Array, rates: Array) -> Array:
+    """Returns the means of the accelerations of the cubics before and after each inner point, zero at both ends."""
+    accelerations = np.zeros_like(values)
+    h = np.diff(times_s)[:, np.newaxis]
+    slopes = np.diff(values, axis=0) / h
+    at_start = (6.0 * slopes - 4.0 * rates[:-1] - 2.0 * rates[1:]) / h
+    at_end = (-6.0 * slopes + 2.0 * rates[:-1] + 4.0 * rates[1:]) / h
+    accelerations[1:-1] = 0.5 * (at_end[:-1] + at_start[1:])
+    return accelerations
+
+
+def _path_knots(waypoints: Waypoints, times_s: tuple[float, ...], method: str) -> list[RotationKnot]:
+    quats = waypoints.quats_xyzw
+    if quats is None:
+        return []
+    if method == "linear":
+        return [RotationKnot(time_s, quat) for time_s, quat in zip(times_s, quats)]
+    rates = angular_rates(times_s, quats)
+    still = (0.0, 0.0, 0.0) if method == "quintic" else None
+    return [RotationKnot(time_s, quat, rate, still) for time_s, quat, rate in zip(times_s, quats, rates)]

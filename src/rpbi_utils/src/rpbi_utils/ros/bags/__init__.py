@@ -1,0 +1,1 @@
+"""Bags and ROS: recording, reading, tables, and reports on topics."""

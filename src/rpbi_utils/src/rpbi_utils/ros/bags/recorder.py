@@ -1,0 +1,294 @@
+"""Starts and stops `rosbag record` without losing messages in between, and reports losses."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import os
+import re
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import Any
+from xmlrpc.client import ServerProxy
+
+import rosgraph
+import roslib.packages
+from rosgraph.names import get_ros_namespace, resolve_name
+
+from custom_ros_tools.errors import MissingDependency
+from custom_ros_tools.processes.child import start_child
+from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, TimedTransport
+from rpbi_utils.bags.errors import RecordingError
+
+_CALLER = "/rpbi_utils"
+_ANSWER_S = 1.0
+_OUTBOUND = "o"
+_POLL_S = 0.02
+_QUIET_TURNS, _TURN_S, _MOST_GRACE_S = 20, 0.01, 10.0
+"""Number, spacing [s] and duration [s] of checks that find the recorder idle at the end, to let the last messages
+arrive. Several checks, since a single time span might pass while the machine stands still.
+"""
+_NOT_WRITING = ("Disabling recording", "Error writing", "Unknown exception")
+_DECORATION = re.compile(r"^(\x1b\[[\d;]*m)?\[ *[A-Z]+\] \[[\d., ]+\]: |\x1b\[[\d;]*m", re.MULTILINE)
+_numbers = itertools.count()
+
+_log = logging.getLogger(__name__)
+
+
+class Recorder:
+    """A `rosbag record` of some topics, as a context: what is published inside it is in the bag, compressed by LZ4.
+
+    When this process is killed, the recorder closes the bag and ends, too.
+
+    On entry it waits until the recorder has subscribed to every topic and every publisher that is there sends to it; on
+    exit it stops the recorder and waits until the bag is closed. It waits in wall time, never ROS time.
+
+        with Recorder("out/run.bag", ["/rpbi/kuka/joint_states", "/tf"]):
+            ...
+
+    Args:
+        path: The bag to write, ending with `.bag`. Its folder is created, and a bag of that name is replaced.
+        topics: Topics to record; relative names are resolved in the namespace of this process.
+        timeout_s: Wall time to wait for the subscriptions, and for the bag to be closed [s].
+        min_space: Smallest free space on the disk (`"1G"`, `"200M"`); with less, `rosbag record` does not write.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        topics: Sequence[str],
+        *,
+        timeout_s: float = 30.0,
+        min_space: str = "1G",
+        chunk_kb: int = 768,
+    ) -> None:
+        self.path = Path(path)
+        if self.path.suffix != ".bag":
+            raise ValueError(f"the name of a bag ends with '.bag', got '{path}'")
+        if isinstance(topics, str) or not topics:
+            raise ValueError(f"a list of at least one topic is needed, got {topics!r}")
+        self.topics = sorted({resolve_name(topic, get_ros_namespace()) for topic in topics})
+        self._timeout_s = timeout_s
+        self._min_space, self._chunk_kb = min_space, chunk_kb
+        self._node = f"/recorder_{os.getpid()}_{next(_numbers)}"
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def __enter__(self) -> Recorder:
+        self.start()
+        return self
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if error is None:
+            self.stop()
+            return
+        try:
+            self.stop()
+        except RecordingError as second:  # what happened inside is the news; Ctrl-C goes to the recorder too
+            _log.log(logging.INFO if isinstance(error, KeyboardInterrupt) else logging.WARNING, "%s", second)
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the recorder is alive."""
+        return self._process is not None and self._process.poll() is None
+
+    def published(self) -> dict[str, int]:
+        """Returns the number of messages that publishers have sent to the recorder so far, by topic.
+
+        Publishers that do not answer are left out, and so are all if the master does not answer.
+        """
+        counts: dict[str, int] = {}
+        try:
+            publishers = rosgraph.Master(_CALLER).getSystemState()[0]
+            nodes = {node for topic, names in publishers if topic in self.topics for node in names}
+            uris = [rosgraph.Master(_CALLER).lookupNode(node) for node in nodes]
+        except (OSError, rosgraph.MasterException):
+            return counts
+        for uri in uris:
+            for topic, sent in _sent(uri, self._node).items():
+                counts[topic] = counts.get(topic, 0) + sent
+        return counts
+
+    def start(self) -> None:
+        """Starts recording and returns when everything that is published from now on will be recorded.
+
+        Raises:
+            RecordingError: If there is no master or it ends, the bag cannot be written, or the recorder ends or
+                does not subscribe in time.
+            MissingDependency: If `rosbag record` is not installed.
+        """
+        if self.is_running:
+            raise RecordingError(self.path, "is going on already")
+        if not rosgraph.is_master_online():
+            raise RecordingError(self.path, f"no ROS master at {rosgraph.get_master_uri()}")
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self.path.unlink(missing_ok=True)  # so that it cannot be taken for the new one
+        except OSError as error:
+            raise RecordingError(self.path, f"cannot be written: {error}") from None
+        self._output = tempfile.TemporaryFile()
+        # SIGTERM has it close the bag; SIGINT is blocked in children of nodes
+        self._process = start_child(self._command(), signal.SIGTERM, stdout=self._output, stderr=subprocess.STDOUT)
+        try:
+            self._wait_until_connected()
+        except BaseException:  # Ctrl-C included: leave no process behind
+            self._end()
+            raise
+
+    def stop(self) -> Path:
+        """Stops recording and returns the path of the bag, closed and complete.
+
+        Raises:
+            RecordingError: If the recorder had ended before, could not write, or did not close the bag.
+        """
+        if self._process is None:
+            raise RecordingError(self.path, "has not been started")
+        self._wait_until_quiet()
+        died = not self.is_running
+        closed = self._end()
+        active = self.path.with_name(self.path.name + ".active")
+        self._raise_if_not_writing()
+        if died:
+            raise RecordingError(self.path, f"the recorder ended early{self._last_line()}{_what_is_left(active)}")
+        if not active.exists() and not self.path.exists():
+            raise RecordingError(self.path, "no bag was begun; with use_sim_time the recorder waits for /clock")
+        if not closed or active.exists():
+            raise RecordingError(self.path, f"the bag was not closed{self._last_line()}{_what_is_left(active)}")
+        return self.path
+
+    def _command(self) -> list[str]:
+        """Returns the command line of the recorder itself; the script `rosbag` would keep signals from it."""
+        found = roslib.packages.find_node("rosbag", "record")
+        if not found:
+            raise MissingDependency("rosbag record", "apt install python3-rosbag")
+        options = ["--output-name", str(self.path), "--min-space", self._min_space, "--lz4"]
+        options += ["--buffsize", "0", "--chunksize", str(self._chunk_kb)]
+        return [found[0], *options, *self.topics, f"__name:={self._node.removeprefix('/')}", "__ns:=/"]
+
+    def _wait_until_connected(self) -> None:
+        deadline = time.monotonic() + self._timeout_s
+        while True:
+            if not self.is_running:
+                raise RecordingError(self.path, f"the recorder ended at once{self._last_line()}")
+            self._raise_if_not_writing()
+            try:
+                missing, silent = _unconnected(self._node, self.topics)
+            except OSError as error:
+                uri = rosgraph.get_master_uri()
+                raise RecordingError(self.path, f"the ROS master at {uri} does not answer any more: {error}") from None
+            if not missing and not silent:
+                return
+            if time.monotonic() > deadline:
+                break
+            time.sleep(_POLL_S)
+        if missing:
+            raise RecordingError(self.path, f"no subscription to {', '.join(missing)} after {self._timeout_s} s")
+        _log.warning("recording %s: not connected to %s", self.path, ", ".join(silent))
+
+    def _wait_until_quiet(self) -> None:
+        assert self._process is not None
+        deadline, turns = time.monotonic() + _MOST_GRACE_S, 0
+        while self.is_running and turns < _QUIET_TURNS and time.monotonic() < deadline:
+            time.sleep(_TURN_S)
+            turns += _is_asleep(self._process.pid)
+
+    def _end(self) -> bool:
+        """Ends the process; returns whether it did so by itself."""
+        assert self._process is not None and self._process.stdin is not None
+        self._process.send_signal(signal.SIGTERM)
+        try:
+            return self._process.wait(self._timeout_s) == 0
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+            return False
+        finally:
+            self._process.stdin.close()
+
+    def _raise_if_not_writing(self) -> None:
+        for line in self._lines():
+            if any(words in line for words in _NOT_WRITING):
+                free = shutil.disk_usage(self.path.parent).free / 1e9
+                raise RecordingError(self.path, f"the recorder does not write ({free:.1f} GB free): {line}")
+
+    def _last_line(self) -> str:
+        lines = self._lines()
+        return f": {lines[-1]}" if lines else ""
+
+    def _lines(self) -> list[str]:
+        """Returns what the recorder has written to its terminal."""
+        file = self._output.fileno()  # the recorder shares its position, so that it must not be moved
+        text = os.pread(file, os.fstat(file).st_size, 0).decode("utf-8", "replace")
+        return [line for line in _DECORATION.sub("", text).splitlines() if line.strip()]
+
+
+def _is_asleep(process_id: int) -> bool:
+    """Returns whether all threads of a process wait: none runs, is runnable or is stopped."""
+    try:
+        threads = [path.read_text() for path in Path(f"/proc/{process_id}/task").glob("*/stat")]
+    except OSError:  # one has just ended
+        return False
+    return all(stat.rpartition(")")[2].split()[0] == "S" for stat in threads)
+
+
+def _what_is_left(active: Path) -> str:
+    return f"; what was recorded can be saved with 'rosbag reindex {active}'" if active.exists() else ""
+
+
+def _unconnected(node: str, topics: Collection[str]) -> tuple[list[str], list[str]]:
+    """Returns the topics that a node has not subscribed to at the master, and what does not send to it yet.
+
+    When it has subscribed to all, the publishers are asked, since only they know when a subscriber gets what they
+    publish. One that is registered but gone is not counted; one that does not answer is: as `"/publisher (/topic)"`.
+
+    Raises:
+        OSError: If the master cannot be reached.
+    """
+    master = rosgraph.Master(_CALLER)
+    publishers, subscribers, _ = master.getSystemState()
+    unsubscribed = set(topics).difference(topic for topic, nodes in subscribers if node in nodes)
+    if unsubscribed:
+        return sorted(unsubscribed), []
+    wanted: dict[str, list[str]] = {}
+    for topic, nodes in publishers:
+        if topic in topics:
+            for publisher in nodes:
+                wanted.setdefault(publisher, []).append(topic)
+    silent = []
+    for publisher, published in wanted.items():
+        try:
+            connected = _receivers(master.lookupNode(publisher), node)
+        except (ConnectionRefusedError, rosgraph.MasterError):  # it ended without a word, or just now
+            continue
+        silent += [f"{publisher} ({topic})" for topic in published if topic not in connected]
+    return [], silent
+
+
+def _receivers(uri: str, node: str) -> set[str]:
+    """Returns the topics that the node at `uri` sends to `node`; none if it does not answer."""
+    proxy: Any = ServerProxy(uri, TimedTransport(_ANSWER_S))
+    try:
+        _, _, connections = proxy.getBusInfo(_CALLER)
+    except ConnectionRefusedError:
+        raise
+    except MASTER_FAILURES:
+        return set()
+    # id, other end, direction, transport, topic, whether connected
+    return {topic for _, other, way, _, topic, *_ in connections if other == node and way == _OUTBOUND}
+
+
+def _sent(uri: str, node: str) -> dict[str, int]:
+    """Returns the number of messages by topic that the node at `uri` has sent to `node`; none if it does not answer."""
+    proxy: Any = ServerProxy(uri, TimedTransport(_ANSWER_S))
+    try:
+        connections = proxy.getBusInfo(_CALLER)[2]
+        publishers = proxy.getBusStats(_CALLER)[2][0]
+    except MASTER_FAILURES:
+        return {}
+    chosen = {each[0] for each in connections if each[1] == node and each[2] == _OUTBOUND}
+    counts = {topic: sum(each[2] for each in sent if each[0] in chosen) for topic, _, sent, *_ in publishers}
+    return {topic: count for topic, count in counts.items() if count}

@@ -1,0 +1,64 @@
+"""Topics of a bag, and the regularity of their messages."""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from .bag_reader import BagMessage, BagReader
+
+_STAMP = struct.Struct("<4xII")  # behind the `seq` of a header
+_COLUMNS = ("type", "messages", "bytes", "rate_hz", "max_gap_s", "first", "last")
+
+
+class TopicReport(pd.DataFrame):
+    """A table that is printed whole, however wide the terminal is; what is made of it is an ordinary table."""
+
+    def __repr__(self) -> str:
+        return self.to_string()
+
+
+def topic_report(path: str | Path, any_size: bool = False) -> TopicReport:
+    """Measures every topic of a bag.
+
+    Args:
+        path: A `.bag` file, of any compression.
+        any_size: Whether the bag may unfold to more than 1 GiB and 255 times its size.
+
+    Returns:
+        A table with one row a topic (the index), sorted by name, with the columns `type`, `messages`, `bytes`
+        (serialised, before compression), `rate_hz` (mean, from the first to the last message; NaN if they have the
+        same time), `max_gap_s` (longest time without a message in between), `first` and `last` [s of ROS time].
+        Times are the stamps of headers, or of recording where there is none, as for `/tf`.
+
+    Raises:
+        BagError: If there is no such file, it is no complete bag, or it unfolds to more than it may.
+    """
+    with BagReader(path, any_size) as bag:
+        times: dict[str, list[float]] = {topic: [] for topic in bag.types}
+        sizes = dict.fromkeys(bag.types, 0)
+        for message in bag.messages(list(bag.types)):
+            times[message.topic].append(message_time(message))
+            sizes[message.topic] += len(message.raw)
+        rows = [
+            ("|".join(sorted(each.name for each in types)), len(times[topic]), sizes[topic], *_rhythm(times[topic]))
+            for topic, types in bag.types.items()
+        ]
+        return TopicReport(rows, index=pd.Index(list(bag.types), name="topic"), columns=_COLUMNS)
+
+
+def message_time(message: BagMessage) -> float:
+    """Returns the stamp of a message [s], or where it has none the time of its recording."""
+    if not message.type.has_header or len(message.raw) < _STAMP.size:
+        return message.record_time_s
+    seconds, nanoseconds = _STAMP.unpack_from(message.raw)
+    return seconds + nanoseconds / 1e9 or message.record_time_s
+
+
+def _rhythm(times: list[float]) -> tuple[float, float, float, float]:
+    """Returns mean rate [Hz], longest gap, first and last time [s]."""
+    ordered = np.sort(times)
+    first, last = ordered[0], ordered[-1]
+    rate_hz = (len(ordered) - 1) / (last - first) if last > first else np.nan
+    return rate_hz, np.diff(ordered).max(initial=0.0), first, last

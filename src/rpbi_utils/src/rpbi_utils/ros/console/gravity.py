@@ -1,0 +1,27 @@
+"""The command `gravity`."""
+
+from typing import Annotated
+
+from geometry_msgs.msg import Vector3
+
+from custom_ros_tools.console.argument import Argument, number
+from ros_pybullet_interface.srv import SetGravity
+
+from .arguments import Namespace
+from .running_simulator import RunningSimulator
+
+
+def gravity(
+    x: Annotated[float, Argument("X", parse=number)],
+    y: Annotated[float, Argument("Y", parse=number)],
+    z: Annotated[float, Argument("Z", parse=number)],
+    *,
+    ns: Namespace = None,
+) -> str:
+    """Changes gravity, until the next reset.
+
+    Args:
+        X Y Z: [m/s^2]
+        ns: of the simulator, if it was started in one
+    """
+    return str(RunningSimulator(ns).call("rpbi/set_gravity", SetGravity, Vector3(x, y, z)).message)

@@ -1,0 +1,15 @@
+"""The command `list`."""
+
+from .arguments import Namespace
+from .running_simulator import RunningSimulator
+
+
+def list(*, ns: Namespace = None) -> str:
+    """Lists what is in the running world, with types.
+
+    Args:
+        ns: of the simulator, if it was started in one
+    """
+    objects = RunningSimulator(ns).objects()
+    width = max(map(len, objects), default=0)
+    return "\n".join(f"{name:<{width}}  {kind}" for name, kind in objects.items()) or "nothing"

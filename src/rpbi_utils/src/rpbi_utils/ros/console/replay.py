@@ -1,0 +1,74 @@
+"""The command `replay`."""
+
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from tqdm import tqdm
+
+from custom_ros_tools.console.argument import Argument
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.plugins import trust_only
+from rpbi.replay.session import Replay, ReplayResult
+from rpbi_utils.bags.errors import BagError
+from rpbi_utils.ros.replay.recorded_session import read_recording
+
+MAX_TICKS = 20_000_000
+"""Length of a recording beyond which it is refused without `--max-ticks` [ticks]: 5.5 hours of a world at 1 kHz."""
+
+
+def replay(
+    bag: Annotated[Path, Argument("BAG", parse=Path, files="*.bag")] = Path("out/demo/recording.bag"),
+    *,
+    ns: Annotated[str, Argument("NAMESPACE")] = "/",
+    quiet: Annotated[bool, Argument("")] = False,
+    trust: Annotated[Sequence[str], Argument("PACKAGE ...")] = (),
+    max_ticks: Annotated[int, Argument("N", parse=int)] = MAX_TICKS,
+    any_size: Annotated[bool, Argument("")] = False,
+) -> int:
+    """Runs a recorded session again and compares its states; without a bag, the demo's.
+
+    It ends with 1 if a state differs; needs no ROS master.
+
+    Args:
+        bag: out/demo/recording.bag without it
+        ns: of the simulator that was recorded
+        quiet: no progress bar
+        trust: Python packages that the bag may have imported, for types of your own
+        max_ticks: bags of more ticks are refused; 20,000,000 without it, 5.5 hours at 1 kHz
+        any_size: also a bag that unfolds to more than 1 GiB and 255 times its size
+    """
+    logging.basicConfig(format="replay: %(message)s", level=logging.ERROR)
+    trust_only({"rpbi", *trust}, "--trust PACKAGE, if you know who made the bag")
+    try:
+        recording = read_recording(bag, ns, any_size)
+        for warning in recording.description.warnings:
+            print(f"replay: warning: {warning}", file=sys.stderr)
+        last_ticks = {each.resets: each.tick for each in sorted(recording.checkpoints)}
+        ticks = sum(last_ticks.values())
+        if ticks > max_ticks:
+            message = f"expected at most {max_ticks} ticks, got states that are {ticks} ticks from the start"
+            raise BagError(bag, f"{message}; --max-ticks {ticks}, if you know who made it")
+        with tqdm(total=ticks, unit=" ticks", unit_scale=True, leave=False, disable=quiet) as bar:
+            result = Replay(recording, bar.update).run()
+    except (InterfaceError, OSError):
+        raise
+    except Exception as error:  # a bag may have anything in it
+        raise BagError(bag, f"cannot be replayed: {type(error).__name__}: {error}") from error
+    return _report(result)
+
+
+def _report(result: ReplayResult) -> int:
+    for text in result.left_out:
+        print(f"not replayed {text}")
+    difference = result.difference
+    if difference is not None:
+        agreement = difference.last_agreement
+        since = "from the start on" if agreement is None else f"after tick {agreement.tick}, where all was the same"
+        recorded = difference.checkpoint.state_hash
+        print(f"first difference at {difference.checkpoint}, {since}: recorded {recorded}, now {difference.state_hash}")
+        return 1
+    print(f"{result.agreed} states agree over {result.ticks} ticks")
+    return 1 if result.left_out else 0

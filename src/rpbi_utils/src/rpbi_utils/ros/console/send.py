@@ -1,0 +1,97 @@
+"""The command `send`."""
+
+import time
+import warnings
+from typing import Annotated, Any
+
+import rospy
+from geometry_msgs.msg import Twist, Vector3, Wrench
+from sensor_msgs.msg import JointState
+
+from custom_ros_tools.console.argument import Argument, number
+from custom_ros_tools.errors import InterfaceError
+from ros_pybullet_interface.srv import ApplyWrench
+
+from .arguments import OBJECTS, Namespace, joint_values
+from .running_simulator import RunningSimulator
+
+SEND_HZ = 50.0
+CONNECT_S = 5.0
+"""Time that the simulator has to connect to the topic [s]; after it the command fails."""
+Numbers = list[float] | None
+
+
+def send(
+    name: Annotated[str, Argument("NAME", offers=OBJECTS)],
+    *targets: Annotated[str, Argument("[JOINT:=VALUE ...]")],
+    velocity: Annotated[bool, Argument("", excludes="kind")] = False,
+    effort: Annotated[bool, Argument("", excludes="kind")] = False,
+    drive: Annotated[Numbers, Argument("VX VY TURN", parse=number, excludes="kind")] = None,
+    push: Annotated[Numbers, Argument("FX FY FZ", parse=number, excludes="kind")] = None,
+    duration_s: Annotated[float, Argument("S", "--for", number)] = 1.0,
+    ns: Namespace = None,
+) -> str:
+    """Sends targets to a robot's joints, a velocity to its base, or a force to anything that can move.
+
+    Positions act at once; `move` takes its time.
+
+    Usage:
+        ./rpbi send ROBOT JOINT:=VALUE ... [--velocity | --effort] [--for S] [--ns NAMESPACE]
+        ./rpbi send ROBOT --drive VX VY TURN [--for S] [--ns NAMESPACE]
+        ./rpbi send OBJECT[/LINK] --push FX FY FZ [--for S] [--ns NAMESPACE]
+
+    Args:
+        JOINT:=VALUE: a position [rad or m], or as 30deg
+        velocity: the values are velocities [rad/s or m/s], for robots under velocity control
+        effort: the values are efforts [N m or N], for robots under torque control
+        drive: velocity of the base [m/s, m/s, rad/s], in its own frame
+        push: force on the link's origin [N], in the world's axes
+        duration_s: how long [s]; 1 without it. Positions are sent once
+        ns: of the simulator, if it was started in one
+    """
+    simulator = RunningSimulator(ns)
+    body, _, link = name.partition("/")
+    if (drive or push) and targets:
+        raise InterfaceError(f"expected --drive, --push or targets of joints, got {' '.join(targets)} as well")
+    if push:
+        wrench = Wrench(force=Vector3(*push))
+        fields = {"object_name": name, "wrench": wrench, "frame": "world", "duration": duration_s}
+        return str(simulator.call("rpbi/apply_wrench", ApplyWrench, **fields).message)
+    if link:
+        raise InterfaceError(f"'{name}': only --push takes a link")
+    if drive:
+        topic = simulator.require(body, "cmd_vel", "a robot with planar_base")
+        vx, vy, turn = drive
+        _publish(simulator, topic, Twist(Vector3(vx, vy, 0.0), Vector3(z=turn)), duration_s, Twist())
+        return f"drove for {duration_s:g} s"
+    topic = simulator.require(body, "joint_states/target", "a robot")
+    values = joint_values(simulator, body, targets)
+    names = [*values]
+    if velocity or effort:
+        field = "velocity" if velocity else "effort"
+        still = JointState(name=names, **{field: [0.0] * len(names)})
+        _publish(simulator, topic, JointState(name=names, **{field: [*values.values()]}), duration_s, still)
+        return f"sent for {duration_s:g} s"
+    _publish(simulator, topic, JointState(name=names, position=[*values.values()]))
+    return "sent"
+
+
+def _publish(simulator: RunningSimulator, topic: str, message: Any, duration_s: float = 0.0, last: Any = None) -> None:
+    """Publishes a message once, or repeats it for a time [s] of the wall clock and then publishes the last one."""
+    rospy.init_node("rpbi_world", anonymous=True, disable_signals=True, disable_rostime=True)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # without a queue, a message has gone when `publish` returns
+            publisher = rospy.Publisher(simulator.full_name(topic), type(message), queue_size=None)
+        end_s = time.monotonic() + CONNECT_S
+        while not publisher.get_num_connections():
+            if time.monotonic() > end_s:
+                raise InterfaceError(f"the simulator does not listen to {simulator.full_name(topic)}")
+            time.sleep(0.01)
+        publisher.publish(message)
+        end_s = time.monotonic() + duration_s
+        while last is not None and time.monotonic() < end_s:
+            time.sleep(min(1.0 / SEND_HZ, duration_s))
+            publisher.publish(message if time.monotonic() < end_s else last)
+    finally:
+        rospy.signal_shutdown("sent")

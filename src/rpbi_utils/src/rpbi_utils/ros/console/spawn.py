@@ -1,0 +1,123 @@
+"""The command `spawn`."""
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from cob_srvs.srv import SetString
+
+from custom_ros_tools.config import config_to_str, load_config
+from custom_ros_tools.console.argument import Argument, number
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.schema import ConfigModel
+from custom_ros_tools.transforms import quat_of
+from robot_model.asset_files import find_file
+from ros_pybullet_interface.msg import PybulletObject
+from ros_pybullet_interface.srv import AddPybulletObject
+from rpbi.config.object_entry import FILE
+
+from .arguments import Namespace
+from .running_simulator import RunningSimulator
+
+CAMERA = "camera"
+Numbers = list[float] | None
+
+
+def kinds() -> Iterator[str]:
+    """Yields the types of things that can come into a world."""
+    from rpbi.bodies import BODY_TYPES  # slow to import, and seldom needed
+
+    yield from BODY_TYPES
+    yield CAMERA
+
+
+def spawn(
+    file: Annotated[str, Argument("FILE", files="*.@(yaml|urdf)")],
+    *,
+    name: Annotated[str | None, Argument("NAME")] = None,
+    at: Annotated[Numbers, Argument("X Y Z", parse=number)] = None,
+    rpy: Annotated[Numbers, Argument("ROLL PITCH YAW", parse=number)] = None,
+    type: Annotated[str | None, Argument("TYPE", choices=kinds)] = None,
+    ns: Namespace = None,
+) -> str:
+    """Puts an object, a robot or a camera into the running world.
+
+    A URDF by itself is a thing without motors that falls; with --type robot its base is fixed and its joints are held
+    by position. Files are read where the simulator runs.
+
+        ./rpbi spawn box.yaml --name second_box --at 0.5 0 1
+        ./rpbi spawn kuka_iiwa/model.urdf --type robot --name arm
+
+    Args:
+        FILE: its YAML, as a world names it, or a URDF; {package}/PATH is resolved
+        name: another name than in the file; without it, a URDF is called as its file
+        at: where [m], in place of basePosition
+        rpy: how turned [rad], in place of baseOrientation
+        type: {choices};
+            without it, the keys of the file decide
+        ns: of the simulator, if it was started in one
+    """
+    simulator = RunningSimulator(ns)
+    try:
+        path = find_file(file, str(Path.cwd() / FILE))
+    except ValueError as error:
+        raise InterfaceError(str(error)) from None
+    is_urdf = Path(path).suffix == ".urdf"
+    data = _urdf_object(path, type) if is_urdf else load_config(path)
+    kind = type or kind_in(data)
+    changes: dict[str, Any] = {} if name is None else {"name": name}
+    changes |= _placement(data, at, rpy)
+    if kind == CAMERA:
+        if at or rpy:
+            raise InterfaceError(f"{file}: a camera is where its object_tf says, not --at or --rpy")
+        return str(simulator.call("rpbi/add_rgbd_sensor", SetString, config_to_str({FILE: path, **changes})).message)
+    object_type = getattr(PybulletObject, kind.upper(), None)
+    if object_type is None:  # the type in a YAML counts before this number
+        object_type, changes["type"] = PybulletObject.VISUAL, kind
+    asked = PybulletObject(object_type=object_type)
+    if is_urdf:
+        asked.config = config_to_str(
+            {**data, **changes, "loadURDF": {**data["loadURDF"], **changes.get("loadURDF", {})}}
+        )
+    elif changes:
+        asked.config = config_to_str({FILE: path, **changes})
+    else:
+        asked.filename = path
+    return str(simulator.call("rpbi/add_pybullet_object", AddPybulletObject, asked).message)
+
+
+def kind_in(data: Mapping[str, Any]) -> str:
+    """Returns the type of thing that a YAML describes.
+
+    The model of that type requires no key that is missing. Among such models it has most of the keys that are there,
+    then requires most of them, then has fewest others.
+    """
+    from rpbi.bodies import BODY_TYPES
+    from rpbi.config.sensors import RgbdSensorConfig
+
+    def fit(model: type[ConfigModel]) -> tuple[bool, int, int, int]:
+        fields = model.model_fields
+        required = {key for key, field in fields.items() if field.is_required()} - {"name"}
+        return required <= data.keys(), len(fields.keys() & data.keys()), len(required), -len(fields)
+
+    models: dict[str, type[ConfigModel]] = {**BODY_TYPES.configs(), CAMERA: RgbdSensorConfig}
+    return max(models, key=lambda kind: fit(models[kind]))
+
+
+def _urdf_object(path: str, kind: str | None) -> dict[str, Any]:
+    """Returns the YAML of a URDF that has none."""
+    name = re.sub(r"\W", "_", Path(path).stem)
+    if kind != "robot":
+        return {"name": name, "loadURDF": {"fileName": path}}
+    motors = {"controlMode": "POSITION_CONTROL"}
+    return {"name": name, "loadURDF": {"fileName": path, "useFixedBase": True}, "setJointMotorControlArray": motors}
+
+
+def _placement(data: Mapping[str, Any], at: Numbers, rpy: Numbers) -> dict[str, Any]:
+    """Returns the keys that put an object somewhere, where its type has them."""
+    keys: dict[str, Any] = {} if at is None else {"basePosition": at}
+    if rpy is not None:
+        keys["baseOrientation"] = quat_of(rpy).tolist()
+    inner = next((key for key in ("loadURDF", "loadSoftBody") if key in data), None)
+    return {inner: keys} if inner and keys else keys

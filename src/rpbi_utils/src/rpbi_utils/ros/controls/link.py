@@ -1,0 +1,189 @@
+"""The running simulator as the window sees it: from topics and the ROS master, without Qt."""
+
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from sensor_msgs.msg import CompressedImage, JointState
+from std_msgs.msg import Int64
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, timed_master
+from ros_pybullet_interface.msg import SimulationState
+from rpbi_utils.ros.console.running_simulator import LIST, RunningSimulator
+
+LOOK_S = 1.0
+"""Time between two looks at the ROS master [s]."""
+SILENCE_S = 2.5
+"""Time without any message after which a simulator counts as gone [s]; /diagnostics comes once a second."""
+IMAGE = "/colour/image/compressed"
+"""End of the topic of a camera that the window shows."""
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The simulator at one moment.
+
+    Attributes:
+        is_alive: Whether it publishes, and has its services.
+        is_running: Whether its world runs.
+        names: Topics and services of its namespace that somebody offers, without the namespace, such as `rpbi/step`.
+        topics: All published topics, with full names.
+        objects: Types of objects and cameras by name.
+        state: Its newest state; None if it publishes none.
+        warning: Its warning of /diagnostics; empty if there is none.
+    """
+
+    is_alive: bool = False
+    is_running: bool = False
+    names: frozenset[str] = frozenset()
+    topics: frozenset[str] = frozenset()
+    objects: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    state: SimulationState | None = None
+    warning: str = ""
+
+    def has(self, name: str) -> bool:
+        """Returns whether it offers a service or topic now."""
+        return self.is_alive and name in self.names
+
+    @property
+    def robots(self) -> list[str]:
+        """Names of all robots."""
+        return [name for name in self.objects if self.has(f"rpbi/{name}/robot_info")]
+
+    @property
+    def cameras(self) -> list[str]:
+        """Names of cameras in topics: `camera` for the first one."""
+        if not self.is_alive:
+            return []
+        return sorted(
+            name.removeprefix("rpbi/").removesuffix(IMAGE)
+            for name in self.names
+            if name.startswith("rpbi/") and name.endswith(IMAGE)
+        )
+
+
+class Newest:
+    """The newest message of a topic that may change.
+
+    Args:
+        message_type: Type of its messages.
+    """
+
+    def __init__(self, message_type: type) -> None:
+        self._type = message_type
+        self.wanted = ""
+        """Name of the topic to subscribe to; empty for none."""
+        self.message: Any = None
+        self._topic = ""
+        self._subscriber: rospy.Subscriber | None = None
+
+    def follow(self) -> None:
+        """Subscribes to the topic that is wanted, which may take time, and to no other."""
+        if self._topic == self.wanted:
+            return
+        if self._subscriber is not None:
+            self._subscriber.unregister()
+        self._topic, self.message, self._subscriber = self.wanted, None, None
+        if self._topic:
+            self._subscriber = rospy.Subscriber(
+                self._topic, self._type, self._on_message, self._topic, queue_size=1, tcp_nodelay=True
+            )
+
+    def _on_message(self, message: Any, topic: str) -> None:
+        if topic == self.wanted:
+            self.message = message
+
+
+class SimulatorLink:
+    """Watches the simulator of this node's namespace, which may come and go.
+
+    Attributes:
+        joints: The joint states that the window shows.
+        image: The image that it shows.
+    """
+
+    def __init__(self) -> None:
+        self.joints, self.image = Newest(JointState), Newest(CompressedImage)
+        self._namespace = rospy.get_namespace()
+        self._heard_s, self._is_running = -SILENCE_S, False
+        self._state: SimulationState | None = None
+        self._warning = ""
+        self._names, self._topics = frozenset[str](), frozenset[str]()
+        self._objects: Mapping[str, str] = MappingProxyType({})
+        self._served: Any = None
+        self._wake = threading.Event()
+        rospy.Subscriber("rpbi/status", Int64, self._on_status, queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber("rpbi/state", SimulationState, self._on_state, queue_size=1)
+        rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics)
+        threading.Thread(target=self._run, name="link", daemon=True).start()
+
+    def look(self) -> None:
+        """Has the master looked at soon, without waiting for it."""
+        self._served = None
+        self._wake.set()
+
+    def follow(self, newest: Newest, topic: str) -> None:
+        """Changes the topic of `joints` or `image` soon, without waiting for it."""
+        if newest.wanted != topic:
+            newest.wanted, newest.message = topic, None
+            self._wake.set()
+
+    def snapshot(self) -> Snapshot:
+        """Returns what is known now."""
+        if time.monotonic() - self._heard_s > SILENCE_S or LIST not in self._names:
+            return Snapshot(topics=self._topics)
+        return Snapshot(True, self._is_running, self._names, self._topics, self._objects, self._state, self._warning)
+
+    def _run(self) -> None:
+        while not rospy.is_shutdown():
+            self._wake.clear()
+            try:
+                self.joints.follow()
+                self.image.follow()
+                self._look()
+            except MASTER_FAILURES:
+                self._names = frozenset()
+            except rospy.ROSException:  # it is shutting down
+                return
+            self._wake.wait(LOOK_S)
+
+    def _look(self) -> None:
+        with timed_master() as master:
+            _, _, (published, _, serving) = master.getSystemState(rospy.get_name())
+        self._topics = frozenset(name for name, _ in published)
+        services = {name for name, _ in serving}
+        names = self._topics | services
+        self._names = frozenset(
+            name.removeprefix(self._namespace) for name in names if name.startswith(self._namespace)
+        )
+        served = frozenset(map(_entry, serving)), self._names
+        if not self.snapshot().is_alive:
+            self._served = None
+        elif served != self._served:  # something came or went
+            self._served = served
+            try:
+                self._objects = MappingProxyType(RunningSimulator().objects())
+            except InterfaceError:
+                self._served = None
+
+    def _on_status(self, message: Int64) -> None:
+        self._heard_s, self._is_running = time.monotonic(), bool(message.data)
+
+    def _on_state(self, message: SimulationState) -> None:
+        self._heard_s, self._state = time.monotonic(), message
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == f"{self._namespace}ros_pybullet_interface: simulation":
+                self._warning = status.message if status.level != DiagnosticStatus.OK else ""
+
+
+def _entry(entry: tuple[str, list[str]]) -> tuple[str, tuple[str, ...]]:
+    name, nodes = entry
+    return name, tuple(nodes)

@@ -1,0 +1,46 @@
+"""A part of the controls window."""
+
+from collections.abc import Callable
+from typing import Any
+
+from PyQt5.QtWidgets import QGroupBox, QWidget
+
+from .link import SimulatorLink, Snapshot
+from .requests import LIMIT_S, Outcome, Requests
+
+Then = Callable[[Outcome], None]
+
+
+class Panel(QGroupBox):
+    """A part of the window, with a frame and a title.
+
+    Args:
+        title: Its title.
+        link: The simulator.
+        requests: Runs what may take time.
+    """
+
+    def __init__(self, title: str, link: SimulatorLink, requests: Requests) -> None:
+        super().__init__(title)
+        self.link, self._requests = link, requests
+        self._needed: dict[QWidget, str] = {}
+
+    def ask(self, name: str, function: Callable[[], Any], then: Then | None = None, limit_s: float = LIMIT_S) -> None:
+        """Runs a function beside the window; its outcome is shown, and `then` called with it in the window's thread."""
+        self._requests.ask(name, function, then, limit_s)
+
+    def require(self, service: str, *widgets: QWidget) -> None:
+        """Disables widgets as long as a service is missing."""
+        self._needed.update(dict.fromkeys(widgets, service))
+
+    def refresh(self, snapshot: Snapshot) -> None:
+        """Shows the state of the simulator; called ten times a second and after each request."""
+        for widget, service in self._needed.items():
+            widget.setEnabled(snapshot.has(service))
+
+
+def named(widget: QWidget, name: str, tip: str = "") -> Any:
+    """Returns a widget, with a name by which programs find it, and a tip."""
+    widget.setObjectName(name)
+    widget.setToolTip(tip)
+    return widget

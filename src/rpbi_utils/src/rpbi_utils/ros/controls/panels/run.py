@@ -1,0 +1,132 @@
+"""Start, stop, steps, reset and pace."""
+
+from functools import partial
+from typing import Any
+
+from PyQt5.QtWidgets import QDoubleSpinBox, QGridLayout, QLabel, QPushButton, QSpinBox
+from std_srvs.srv import Trigger
+
+from ros_pybullet_interface.srv import SetRealTimeFactor, StepN
+from rpbi_utils.ros.console.running_simulator import RunningSimulator
+
+from ..link import SimulatorLink, Snapshot
+from ..panel import Panel, named
+from ..requests import Outcome, Requests
+
+MAX_STEPS = 1_000_000
+"""Largest number of steps of one request; the simulator refuses more."""
+STEPS_LIMIT_S = 3600.0
+DASH = "–"
+
+
+class RunPanel(Panel):
+    """Start, stop, steps, reset and pace, and how the world is doing."""
+
+    def __init__(self, link: SimulatorLink, requests: Requests) -> None:
+        super().__init__("Simulation", link, requests)
+        grid = QGridLayout(self)
+        self._start = self._button("Start", "rpbi/start", "Lets the world run")
+        self._step = self._button("Step", "rpbi/step", "Goes one tick on")
+        self._stop = self._button("Stop", "rpbi/stop", "Lets the world stand still")
+        self._reset = self._button("Reset", "rpbi/reset", "Makes the world what it was at its start")
+        for column, button in enumerate((self._start, self._step, self._stop, self._reset)):
+            grid.addWidget(button, 0, column)
+
+        self._count = named(QSpinBox(), "steps", "Number of steps")
+        self._count.setRange(1, MAX_STEPS)
+        self._count.setValue(100)
+        self._count.setGroupSeparatorShown(True)
+        self._steps = named(QPushButton("N steps"), "n_steps", "Goes that many ticks on, as fast as possible")
+        self._steps.clicked.connect(lambda: self._go(self._count.value()))
+        self.require("rpbi/step_n", self._steps, self._count)
+        grid.addWidget(QLabel("Steps"), 1, 0)
+        grid.addWidget(self._count, 1, 1, 1, 2)
+        grid.addWidget(self._steps, 1, 3)
+
+        self._factor = named(QDoubleSpinBox(), "factor", "Simulated seconds per second")
+        self._factor.setRange(0.0, 1000.0)
+        self._factor.setDecimals(3)
+        self._factor.setSingleStep(0.1)
+        self._factor.setValue(1.0)
+        self._factor.setSpecialValueText("as fast as possible")
+        self._set = named(QPushButton("Set"), "set_factor", "Changes the pace")
+        self._set.clicked.connect(lambda: self._pace(self._factor.value()))
+        self.require("rpbi/set_real_time_factor", self._set, self._factor)
+        grid.addWidget(QLabel("Real-time factor"), 2, 0)
+        grid.addWidget(self._factor, 2, 1, 1, 2)
+        grid.addWidget(self._set, 2, 3)
+
+        self._status = named(QLabel(), "status")
+        self._figures = {
+            name: named(QLabel(DASH), name) for name in ("time", "tick", "achieved", "overruns", "lost", "resets")
+        }
+        titles = ("Time", "Tick", "Achieved", "Overruns", "Lost time", "Resets")
+        grid.addWidget(QLabel("Status"), 3, 0)
+        grid.addWidget(self._status, 3, 1, 1, 3)
+        for index, (title, label) in enumerate(zip(titles, self._figures.values())):
+            row, column = divmod(index, 2)
+            grid.addWidget(QLabel(title), 4 + row, 2 * column)
+            grid.addWidget(label, 4 + row, 2 * column + 1)
+        for column in range(4):
+            grid.setColumnStretch(column, 1)
+        self._asked: float | None = None
+
+    def refresh(self, snapshot: Snapshot) -> None:
+        super().refresh(snapshot)
+        stands = not snapshot.is_running
+        self._start.setEnabled(self._start.isEnabled() and stands)
+        self._stop.setEnabled(self._stop.isEnabled() and not stands)
+        for widget in (self._step, self._steps):
+            widget.setEnabled(widget.isEnabled() and stands)
+        self._show_status(snapshot)
+        state = snapshot.state
+        if state is None:
+            for label in self._figures.values():
+                label.setText(DASH)
+            self._asked = None
+            return
+        if state.real_time_factor_asked != self._asked:  # at the start, or changed by somebody
+            self._asked = state.real_time_factor_asked
+            self._factor.setValue(state.real_time_factor_asked)
+        texts = {
+            "time": f"{state.simulated_time:.3f} s",
+            "tick": f"{state.tick:,}",
+            "achieved": f"{state.real_time_factor:.3f}",
+            "overruns": f"{state.overruns:,}",
+            "lost": f"{state.lost_time:.3f} s",
+            "resets": f"{state.resets}",
+        }
+        for name, text in texts.items():
+            self._figures[name].setText(text)
+
+    def _show_status(self, snapshot: Snapshot) -> None:
+        if not snapshot.is_alive:
+            text, colour = "no simulator", "#a02020"
+        elif not snapshot.is_running:
+            text, colour = "stopped", "#806000"
+        elif snapshot.warning:
+            text, colour = snapshot.warning, "#806000"
+        else:
+            text, colour = "running", "#207020"
+        self._status.setText(text)
+        self._status.setStyleSheet(f"font-weight: bold; color: {colour}")
+
+    def _button(self, title: str, service: str, tip: str) -> QPushButton:
+        button: QPushButton = named(QPushButton(title), title.lower(), tip)
+        button.clicked.connect(lambda: self.ask(title, partial(_call, service, Trigger), self._look_again))
+        self.require(service, button)
+        return button
+
+    def _look_again(self, outcome: Outcome) -> None:
+        if outcome.name == "Reset" and not outcome.error:
+            self.link.look()  # a reset brings back what was removed
+
+    def _go(self, steps: int) -> None:
+        self.ask("N steps", partial(_call, "rpbi/step_n", StepN, steps), limit_s=STEPS_LIMIT_S)
+
+    def _pace(self, factor: float) -> None:
+        self.ask("Real-time factor", partial(_call, "rpbi/set_real_time_factor", SetRealTimeFactor, factor))
+
+
+def _call(service: str, service_type: type, *arguments: object) -> Any:
+    return RunningSimulator().call(service, service_type, *arguments).message

@@ -1,0 +1,106 @@
+"""The controls window."""
+
+from PyQt5.QtCore import QObject, Qt, QTimer, pyqtSignal
+from PyQt5.QtWidgets import QLabel, QMainWindow, QScrollArea, QSplitter, QVBoxLayout, QWidget
+
+from .link import SimulatorLink
+from .panel import Panel, named
+from .panels.cameras import CamerasPanel
+from .panels.joints import JointsPanel
+from .panels.objects import ObjectsPanel
+from .panels.recording import RecordingPanel
+from .panels.run import RunPanel
+from .requests import Outcome, Requests
+
+TITLE = "ROS-PyBullet Interface Controls"
+REFRESH_MS = 100
+SIZE, SIZE_WITH_VIEW = (920, 760), (1400, 800)
+"""Initial width and height [px]."""
+
+
+class Signals(QObject):
+    """Carries events of other threads into that of the window."""
+
+    answered = pyqtSignal(object)
+    ended = pyqtSignal()
+
+
+class ControlsWindow(QMainWindow):
+    """Panels with buttons, RViz's view beside them, and the newest message below.
+
+    Args:
+        link: The simulator.
+        signals: Its events.
+        first: Name of the robot whose joints are shown first.
+        view: RViz's view, if any.
+    """
+
+    def __init__(self, link: SimulatorLink, signals: Signals, first: str | None, view: QWidget | None) -> None:
+        super().__init__()
+        self.setWindowTitle(TITLE)
+        self._link = link
+        requests = Requests(signals.answered.emit)
+        signals.answered.connect(self._on_answer)
+        left: list[Panel] = [RunPanel(link, requests), JointsPanel(link, requests, first)]
+        right: list[Panel] = [
+            ObjectsPanel(link, requests),
+            CamerasPanel(link, requests),
+            RecordingPanel(link, requests),
+        ]
+        self._panels = left + right
+        splitter = QSplitter(Qt.Orientation.Horizontal)
+        for panels in (left, right):
+            splitter.addWidget(_column(panels))
+        if view is not None:
+            splitter.addWidget(view)
+            splitter.setStretchFactor(2, 1)
+            splitter.setSizes([430, 330, 640])
+        else:
+            splitter.setSizes([520, 400])
+        self.setCentralWidget(splitter)
+        self._message = named(QLabel("Messages appear here."), "message")
+        self._message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._message.setWordWrap(True)
+        self._message.setContentsMargins(8, 0, 8, 4)
+        self.statusBar().addWidget(self._message, 1)
+        self.resize(*(SIZE if view is None else SIZE_WITH_VIEW))
+        self._timer = QTimer(self)
+        self._timer.timeout.connect(self.refresh)
+        self._timer.start(REFRESH_MS)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Shows the newest state."""
+        snapshot = self._link.snapshot()
+        for panel in self._panels:
+            panel.refresh(snapshot)
+
+    def end(self) -> None:
+        """Ends what the panels have going on."""
+        self._timer.stop()
+        for panel in self._panels:
+            panel.close()
+
+    def _on_answer(self, outcome: Outcome) -> None:
+        if outcome.then is not None:
+            outcome.then(outcome)
+        text = outcome.error or (outcome.value if isinstance(outcome.value, str) else "done")
+        duration = f"{1e3 * outcome.duration_s:.0f} ms" if outcome.duration_s < 1.0 else f"{outcome.duration_s:.1f} s"
+        self._message.setText(f"{outcome.name}: {text} ({duration})")
+        self._message.setStyleSheet("color: #a02020" if outcome.error else "")
+        self.refresh()
+
+
+def _column(panels: list[Panel]) -> QWidget:
+    """Returns panels below each other, with a bar to scroll if the window is too low."""
+    column = QWidget()
+    layout = QVBoxLayout(column)
+    for panel in panels:
+        layout.addWidget(panel, 0 if isinstance(panel, RunPanel | RecordingPanel) else 1)
+    area = QScrollArea()
+    area.setWidget(column)
+    area.setWidgetResizable(True)
+    area.setFrameShape(QScrollArea.NoFrame)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setMinimumWidth(column.minimumSizeHint().width())
+    return area

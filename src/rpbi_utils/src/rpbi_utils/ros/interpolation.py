@@ -1,0 +1,186 @@
+"""`interpolation_node.py`: waypoints as smooth targets, of a TF frame or of joints."""
+
+from __future__ import annotations
+
+import contextlib
+from collections import deque
+from collections.abc import Callable
+
+import rospy
+from geometry_msgs.msg import TransformStamped
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, Header
+from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
+from tf2_msgs.msg import TFMessage
+
+from custom_ros_tools.config import load_config
+from custom_ros_tools.ros.lifecycle.parameters import kept_parameters, private_parameters
+from custom_ros_tools.ros.lifecycle.run_node import run_node
+from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, timed_master
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
+from custom_ros_tools.ros.transform_messages import transform_message
+from rpbi_utils.interpolation.config import InterpolationParameters, PublisherConfig, TrajectoryConfig, WaypointError
+from rpbi_utils.interpolation.interpolator import Interpolator, Sample
+from rpbi_utils.interpolation.waypoints import Waypoints, read_waypoints, waypoint_matrix
+
+NAME = "ros_Traj_interface"
+WAYPOINTS = "ros_pybullet_interface/waypt_traj"
+STREAMING = "/stream_interpolated_motion_flag"
+"""Parameter that pauses the motion while it is not true."""
+LOOKS_HZ = 5.0
+"""Rate at which that parameter is looked at [Hz of wall time]."""
+QUEUE_SIZE = 100
+NS_PER_S = 1_000_000_000
+
+
+class InterpolationNode:
+    """Publishes a motion through the waypoints that arrive, sample by sample in ROS time.
+
+    Raises:
+        ConfigError: If parameters or the motion's file are wrong.
+    """
+
+    def __init__(self) -> None:
+        parameters = private_parameters(InterpolationParameters)
+        config = TrajectoryConfig.parse(load_config(parameters.traj_config), parameters.traj_config)
+        self._config, self._hz = config, parameters.consuming_freq
+        self._interpolator = Interpolator(config)
+        self._arrived: deque[tuple[rospy.Time, Waypoints] | None] = deque()
+        """Waypoints that the next tick adds; None ends the motion."""
+        self._last: Float64MultiArray | None = None
+        self._epoch: rospy.Time | None = None
+        """Zero of the interpolator's time, near it so that floats are exact."""
+        self._now_s = 0.0
+        self._moves, self._is_streaming = False, True
+        self._warn = ThrottledWarning()
+        publisher, joints = config.communication.publisher, config.motion_dimensions.joint_names
+        self._publish = (
+            _frame_publisher(publisher, parameters.namespace) if joints is None else _joint_publisher(config)
+        )
+        kept_parameters.set(STREAMING, True)
+        WallTimer(LOOKS_HZ, self._look_at_flag)
+        rospy.Service("interpolation/reset", Trigger, self._reset)
+        self._topic = rospy.Subscriber(
+            WAYPOINTS, Float64MultiArray, self._on_waypoints, queue_size=QUEUE_SIZE, tcp_nodelay=True
+        ).resolved_name
+        rospy.loginfo("waits for waypoints on '%s'", self._topic)
+
+    def run(self) -> None:
+        """Publishes samples until ROS shuts down."""
+        rate = rospy.Rate(self._hz, reset=True)
+        try:
+            while not rospy.is_shutdown():
+                self._tick(rospy.Time.now())
+                rate.sleep()
+        except rospy.ROSException:
+            if not rospy.is_shutdown():  # its topic is closed already
+                raise
+
+    def _on_waypoints(self, message: Float64MultiArray) -> None:
+        is_repetition = message == self._last and not self._config.interpolation.accept_repetitions
+        if is_repetition:
+            return
+        layout = message.layout
+        try:
+            shape = [(each.label, each.size) for each in layout.dim]
+            matrix = waypoint_matrix(shape, message.data, layout.data_offset)
+            waypoints = read_waypoints(matrix, self._config.motion_dimensions)
+        except WaypointError as error:
+            self._warn(self._topic, f"waypoints rejected: {error}")
+            return
+        self._last = message
+        self._arrived.append((rospy.Time.now(), waypoints))
+
+    def _tick(self, now: rospy.Time) -> None:
+        if not now:  # no clock yet
+            return
+        if self._epoch is None:
+            self._epoch = now
+        now_s = (now - self._epoch).to_sec()
+        if now_s < self._now_s:
+            self._warn(rospy.get_name(), f"ROS time went back by {self._now_s - now_s:g} s: the motion ends")
+            self._forget()
+        self._now_s = now_s
+        if self._is_streaming:
+            self._interpolator.resume(now_s)
+        else:
+            self._interpolator.pause(now_s)
+        while self._arrived:
+            self._add(self._arrived.popleft(), now)
+        sample = self._interpolator.newest(now_s)
+        if sample is not None:
+            self._publish(self._epoch + rospy.Duration(0, round(sample.time_s * NS_PER_S)), sample)
+        self._report()
+
+    def _add(self, arrived: tuple[rospy.Time, Waypoints] | None, now: rospy.Time) -> None:
+        assert self._epoch is not None
+        if arrived is None:
+            self._forget()
+            return
+        stamp, waypoints = arrived
+        if not stamp or not self._moves:  # from rest, the first sample is the first waypoint
+            stamp = now
+        if self._config.interpolation.time_origin == "ros_time":
+            zero_s = -self._epoch.to_sec()
+        else:
+            zero_s = (stamp - self._epoch).to_sec()
+        try:
+            self._interpolator.add(
+                waypoints._replace(times_s=tuple(zero_s + t for t in waypoints.times_s)), self._now_s
+            )
+        except WaypointError as error:
+            self._last = None
+            self._warn(self._topic, f"waypoints rejected: {error}")
+
+    def _forget(self) -> None:
+        self._last = None
+        self._interpolator.forget()
+
+    def _report(self) -> None:
+        """Logs when a motion begins from rest, and when it ends."""
+        plan = self._interpolator.plan
+        moves = plan is not None and self._now_s < plan.scalars.end_s + self._interpolator.delay_s
+        if moves != self._moves:
+            self._moves = moves
+            rospy.loginfo("the motion %s", "begins" if moves else "has ended")
+
+    def _reset(self, _: TriggerRequest) -> TriggerResponse:
+        """Ends the motion; the next one begins at its first waypoint, wherever the target is."""
+        self._arrived.append(None)
+        return TriggerResponse(True, "the motion ends; the next one begins at its first waypoint")
+
+    def _look_at_flag(self) -> None:
+        with contextlib.suppress(*MASTER_FAILURES), timed_master() as master:
+            code, _, value = master.getParam(rospy.get_name(), STREAMING)
+            if code == 1:
+                self._is_streaming = value is True
+
+
+def _frame_publisher(config: PublisherConfig, namespace: str) -> Callable[[rospy.Time, Sample], None]:
+    """Returns a function that publishes the pose of a sample on /tf."""
+    child = "/".join(part for part in (namespace.strip("/"), config.msg_child_frame_id) if part)
+    publisher = rospy.Publisher("/tf", TFMessage, queue_size=QUEUE_SIZE, tcp_nodelay=True)
+
+    def publish(stamp: rospy.Time, sample: Sample) -> None:
+        assert sample.pose is not None
+        header = Header(stamp=stamp, frame_id=config.header_frame_id)
+        publisher.publish(TFMessage([TransformStamped(header, child, transform_message(*sample.pose))]))
+
+    return publish
+
+
+def _joint_publisher(config: TrajectoryConfig) -> Callable[[rospy.Time, Sample], None]:
+    """Returns a function that publishes the positions and velocities of a sample."""
+    topic, names = config.communication.publisher.joint_topic, config.motion_dimensions.joint_names
+    publisher = rospy.Publisher(topic, JointState, queue_size=QUEUE_SIZE, tcp_nodelay=True)
+
+    def publish(stamp: rospy.Time, sample: Sample) -> None:
+        state = sample.state
+        publisher.publish(JointState(Header(stamp=stamp), names, state.position, state.velocity, ()))
+
+    return publish
+
+
+def main() -> None:
+    """Runs the node."""
+    run_node(NAME, InterpolationNode, InterpolationNode.run, anonymous=True)

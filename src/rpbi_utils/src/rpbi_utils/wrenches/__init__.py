@@ -1,0 +1,1 @@
+"""Calibration of force-torque sensors: their zero, and the weight of what they carry."""

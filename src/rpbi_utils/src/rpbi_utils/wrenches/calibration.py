@@ -1,0 +1,175 @@
+"""Configuration of `calibrate_wrench_node.py`, samples of a sensor at rest, and the calibrated wrench."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from custom_ros_tools.schema import (
+    ConfigModel,
+    Count,
+    FrameId,
+    Position,
+    Positive,
+    PositiveMetres,
+    Unit,
+    Vec3,
+    optional,
+)
+from robot_model.geometry import Pose, Vector, rotated_back, rotation_between
+
+Array = NDArray[np.float64]
+Newton = Annotated[Positive, Unit("N")]
+NewtonMetre = Annotated[Positive, Unit("N m")]
+
+
+class MovedError(ValueError):
+    """The sensor moved, or was touched, while it was sampled."""
+
+
+class PayloadConfig(ConfigModel):
+    """A payload, and the wrench of the sensor without it."""
+
+    mass: Annotated[float, Unit("kg")] = Field(
+        description="Mass; negative if the sensor reports the wrench that acts on it, not the one that it exerts."
+    )
+    centre: Position = Field(description="Centre of mass in the sensor's frame.")
+    force_offset: Annotated[Vec3, Unit("N")] = Field((0.0, 0.0, 0.0), description="Force without any load.")
+    torque_offset: Annotated[Vec3, Unit("N m")] = Field((0.0, 0.0, 0.0), description="Torque without any load.")
+
+    def weight(self, gravity: Vector) -> Array:
+        """Returns force and torque of the payload at rest [N, N m], shape (6,).
+
+        Args:
+            gravity: Gravity in the sensor's axes [m/s^2].
+        """
+        force = -self.mass * np.asarray(gravity)
+        return np.concatenate([force, np.cross(self.centre, force)])
+
+    @property
+    def offset(self) -> Array:
+        """Force and torque without any load [N, N m], shape (6,)."""
+        return np.array(self.force_offset + self.torque_offset)
+
+
+class CalibrationParameters(ConfigModel):
+    """Private parameters of `calibrate_wrench_node.py`."""
+
+    max_samples: Annotated[Count, Field(ge=1)] = Field(100, description="Number of messages that a mean is made of.")
+    sensor_frame: FrameId | None = optional("TF frame of the sensor; without it, the one that messages name.")
+    gravity_frame: FrameId = Field("rpbi/world", description="TF frame in which gravity points along -z.")
+    gravity: Annotated[Positive, Unit("m/s^2")] = Field(9.81, description="Gravity.")
+    max_force_spread: Newton = Field(1.0, description="Largest standard deviation of a force while the sensor rests.")
+    max_torque_spread: NewtonMetre = Field(0.1, description="Largest standard deviation of a torque while it rests.")
+    max_shift: PositiveMetres = Field(0.001, description="Largest motion of the sensor's frame while it rests.")
+    max_turn: Annotated[Positive, Unit("rad")] = Field(0.005, description="Largest rotation of it while it rests.")
+    max_residual_force: Newton = Field(1.0, description="Largest residual of the forces of an identified payload.")
+    max_residual_torque: NewtonMetre = Field(0.1, description="Largest residual of its torques.")
+    payload: PayloadConfig | None = optional("A known payload, such as an identified one.")
+
+
+class RestingMean:
+    """The mean of a number of wrenches of a sensor at rest.
+
+    Args:
+        limits: How much wrenches and pose may differ.
+    """
+
+    def __init__(self, limits: CalibrationParameters) -> None:
+        self._limits = limits
+        self._wrenches: list[Array] = []
+        self._poses: list[Pose] = []
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether no further wrench is needed."""
+        return len(self._wrenches) >= self._limits.max_samples
+
+    def add(self, wrench: Array, pose: Pose | None) -> None:
+        """Adds force and torque [N, N m], shape (6,), and the sensor's pose, if it is known."""
+        self._wrenches.append(wrench)
+        if pose is not None:
+            self._poses.append(pose)
+
+    def result(self) -> tuple[Array, Pose | None]:
+        """Returns the mean, shape (6,), and the sensor's pose, None if it is not always known.
+
+        Raises:
+            MovedError: If the sensor moved, or the wrench changed.
+        """
+        limits = self._limits
+        for kind, unit, spread, most in (
+            ("force", "N", self._spread(slice(0, 3)), limits.max_force_spread),
+            ("torque", "N m", self._spread(slice(3, 6)), limits.max_torque_spread),
+        ):
+            if spread > most:
+                raise MovedError(f"the {kind} changes: expected a spread of {most:g} {unit} at most, got {spread:.3g}")
+        for what, unit, moved, most in (
+            ("moves", "m", self._shift(), limits.max_shift),
+            ("turns", "rad", self._turn(), limits.max_turn),
+        ):
+            if moved > most:
+                raise MovedError(f"the sensor {what}: expected {most:g} {unit} at most, got {moved:.3g}")
+        is_known = len(self._poses) == len(self._wrenches)
+        return np.mean(self._wrenches, axis=0), self._poses[-1] if is_known else None
+
+    def _spread(self, part: slice) -> float:
+        return float(np.std(self._wrenches, axis=0)[part].max())
+
+    def _shift(self) -> float:
+        return max((math.dist(self._poses[0].position, each.position) for each in self._poses), default=0.0)
+
+    def _turn(self) -> float:
+        turns = (rotation_between(self._poses[0].quat_xyzw, each.quat_xyzw) for each in self._poses)
+        return max((math.hypot(*turn) for turn in turns), default=0.0)
+
+
+class WrenchCalibration:
+    """Zero of a sensor, and the payload whose weight is subtracted.
+
+    Attributes:
+        offset: Wrench that is subtracted [N, N m], shape (6,); None until there is a zero.
+        payload: The payload, None if there is none.
+    """
+
+    def __init__(self, payload: PayloadConfig | None = None) -> None:
+        self.payload = payload
+        self.offset: Array | None = None if payload is None else payload.offset
+
+    def zero(self, mean: Array, gravity: Vector | None) -> None:
+        """Makes the mean of a sensor that touches nothing, less the payload's weight, the zero."""
+        self.offset = mean - self._weight(gravity)
+
+    def use(self, payload: PayloadConfig) -> None:
+        """Subtracts the weight and the offsets of an identified payload."""
+        self.payload, self.offset = payload, payload.offset
+
+    def calibrated(self, wrench: Array, gravity: Vector | None) -> Array:
+        """Returns a wrench less zero and payload.
+
+        Args:
+            gravity: Gravity in the sensor's axes [m/s^2]; not needed without a payload.
+        """
+        assert self.offset is not None
+        return wrench - self.offset - self._weight(gravity)
+
+    def _weight(self, gravity: Vector | None) -> Array:
+        if self.payload is None:
+            return np.zeros(6)
+        assert gravity is not None
+        return self.payload.weight(gravity)
+
+
+def gravity_in(pose: Pose, gravity: float) -> Vector:
+    """Returns gravity [m/s^2] in the axes of a sensor, from its pose in a frame whose z axis points up."""
+    return rotated_back(pose.quat_xyzw, (0.0, 0.0, -gravity))
+
+
+def listed(values: Sequence[float], digits: int = 3) -> str:
+    """Returns numbers as text."""
+    return ", ".join(f"{value:.{digits}f}" for value in values)

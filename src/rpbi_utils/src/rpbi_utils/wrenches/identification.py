@@ -1,0 +1,142 @@
+"""Mass and centre of a payload, and the offsets of a sensor, from wrenches in several poses.
+
+At rest the sensor reports f = f0 - m g and t = t0 + m c x (-g) = t0 + g x (m c), with gravity g in its own axes. Forces
+depend on the mass and their offset, torques on the first moment m c and theirs: two linear least-squares problems.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from robot_model.geometry import Vector
+
+from .calibration import Array, CalibrationParameters, PayloadConfig, listed
+
+MIN_POSES = 3
+MIN_SPREAD = 0.1
+"""Least root mean square of the tilt of gravity's direction about the axis about which it tilts second most [rad]."""
+MIN_SIGNIFICANCE = 3.0
+"""Least ratio of the mass and its standard deviation."""
+MIN_MASS_KG = 1e-3
+
+
+class UndeterminedError(ValueError):
+    """The poses do not determine the payload; the message says what is missing."""
+
+
+class PoseSample(NamedTuple):
+    """Mean wrench in one pose.
+
+    Attributes:
+        wrench: Force and torque [N, N m], shape (6,).
+        gravity: Gravity in the sensor's axes [m/s^2].
+    """
+
+    wrench: Array
+    gravity: Vector
+
+
+class Identification(NamedTuple):
+    """An identified payload.
+
+    Attributes:
+        payload: The payload, with the sensor's offsets.
+        mass_sd: Standard deviation of its mass [kg].
+        centre_sd: Largest standard deviation of a coordinate of its centre [m].
+        force_residual: Root mean square of the residual forces [N].
+        torque_residual: Root mean square of the residual torques [N m].
+        poses: Number of poses.
+    """
+
+    payload: PayloadConfig
+    mass_sd: float
+    centre_sd: float
+    force_residual: float
+    torque_residual: float
+    poses: int
+
+    def __str__(self) -> str:
+        payload = self.payload
+        return (
+            f"mass {abs(payload.mass):.4f} kg (+-{self.mass_sd:.2g}), centre {listed(payload.centre, 4)} m "
+            f"(+-{self.centre_sd:.2g}), offsets {listed(payload.force_offset)} N and "
+            f"{listed(payload.torque_offset, 4)} N m; residual {self.force_residual:.2g} N and "
+            f"{self.torque_residual:.2g} N m in {self.poses} poses"
+        )
+
+
+def identify_payload(samples: Sequence[PoseSample], limits: CalibrationParameters) -> Identification:
+    """Returns the payload that explains wrenches at rest best.
+
+    Raises:
+        UndeterminedError: If there are too few poses or they are too alike, if the sensor carries nothing, or if no
+            payload explains the wrenches.
+    """
+    if len(samples) < MIN_POSES:
+        raise UndeterminedError(f"expected at least {MIN_POSES} poses, got {len(samples)}")
+    gravity = np.array([each.gravity for each in samples])
+    forces, torques = np.split(np.array([each.wrench for each in samples]), 2, axis=1)
+    _check_spread((gravity - gravity.mean(axis=0)) / limits.gravity)
+    mass, mass_sd, force_offset, force_residual = _fit(-gravity[..., np.newaxis], forces)
+    moment, moment_sd, torque_offset, torque_residual = _fit(_cross(gravity), torques)
+    for kind, unit, residual, most in (
+        ("force", "N", force_residual, limits.max_residual_force),
+        ("torque", "N m", torque_residual, limits.max_residual_torque),
+    ):
+        if residual > most:
+            raise UndeterminedError(
+                f"{kind}: expected a residual of {most:g} {unit} at most, got {residual:.3g}; was the payload touched, "
+                "or is the sensor's frame another one?"
+            )
+    if abs(mass[0]) < max(MIN_SIGNIFICANCE * mass_sd, MIN_MASS_KG):
+        raise UndeterminedError(f"expected a payload, got a mass of {mass[0]:.2g} kg (+-{mass_sd:.2g})")
+    payload = PayloadConfig(
+        mass=float(mass[0]),
+        centre=tuple((moment / mass[0]).tolist()),
+        force_offset=tuple(force_offset.tolist()),
+        torque_offset=tuple(torque_offset.tolist()),
+    )
+    return Identification(
+        payload, mass_sd, moment_sd / abs(float(mass[0])), force_residual, torque_residual, len(samples)
+    )
+
+
+def _check_spread(directions: Array) -> None:
+    """Checks that gravity's direction, less its mean, shape (N, 3), differs about two axes."""
+    _, second, third = np.linalg.svd(directions, compute_uv=False)
+    spread = float(np.hypot(second, third) / np.sqrt(len(directions)))
+    if spread < MIN_SPREAD:
+        raise UndeterminedError(
+            f"the poses are too alike: expected gravity to tilt by {MIN_SPREAD:g} rad about a second axis of the "
+            f"sensor, got {spread:.2g}; add poses that tilt it about another axis"
+        )
+
+
+def _fit(factors: Array, values: Array) -> tuple[Array, float, Array, float]:
+    """Fits `values = offset + factors @ x`.
+
+    Args:
+        factors: Shape (N, 3, P).
+        values: Shape (N, 3).
+
+    Returns:
+        x, shape (P,), its largest standard deviation, the offset, shape (3,), and the residual's root mean square.
+    """
+    count, _, parameters = factors.shape
+    A = (factors - factors.mean(axis=0)).reshape(3 * count, parameters)
+    b = (values - values.mean(axis=0)).ravel()
+    x = np.linalg.lstsq(A, b, rcond=None)[0]
+    residual = b - A @ x
+    variance = float(residual @ residual) / (3 * count - parameters - 3)
+    deviation = float(np.sqrt(variance * np.linalg.inv(A.T @ A).diagonal().max()))
+    return x, deviation, values.mean(axis=0) - factors.mean(axis=0) @ x, float(np.sqrt(np.mean(residual**2)))
+
+
+def _cross(vectors: Array) -> Array:
+    """Returns the matrices of cross products with vectors, shape (N, 3, 3)."""
+    x, y, z = vectors.T
+    zero = np.zeros_like(x)
+    return np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)

@@ -1,0 +1,296 @@
+"""Which things come too near to each other while a robot moves."""
+
+import math
+from abc import abstractmethod
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from safe_robot.check import Check, MarginViolation, Violation
+from safe_robot.geometry.distances import Contact, LinkDistances, Pair
+from safe_robot.geometry.separation import Separation
+from safe_robot.motion import Bound, CommandedMotion
+
+LEAST_SPACING_M = 0.01
+"""The braking is tried no more densely than this [m], however small the margin is."""
+ROUNDING_M = 1e-9
+"""Distances that differ by less are equal [m]."""
+SPARE_M = 3e-4
+"""Distance kept beyond the margin where a command is chosen [m], since distances count as linear there."""
+LOOSE_M = 0.003
+"""A bound that is that much below the distance is made anew [m]."""
+FAR_M = 10.0
+"""Distances are not looked at beyond this [m]."""
+
+
+class TooNear(NamedTuple):
+    """A pair that comes too near.
+
+    Attributes:
+        pair: The pair.
+        distance: Distance [m].
+        is_while_braking: Whether the braking causes it, not the command.
+    """
+
+    pair: Pair
+    distance: float
+    is_while_braking: bool
+
+
+class Proximity:
+    """Finds out which pairs come nearer than a margin, and nearer than they were.
+
+    Most pairs are so far apart that how far joints may move them is enough, or a plane between them. Only those that
+    are left are measured.
+
+    Args:
+        distances: Where shapes are.
+        pairs: The pairs.
+        margin_m: The margin [m].
+    """
+
+    def __init__(self, distances: LinkDistances, pairs: Sequence[Pair], margin_m: float) -> None:
+        self._distances, self._pairs, self._margin_m = distances, pairs, margin_m
+        self._reach = np.array([distances.reach(pair) for pair in pairs])
+        self._furthest = self._reach.max(axis=0, initial=0.0)
+        self._separation = Separation([(distances.solids(a), distances.solids(b)) for a, b in pairs])
+        self._last = -1, 0  # the pair and the row that were too near last: in a similar motion they likely are again
+        self._known_at = np.zeros((2, *self._reach.shape))  # for each pair the ends of a motion
+        self._known_m = np.full((2, len(pairs)), -np.inf)  # it is no nearer there
+
+    def forget(self, indices: Sequence[int]) -> None:
+        """Looks at some pairs anew, since what moved are not the joints."""
+        self._known_m[:, list(indices)] = -np.inf
+        for i in indices:
+            self._separation.replace(i, self._distances.solids(self._pairs[i][1]))
+
+    def first(self, motion: CommandedMotion) -> TooNear | None:
+        """Returns a pair that comes too near in a motion; None if none does in any row.
+
+        A pair that is d and e away at two rows, between which it moves by m, is (d + e - m) / 2 away between them.
+        Where that is not enough, every row is judged.
+        """
+        if not len(self._pairs):
+            return None
+        least_m, reach = self._margin_m + ROUNDING_M, self._reach
+        known = self._known_near(motion.position[[0, -1], None])
+        near = np.flatnonzero(~(known[0] + known[1] - reach @ motion.path > 2.0 * least_m))
+        if not len(near):
+            return None
+        i, row = self._last[0], min(self._last[1], len(motion.position) - 1)
+        if motion.is_trial and i in near:
+            self._distances.place(motion.position[row])
+            if found := self._too_near(motion, i, row, self._contact(i)):
+                return found
+        rows = motion.waypoints
+        bounds = self._separation.lower_bounds(motion.waypoint_frames, near)
+        self._known_m[:, near], self._known_at[:, near] = bounds[[0, -1]], motion.position[[0, -1], None]
+        steps = np.diff(motion.travelled[rows], axis=0) @ reach[near].T
+        between = (bounds[:-1] + bounds[1:] - steps) / 2.0 if len(rows) > 1 else bounds  # no less on the way
+        is_unsure = ~(between > least_m)  # NaN is, too
+        suspects = np.flatnonzero(is_unsure.any(axis=0))
+        if not len(suspects):
+            return None
+        all_rows = np.arange(len(motion.position))
+        section = np.clip(np.searchsorted(rows, all_rows, side="right") - 1, 0, len(is_unsure) - 1)
+        return self._judged(motion, near[suspects], all_rows[is_unsure.any(axis=1)[section]])
+
+    def _judged(self, motion: CommandedMotion, suspects: np.ndarray, rows: np.ndarray) -> TooNear | None:
+        """Returns one of s pairs that comes too near in some of k rows of a motion; None if none does in any of them.
+
+        Rows far from each other are judged first: a motion that is not safe shows there soonest, and what is found
+        there is enough for most rows between them.
+
+        Args:
+            motion: The motion.
+            suspects: Numbers of the pairs.
+            rows: Numbers of the rows.
+        """
+        ways = motion.travelled[rows] @ self._reach[suspects].T
+        spare = np.full(ways.shape, -np.inf)
+        sparse = self._sparse(motion.travelled[rows] @ self._furthest)
+        if found := self._measured(motion, suspects, rows, sparse, ways, spare):
+            return found
+        _spread(spare, sparse, ways)
+        unsure = np.flatnonzero(~(spare > 0.0).all(axis=1))
+        return self._measured(motion, suspects, rows, unsure, ways, spare) if len(unsure) else None
+
+    def _measured(
+        self,
+        motion: CommandedMotion,
+        suspects: np.ndarray,
+        rows: np.ndarray,
+        chosen: np.ndarray,
+        ways: np.ndarray,
+        spare: np.ndarray,
+    ) -> TooNear | None:
+        """Returns one of s pairs that comes too near in some chosen ones of k rows, by measuring if need be.
+
+        In a trial, the row with the smallest bound is measured next, since it is most likely too near. Otherwise rows
+        are measured in order, so that equal motions have equal answers.
+
+        Args:
+            motion: The motion.
+            suspects: Numbers of the pairs.
+            rows: Numbers of the k rows.
+            chosen: Indices of the rows to judge.
+            ways: Distance that each pair has moved by each row, k x s [m].
+            spare: Lower bounds of distances less the margin, k x s [m], which are raised; inf where the pair may be.
+        """
+        least_m = self._margin_m + ROUNDING_M
+        frames = self._distances.frames(motion.position[rows[chosen]])
+        spare[chosen] = np.fmax(spare[chosen], self._separation.lower_bounds(frames, suspects) - least_m)
+        placed = -1
+        while (bounds := spare[chosen]).min() <= 0.0:
+            at, k = divmod(int(bounds.argmin() if motion.is_trial else (bounds <= 0.0).argmax()), len(suspects))
+            i, row = int(suspects[k]), int(rows[chosen[at]])
+            if placed != row:
+                self._distances.place(motion.position[row])
+                placed = row
+            contact = self._contact(i)
+            if found := self._too_near(motion, i, row, contact):
+                return found
+            distance = FAR_M if contact is None else contact.distance
+            if contact is not None and not distance - least_m < bounds[at, k] + LOOSE_M:
+                self._separation.learn(i, contact.directions, frames[at])
+                more = self._separation.lower_bounds(frames, suspects[k : k + 1])[:, 0] - least_m
+                spare[chosen, k] = np.fmax(spare[chosen, k], more)
+            spare[:, k] = np.maximum(spare[:, k], distance - least_m - np.abs(ways[:, k] - ways[chosen[at], k]))
+            spare[chosen[at], k] = np.inf
+        return None
+
+    def _known_near(self, q: np.ndarray) -> np.ndarray:
+        """Returns lower bounds of the distances [m] by what is known at both ends of a motion, ... x 2 x pairs.
+
+        Args:
+            q: Positions of the n joints, ... x 2 x 1 x n; or ... x 1 x 1 x n for both.
+        """
+        known: np.ndarray = self._known_m - np.einsum("...n,...n->...", np.abs(q - self._known_at), self._reach)
+        return known
+
+    def _sparse(self, travelled: np.ndarray) -> np.ndarray:
+        """Returns some of k rows in order, the first and the last among them, a spacing apart."""
+        spacing_m = max(2.0 * self._margin_m, LEAST_SPACING_M)
+        marks = np.arange(travelled[0] + spacing_m, travelled[-1], spacing_m)
+        between = np.searchsorted(travelled, marks, side="right").tolist()
+        return np.array(list(dict.fromkeys((0, *between, len(travelled) - 1))))
+
+    def _contact(self, i: int) -> Contact | None:
+        return self._distances.contact(self._pairs[i], FAR_M, self._margin_m + ROUNDING_M)
+
+    def _too_near(self, motion: CommandedMotion, i: int, row: int, contact: Contact | None) -> TooNear | None:
+        """Returns a pair if its contact is too near and nearer than at the start; the robot has to stand at the row."""
+        if contact is None or contact.distance >= self._margin_m:
+            return None
+        self._distances.place(motion.start.position)
+        before = self._distances.distance(self._pairs[i], FAR_M, self._margin_m)
+        if contact.distance >= before - ROUNDING_M:
+            self._distances.place(motion.position[row])
+            return None
+        self._last = i, row
+        return TooNear(self._pairs[i], contact.distance, row > 0)
+
+    def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
+        """Returns what keeps pairs apart near some configurations, see `Check.bounds`."""
+        if not len(self._pairs):
+            return []
+        within_m = self._margin_m + SPARE_M + self._reach @ spread
+        near = np.flatnonzero(~(self._known_near(rows[:, None, None]).max(axis=1) > within_m).all(axis=0))
+        if not len(near):
+            return []
+        frames = self._distances.frames(rows)
+        least = self._separation.lower_bounds(frames, near)
+        bounds, placed = [], -1
+        for row, k in np.argwhere(~(least > within_m[near])).tolist():
+            i = int(near[k])
+            pair = self._pairs[i]
+            if placed != row:
+                self._distances.place(rows[row])
+                placed = row
+            contact = self._distances.contact(pair, FAR_M, float(within_m[i]))
+            if contact is None:
+                continue
+            if not contact.distance < least[row, k] + LOOSE_M:
+                self._separation.learn(i, contact.directions, frames[row])
+            if contact.distance >= within_m[i]:
+                continue
+            gradient = self._distances.gradient(pair, contact, rows[row])
+            room = contact.distance - self._margin_m - SPARE_M
+            if room < 0.0:
+                self._distances.place(before)
+                room = max(room, contact.distance - self._distances.distance(pair, FAR_M, float(within_m[i])))
+                placed = -1
+            bounds.append(Bound(row, gradient, room))
+        return bounds
+
+    def contacts(self, q: np.ndarray, within_m: float) -> Iterator[tuple[Pair, Contact]]:
+        """Yields the pairs that are nearer than a distance in a configuration of n positions, and where they are."""
+        self._distances.place(q)
+        for pair in self._pairs:
+            contact = self._distances.contact(pair, within_m, within_m)
+            if contact is not None and contact.distance < within_m:
+                yield pair, contact
+
+
+class ProximityCheck(Check):
+    """Base of the checks that keep pairs further apart than the margin of their configuration.
+
+    Attributes:
+        distances: Where shapes are.
+        proximity: The pairs.
+    """
+
+    distances: LinkDistances
+    proximity: Proximity
+
+    def bounds(self, rows: np.ndarray, spread: np.ndarray, before: np.ndarray) -> list[Bound]:
+        """See `Check`."""
+        return self.proximity.bounds(rows, spread, before)
+
+    def inside(self, q: np.ndarray) -> list[MarginViolation]:
+        """See `Check`."""
+        near = self.proximity.contacts(q, self.config.margin_m)
+        return [
+            MarginViolation(
+                self.name,
+                pair,
+                self.subject(pair),
+                contact.distance,
+                self.config.margin_m,
+                self.distances.gradient(pair, contact, q),
+            )
+            for pair, contact in near
+        ]
+
+    @abstractmethod
+    def subject(self, pair: Pair) -> str:
+        """Returns a pair in words."""
+
+    def undefined(self, motion: CommandedMotion) -> Violation | None:
+        """Returns a violation by a motion with numbers that are not finite, near which PyBullet would find nothing."""
+        if np.isfinite(motion.position).all():
+            return None
+        return Violation(self.name, "the robot", math.nan, self.config.margin_m, "m", quantity="distance")
+
+    def too_near(self, motion: CommandedMotion) -> Violation | None:
+        """Returns a violation by a pair that comes too near, None if none does."""
+        found = self.proximity.first(motion)
+        if found is None:
+            return None
+        subject, margin_m = self.subject(found.pair), self.config.margin_m
+        return Violation(self.name, subject, found.distance, margin_m, "m", found.is_while_braking, "distance")
+
+
+def _spread(bounds: np.ndarray, rows: np.ndarray, ways: np.ndarray) -> None:
+    """Raises lower bounds in k rows by those in some of them: between two rows a pair moves by no more than its way.
+
+    Args:
+        bounds: k x s [m]; inf of a row bounds no other one.
+        rows: Numbers of the rows, in ascending order.
+        ways: Distance that each pair has moved by each row, k x s [m].
+    """
+    known = np.where(bounds[rows] < np.inf, bounds[rows], -np.inf)
+    after = np.clip(np.searchsorted(rows, np.arange(len(bounds))), 0, len(rows) - 1)
+    for side in (after, np.maximum(after - 1, 0)):
+        np.maximum(bounds, known[side] - np.abs(ways[rows[side]] - ways), out=bounds)

@@ -1,0 +1,179 @@
+"""Distances between collision shapes by PyBullet, in a client of its own; shapes of meshes are their convex hulls."""
+
+import math
+import weakref
+from typing import Any
+
+import numpy as np
+import pybullet
+
+from custom_ros_tools.transforms import matrix_of
+from robot_model.geometry import Pose
+from rpbi.engine.client import Client
+from rpbi.urdf.joints import Joint
+from rpbi.urdf.loading import load_urdf
+from safe_robot.robot import GuardedRobot
+
+from .obstacles import Kind, Obstacle
+from .solids import ClosestPoints, Solid, balls_of, box_of, few_balls
+
+OF_PYBULLET: dict[int, Kind] = {
+    pybullet.GEOM_BOX: "box",
+    pybullet.GEOM_SPHERE: "sphere",
+    pybullet.GEOM_CYLINDER: "cylinder",
+    pybullet.GEOM_CAPSULE: "capsule",
+    pybullet.GEOM_PLANE: "plane",
+    pybullet.GEOM_MESH: "mesh",
+}
+NO_FILE = ("", "unknown_file")
+"""Names that PyBullet reports for a mesh without a file."""
+EDGE_M = (math.sqrt(3.0) - 1.0) * 1e-3
+"""Largest distance of the corners of boxes from those that PyBullet rounds, with a radius of 1 mm [m]."""
+EDGED = (pybullet.GEOM_BOX, pybullet.GEOM_CYLINDER)
+"""Shapes whose edges and corners it rounds."""
+AABB_MARGIN_M = 6e-3
+"""Largest excess of PyBullet's boxes around shapes [m]."""
+
+
+class BulletShapes:
+    """Collision shapes of a robot, and obstacles around it.
+
+    Args:
+        robot: The robot; its meshes have to be there.
+
+    Attributes:
+        links: Links that have a collision shape.
+
+    Raises:
+        ConfigError: If the robot cannot be loaded.
+    """
+
+    def __init__(self, robot: GuardedRobot) -> None:
+        self._pb = Client(pybullet.DIRECT)
+        weakref.finalize(self, self._pb.disconnect)
+        self._body = load_urdf(self._pb, robot.urdf_path, {"fileName": robot.urdf_path, "useFixedBase": True})
+        joints = Joint.all_of(self._pb, self._body)
+        moving = [(joint.index, joint.name) for joint in joints if robot.all_joints[joint.name].is_moving]
+        self._moving = [index for index, _ in moving]
+        self._to_moving = robot.map_to([name for _, name in moving])
+        names = {-1: self._pb.getBodyInfo(self._body)[0].decode(), **{joint.index: joint.link for joint in joints}}
+        self._index = {name: i for i, name in names.items() if self._pb.getCollisionShapeData(self._body, i)}
+        self.links = tuple(self._index)
+        self._missing_m = {link: _missing_m(self._pb, self._body, i) for link, i in self._index.items()}
+        self._obstacles: dict[int, int] = {}
+        self._missing_of_obstacle: dict[int, float] = {}
+
+    def place(self, q: np.ndarray) -> None:
+        """Puts the robot into a configuration of n positions [rad or m]."""
+        self._pb.resetJointStatesMultiDof(self._body, self._moving, self._to_moving(q)[:, None].tolist())
+
+    def put(self, number: int, obstacle: Obstacle) -> None:
+        """Puts an obstacle into the place of another one of its number, if there is one.
+
+        Raises:
+            ValueError: If PyBullet cannot have it.
+        """
+        self.remove(number)
+        body = self._obstacles[number] = _add(self._pb, obstacle)
+        self._missing_of_obstacle[number] = _missing_m(self._pb, body, -1)
+
+    def move(self, number: int, pose: Pose) -> None:
+        """Moves an obstacle."""
+        self._pb.resetBasePositionAndOrientation(self._obstacles[number], *pose)
+
+    def remove(self, number: int) -> None:
+        """Removes an obstacle, if there is one of that number."""
+        if number in self._obstacles:
+            self._pb.removeBody(self._obstacles.pop(number))
+
+    def closest(self, link: str, other: str | int, most_m: float) -> list[ClosestPoints]:
+        """Returns where shapes of a link are nearest to those of another one or an obstacle, up to a distance [m]."""
+        if isinstance(other, str):
+            body, index, missing_m = self._body, self._index[other], self._missing_m[other]
+        else:
+            body, index, missing_m = self._obstacles[other], -1, self._missing_of_obstacle[other]
+        missing_m += self._missing_m[link]
+        points: Any = self._pb.getClosestPoints(self._body, body, most_m + missing_m, self._index[link], index)
+        return [ClosestPoints(point[8] - missing_m, point[7], point[5], point[6]) for point in points]
+
+    def solids_of(self, link: str) -> list[Solid]:
+        """Returns the shapes of a link in its frame, larger by what PyBullet measures too far."""
+        index = self._index[link]
+        mass = matrix_of(*self._pb.getDynamicsInfo(self._body, index)[3:5])
+        return [solid.moved(0, mass) for solid in _solids_of_link(self._pb, self._body, index)]
+
+    def solids_of_obstacle(self, number: int) -> list[Solid]:
+        """Returns the shape of an obstacle in its frame."""
+        return _solids_of_link(self._pb, self._obstacles[number], -1)
+
+    def radius_m(self, link: str, origin: np.ndarray) -> float:
+        """Returns the largest distance of its shapes from a point in the root [m], as the robot stands."""
+        lower, upper = self._pb.getAABB(self._body, self._index[link])
+        return math.hypot(*np.maximum(np.subtract(upper, origin), np.subtract(origin, lower)))
+
+
+def _add(pb: Client, obstacle: Obstacle) -> int:
+    """Adds an obstacle, and returns PyBullet's number of it.
+
+    Raises:
+        ValueError: If PyBullet refuses.
+    """
+    x, y, z = obstacle.size
+    options: dict[str, dict[str, Any]] = {
+        "box": {"shapeType": pybullet.GEOM_BOX, "halfExtents": (x / 2.0, y / 2.0, z / 2.0)},
+        "sphere": {"shapeType": pybullet.GEOM_SPHERE, "radius": max(obstacle.size) / 2.0},
+        "cylinder": {"shapeType": pybullet.GEOM_CYLINDER, "radius": max(x, y) / 2.0, "height": z},
+        "capsule": {"shapeType": pybullet.GEOM_CAPSULE, "radius": max(x, y) / 2.0, "height": z},
+        "plane": {"shapeType": pybullet.GEOM_PLANE, "planeNormal": (0.0, 0.0, 1.0)},
+        "mesh": {"shapeType": pybullet.GEOM_MESH, "fileName": obstacle.mesh_file, "meshScale": obstacle.size},
+        "points": {"shapeType": pybullet.GEOM_MESH, "vertices": obstacle.corners},
+    }
+    try:
+        shape = pb.createCollisionShape(**options[obstacle.kind])
+        body = -1 if shape < 0 else pb.createMultiBody(0.0, shape, -1, *obstacle.pose)
+    except pybullet.error:
+        body = -1
+    if body < 0:
+        raise ValueError(f"PyBullet has no {obstacle.kind} for '{obstacle.name}' {obstacle.mesh_file}".rstrip())
+    return int(body)
+
+
+def _solids_of_link(pb: Client, body: int, link: int) -> list[Solid]:
+    """Returns the collision shapes of a link, in the frame of its centre of mass, larger by `missing_m`."""
+    return [solid.grown(_missing_m(pb, body, link)) for solid in _shapes_of_link(pb, body, link)]
+
+
+def _missing_m(pb: Client, body: int, link: int) -> float:
+    """Returns how much nearer a link may be than PyBullet measures, since it rounds edges [m]."""
+    return EDGE_M * any(shape[2] in EDGED for shape in pb.getCollisionShapeData(body, link))
+
+
+def _shapes_of_link(pb: Client, body: int, link: int) -> list[Solid]:
+    """Returns the shapes as they are.
+
+    If PyBullet does not tell the corners of each, the link counts as the box around it, as it lies now. So it does if
+    some shapes are meshes of files and others are not, or lie askew to each other.
+    """
+    shapes = pb.getCollisionShapeData(body, link)
+    if any(shape[2] == pybullet.GEOM_PLANE for shape in shapes):
+        return [Solid(0, np.zeros((1, 4)), np.array((0.0, 0.0, 1.0)))]
+    state = pb.getLinkState(body, link)[:2] if link >= 0 else pb.getBasePositionAndOrientation(body)
+    pose = matrix_of(*state)
+    shapes_of_files = [shape for shape in shapes if shape[2] == pybullet.GEOM_MESH and shape[4].decode() not in NO_FILE]
+    solids, places = list[Solid](), [matrix_of(*shape[5:7]) for shape in shapes]
+    if not shapes_of_files:
+        for i, (shape, place) in enumerate(zip(shapes, places)):
+            if shape[2] == pybullet.GEOM_MESH:
+                solids.append(Solid(0, few_balls(pb.getMeshData(body, link, collisionShapeIndex=i)[1])))
+            else:
+                solids.append(Solid(0, balls_of(OF_PYBULLET.get(shape[2], ""), shape[3])).moved(0, place))
+    elif len(shapes_of_files) == len(shapes):  # PyBullet makes several shapes of each: they cannot be told apart
+        solids.append(Solid(0, few_balls(pb.getMeshData(body, link)[1])))
+    boxes = [box_of(*each.moved(0, np.linalg.inv(place)).extent).moved(0, place) for each, place in zip(solids, places)]
+    lower, upper = pb.getAABB(body, link)
+    if boxes and all(np.isfinite(box.balls).all() for box in boxes):
+        # PyBullet's box is around the boxes of shapes, too: it is as large, unless there is more than it tells of
+        least, most = box_of(*Solid(0, np.concatenate([box.balls for box in boxes])).extent).moved(0, pose).extent
+        if (least - AABB_MARGIN_M <= lower).all() and (most + AABB_MARGIN_M >= upper).all():
+            return solids
+    return [box_of(np.array(lower), np.array(upper)).moved(0, np.linalg.inv(pose))]

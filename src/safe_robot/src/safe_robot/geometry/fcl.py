@@ -1,0 +1,204 @@
+"""Distances between collision shapes by hpp-fcl, which needs no simulator; shapes of meshes are their convex hulls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from custom_ros_tools.errors import ConfigError, MissingDependency, Problem
+from custom_ros_tools.transforms import matrix_of
+from robot_model.geometry import Pose, Vector, minus, norm, scaled
+from robot_model.urdf.shapes import collision_shapes
+from safe_robot.robot import GuardedRobot
+
+try:
+    import hppfcl
+except ImportError:
+    raise MissingDependency("hpp-fcl", "./rpbi setup ik") from None
+
+from .obstacles import Kind, Obstacle
+from .solids import ClosestPoints, Solid, balls_of, few_balls
+
+TOUCHING_M = 1e-9
+"""Distance between two points below which hpp-fcl's normal is the direction [m]; elsewhere the normal may be NaN."""
+
+
+class Hull(NamedTuple):
+    """A convex shape that moves with a frame.
+
+    Attributes:
+        frame: Number of the frame, see `LinkFrames`.
+        pose: Its pose in that frame, 4 x 4.
+        shape: The shape in hpp-fcl.
+        solid: The same as balls, in its own frame.
+    """
+
+    frame: int
+    pose: np.ndarray
+    shape: Any
+    solid: Solid
+
+
+class FclShapes:
+    """Collision shapes of a robot, and obstacles around it.
+
+    Args:
+        robot: The robot; its meshes have to be there.
+
+    Attributes:
+        links: Links that have a collision shape.
+
+    Raises:
+        ConfigError: If a mesh cannot be read.
+    """
+
+    def __init__(self, robot: GuardedRobot) -> None:
+        self._robot = robot
+        self._hulls: dict[str | int, list[Hull]] = {}
+        for link in robot.links:
+            frame, pose = robot.frames.place(link)
+            try:
+                shapes = collision_shapes(robot.document, link)
+                hulls = [_hull(*each[:2], each.mesh_file, frame, pose @ each.pose) for each in shapes]
+            except (ValueError, OSError) as error:
+                raise ConfigError([Problem(robot.urdf_path, f"link '{link}'", str(error))]) from None
+            if hulls:
+                self._hulls[link] = hulls
+        self.links = tuple(robot_link for robot_link in robot.links if robot_link in self._hulls)
+        self.place(np.zeros(len(robot.joint_names)))
+
+    def place(self, q: np.ndarray) -> None:
+        """Puts the robot into a configuration of n positions [rad or m]."""
+        self._frames = self._robot.frames.at(q[None])[0]
+
+    def put(self, number: int, obstacle: Obstacle) -> None:
+        """Puts an obstacle into the place of another one of its number, if there is one.
+
+        Raises:
+            ValueError: If its mesh cannot be read.
+        """
+        pose = matrix_of(*obstacle.pose)
+        self._hulls[number] = [_hull(obstacle.kind, sizes_of(obstacle), obstacle.mesh_file, 0, pose, obstacle.corners)]
+
+    def move(self, number: int, pose: Pose) -> None:
+        """Moves an obstacle."""
+        self._hulls[number] = [hull._replace(pose=matrix_of(*pose)) for hull in self._hulls[number]]
+
+    def remove(self, number: int) -> None:
+        """Removes an obstacle, if there is one of that number."""
+        self._hulls.pop(number, None)
+
+    def closest(self, link: str, other: str | int, most_m: float) -> list[ClosestPoints]:
+        """Returns where shapes of a link are nearest to those of another one or an obstacle, up to a distance [m]."""
+        found = []
+        placed = [(hull.shape, transform(self._frames[hull.frame] @ hull.pose)) for hull in self._hulls[other]]
+        for hull in self._hulls[link]:
+            place = transform(self._frames[hull.frame] @ hull.pose)
+            for shape, at in placed:
+                result = hppfcl.DistanceResult()
+                distance = hppfcl.distance(hull.shape, place, shape, at, hppfcl.DistanceRequest(True), result)
+                if distance <= most_m:
+                    ends = tuple(result.getNearestPoint1()), tuple(result.getNearestPoint2())
+                    way = minus(*ends)
+                    apart = norm(way)
+                    direction = scaled(1.0 / apart, way) if apart > TOUCHING_M else tuple(result.normal)
+                    found.append(ClosestPoints(distance, direction, *ends))
+        return found
+
+    def solids_of(self, link: str) -> list[Solid]:
+        """Returns the shapes of a link in its frame."""
+        inverse = np.linalg.inv(self._robot.frames.place(link)[1])
+        return [hull.solid.moved(0, inverse @ hull.pose) for hull in self._hulls[link]]
+
+    def solids_of_obstacle(self, number: int) -> list[Solid]:
+        """Returns the shape of an obstacle in its frame."""
+        return [hull.solid for hull in self._hulls[number]]
+
+    def radius_m(self, link: str, origin: np.ndarray) -> float:
+        """Returns the largest distance of its shapes from a point in the root [m], as the robot stands."""
+        placed = [hull.solid.moved(0, self._frames[hull.frame] @ hull.pose).balls for hull in self._hulls[link]]
+        return max(float((np.linalg.norm(balls[:, :3] - origin, axis=1) + balls[:, 3]).max()) for balls in placed)
+
+
+def _hull(
+    kind: Kind, size: tuple[float, ...], file: str, frame: int, pose: np.ndarray, corners: Sequence[Vector] = ()
+) -> Hull:
+    if kind in ("mesh", "points"):
+        shape, points = _convex(tuple(corners) if kind == "points" else mesh_corners(file, size))
+        return Hull(frame, pose, shape, Solid(0, few_balls(points)))
+    if kind == "plane":
+        below = hppfcl.Halfspace(np.array((0.0, 0.0, 1.0)), 0.0)
+        return Hull(frame, pose, below, Solid(0, np.zeros((1, 4)), np.array((0.0, 0.0, 1.0))))
+    return Hull(frame, pose, primitive(kind, size), Solid(0, balls_of(kind, size)))
+
+
+def primitive(kind: Kind, size: tuple[float, ...]) -> Any:
+    """Returns a box, sphere, cylinder or capsule in hpp-fcl, with sizes as those of a `CollisionShape`."""
+    if kind == "box":
+        return hppfcl.Box(*size)
+    if kind == "sphere":
+        return hppfcl.Sphere(size[0])
+    return (hppfcl.Cylinder if kind == "cylinder" else hppfcl.Capsule)(size[1], size[0])
+
+
+def sizes_of(obstacle: Obstacle) -> tuple[float, ...]:
+    """Returns the sizes of an obstacle as those of a `CollisionShape`."""
+    x, y, z = obstacle.size
+    round_ones = {"sphere": (max(x, y, z) / 2.0,), "cylinder": (z, max(x, y) / 2.0), "capsule": (z, max(x, y) / 2.0)}
+    return round_ones.get(obstacle.kind, obstacle.size)
+
+
+def transform(pose: np.ndarray) -> Any:
+    """Returns a pose, 4 x 4, as hpp-fcl has it."""
+    return hppfcl.Transform3f(pose[:3, :3], pose[:3, 3])
+
+
+def load_mesh(file: str, scale: tuple[float, ...]) -> Any:
+    """Returns a mesh in hpp-fcl.
+
+    Raises:
+        ValueError: If it cannot be read.
+    """
+    try:
+        return hppfcl.MeshLoader(hppfcl.NODE_TYPE.BV_OBBRSS).load(file, np.array(scale))
+    except (RuntimeError, ValueError) as error:
+        raise ValueError(f"mesh {file}: {error}") from None
+
+
+@lru_cache(maxsize=64)
+def mesh_corners(file: str, scale: tuple[float, ...]) -> tuple[Vector, ...]:
+    """Returns the corners of a mesh [m].
+
+    Raises:
+        ValueError: If it cannot be read.
+    """
+    corners = np.array(load_mesh(file, scale).vertices())
+    if not len(corners) or not np.isfinite(corners).all():
+        raise ValueError(f"mesh {file}: expected finite corners")
+    return tuple(map(tuple, corners.tolist()))
+
+
+@lru_cache(maxsize=64)
+def _convex(corners: tuple[Vector, ...]) -> tuple[Any, list[Vector]]:
+    """Returns the convex hull of some points in hpp-fcl, and its corners.
+
+    Raises:
+        ValueError: If the points are in one plane.
+    """
+    try:
+        hull = ConvexHull(np.array(corners))
+    except QhullError:
+        raise ValueError("expected a shape that is not flat") from None
+    number = {int(vertex): i for i, vertex in enumerate(hull.vertices)}
+    points, triangles = hppfcl.StdVec_Vec3f(), hppfcl.StdVec_Triangle()
+    for vertex in hull.vertices:
+        points.append(hull.points[vertex])
+    for simplex, outward in zip(hull.simplices, hull.equations[:, :3]):
+        a, b, c = hull.points[simplex]
+        ordered = simplex if np.cross(b - a, c - a) @ outward > 0.0 else simplex[::-1]
+        triangles.append(hppfcl.Triangle(*(number[int(vertex)] for vertex in ordered)))
+    return hppfcl.Convex(points, triangles), [corners[vertex] for vertex in hull.vertices]

@@ -1,0 +1,80 @@
+"""Bodies of a world of the simulator as obstacles."""
+
+from collections.abc import Iterator, Set
+
+import pybullet
+
+from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
+from robot_model.geometry import Pose
+from rpbi.bodies import Body
+from rpbi.bodies.visual_shapes import turned_to
+from rpbi.world import World
+
+from .bullet import NO_FILE, OF_PYBULLET
+from .obstacles import Obstacle
+
+
+def obstacles_of_world(path: str, joints: Set[str], robot: str | None = None) -> tuple[Obstacle, ...]:
+    """Returns the collision shapes of a world, where they are at its start, in the root of one of its robots.
+
+    Args:
+        path: The main YAML file of the world.
+        joints: Names of the joints of the guarded robot.
+        robot: Its name in the world, where it is left out. Without it, it is the only body of the world that has these
+            joints; if there is none, the world's origin is the robot's root.
+
+    Raises:
+        ConfigError: If the world cannot be loaded, has no such robot, or a shape that cannot be taken.
+    """
+    world = World.from_file(path, connection_mode=pybullet.DIRECT)
+    try:
+        own = _own_body(world, path, joints, robot)
+        base = Pose() if own is None else own.base_pose()
+        shapes = [
+            shape._replace(pose=base.inverse() @ shape.pose)
+            for body in world.bodies.values()
+            if body is not own and not body.is_soft
+            for shape in _shapes_of(body, path)
+        ]
+    finally:
+        world.close()
+    return tuple(shapes)
+
+
+def _own_body(world: World, path: str, joints: Set[str], name: str | None) -> Body | None:
+    if name is not None:
+        if name not in world.bodies:
+            raise ConfigError([Problem(path, "", str(UnknownNameError("robot", name, world.bodies)))])
+        return world.bodies[name]
+    alike = [body for body in world.bodies.values() if not body.is_soft and joints <= _joints_of(body)]
+    if len(alike) > 1:
+        names = ", ".join(body.name for body in alike)
+        message = f"expected the name of one robot, since several have these joints: {names}"
+        raise ConfigError([Problem(path, "", message)])
+    return alike[0] if alike else None
+
+
+def _joints_of(body: Body) -> set[str]:
+    return {body.pb.getJointInfo(body.body_id, i)[1].decode() for i in range(body.pb.getNumJoints(body.body_id))}
+
+
+def _shapes_of(body: Body, path: str) -> Iterator[Obstacle]:
+    pb = body.pb
+    for link in range(-1, pb.getNumJoints(body.body_id)):
+        if link < 0:
+            middle = Pose(*pb.getBasePositionAndOrientation(body.body_id))
+        else:
+            middle = Pose(*pb.getLinkState(body.body_id, link, computeForwardKinematics=1)[:2])
+        for _, _, geometry, size, file, position, quat in pb.getCollisionShapeData(body.body_id, link):
+            kind = OF_PYBULLET.get(geometry)
+            if kind is None or (kind == "mesh" and file.decode() in NO_FILE):
+                message = f"'{body.name}' has a shape that a guard cannot take: expected a box, sphere, cylinder, "
+                raise ConfigError([Problem(path, "", message + "capsule, plane or mesh of a file, got another")])
+            pose = middle @ Pose(position, quat)
+            if kind == "sphere":
+                size = (2.0 * size[0],) * 3
+            elif kind in ("cylinder", "capsule"):
+                size = 2.0 * size[1], 2.0 * size[1], size[0]
+            elif kind == "plane":
+                pose, size = pose @ Pose(quat_xyzw=turned_to(size)), (1.0, 1.0, 1.0)
+            yield Obstacle(body.name, kind, tuple(size), pose, file.decode() if kind == "mesh" else "")

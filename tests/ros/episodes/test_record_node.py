@@ -1,0 +1,160 @@
+"""Episodes recorded from a world, listed, repaired, and simulated again."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import signal
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rospy
+from keyboard.msg import Key
+from node_world import main_config, publishing
+from ros_system import wait_until
+from sensor_msgs.msg import JointState, Joy
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+from worlds import FLOOR, box, iiwa
+
+from custom_ros_tools.console.modules import command_of
+from episodes import EpisodeFolder, episodes_to_dataframes
+from ros_pybullet_interface.msg import SimulationState
+
+JOINTS = ["lbr_iiwa_joint_1", "lbr_iiwa_joint_2"]
+
+
+def _run(name: str, *words: str | Path) -> tuple[int, str]:
+    """Runs a command; returns its exit code and what it printed."""
+    command = command_of(f"episodes.ros.console.{name}")
+    assert command is not None
+    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(out):
+        code = command.run([str(word) for word in words])
+    return code, out.getvalue()
+
+
+def _recorder_pid() -> int:
+    found = subprocess.run(["pgrep", "-f", "rosbag/record.*episode.bag"], capture_output=True, text=True).stdout.split()
+    return int(found[0])
+
+
+class _Session:
+    """A world with an arm, and the node that records."""
+
+    def __init__(self, ros: Any, tmp_path: Path, **parameters: Any) -> None:
+        self.ros, self.folder = ros, EpisodeFolder(tmp_path / "demos")
+        world = main_config(tmp_path, collision=(FLOOR,), dynamic=(box("box"),), robots=(iiwa(),), state_hash_hz=20.0)
+        ros.simulator(world, use_sim_time=True)
+        for name, value in {"folder": str(self.folder.path), "disk_reserve_mb": 1.0, **parameters}.items():
+            rospy.set_param(f"/record/{name}", value)
+        self.states = ros.listen("/rpbi/state", SimulationState)
+        self.status = ros.listen("/record/status", String)
+        self.node = ros.start(["rosrun", "episodes", "record_node.py"])
+        wait_until(lambda: self.now()["recording"] is False, "the node is up")
+        wait_until(lambda: "no rpbi/world" not in self.call("start").message, "it has the world's description")
+
+    def call(self, name: str) -> Any:
+        return self.ros.call(f"/record/{name}", Trigger)
+
+    def now(self) -> dict[str, Any]:
+        return dict(json.loads(self.status.messages[-1].data))
+
+    def move(self, angle: float) -> None:
+        """Moves the arm for a while."""
+        with publishing("/rpbi/iiwa/joint_states/target", JointState) as target:
+            target.publish(JointState(name=JOINTS, position=[angle, angle / 2]))
+            tick = self.states.messages[-1].tick
+            wait_until(lambda: self.states.messages[-1].tick > tick + 300, "it moves")
+
+
+def _answer(answer: Any) -> str:
+    assert answer.success, answer.message
+    return str(answer.message)
+
+
+@pytest.mark.quick
+def test_episodes_are_recorded_listed_verified_and_a_changed_file_is_named(ros: Any, tmp_path: Path) -> None:
+    session = _Session(ros, tmp_path, seeds="3")
+    folder = session.folder
+    session.move(0.3)  # the first episode; a start is refused meanwhile
+    assert not session.call("start").success
+    with publishing("/keyboard/keydown", Key) as keys:
+        keys.publish(Key(code=Key.KEY_s))
+        wait_until(lambda: session.now()["label"] == "success", "the key labels it")
+    assert "episode 0 is complete" in _answer(session.call("stop"))
+    assert not session.call("stop").success
+    _answer(session.call("start"))
+    session.move(-0.3)
+    assert "discarded/episode_000001" in _answer(session.call("discard"))
+    session.move(0.1)  # between two episodes
+    _answer(session.call("start"))
+    session.move(0.5)
+    wait_until(lambda: session.now()["messages"] > 100, "the counters have been read")
+    os.kill(_recorder_pid(), signal.SIGKILL)
+    wait_until(lambda: folder.numbers() == [0, 2], "what is left is repaired")
+
+    first, third = folder.all()
+    assert (first.label, first.seeds, first.state, first.lost) == ("success", "3", "complete", {})
+    assert third.state == "recovered" and third.messages > 0 and "messages recovered of" in third.note
+    assert first.topics["/rpbi/iiwa/joint_states"]["messages"] > 10
+    assert {"/clock", "/rpbi/commands", "/rpbi/state"} <= first.topics.keys()
+    assert any(each["path"].endswith(".urdf") and each["meshes"] for each in first.files)
+
+    code, text = _run("episodes", folder.path)
+    assert code == 0 and len(text.splitlines()) == 3 and "recovered" in text
+    assert _run("episodes", folder.path, "--relabel", "2", "killed")[0] == 0
+    code, text = _run("episodes", folder.path, "--show", "2")
+    assert code == 0 and "label    killed" in text
+    tables = episodes_to_dataframes(folder.path, "/rpbi/iiwa/joint_states")
+    states = tables["/rpbi/iiwa/joint_states"]
+    assert states.index.names == ["episode", "time"] and set(states.index.get_level_values(0)) == {0, 2}
+
+    code, text = _run("verify", folder.path, "--jobs", "2")
+    assert code == 0, text
+    assert "episode 0 (success): same: " in text and "2 of 2 episodes are the same" in text
+
+    [copy] = [each for each in folder.files.glob("*.yaml") if "baseMass" in each.read_text()]
+    copy.write_text(copy.read_text().replace("1", "2", 1))
+    code, text = _run("verify", folder.path)
+    assert code == 1 and text.count(f"files/{copy.name}, the copy of {tmp_path}/") == 2
+
+
+def test_with_resets_by_a_button_and_a_changed_urdf(ros: Any, tmp_path: Path) -> None:
+    session = _Session(ros, tmp_path, reset=True, start_button=1)
+    session.move(0.4)
+    with publishing("/joy", Joy) as joy:
+        for is_recording in (False, True, False):
+            joy.publish(Joy(buttons=[0, 1]))
+            joy.publish(Joy(buttons=[0, 0]))
+            wait_until(lambda state=is_recording: session.now()["recording"] is state, "the button acts")
+            if is_recording:
+                session.move(-0.4)
+    folder = session.folder
+    code, text = _run("verify", folder.path)
+    assert code == 0, text
+    [urdf] = [each for each in folder.files.glob("*.urdf")]
+    urdf.write_text(urdf.read_text().replace('<mass value="', '<mass value="1'))
+    code, text = _run("verify", folder.path)
+    assert code == 1 and f"{urdf.name}, the copy of" in text and "differs at tick" in text
+
+
+def test_the_node_repairs_what_it_finds_and_a_full_disk_is_named(ros: Any, tmp_path: Path) -> None:
+    session = _Session(ros, tmp_path)
+    session.move(0.2)
+    recorder = _recorder_pid()
+    session.node.kill()
+    os.kill(recorder, signal.SIGKILL)
+    session.node.wait()
+    folder = session.folder
+    assert (folder.numbers(), len(folder.partial())) == ([], 1)
+    code, text = _run("episodes", folder.path, "--repair")
+    assert code == 0 and "episode 0: recovered: the recorder was killed, " in text
+    assert folder.read(0).messages > 0 and folder.partial() == []
+    rospy.set_param("/record/disk_reserve_mb", 1e9)
+    ros.start(["rosrun", "episodes", "record_node.py"])
+    wait_until(lambda: "MB free on the disk" in session.call("start").message, "the start is refused")
+    assert folder.numbers() == [0]

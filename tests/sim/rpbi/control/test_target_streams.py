@@ -1,0 +1,184 @@
+"""Robots that follow streams of position targets."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections import deque
+
+import numpy as np
+import pytest
+from worlds import iiwa, write_world
+
+from rpbi.control.joint_command import JointCommand
+from rpbi.world import World
+
+FIRST = "lbr_iiwa_joint_1"
+DT_S = 0.002
+EVERY = 10
+"""Ticks between two targets of a stream at 50 Hz."""
+TICKS = 1500
+BUFFER_S = 0.02 - 1.5 * DT_S
+"""Delay by the jitter buffer, which counts one and a half ticks for itself."""
+
+
+def swing(time_s: float) -> float:
+    return 0.8 * math.sin(2.0 * math.pi * 0.3 * time_s)
+
+
+def swing_velocity(time_s: float) -> float:
+    return 0.8 * 2.0 * math.pi * 0.3 * math.cos(2.0 * math.pi * 0.3 * time_s)
+
+
+@pytest.fixture
+def build(tmp_path):
+    worlds = []
+
+    def build_world(interpolation: str | None = None, **more) -> World:
+        keys = {} if interpolation is None else {"target_interpolation": interpolation}
+        world = World.from_file(write_world(tmp_path, robots=(iiwa(**keys, **more),), timeStep=DT_S))
+        worlds.append(world)
+        return world
+
+    yield build_world
+    for world in worlds:
+        world.close()
+
+
+def follow(world: World, every: int, velocities: bool = False) -> np.ndarray:
+    """Has the first joint follow targets; returns position [rad], velocity [rad/s] and effort [N m] by tick."""
+    arm = world.bodies["iiwa"]
+    states = []
+    for tick in range(TICKS):
+        if tick % every == 0:
+            time_s = tick * DT_S
+            velocity = [swing_velocity(time_s)] if velocities else []
+            stamp_ns = round(1e9 * (1.0 + time_s))
+            world.put("iiwa/target", JointCommand([FIRST], [swing(time_s)], velocity, stamp_ns=stamp_ns))
+        world.step()
+        states.append([arm.pb.getJointState(arm.body_id, arm.model[FIRST].index)[index] for index in (0, 1, 3)])
+    return np.array(states)[300:]
+
+
+def test_a_stream_needs_no_more_effort_than_targets_at_every_tick(build):
+    ideal = np.abs(follow(build(), 1)[:, 2]).max()
+    smooth, hold = (np.abs(follow(build(mode), EVERY)[:, 2]).max() for mode in ("smooth", "hold"))
+    assert smooth < 1.3 * ideal
+    assert hold > 5.0 * ideal
+
+
+@pytest.mark.parametrize(
+    "mode, lag_s", [("smooth", 1.5 * EVERY * DT_S + BUFFER_S), ("linear", EVERY * DT_S + BUFFER_S)]
+)
+def test_a_stream_is_followed_with_a_known_lag(build, mode, lag_s):
+    position, velocity, _ = follow(build(mode), EVERY).T
+    times_s = (np.arange(300, TICKS) + 1) * DT_S - lag_s
+    assert position == pytest.approx([swing(each) for each in times_s], abs=2e-3)
+    ripple = velocity - [swing_velocity(each - DT_S / 2.0) for each in times_s]
+    assert np.sqrt(np.mean(ripple**2)) < (0.01 if mode == "smooth" else 0.04)
+
+
+def test_velocities_are_fed_forward(build):
+    """A stream that tells them lags by one period, targets at every tick do not lag at all."""
+    times_s = (np.arange(300, TICKS) + 1) * DT_S
+    for every, lag_s in ((EVERY, EVERY * DT_S + BUFFER_S), (1, DT_S)):
+        position = follow(build(), every, velocities=True)[:, 0]
+        assert position == pytest.approx([swing(each - lag_s) for each in times_s], abs=1e-3)
+    without = follow(build(), 1)[:, 0]
+    assert np.abs(without - [swing(each) for each in times_s]).max() > 0.02
+
+
+def jittery(rng: random.Random, stamps: str, jitter_s: float, stall_s: float = 0.0) -> list[tuple[float, float, int]]:
+    """Returns arrival [s], time of the sample [s] and stamp [ns] of targets at 50 Hz, one of them with a stall."""
+    targets, latest_s = [], 0.0
+    for number in range(round(TICKS / EVERY)):
+        sample_s = number * EVERY * DT_S
+        late_s = stall_s if stall_s and number == 100 else rng.uniform(0.0, jitter_s)
+        latest_s = max(latest_s, sample_s + late_s)
+        stamp_s = {"sample": sample_s, "sending": latest_s, "none": -1.0}[stamps]
+        targets.append((latest_s, sample_s, round(1e9 * (1.0 + stamp_s))))
+    return targets
+
+
+def follow_jittery(world: World, targets: list[tuple[float, float, int]], velocities: bool) -> tuple[float, float]:
+    """Returns the largest effort [N m] of the first joint and its mean lag [s]."""
+    arm = world.bodies["iiwa"]
+    index, waiting, states = arm.model[FIRST].index, deque(targets), []
+    for tick in range(TICKS):
+        while waiting and waiting[0][0] <= tick * DT_S + 1e-9:
+            _, sample_s, stamp_ns = waiting.popleft()
+            velocity = [swing_velocity(sample_s)] if velocities else []
+            world.put("iiwa/target", JointCommand([FIRST], [swing(sample_s)], velocity, stamp_ns=stamp_ns))
+        world.step()
+        position, _, _, effort = arm.pb.getJointState(arm.body_id, index)
+        time_s = (tick + 1) * DT_S
+        states.append((position - swing(time_s), swing_velocity(time_s), effort))
+    error, velocity, effort = np.array(states)[400:].T
+    return float(np.abs(effort).max()), float(-(error @ velocity) / (velocity @ velocity))
+
+
+@pytest.mark.parametrize(
+    "stamps, velocities", [("sample", False), ("sending", False), ("sending", True), ("none", False)]
+)
+def test_jitter_costs_little_effort_and_lag(build, stamps, velocities):
+    ideal = np.abs(follow(build(), 1, velocities)[100:, 2]).max()
+    effort, lag_s = follow_jittery(build(), jittery(random.Random(7), stamps, 0.012), velocities)
+    assert effort < 1.2 * ideal
+    assert lag_s < 0.051
+
+
+@pytest.mark.parametrize("velocities", [False, True])
+def test_a_stall_costs_little_effort(build, velocities):
+    ideal = np.abs(follow(build(), 1, velocities)[100:, 2]).max()
+    effort, _ = follow_jittery(build(), jittery(random.Random(0), "sending", 0.0, 0.03), velocities)
+    assert effort < 1.5 * ideal
+
+
+def test_a_single_target_acts_at_the_next_tick(build):
+    world = build()
+    arm = world.bodies["iiwa"]
+    index = arm.model[FIRST].index
+    world.put("iiwa/target", JointCommand([FIRST], [0.3]))
+    world.step()
+    assert arm.motors.targets[index] == 0.3
+    assert arm.drive.measured()[index][0] > 0.01
+
+
+def test_targets_beyond_a_limit_go_to_the_limit(build):
+    world = build()
+    arm = world.bodies["iiwa"]
+    upper = arm.model[FIRST].upper
+    for number in range(40):
+        world.put("iiwa/target", JointCommand([FIRST], [0.1 * number], [5.0]))
+        for _ in range(EVERY):
+            world.step()
+            assert arm.motors.targets[arm.model[FIRST].index] <= upper
+    assert arm.drive.measured()[arm.model[FIRST].index][0] == pytest.approx(upper, abs=1e-3)
+
+
+def test_what_comes_between_ends_a_stream(build):
+    """Put elsewhere in the middle of a stream, a joint stays there; others of the stream hold."""
+    world = build()
+    arm = world.bodies["iiwa"]
+    second = "lbr_iiwa_joint_2"
+    for number in range(8):
+        world.put("iiwa/target", JointCommand([FIRST, second], [0.02 * number] * 2))
+        for _ in range(EVERY):
+            world.step()
+    world.act("iiwa", "set_joint_state", JointCommand([FIRST], [-0.5]))
+    held = arm.motors.targets[arm.model[second].index]
+    for _ in range(200):
+        world.step()
+    measured = arm.drive.measured()
+    assert measured[arm.model[FIRST].index][0] == pytest.approx(-0.5, abs=1e-3)
+    assert measured[arm.model[second].index][0] == pytest.approx(held, abs=1e-3)
+    assert 0.1 < held < 0.14
+
+
+def test_targets_that_come_while_it_stands_still_act_when_it_goes_on(build):
+    world = build()
+    for number in range(500):
+        world.put("iiwa/target", JointCommand([FIRST], [0.001 * number], stamp_ns=1 + number * 20_000_000))
+        world.apply_inputs()
+    world.step()
+    assert world.bodies["iiwa"].motors.targets[world.bodies["iiwa"].model[FIRST].index] == pytest.approx(0.499)

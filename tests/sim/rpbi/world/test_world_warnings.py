@@ -1,0 +1,202 @@
+"""What is probably not meant in a world is told, and nothing else."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pybullet
+import pytest
+from worlds import BOX_FLOOR, FLOOR, ball, box, iiwa, write_world
+
+from rpbi.world import World
+from rpbi.world_warnings import PLANE_ADVICE, world_warnings
+
+ROOT = Path(__file__).resolve().parents[4]
+SHIPPED = [path for path in sorted(ROOT.glob("src/*/configs/**/*.yaml")) if "\ntimeStep:" in path.read_text()]
+"""The main files of all examples."""
+
+GRAVITY = {"setGravity": {"gravZ": -9.81}}
+PIN = """<robot name="pin"><link name="base"/>
+<link name="rod"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="slide" type="prismatic"><parent link="base"/><child link="rod"/><axis xyz="0 0 1"/>
+<limit lower="0.1" upper="0.2" effort="1" velocity="1"/></joint></robot>"""
+
+
+@pytest.fixture
+def warnings_of(tmp_path):
+    """Returns the warnings of a world."""
+
+    def build(**parts) -> list[str]:
+        world = World.from_file(write_world(tmp_path, **parts), connection_mode=pybullet.DIRECT)
+        try:
+            return [str(warning).replace(f"{tmp_path}/", "") for warning in world_warnings(world)]
+        finally:
+            world.close()
+
+    return build
+
+
+def follower(name, tf_id, **more):
+    table = {key: value for key, value in box(name, **more).items() if key != "baseMass"}
+    return {**table, "object_tf": {"tf_id": tf_id}}
+
+
+def test_a_sound_world_has_none(warnings_of):
+    resting = box(basePosition=[1.0, 0.0, 0.1])  # on the floor
+    assert warnings_of(collision=(BOX_FLOOR,), dynamic=(resting,), robots=(iiwa(),)) == []
+
+
+def test_no_gravity_is_told_if_something_could_fall_and_nobody_says_that_it_is_meant(tmp_path, warnings_of):
+    weightless = {"name": "free", "loadURDF": {"fileName": "cube_small.urdf", "basePosition": [0, 0, 1]}}
+    path = write_world(tmp_path, dynamic=(ball(),), urdfs=(weightless,), robots=(iiwa(),), collision=(BOX_FLOOR,))
+    text = (tmp_path / "world.yaml").read_text().replace("setGravity:\n  gravZ: -9.81\n", "")
+    (tmp_path / "world.yaml").write_text(text)
+    world = World.from_file(path)
+    [told] = [str(each) for each in world_warnings(world) if each.key == "setGravity"]
+    world.close()
+    assert "no gravity, and ball, free will not fall" in told
+    assert not [each for each in warnings_of(dynamic=(ball(),), setGravity={"gravZ": 0.0}) if "gravity" in each]
+    assert warnings_of(robots=(iiwa(),), collision=(BOX_FLOOR,), setGravity={}) == []
+
+
+def test_bodies_in_each_other_are_told_with_the_depth(warnings_of):
+    low = box("low", basePosition=[1.0, 0.0, 0.06])
+    other = box("other", basePosition=[1.18, 0.0, 0.1])
+    told = warnings_of(collision=(BOX_FLOOR,), dynamic=(low, other), robots=(iiwa(),))
+    assert told == [
+        "floor.yaml: at the start, 'floor' and 'low' overlap by 0.04 m, and will be pushed apart",
+        "low.yaml: at the start, 'low' and 'other' overlap by 0.02 m, and will be pushed apart",
+    ]
+
+
+def test_the_link_of_a_robot_that_is_in_something_is_named_but_not_what_stands_still_anyway(warnings_of):
+    plinth = {**follower("plinth", "x"), "basePosition": [0.0, 0.0, -0.05]}  # the foot of the arm is in it
+    del plinth["object_tf"]
+    hit = ball("hit", radius_m=0.05, basePosition=[0.0, 0.0, 1.2])
+    told = warnings_of(collision=(plinth,), dynamic=(hit,), robots=(iiwa(),))
+    assert len(told) == 1 and "'hit' and 'iiwa/lbr_iiwa_link_" in told[0]
+
+
+def test_bodies_that_follow_a_frame_are_looked_at_where_the_main_file_puts_it(warnings_of):
+    table = follower("table", "rpbi/table")
+    thing = box("thing", basePosition=[3.0, 0.0, 0.15])
+    poses = [{"tf_id": "rpbi/table", "position": [3.0, 0.0, 0.0]}]
+    told = warnings_of(collision=(table,), dynamic=(thing,), poses=poses)
+    assert told == ["table.yaml: at the start, 'table' and 'thing' overlap by 0.05 m, and will be pushed apart"]
+    at_origin = box("thing", basePosition=[0.0, 0.0, 0.15])
+    assert warnings_of(collision=(table,), dynamic=(at_origin,), poses=poses) == []
+
+
+def test_frames_that_nobody_publishes_are_told_with_who_follows_them_and_what_to_do(warnings_of):
+    lone, near = follower("lone", "bench"), follower("near", "rpbi/tabel", basePosition=[9.0, 0.0, 0.0])
+    held, kept = follower("held", "rpbi/iiwa/lbr_iiwa_link_7"), follower("kept", "rpbi/ball")
+    camera = {"name": "eye", "object_tf": {"tf_id": "rpbi/iiwa/lbr_iiwa_link_9"}}
+    parts = {"collision": (lone, near, held, kept), "poses": [{"tf_id": "rpbi/table"}, {"tf_id": "p", "parent": "q"}]}
+    told = warnings_of(**parts, dynamic=(ball(basePosition=[5, 5, 5]),), robots=(iiwa(),), rgbd_sensor=camera)
+    nothing = "nothing here publishes the TF frame"
+    assert told == [
+        f"world.yaml: poses[1].parent: {nothing} 'q'; say where it is under `poses`, or have another node publish it",
+        f"lone.yaml: object_tf.tf_id: 'lone' follows it: {nothing} 'bench'; say where it is under `poses`, or have "
+        "another node publish it",
+        f"near.yaml: object_tf.tf_id: 'near' follows it: {nothing} 'rpbi/tabel'; did you mean 'rpbi/table'?; say where "
+        "it is under `poses`, or have another node publish it",
+        f"held.yaml: object_tf.tf_id: 'held' follows it: {nothing} 'rpbi/iiwa/lbr_iiwa_link_7'; 'iiwa' does with "
+        "broadcast_link_states: true",
+        f"kept.yaml: object_tf.tf_id: 'kept' follows it: {nothing} 'rpbi/ball'; 'ball' does with broadcast_hz",
+        f"world.yaml: object_tf.tf_id: 'eye' follows it: {nothing} 'rpbi/iiwa/lbr_iiwa_link_9'; 'iiwa' does with "
+        "broadcast_link_states: true",
+    ]
+    told = warnings_of(
+        **parts,
+        dynamic=(ball(basePosition=[5, 5, 5], broadcast_hz=10.0),),
+        robots=(iiwa(broadcast_link_states=True),),
+        rgbd_sensor=camera,
+    )
+    assert [warning.split(":")[0] for warning in told] == ["world.yaml", "lone.yaml", "near.yaml", "world.yaml"]
+    assert "'rpbi/iiwa/lbr_iiwa_link_9'; did you mean 'rpbi/iiwa/lbr_iiwa_link_" in told[-1]
+    twice = warnings_of(dynamic=(ball(broadcast_hz=10.0),), poses=[{"tf_id": "rpbi/ball"}])
+    assert twice == ["world.yaml: poses[0].tf_id: 'ball' publishes 'rpbi/ball' too"]
+
+
+def test_links_that_robot_state_publisher_makes_are_taken_to_be_there(warnings_of):
+    held = follower("held", "rpbi/iiwa/lbr_iiwa_link_7")
+    assert warnings_of(collision=(held,), robots=(iiwa(broadcast_root_tf_hz=10.0),)) == []
+
+
+@pytest.mark.parametrize("kind", ["robots", "urdfs"])
+def test_joints_that_start_beyond_their_limits_are_told(tmp_path, warnings_of, kind):
+    (tmp_path / "pin.urdf").write_text(PIN)
+    pin = {"name": "pin", "loadURDF": {"fileName": "pin.urdf", "useFixedBase": True}}
+    if kind == "robots":
+        pin["setJointMotorControlArray"] = {"controlMode": "POSITION_CONTROL"}
+    [told] = warnings_of(**{kind: (pin,)})
+    assert told.endswith("at the start, joint 'slide' must be within 0.1 to 0.2 m, got 0")
+    if kind == "robots":
+        assert warnings_of(robots=({**pin, "initial_joint_position": {"slide": 0.15}},)) == []
+
+
+def test_a_robot_that_waits_for_another_is_told(warnings_of):
+    [told] = warnings_of(robots=(iiwa(initial_joint_state_topic="real/joint_states"),))
+    assert (
+        told == "iiwa.yaml: initial_joint_state_topic: the world only starts if joint states come on real/joint_states"
+    )
+
+
+PLANE = "floor.yaml: createCollisionShape.shapeType: "
+ADVICE = "use a box, such as {shapeType: GEOM_BOX, halfExtents: [50, 50, 0.5], collisionFramePosition: [0, 0, -0.5]}"
+
+
+@pytest.mark.parametrize("height_m", [0.1, 0.1001, 3.0])
+def test_what_rests_on_a_plane_or_falls_onto_it_is_told_with_the_remedy(warnings_of, height_m):
+    thing = box(basePosition=[1.0, 0.0, height_m])
+    [told] = warnings_of(collision=(FLOOR,), dynamic=(thing,), robots=(iiwa(),))
+    assert told.startswith(f"{PLANE}'box' rests on this plane: planes lose contact points") and told.endswith(ADVICE)
+    assert warnings_of(collision=(BOX_FLOOR,), dynamic=(thing,), robots=(iiwa(),)) == []
+
+
+def test_many_on_a_plane_are_one_warning_and_urdfs_count_too(warnings_of):
+    boxes = tuple(box(f"box_{index}", basePosition=[0.5 * index, 0.0, 0.1]) for index in range(4))
+    cube = {"name": "cube", "loadURDF": {"fileName": "cube_small.urdf", "basePosition": [0, 3, 0.5]}}
+    [told] = warnings_of(collision=(FLOOR,), dynamic=boxes, urdfs=(cube,))
+    assert told.startswith(f"{PLANE}'box_0', 'box_1', 'box_2' and 2 more rest on this plane: ")
+    plane = {"name": "plane", "loadURDF": {"fileName": "plane_implicit.urdf"}}
+    [told] = warnings_of(dynamic=boxes[:1], urdfs=(plane,))
+    assert told.startswith("plane.yaml: loadURDF.fileName: 'box_0' rests on this plane: ")
+
+
+def test_a_ball_on_a_plane_a_box_on_a_table_a_wall_and_weightlessness_are_fine(warnings_of):
+    table = follower("table", "rpbi/table")
+    poses = [{"tf_id": "rpbi/table", "position": [3.0, 0.0, 0.1]}]
+    upon = box("upon", basePosition=[3.0, 0.0, 0.3])
+    balls = ball(basePosition=[1.0, 0.0, 0.1])
+    assert warnings_of(collision=(FLOOR, table), dynamic=(upon, balls), poses=poses) == []
+    wall = {**FLOOR, "createCollisionShape": {"shapeType": "GEOM_PLANE", "planeNormal": [1.0, 0.0, 0.0]}}
+    assert warnings_of(collision=(wall,), dynamic=(box(basePosition=[0.1, 0.0, 0.0]),)) == []
+    free = {"setGravity": {"gravZ": 0.0}}
+    assert warnings_of(collision=(FLOOR,), dynamic=(box(basePosition=[0.0, 0.0, 0.1]),), **free) == []
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: str(path.relative_to(ROOT / "src")))
+def test_no_shipped_world_has_anything_on_a_plane(path):
+    world = World.from_file(str(path), connection_mode=pybullet.DIRECT)
+    told = [str(warning) for warning in world_warnings(world) if PLANE_ADVICE in warning.message]
+    world.close()
+    assert told == []
+
+
+def test_no_page_and_no_template_shows_a_plane_to_copy():
+    texts = {path: path.read_text() for path in ROOT.glob("templates/**/*.yaml")}
+    texts |= {
+        path: "".join(re.findall("```yaml.*?```", path.read_text(), re.DOTALL)) for path in ROOT.glob("docs/*.md")
+    }
+    assert len(texts) > 40
+    assert [path.name for path, text in texts.items() if "GEOM_PLANE" in text] == []
+
+
+def test_bodies_in_maximal_coordinates_of_which_pybullet_tells_no_shapes_have_warnings_too(warnings_of):
+    cube = {"name": "cube", "loadURDF": {"fileName": "cube_small.urdf", "useMaximalCoordinates": True}}
+    found = warnings_of(
+        collision=(FLOOR,), urdfs=({**cube, "loadURDF": {**cube["loadURDF"], "basePosition": [0, 0, 1]}},)
+    )
+    assert any("cube" in each for each in found)

@@ -1,0 +1,137 @@
+"""Plugin for pytest: which tests run, on which worker, and in which order."""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+from collections.abc import Generator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+TESTS = Path(__file__).resolve().parents[2]
+FIRST = ("ros/ik_ros", "ros/rpbi_examples", "gui", "ros", "unit/safe_robot", "sim")
+"""Folders whose files take long: they are begun first, so that no worker is left alone with one at the end."""
+
+
+QUICK_FOLDERS = ("unit", "sim")
+"""Folders whose tests are quick, as those of the top are; elsewhere those with the mark."""
+NOT_QUICK = ("sim/rpbi_examples/test_dressing.py", "unit/safe_robot/test_guard_fuzz.py")
+"""Files in these folders whose tests take longest and draw at random: only the whole run has them."""
+
+EXTRA_OF = {
+    "pinocchio": "ik",
+    "daqp": "ik",
+    "casadi": "mpc",
+    "cv2": "tags",
+    "nbclient": "notebook",
+    "nbformat": "notebook",
+}
+"""Extra that has a module."""
+
+
+STUCK_S = 700.0
+"""After so long a test that its time-out cannot end, since it is stuck outside of Python, ends its worker [s]."""
+STDERR = pytest.StashKey[int]()
+"""Where the stacks of a stuck worker go."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Keeps a way out to the terminal that no test captures."""
+    config.stash[STDERR] = os.dup(2)
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, None, None]:
+    """Has a run that is stuck end with where, instead of never."""
+    faulthandler.dump_traceback_later(STUCK_S, exit=True, file=item.config.stash[STDERR])
+    yield
+    faulthandler.cancel_dump_traceback_later()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Knows `--quick` and `--skip-missing-extras`."""
+    parser.addoption("--quick", action="store_true", help="most of unit and sim, one test of each ROS path")
+    text = "skip tests that need an extra that is not installed"
+    parser.addoption("--skip-missing-extras", action="store_true", help=text)
+
+
+def _missing_extra(error: BaseException | None) -> str | None:
+    """Returns what an error and its causes say of an extra that is not installed."""
+    while error is not None:
+        if type(error).__name__ == "MissingDependency":
+            return str(error)
+        if isinstance(error, ModuleNotFoundError) and error.name in EXTRA_OF:
+            return f"'{error.name}' is not installed: ./rpbi setup {EXTRA_OF[error.name]}"
+        error = error.__cause__
+    return None
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_make_collect_report(collector: pytest.Collector) -> Generator[None, Any, None]:
+    """Makes a file whose imports miss an extra a skipped one, if that is asked for."""
+    report = (yield).get_result()
+    missing = report.call.excinfo and _missing_extra(report.call.excinfo.value)
+    if missing and collector.config.getoption("skip_missing_extras"):
+        report.outcome, report.longrepr, report.result = "skipped", (str(collector.path), 1, f"Skipped: {missing}"), []
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo) -> Generator[None, Any, None]:
+    """Makes a test that misses an extra a skipped one, if that is asked for."""
+    report = (yield).get_result()
+    missing = call.excinfo and _missing_extra(call.excinfo.value)
+    if missing and item.config.getoption("skip_missing_extras"):
+        report.outcome, report.longrepr = "skipped", (str(item.path), item.location[1], f"Skipped: {missing}")
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leaves files without a quick test out of a quick run, since their imports take long."""
+    is_file = collection_path.match("test_*.py") and collection_path.is_file()
+    if config.getoption("quick") and is_file and not _is_all_quick(collection_path):
+        return True if "pytest.mark.quick" not in collection_path.read_text() else None
+    return None
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leaves out what is not asked for and brings the folders into their order; within, everything stays as it is."""
+    if config.getoption("quick"):
+        slow = [item for item in items if not _is_quick(item)]
+        config.hook.pytest_deselected(items=slow)
+        items[:] = [item for item in items if _is_quick(item)]
+
+    def rank(item: pytest.Item) -> int:
+        matches = (number for number, folder in enumerate(FIRST) if item.path.is_relative_to(TESTS / folder))
+        return next(matches, len(FIRST))
+
+    items.sort(key=rank)
+
+
+def _is_quick(item: pytest.Item) -> bool:
+    return _is_all_quick(item.path) or item.get_closest_marker("quick") is not None
+
+
+def _is_all_quick(path: Path) -> bool:
+    if path in (TESTS / file for file in NOT_QUICK):
+        return False
+    return path.parent == TESTS or any(path.is_relative_to(TESTS / folder) for folder in QUICK_FOLDERS)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """Returns how many workers `-n auto` means: two more than processors, since tests wait for half of their time."""
+    files = [argument.split("::")[0] for argument in getattr(config, "args", ())]
+    wanted = (os.cpu_count() or 1) + 2
+    if all(Path(file).is_file() for file in files):
+        wanted = min(wanted, len(set(files)))
+    return wanted if wanted > 1 else 0
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Returns a scheduler that gives out whole files in their order, since the tests of a file share simulators."""
+    from xdist.scheduler import LoadFileScheduling
+
+    config.option.loadscopereorder = False
+    return LoadFileScheduling(config, log)

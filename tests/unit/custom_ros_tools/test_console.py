@@ -1,0 +1,109 @@
+"""Commands of the console are made of functions: parser, exit codes, help and completion."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import pytest
+
+from custom_ros_tools.console.argument import Argument, UsageError, number
+from custom_ros_tools.console.command import Command
+from custom_ros_tools.errors import InterfaceError
+
+Switch = Annotated[bool, Argument("", excludes="one")]
+
+
+def push(
+    name: Annotated[str, Argument("NAME")],
+    *targets: Annotated[float, Argument("[TARGET ...]", parse=number, files="*.yaml")],
+    force: Annotated[list[float] | None, Argument("X Y Z", "--by", number)] = None,
+    hard: Switch = False,
+    soft: Switch = False,
+) -> str:
+    """Pushes something.
+
+    Text of its own.
+
+    Args:
+        NAME: what is pushed
+        force: force [N], by default
+            none
+        hard: with all its might
+    """
+    if name == "wall":
+        raise InterfaceError("the wall stays")
+    if soft and force:
+        raise UsageError("--soft has no force")
+    return f"{name} {targets} {force} {hard} {soft}"
+
+
+def echo(*words: Annotated[str, Argument("[WORD ...]", is_raw=True)]) -> int:
+    """Prints its words."""
+    print(*words)
+    return len(words)
+
+
+@pytest.mark.parametrize(
+    ("line", "printed"),
+    [
+        ("box", "box () None False False\n"),
+        ("box -90deg 1e0 __name:=x --hard", "box (-1.5707963267948966, 1.0) None True False\n"),
+        ("box --by -1 .5 -2e1", "box () [-1.0, 0.5, -20.0] False False\n"),
+    ],
+)
+def test_words_become_arguments(capsys, line, printed):
+    assert Command(push).run(line.split()) == 0
+    assert capsys.readouterr().out == printed
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("box --soft --by 1 2 3", "./rpbi push: error: --soft has no force\n"),
+        ("box --soft --hard", "./rpbi push: error: argument --hard: not allowed with argument --soft\n"),
+        ("box --by 1 2", "./rpbi push: error: argument --by: expected 3 arguments\n"),
+        ("box much", "./rpbi push: error: argument TARGET: invalid number value: 'much'\n"),
+    ],
+)
+def test_wrong_words_end_with_2_after_the_usage(capsys, line, message):
+    with pytest.raises(SystemExit) as end:
+        Command(push).run(line.split())
+    assert end.value.code == 2
+    assert capsys.readouterr().err.endswith(message)
+
+
+def test_an_error_is_a_line_with_the_name_of_the_command(capsys):
+    assert Command(push).run(["wall"]) == 1
+    assert capsys.readouterr().err == "push: the wall stays\n"
+
+
+def test_raw_words_are_passed_on_and_a_number_is_the_exit_code(capsys):
+    assert Command(echo).run(["-x", "__name:=y", "--zed=1"]) == 3
+    assert capsys.readouterr().out == "-x __name:=y --zed=1\n"
+
+
+def test_help_and_completion_follow_from_the_function(capsys):
+    section = """\
+    ./rpbi push NAME [TARGET ...] [--by X Y Z] [--hard] [--soft]
+
+Pushes something.
+
+    NAME             what is pushed
+    --by X Y Z       force [N], by default
+                     none
+    --hard           with all its might
+
+Text of its own.
+"""
+    assert Command(push).section == section
+    assert Command(push).run(["box", "--help"]) == 0
+    assert capsys.readouterr().out == section
+    assert list(Command(push).completions()) == ["push * files *.yaml"]
+
+
+def test_a_parameter_without_an_argument_is_named():
+    def wave(hand: str) -> None:
+        """Waves."""
+
+    with pytest.raises(TypeError, match="wave: hand: expected Annotated"):
+        _ = Command(wave).parameters
