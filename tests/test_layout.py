@@ -5,8 +5,10 @@ Each rule is a function that names file and rule of whatever breaks it; the last
 
 from __future__ import annotations
 
+import ast
 import re
 import shutil
+from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
 
@@ -27,8 +29,11 @@ TABLES = (
     "safe_robot.checks",
     "rpbi_utils.ros.controls.panels",
     "motion_primitives.primitives",
+    "rpbi_utils.ros.console",
+    "episodes.ros.console",
+    "rpbi_examples.ros.console",
 )
-"""Packages whose classes have a file each, whoever imports them."""
+"""Packages whose classes or commands have a file each, whoever imports them."""
 FLOORS = {
     "rpbi": (
         {"geometry", "plain_values", "plugins"},
@@ -55,6 +60,9 @@ ONE_PLACE = {
     "class Waypoint": r"^class Waypoint\b",
 }
 """What stands in one library file only, and how it is recognised."""
+
+SHARED_NAMES = {"Pose", "Twist"}
+"""Names of classes that two packages have, with the same meaning."""
 
 
 def graph_of(src: Path) -> ImportGraph:
@@ -138,6 +146,19 @@ def repeated(src: Path) -> list[str]:
     return [f"{what} belongs into one file, found in {names}" for what, names in found.items() if len(names) != 1]
 
 
+def shared_class_names(src: Path) -> list[str]:
+    homes = defaultdict(list)
+    for module, path in graph_of(src).files.items():
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                homes[node.name].append(module)
+    return [
+        f"class {name} is in {len(modules)} modules: {', '.join(sorted(modules))}"
+        for name, modules in homes.items()
+        if len(modules) > 1 and name not in SHARED_NAMES
+    ]
+
+
 RULES: tuple[Callable[[Path], list[str]], ...] = (
     circles,
     circles_of_rooms,
@@ -146,6 +167,7 @@ RULES: tuple[Callable[[Path], list[str]], ...] = (
     small_modules,
     ros_in_the_core,
     repeated,
+    shared_class_names,
 )
 
 
@@ -173,6 +195,7 @@ BREAKS = {
     ),
     ros_in_the_core: ({"engine/pacer.py": "def late():\n    from rpbi.ros.node import main"}, "rpbi.engine.pacer"),
     repeated: ({"engine/pacer.py": "import xml.etree.ElementTree"}, "rpbi.engine.pacer"),
+    shared_class_names: ({"engine/pacer.py": "class Mailbox:\n    pass"}, "rpbi.engine.pacer"),
 }
 """What to add to which files, so that a rule is broken; and what the message names."""
 

@@ -11,7 +11,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from motion_primitives import Demonstration, Obstacle, ViaPoint, make_primitive
+from motion_primitives import Demonstration, ObstacleCoupling, ViaPoint, make_primitive
 
 TIMES = np.linspace(0.0, 4.0, 401)
 SHARE = np.sin(np.linspace(0.0, np.pi / 2, 401)) ** 2
@@ -31,7 +31,7 @@ def draw_dmp(axes):
             motion.set_goal([0.35, -0.1, 0.0])
         path.append(motion.step(0.01).point)
     axes.plot(*np.array(path).T[:2], "C1", label="another goal half-way")
-    ball = Obstacle([0.22, 0.155, 0.0], 0.04)
+    ball = ObstacleCoupling([0.22, 0.155, 0.0], 0.04)
     axes.add_patch(plt.Circle(ball.center[:2], ball.radius_m, color="0.8"))
     axes.plot(*primitive.plan(couplings=[ball]).positions.T[:2], "C3", label="around an obstacle")
     axes.set(title="dmp: one demonstration", xlabel="x [m]", ylabel="y [m]", aspect="equal")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from shown_motions import reach, stir
 
-from motion_primitives import ForceCoupling, Obstacle, make_primitive
+from motion_primitives import ForceCoupling, ObstacleCoupling, make_primitive
 
 NAMES = ("dmp", "promp")
 LEARNED = {name: make_primitive(name, {}).learn([reach(seed) for seed in range(3)]) for name in NAMES}
@@ -42,7 +42,7 @@ def test_an_obstacle_near_the_way_is_avoided_and_the_goal_reached(name, seed):
     rng = np.random.default_rng(seed)
     free = LEARNED[name].plan(dt_s=0.02)
     center = free.positions[rng.integers(30, 70) * len(free.times) // 100] + rng.normal(0.0, 0.01, 3)
-    obstacle = Obstacle(center, radius_m=0.05)
+    obstacle = ObstacleCoupling(center, radius_m=0.05)
     assert np.linalg.norm(free.positions - center, axis=1).min() < obstacle.radius_m
     plan = LEARNED[name].plan(dt_s=0.02, couplings=[obstacle])
     assert np.linalg.norm(plan.positions - center, axis=1).min() > obstacle.radius_m
@@ -55,14 +55,14 @@ def test_an_obstacle_exactly_ahead_is_avoided():
     from motion_primitives import Demonstration
 
     straight = make_primitive("dmp", {}).learn(Demonstration.of(times, np.outer(share, [0.6, 0.0, 0.0])))
-    plan = straight.plan(couplings=[Obstacle([0.3, 0.0, 0.0], radius_m=0.05)])
+    plan = straight.plan(couplings=[ObstacleCoupling([0.3, 0.0, 0.0], radius_m=0.05)])
     assert np.linalg.norm(plan.positions - [0.3, 0.0, 0.0], axis=1).min() > 0.05
 
 
 def test_an_obstacle_that_is_passed_or_far_changes_nothing():
     primitive = LEARNED["dmp"]
-    behind = Obstacle(reach().points[0, :3] + [0.0, -0.3, -0.3])
-    far = Obstacle([0.0, 3.0, 0.3])
+    behind = ObstacleCoupling(reach().points[0, :3] + [0.0, -0.3, -0.3])
+    far = ObstacleCoupling([0.0, 3.0, 0.3])
     assert primitive.plan(couplings=[behind, far]).points == pytest.approx(primitive.plan().points, abs=1e-4)
 
 
@@ -70,6 +70,6 @@ def test_values_that_make_no_sense():
     with pytest.raises(ValueError, match="stiffness: expected numbers above 0, got 0"):
         ForceCoupling(0)
     with pytest.raises(ValueError, match="radius_m: expected a number above 0, got -1"):
-        Obstacle([0, 0, 0], -1)
+        ObstacleCoupling([0, 0, 0], -1)
     with pytest.raises(ValueError, match="center: must be finite"):
-        Obstacle([0, 0, math.nan])
+        ObstacleCoupling([0, 0, math.nan])

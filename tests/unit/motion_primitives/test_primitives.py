@@ -12,7 +12,7 @@ from shown_motions import random_pose, reach, stir
 
 from motion_primitives import PRIMITIVES, Demonstration, ViaPoint, make_primitive
 from motion_primitives.errors import GoalNotReachedError, NotLearnedError, PlanError
-from motion_primitives.primitive import Trajectory
+from motion_primitives.primitive import MotionPlan
 
 SHOWN = [reach(seed) for seed in range(5)]
 DISCRETE = ("dmp", "promp")
@@ -24,7 +24,7 @@ def angles_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return (Rotation.from_quat(a) * Rotation.from_quat(b).inv()).magnitude()
 
 
-def check_velocities(plan: Trajectory, tolerance: float) -> None:
+def check_velocities(plan: MotionPlan, tolerance: float) -> None:
     """Checks that velocities are those of the points, which cannot be if one jumps."""
     measured = plan.space.rates(plan.times, plan.points)
     assert plan.velocities[2:-2] == pytest.approx(measured[2:-2], abs=tolerance)
@@ -100,7 +100,7 @@ def test_another_goal_on_the_way(name, progress):
     assert execution.is_at_goal()
     times, points, velocities = (np.array(each) for each in zip(*states))
     assert np.abs(np.diff(velocities, axis=0)).max() < 0.2
-    check_velocities(Trajectory(execution.space, times, points, velocities), 0.02)
+    check_velocities(MotionPlan(execution.space, times, points, velocities), 0.02)
 
 
 def test_a_goal_that_changes_after_the_end_is_reached_too():

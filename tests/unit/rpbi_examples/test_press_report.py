@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rpbi_examples.press_report import Press, Sample
+from rpbi_examples.press_report import Press, PressSample
 
 STIFFNESS, SCALE, TOUCH_M = 500.0, 0.5, 0.135
 
@@ -20,7 +20,7 @@ def pressed(depth_m: float, felt: float = 1.0, stiffness: float = STIFFNESS) -> 
         share = min(max(time_s - 1.0, 0.0), max(4.0 - time_s, 0.0), 1.0)
         tool_z = TOUCH_M + 0.01 - share * (0.01 + depth_m)
         force_n = stiffness * max(TOUCH_M - tool_z, 0.0)
-        press.add(Sample(time_s, 0.0, tool_z, tool_z, force_n, felt * SCALE * force_n))
+        press.add(PressSample(time_s, 0.0, tool_z, tool_z, force_n, felt * SCALE * force_n))
     return press
 
 

@@ -11,8 +11,8 @@ import pytest
 
 from custom_ros_tools.errors import ConfigError
 from robot_model.geometry import Quaternion, minus, normalized, quaternion_product, rotation_between, scaled
-from rpbi_utils.interpolation.config import TrajectoryConfig, WaypointError
-from rpbi_utils.interpolation.interpolator import Interpolator, Sample
+from rpbi_utils.interpolation.config import WaypointError, WaypointMotionConfig
+from rpbi_utils.interpolation.interpolator import Interpolator, TargetSample
 from rpbi_utils.interpolation.rotation import RotationKnot, RotationPath, exponential
 from rpbi_utils.interpolation.waypoints import read_waypoints, waypoint_matrix
 
@@ -22,25 +22,27 @@ QUAT = {"rotation_repr": "quat", "rotation_vec_index": [3, 7]}
 SEEDS = range(20)
 
 
-def motion(number: int, rotation: dict[str, Any] | None = None, trans: Any = TRANS, **more: Any) -> TrajectoryConfig:
+def motion(
+    number: int, rotation: dict[str, Any] | None = None, trans: Any = TRANS, **more: Any
+) -> WaypointMotionConfig:
     """Returns the configuration of a frame's motion; `more` is the part `interpolation`."""
     dimensions = {"number": number, "trans": trans, "rotation": rotation or {"rotation_repr": "none"}}
     data = {"motion_dimensions": dimensions, "interpolation": more, "communication": FRAMES}
-    return TrajectoryConfig.parse(data, "traj.yaml")
+    return WaypointMotionConfig.parse(data, "traj.yaml")
 
 
-def joints(*names: str, **more: Any) -> TrajectoryConfig:
+def joints(*names: str, **more: Any) -> WaypointMotionConfig:
     data = {"motion_dimensions": {"number": len(names), "joint_names": list(names)}, "interpolation": more}
-    return TrajectoryConfig.parse(data, "traj.yaml")
+    return WaypointMotionConfig.parse(data, "traj.yaml")
 
 
-def add(plan: Interpolator, config: TrajectoryConfig, rows: Any, now_s: float) -> None:
+def add(plan: Interpolator, config: WaypointMotionConfig, rows: Any, now_s: float) -> None:
     """Adds waypoints whose times begin now."""
     waypoints = read_waypoints(np.array(rows, dtype=float), config.motion_dimensions)
     plan.add(waypoints._replace(times_s=tuple(now_s + t for t in waypoints.times_s)), now_s)
 
 
-def samples(plan: Interpolator, start_s: float, end_s: float, tick_s: float = 0.01) -> list[Sample]:
+def samples(plan: Interpolator, start_s: float, end_s: float, tick_s: float = 0.01) -> list[TargetSample]:
     """Returns what is published by ticks at a rate."""
     ticks = start_s + tick_s * np.arange(math.floor((end_s - start_s) / tick_s + 1e-6) + 1)
     return [sample for tick in ticks for sample in [plan.newest(float(tick))] if sample is not None]
@@ -373,11 +375,11 @@ def test_waypoints_that_are_over_are_refused_and_the_motion_goes_on():
 def test_a_wrong_configuration_is_named_with_its_key(change, expected):
     dimensions = {"number": 7, "trans": TRANS, "rotation": QUAT, **change}
     with pytest.raises(ConfigError) as error:
-        TrajectoryConfig.parse({"motion_dimensions": dimensions, "communication": FRAMES}, "traj.yaml")
+        WaypointMotionConfig.parse({"motion_dimensions": dimensions, "communication": FRAMES}, "traj.yaml")
     assert "traj.yaml: motion_dimensions." in str(error.value) and expected in str(error.value)
 
 
 def test_a_frame_needs_its_names():
     dimensions = {"number": 7, "trans": TRANS, "rotation": QUAT}
     with pytest.raises(ConfigError, match="communication.publisher.header_frame_id: expected a TF frame, got none"):
-        TrajectoryConfig.parse({"motion_dimensions": dimensions}, "traj.yaml")
+        WaypointMotionConfig.parse({"motion_dimensions": dimensions}, "traj.yaml")

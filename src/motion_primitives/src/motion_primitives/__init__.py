@@ -1,12 +1,12 @@
 """Movement primitives: learned from demonstrations, planned and executed with other starts, goals and durations."""
 
 from .coupling import ForceCoupling as ForceCoupling
-from .coupling import Obstacle as Obstacle
+from .coupling import ObstacleCoupling as ObstacleCoupling
 from .demonstration import Demonstration as Demonstration
 from .files import load as load
 from .files import save as save
+from .primitive import MotionPlan as MotionPlan
 from .primitive import Primitive as Primitive
-from .primitive import Trajectory as Trajectory
 from .primitive import ViaPoint as ViaPoint
 from .primitives import PRIMITIVES
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from custom_ros_tools.transforms import Array, finite_vector
 
-from .dynamics import SpringDamper, State
+from .dynamics import MotionState, SpringDamper
 
 STEEPNESS = 20.0 / math.pi
 """Decay of the evasion with the angle between the motion and the obstacle [1/rad] (Hoffmann 2009)."""
@@ -34,14 +34,14 @@ class ForceCoupling:
         if not (np.asarray(self.stiffness, dtype=float) > 0.0).all():
             raise ValueError(f"stiffness: expected numbers above 0, got {self.stiffness!r}")
 
-    def __call__(self, state: State, spring: SpringDamper) -> Array:
+    def __call__(self, state: MotionState, spring: SpringDamper) -> Array:
         """Returns the acceleration."""
         given_way = np.asarray(self.force, dtype=float) / np.asarray(self.stiffness, dtype=float)
         return np.asarray(spring.stiffness * np.broadcast_to(given_way, state.velocity.shape))
 
 
 @dataclass
-class Obstacle:
+class ObstacleCoupling:
     """Steers the first three positions around a ball (Hoffmann 2009, equation 8).
 
     The motion is turned away from the ball's edge as seen from it, more so the straighter it heads there, and within
@@ -66,7 +66,7 @@ class Obstacle:
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ValueError(f"{name}: expected a number above 0, got {getattr(self, name)}")
 
-    def __call__(self, state: State, spring: SpringDamper) -> Array:
+    def __call__(self, state: MotionState, spring: SpringDamper) -> Array:
         """Returns the acceleration."""
         evasion = np.zeros_like(state.velocity)
         velocity, to_center = state.velocity[:3], np.asarray(self.center, dtype=float) - state.point[:3]

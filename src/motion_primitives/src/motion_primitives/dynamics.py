@@ -26,7 +26,7 @@ MIN_CHANGE_SHARE = 0.25
 """Least share of the duration that a change of the goal takes."""
 
 
-class State(NamedTuple):
+class MotionState(NamedTuple):
     """State of a motion.
 
     Attributes:
@@ -62,7 +62,7 @@ class SpringDamper(NamedTuple):
         return self.alpha / self.duration_s
 
 
-Coupling = Callable[[State, SpringDamper], Array]
+Coupling = Callable[[MotionState, SpringDamper], Array]
 """Returns an acceleration [m/s^2 or rad/s^2], shape (dof,), for a state and the spring that pulls to the motion."""
 
 
@@ -76,7 +76,7 @@ class Execution(ABC):
     """
 
     space: Space
-    state: State
+    state: MotionState
     goal: Array | None
 
     @property
@@ -85,7 +85,7 @@ class Execution(ABC):
         """Time at which it is to be at its goal [s]."""
 
     @abstractmethod
-    def step(self, dt_s: float, couplings: Sequence[Coupling] = ()) -> State:
+    def step(self, dt_s: float, couplings: Sequence[Coupling] = ()) -> MotionState:
         """Goes on by a time step [s] and returns the new state.
 
         Args:
@@ -124,7 +124,7 @@ class Path(Protocol):
         """Sets another goal at a time of the motion."""
 
 
-class Move(NamedTuple):
+class QuinticOffset(NamedTuple):
     """A difference that is added to a path along a quintic.
 
     Attributes:
@@ -160,14 +160,14 @@ class QuinticPath:
     def __init__(self, space: Space, duration_s: float, start: Array, goal: Array, velocity: Array) -> None:
         self._space, self._duration_s, self._start, self._goal = space, duration_s, start, goal
         self.end_s = duration_s
-        self._moves = [Move(0.0, duration_s, space.minus(goal, start))]
+        self._moves = [QuinticOffset(0.0, duration_s, space.minus(goal, start))]
         if velocity.any():
-            self._moves.append(Move(0.0, duration_s, velocity * duration_s, COASTING))
+            self._moves.append(QuinticOffset(0.0, duration_s, velocity * duration_s, COASTING))
 
     def set_goal(self, goal: Array, time_s: float) -> None:
         """Sets another goal; it is reached at the end, or after a quarter of the duration if that is later."""
         left_s = max(self._duration_s - time_s, MIN_CHANGE_SHARE * self._duration_s)
-        self._moves.append(Move(time_s, left_s, self._space.minus(goal, self._goal)))
+        self._moves.append(QuinticOffset(time_s, left_s, self._space.minus(goal, self._goal)))
         self._goal, self.end_s = goal, max(self.end_s, time_s + left_s)
 
     def at(self, time_s: float) -> tuple[Array, Array]:
@@ -200,7 +200,7 @@ class PathExecution(Execution):
     ) -> None:
         self.space, self.spring, self.goal, self.path, self._forcing = space, spring, goal, path, forcing
         self._flat = Space(tuple(map(str, range(space.dof))))
-        self.deviation = State(0.0, np.zeros(space.dof), np.zeros(space.dof))
+        self.deviation = MotionState(0.0, np.zeros(space.dof), np.zeros(space.dof))
         self.state = self._moved(self.deviation)
 
     @property
@@ -208,11 +208,11 @@ class PathExecution(Execution):
         """Time at which it is to be at its goal [s]."""
         return self.path.end_s
 
-    def step(self, dt_s: float, couplings: Sequence[Coupling] = ()) -> State:
+    def step(self, dt_s: float, couplings: Sequence[Coupling] = ()) -> MotionState:
         """Goes on by a time step, see `Execution`."""
         spring = self.spring
 
-        def acceleration(deviation: State) -> Array:
+        def acceleration(deviation: MotionState) -> Array:
             found = self._forcing(deviation.time_s)
             found = found - spring.stiffness * deviation.point - spring.damping * deviation.velocity
             moved = self._moved(deviation) if couplings else deviation
@@ -235,12 +235,14 @@ class PathExecution(Execution):
 
     def start_beside(self, shift: Array, rate: Array) -> None:
         """Starts at a difference from the path, shape (dof,), that changes at a rate."""
-        self.deviation = State(0.0, shift, rate)
+        self.deviation = MotionState(0.0, shift, rate)
         self.state = self._moved(self.deviation)
 
-    def _moved(self, deviation: State) -> State:
+    def _moved(self, deviation: MotionState) -> MotionState:
         point, velocity = self.path.at(deviation.time_s)
-        return State(deviation.time_s, *deviated(self.space, point, velocity, deviation.point, deviation.velocity))
+        return MotionState(
+            deviation.time_s, *deviated(self.space, point, velocity, deviation.point, deviation.velocity)
+        )
 
 
 def deviated(space: Space, point: Array, velocity: Array, shift: Array, rate: Array) -> tuple[Array, Array]:
@@ -252,12 +254,14 @@ def deviated(space: Space, point: Array, velocity: Array, shift: Array, rate: Ar
     return space.plus(point, shift), np.concatenate([velocity[:n] + rate[:n], angular])
 
 
-def integrated(space: Space, acceleration: Callable[[State], Array], state: State, dt_s: float) -> State:
+def integrated(
+    space: Space, acceleration: Callable[[MotionState], Array], state: MotionState, dt_s: float
+) -> MotionState:
     """Returns the state a time step later, by the Runge-Kutta method of order 4 (of Munthe-Kaas, for orientations)."""
     half_s = 0.5 * dt_s
 
     def slope(share_s: float, shift: Array, velocity: Array) -> tuple[Array, Array]:
-        at = State(state.time_s + share_s, space.plus(state.point, shift), velocity)
+        at = MotionState(state.time_s + share_s, space.plus(state.point, shift), velocity)
         return space.shift_rate(shift, velocity), acceleration(at)
 
     rate_1, bend_1 = slope(0.0, np.zeros(space.dof), state.velocity)
@@ -266,4 +270,4 @@ def integrated(space: Space, acceleration: Callable[[State], Array], state: Stat
     rate_4, bend_4 = slope(dt_s, dt_s * rate_3, state.velocity + dt_s * bend_3)
     shift = dt_s / 6.0 * (rate_1 + 2.0 * (rate_2 + rate_3) + rate_4)
     bend = dt_s / 6.0 * (bend_1 + 2.0 * (bend_2 + bend_3) + bend_4)
-    return State(state.time_s + dt_s, space.plus(state.point, shift), state.velocity + bend)
+    return MotionState(state.time_s + dt_s, space.plus(state.point, shift), state.velocity + bend)

@@ -23,7 +23,7 @@ from custom_ros_tools.schema import (
 )
 from custom_ros_tools.schema.json_schema import explained, json_schema, schema_text
 
-from .coupling import ForceCoupling, Obstacle
+from .coupling import ForceCoupling, ObstacleCoupling
 from .space import POSE, Space
 
 Bounds = Annotated[tuple[float, float], Field(strict=False)]
@@ -102,9 +102,9 @@ class ObstacleConfig(ConfigModel):
     range: PositiveMetres = Field(0.1, description="Distance from its surface at which the evasion falls to 37 %.")
     gain: Positive = Field(1000.0, description="Strength of the evasion.")
 
-    def obstacle(self) -> Obstacle:
+    def obstacle(self) -> ObstacleCoupling:
         """Returns the obstacle, at the origin."""
-        return Obstacle((0.0, 0.0, 0.0), self.radius, self.range, self.gain)
+        return ObstacleCoupling((0.0, 0.0, 0.0), self.radius, self.range, self.gain)
 
 
 class CouplingConfig(ConfigModel):

@@ -43,7 +43,7 @@ class ViaPoint(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Trajectory:
+class MotionPlan:
     """A planned motion.
 
     Attributes:
@@ -173,7 +173,7 @@ class Primitive(ABC):
         couplings: Sequence[Coupling] = (),
         tolerance: float = TOLERANCE,
         tolerance_rad: float = TOLERANCE_RAD,
-    ) -> Trajectory:
+    ) -> MotionPlan:
         """Returns a whole motion; for the other arguments see `begin`.
 
         It takes the duration, and longer only if couplings, or the type of the primitive, keep it from its goal.
@@ -201,7 +201,7 @@ class Primitive(ABC):
                 raise GoalNotReachedError(*execution.miss(), execution.state.time_s, tolerance, tolerance_rad)
             states.append(execution.step(dt_s, couplings))
         times, points, velocities = (np.array(each) for each in zip(*states))
-        return Trajectory(self.space, times, points, velocities)
+        return MotionPlan(self.space, times, points, velocities)
 
     def learned(self) -> ConfigModel:
         """Returns what it has learned, for files.

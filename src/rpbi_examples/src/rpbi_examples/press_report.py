@@ -22,7 +22,7 @@ MIN_SHARE = 0.5
 """A press is not judged if less of its time counts."""
 
 
-class Sample(NamedTuple):
+class PressSample(NamedTuple):
     """State at one moment.
 
     Attributes:
@@ -98,11 +98,11 @@ class Press:
 
     def __init__(self, stiffness: float, force_scale: float, touch_height: float) -> None:
         self._stiffness, self._force_scale, self._touch_height = stiffness, force_scale, touch_height
-        self.samples: list[Sample] = []
+        self.samples: list[PressSample] = []
         self._has_touched = False
         self._released_s = 0.0
 
-    def add(self, sample: Sample) -> None:
+    def add(self, sample: PressSample) -> None:
         """Adds the present state."""
         if self._depth_m(sample) > TOUCHED_M:
             self._has_touched, self._released_s = True, sample.time_s
@@ -144,14 +144,14 @@ class Press:
             max(abs(each.felt_n) for each in self.samples),
         )
 
-    def _depth_m(self, sample: Sample) -> float:
+    def _depth_m(self, sample: PressSample) -> float:
         return self._touch_height - sample.tool_z
 
     def write_table(self, path: Path) -> None:
         """Writes all samples as CSV."""
         with open(path, "w", newline="") as file:
             table = csv.writer(file)
-            table.writerow(Sample._fields)
+            table.writerow(PressSample._fields)
             table.writerows([f"{value:.6f}" for value in sample] for sample in self.samples)
 
     def draw(self, figure: object) -> None:

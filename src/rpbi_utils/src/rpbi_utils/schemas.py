@@ -5,14 +5,14 @@ from pathlib import Path
 from custom_ros_tools.schema import ConfigModel
 from custom_ros_tools.schema.json_schema import json_schema, schema_texts
 from rpbi_utils.fake_driver.config import FakeDriverConfig, RobotLimits
-from rpbi_utils.interpolation.config import TrajectoryConfig
+from rpbi_utils.interpolation.config import WaypointMotionConfig
 from rpbi_utils.tracking.config import TrackingNodeConfig
 
 FILES: dict[str, type[ConfigModel]] = {
     "robot_limits": RobotLimits,
     "stand_in": FakeDriverConfig,
     "tracked_objects": TrackingNodeConfig,
-    "trajectory": TrajectoryConfig,
+    "trajectory": WaypointMotionConfig,
 }
 
 

@@ -14,7 +14,15 @@ from custom_ros_tools.schema import ConfigModel, ListOf, Seconds
 from custom_ros_tools.transforms import Array
 from motion_primitives.basis import DECAY, GaussianBasis, fitted
 from motion_primitives.demonstration import Demonstration
-from motion_primitives.dynamics import Coupling, Execution, PathExecution, QuinticPath, SpringDamper, State, integrated
+from motion_primitives.dynamics import (
+    Coupling,
+    Execution,
+    MotionState,
+    PathExecution,
+    QuinticPath,
+    SpringDamper,
+    integrated,
+)
 from motion_primitives.errors import DemonstrationError
 from motion_primitives.primitive import Primitive, PrimitiveConfig, ViaPoint, check_shape, no_via_points
 from motion_primitives.space import Space
@@ -45,7 +53,7 @@ class LearnedDMP(ConfigModel):
     weights: ListOf[ListOf[float]] = Field(description="Weights of the basis functions, a row for each signal.")
 
 
-def pull(space: Space, spring: SpringDamper, start: Array, goal: Array, state: State) -> Array:
+def pull(space: Space, spring: SpringDamper, start: Array, goal: Array, state: MotionState) -> Array:
     """Returns the acceleration of spring and damper [m/s^2 or rad/s^2], shape (dof,).
 
     Ijspeert 2013, equation 2.1, for positions; Ude 2014, equation 16, for orientations. The goal pulls weakly at first
@@ -69,19 +77,19 @@ class FixedGoalExecution(Execution):
         velocity: Array,
     ) -> None:
         self.space, self.goal, self._spring, self._forcing, self._start = space, goal, spring, forcing, start
-        self.state = State(0.0, start, velocity)
+        self.state = MotionState(0.0, start, velocity)
 
     @property
     def end_s(self) -> float:
         """The duration [s]; the goal is reached some time after it."""
         return self._spring.duration_s
 
-    def step(self, dt_s: float, couplings: Sequence[Coupling] = ()) -> State:
+    def step(self, dt_s: float, couplings: Sequence[Coupling] = ()) -> MotionState:
         """Goes on by a time step, see `Execution`."""
         spring, goal = self._spring, self.goal
         assert goal is not None
 
-        def acceleration(state: State) -> Array:
+        def acceleration(state: MotionState) -> Array:
             found = pull(self.space, spring, self._start, goal, state) + self._forcing(state.time_s)
             return sum((each(state, spring) for each in couplings), found)
 
@@ -138,7 +146,7 @@ class DMP(Primitive):
         rates = space.rates(progress, points)
         bends = np.gradient(rates, progress, axis=0)
         spring = SpringDamper(self.config.alpha, 1.0)
-        states = map(State, progress.tolist(), points, rates)
+        states = map(MotionState, progress.tolist(), points, rates)
         return np.asarray(bends - [pull(space, spring, points[0], points[-1], state) for state in states])
 
     def _rest_at_end(self, basis: GaussianBasis) -> Array:

@@ -15,7 +15,7 @@ from custom_ros_tools.schema import ConfigModel, ListOf, Seconds, optional
 from custom_ros_tools.transforms import Array
 from motion_primitives.basis import PeriodicBasis, fitted
 from motion_primitives.demonstration import Demonstration
-from motion_primitives.dynamics import Coupling, Execution, PathExecution, QuinticPath, SpringDamper, State
+from motion_primitives.dynamics import Coupling, Execution, MotionState, PathExecution, QuinticPath, SpringDamper
 from motion_primitives.errors import DemonstrationError, PlanError
 from motion_primitives.primitive import Primitive, PrimitiveConfig, ViaPoint, check_shape, no_via_points
 from motion_primitives.space import Space
@@ -75,7 +75,7 @@ class RhythmicExecution(PathExecution):
     def period_s(self, period_s: float) -> None:
         self.spring = SpringDamper(self.spring.alpha, checked_period(period_s))
 
-    def step(self, dt_s: float, couplings: Sequence[Coupling] = ()) -> State:
+    def step(self, dt_s: float, couplings: Sequence[Coupling] = ()) -> MotionState:
         """Goes on by a time step, see `Execution`."""
         state = super().step(dt_s, couplings)
         self.cycles, self._counted_s = self._cycles_at(state.time_s), state.time_s

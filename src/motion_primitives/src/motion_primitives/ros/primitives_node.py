@@ -25,14 +25,14 @@ from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
 from custom_ros_tools.ros.services import ToggleService
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.transforms import Array, finite_vector
-from motion_primitives.coupling import Obstacle
+from motion_primitives.coupling import ObstacleCoupling
 from motion_primitives.demonstration import Demonstration
-from motion_primitives.dynamics import Coupling, Execution, State
+from motion_primitives.dynamics import Coupling, Execution, MotionState
 from motion_primitives.errors import PlanError
 from motion_primitives.files import load, save
 from motion_primitives.msg import PrimitiveState
 from motion_primitives.node_configs import PrimitivesNodeConfig
-from motion_primitives.primitive import MAX_LONGER, Primitive, Trajectory, ViaPoint
+from motion_primitives.primitive import MAX_LONGER, MotionPlan, Primitive, ViaPoint
 from motion_primitives.primitives import PRIMITIVES
 from motion_primitives.srv import PlanPrimitive, PlanPrimitiveRequest, PlanPrimitiveResponse
 
@@ -194,7 +194,7 @@ class PrimitivesNode:
         via_points = [ViaPoint(each.time, each.position) for each in request.via_points]
         return start, request.goal or None, request.duration or None, via_points
 
-    def _check_bounds(self, trajectory: Trajectory) -> None:
+    def _check_bounds(self, trajectory: MotionPlan) -> None:
         for index, name in enumerate(trajectory.space.names):
             lower, upper = self._config.bounds.get(name, (-math.inf, math.inf))
             column = trajectory.positions[:, index]
@@ -246,7 +246,7 @@ class PrimitivesNode:
                 found.append(obstacle)
         return found
 
-    def _center(self, parent: str, frame_id: str, obstacle: Obstacle) -> Array | None:
+    def _center(self, parent: str, frame_id: str, obstacle: ObstacleCoupling) -> Array | None:
         try:
             position, _ = self._tf.get_tf(parent, frame_id)
         except (ValueError, tf2_ros.TransformException):
@@ -278,7 +278,7 @@ class PrimitivesNode:
                 distance, angle_rad = execution.miss()
                 self._end(f"goal missed by {distance:.3g} m or rad and {angle_rad:.3g} rad: it is out of reach")
 
-    def _send(self, state: State) -> None:
+    def _send(self, state: MotionState) -> None:
         for output in self._outputs:
             output(state)
 
@@ -287,7 +287,7 @@ class PrimitivesNode:
         assert self._execution is not None
         last = self._execution.state
         self._execution = None
-        self._send(State(last.time_s, last.point, np.zeros_like(last.velocity)))
+        self._send(MotionState(last.time_s, last.point, np.zeros_like(last.velocity)))
         self._set_mode(IDLE, message)
 
     # --- State
@@ -329,7 +329,7 @@ class PrimitivesNode:
         return lambda request: SetStringResponse(*self._tried(lambda: act(request.data)))
 
 
-def _trajectory_message(trajectory: Trajectory) -> JointTrajectory:
+def _trajectory_message(trajectory: MotionPlan) -> JointTrajectory:
     rows = zip(trajectory.times.tolist(), trajectory.points.tolist(), trajectory.velocities.tolist())
     points = [
         JointTrajectoryPoint(positions=point, velocities=velocity, time_from_start=rospy.Duration.from_sec(time_s))

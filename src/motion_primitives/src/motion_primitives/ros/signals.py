@@ -14,7 +14,7 @@ from custom_ros_tools.ros.joint_states import JointStateSubscriber
 from custom_ros_tools.ros.tf_interface import NO_ROTATION, TfInterface
 from custom_ros_tools.transforms import Array
 from motion_primitives.demonstration import Demonstration
-from motion_primitives.dynamics import State
+from motion_primitives.dynamics import MotionState
 from motion_primitives.node_configs import (
     FrameOutput,
     FrameSource,
@@ -117,7 +117,7 @@ def source_of(config: SourceConfig, tf: TfInterface, record: Record) -> Source:
     return TfSource(config.tf, tf, record)
 
 
-Output = Callable[[State], None]
+Output = Callable[[MotionState], None]
 """Publishes a state."""
 
 
@@ -134,7 +134,7 @@ def outputs_of(config: OutputConfig, space: Space, tf: TfInterface) -> list[Outp
 
 
 def _frame(config: FrameOutput, tf: TfInterface) -> Output:
-    def send(state: State) -> None:
+    def send(state: MotionState) -> None:
         quat_xyzw = state.point[3:] if len(state.point) > 3 else NO_ROTATION
         tf.set_tf(config.parent, config.child, state.point[:3], quat_xyzw)
 
@@ -144,7 +144,7 @@ def _frame(config: FrameOutput, tf: TfInterface) -> Output:
 def _joints(config: JointOutput, space: Space) -> Output:
     publisher = rospy.Publisher(config.topic, JointState, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
-    def send(state: State) -> None:
+    def send(state: MotionState) -> None:
         header = Header(stamp=rospy.Time.now())
         publisher.publish(JointState(header, list(space.names), state.point.tolist(), state.velocity.tolist(), []))
 
@@ -154,7 +154,7 @@ def _joints(config: JointOutput, space: Space) -> Output:
 def _signal(config: SignalOutput) -> Output:
     publisher = rospy.Publisher(config.topic, Float64MultiArray, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
-    def send(state: State) -> None:
+    def send(state: MotionState) -> None:
         numbers = state.point if config.content == "position" else state.velocity
         publisher.publish(Float64MultiArray(data=np.asarray(numbers).tolist()))
 

@@ -22,7 +22,7 @@ from custom_ros_tools.ros.lifecycle.wall_time import WallTimer
 from custom_ros_tools.ros.services import call_service, get_srv_handler
 from custom_ros_tools.tf import TfInterface
 from operator_node.msg import HapticState
-from rpbi_examples.press_report import Press, Sample
+from rpbi_examples.press_report import Press, PressSample
 
 SENSOR = "rpbi/kuka_lwr/force_torque_sensor_mount/ft_sensor"
 WORLD, TOOL, TARGET = "rpbi/world", "rpbi/kuka_lwr/end_effector_ball", "rpbi/target"
@@ -134,7 +134,7 @@ class Watch:
             stamp_s = stamp.to_sec()
             self._start_s = stamp_s if self._start_s is None else self._start_s
             handle_z, felt_n = _value_at(self._handle_z, stamp_s), _value_at(self._felt_n, stamp_s)
-            self._press.add(Sample(stamp_s - self._start_s, handle_z, target_z, tool_z, measured_n, felt_n))
+            self._press.add(PressSample(stamp_s - self._start_s, handle_z, target_z, tool_z, measured_n, felt_n))
             if self._press.is_over:
                 self._finish()
         if self._is_scripted and time.monotonic() - self._connected_s > LEFT_S and not self._over.is_set():

@@ -218,7 +218,7 @@ class CommunicationConfig(ConfigModel):
     publisher: PublisherConfig = Field(PublisherConfig(), description="Destination of the targets.")
 
 
-class TrajectoryConfig(ConfigModel):
+class WaypointMotionConfig(ConfigModel):
     """A motion through waypoints."""
 
     motion_dimensions: MotionDimensions = Field(description="Meaning of the rows of the waypoints.")
@@ -226,7 +226,7 @@ class TrajectoryConfig(ConfigModel):
     communication: CommunicationConfig = Field(CommunicationConfig(), description="Topics and frames.")
 
     @model_validator(mode="after")
-    def _has_frames(self) -> TrajectoryConfig:
+    def _has_frames(self) -> WaypointMotionConfig:
         publisher = self.communication.publisher
         if self.motion_dimensions.joint_names is None:
             for key in ("header_frame_id", "msg_child_frame_id"):

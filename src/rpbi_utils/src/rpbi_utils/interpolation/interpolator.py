@@ -10,7 +10,7 @@ import numpy as np
 from robot_model.geometry import Pose
 from rpbi.control.trajectories.trajectory import Knot, State, Trajectory
 
-from .config import TrajectoryConfig, WaypointError
+from .config import WaypointError, WaypointMotionConfig
 from .rotation import RotationKnot, RotationPath, angular_rates
 from .waypoints import Array, Waypoints, estimated_rates
 
@@ -18,7 +18,7 @@ ROUNDING_S = 1e-9
 """Time by which a sample may be later than the present, for rounding [s]."""
 
 
-class Sample(NamedTuple):
+class TargetSample(NamedTuple):
     """The target at one time.
 
     Attributes:
@@ -70,7 +70,7 @@ class Interpolator:
         delay_s: Time that pauses have taken [s]; the plan is later than its waypoints by it.
     """
 
-    def __init__(self, config: TrajectoryConfig) -> None:
+    def __init__(self, config: WaypointMotionConfig) -> None:
         self._dimensions, self._config = config.motion_dimensions, config.interpolation
         self._plan: Plan | None = None
         self._grid_s = 0.0
@@ -114,7 +114,7 @@ class Interpolator:
         new = self._through(waypoints, times_s, first, (from_s, old))
         self._plan = old.spliced(new, from_s).since(self._sent_s)
 
-    def newest(self, now_s: float) -> Sample | None:
+    def newest(self, now_s: float) -> TargetSample | None:
         """Returns the newest sample up to a time [s] if there is one that has not been returned, else None."""
         plan = self._plan
         if plan is None or self._paused_s is not None:
@@ -158,13 +158,13 @@ class Interpolator:
             return max(time_s, end_s) if self._config.hold else end_s
         return time_s if time_s >= plan.scalars.start_s else None
 
-    def _at(self, plan: Plan, time_s: float) -> Sample:
+    def _at(self, plan: Plan, time_s: float) -> TargetSample:
         state = plan.scalars.sample(time_s)
         pose = None
         if self._dimensions.joint_names is None:
             quat = None if plan.path is None else plan.path.sample(time_s).quat_xyzw
             pose = self._dimensions.pose(state.position, quat)
-        return Sample(time_s + self.delay_s, state, pose)
+        return TargetSample(time_s + self.delay_s, state, pose)
 
     def _through(
         self,

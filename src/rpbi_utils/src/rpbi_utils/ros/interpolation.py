@@ -19,8 +19,13 @@ from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, timed_master
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning, WallTimer
 from custom_ros_tools.ros.transform_messages import transform_message
-from rpbi_utils.interpolation.config import InterpolationParameters, PublisherConfig, TrajectoryConfig, WaypointError
-from rpbi_utils.interpolation.interpolator import Interpolator, Sample
+from rpbi_utils.interpolation.config import (
+    InterpolationParameters,
+    PublisherConfig,
+    WaypointError,
+    WaypointMotionConfig,
+)
+from rpbi_utils.interpolation.interpolator import Interpolator, TargetSample
 from rpbi_utils.interpolation.waypoints import Waypoints, read_waypoints, waypoint_matrix
 
 NAME = "ros_Traj_interface"
@@ -42,7 +47,7 @@ class InterpolationNode:
 
     def __init__(self) -> None:
         parameters = private_parameters(InterpolationParameters)
-        config = TrajectoryConfig.parse(load_config(parameters.traj_config), parameters.traj_config)
+        config = WaypointMotionConfig.parse(load_config(parameters.traj_config), parameters.traj_config)
         self._config, self._hz = config, parameters.consuming_freq
         self._interpolator = Interpolator(config)
         self._arrived: deque[tuple[rospy.Time, Waypoints] | None] = deque()
@@ -156,12 +161,12 @@ class InterpolationNode:
                 self._is_streaming = value is True
 
 
-def _frame_publisher(config: PublisherConfig, namespace: str) -> Callable[[rospy.Time, Sample], None]:
+def _frame_publisher(config: PublisherConfig, namespace: str) -> Callable[[rospy.Time, TargetSample], None]:
     """Returns a function that publishes the pose of a sample on /tf."""
     child = "/".join(part for part in (namespace.strip("/"), config.msg_child_frame_id) if part)
     publisher = rospy.Publisher("/tf", TFMessage, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
-    def publish(stamp: rospy.Time, sample: Sample) -> None:
+    def publish(stamp: rospy.Time, sample: TargetSample) -> None:
         assert sample.pose is not None
         header = Header(stamp=stamp, frame_id=config.header_frame_id)
         publisher.publish(TFMessage([TransformStamped(header, child, transform_message(*sample.pose))]))
@@ -169,12 +174,12 @@ def _frame_publisher(config: PublisherConfig, namespace: str) -> Callable[[rospy
     return publish
 
 
-def _joint_publisher(config: TrajectoryConfig) -> Callable[[rospy.Time, Sample], None]:
+def _joint_publisher(config: WaypointMotionConfig) -> Callable[[rospy.Time, TargetSample], None]:
     """Returns a function that publishes the positions and velocities of a sample."""
     topic, names = config.communication.publisher.joint_topic, config.motion_dimensions.joint_names
     publisher = rospy.Publisher(topic, JointState, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
-    def publish(stamp: rospy.Time, sample: Sample) -> None:
+    def publish(stamp: rospy.Time, sample: TargetSample) -> None:
         state = sample.state
         publisher.publish(JointState(Header(stamp=stamp), names, state.position, state.velocity, ()))
 

@@ -26,7 +26,7 @@ IMAGE = "/colour/image/compressed"
 
 
 @dataclass(frozen=True)
-class Snapshot:
+class SimulatorSnapshot:
     """The simulator at one moment.
 
     Attributes:
@@ -134,11 +134,13 @@ class SimulatorLink:
             newest.wanted, newest.message = topic, None
             self._wake.set()
 
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> SimulatorSnapshot:
         """Returns what is known now."""
         if time.monotonic() - self._heard_s > SILENCE_S or LIST not in self._names:
-            return Snapshot(topics=self._topics)
-        return Snapshot(True, self._is_running, self._names, self._topics, self._objects, self._state, self._warning)
+            return SimulatorSnapshot(topics=self._topics)
+        return SimulatorSnapshot(
+            True, self._is_running, self._names, self._topics, self._objects, self._state, self._warning
+        )
 
     def _run(self) -> None:
         while not rospy.is_shutdown():

@@ -5,10 +5,10 @@ from typing import Any
 
 from PyQt5.QtWidgets import QGroupBox, QWidget
 
-from .link import SimulatorLink, Snapshot
-from .requests import LIMIT_S, Outcome, Requests
+from .link import SimulatorLink, SimulatorSnapshot
+from .requests import LIMIT_S, BackgroundRequests, RequestResult
 
-Then = Callable[[Outcome], None]
+Then = Callable[[RequestResult], None]
 
 
 class Panel(QGroupBox):
@@ -20,7 +20,7 @@ class Panel(QGroupBox):
         requests: Runs what may take time.
     """
 
-    def __init__(self, title: str, link: SimulatorLink, requests: Requests) -> None:
+    def __init__(self, title: str, link: SimulatorLink, requests: BackgroundRequests) -> None:
         super().__init__(title)
         self.link, self._requests = link, requests
         self._needed: dict[QWidget, str] = {}
@@ -33,7 +33,7 @@ class Panel(QGroupBox):
         """Disables widgets as long as a service is missing."""
         self._needed.update(dict.fromkeys(widgets, service))
 
-    def refresh(self, snapshot: Snapshot) -> None:
+    def refresh(self, snapshot: SimulatorSnapshot) -> None:
         """Shows the state of the simulator; called ten times a second and after each request."""
         for widget, service in self._needed.items():
             widget.setEnabled(snapshot.has(service))

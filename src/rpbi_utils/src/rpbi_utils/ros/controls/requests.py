@@ -11,7 +11,7 @@ LIMIT_S = 10.0
 """Time after which a request counts as unanswered [s]; its late answer is dropped."""
 
 
-class Outcome(NamedTuple):
+class RequestResult(NamedTuple):
     """The end of a request.
 
     Attributes:
@@ -26,31 +26,31 @@ class Outcome(NamedTuple):
     value: Any
     error: str
     duration_s: float
-    then: Callable[["Outcome"], None] | None
+    then: Callable[["RequestResult"], None] | None
 
 
-class Requests:
+class BackgroundRequests:
     """Runs functions in threads of their own.
 
     Args:
         deliver: Receives each outcome exactly once, in any thread.
     """
 
-    def __init__(self, deliver: Callable[[Outcome], None]) -> None:
+    def __init__(self, deliver: Callable[[RequestResult], None]) -> None:
         self._deliver = deliver
 
     def ask(
         self,
         name: str,
         function: Callable[[], Any],
-        then: Callable[[Outcome], None] | None = None,
+        then: Callable[[RequestResult], None] | None = None,
         limit_s: float = LIMIT_S,
     ) -> None:
         """Runs a function; returns at once. An exception of it is a failure."""
         threading.Thread(target=self._watch, args=(name, function, then, limit_s), name=name, daemon=True).start()
 
     def _watch(
-        self, name: str, function: Callable[[], Any], then: Callable[[Outcome], None] | None, limit_s: float
+        self, name: str, function: Callable[[], Any], then: Callable[[RequestResult], None] | None, limit_s: float
     ) -> None:
         start_s = time.monotonic()
         results: list[tuple[Any, str]] = []
@@ -68,4 +68,4 @@ class Requests:
         threading.Thread(target=work, name=f"{name}, its work", daemon=True).start()
         done.wait(limit_s)
         value, error = results[0] if results else (None, f"no answer within {limit_s:g} s")
-        self._deliver(Outcome(name, value, error, time.monotonic() - start_s, then))
+        self._deliver(RequestResult(name, value, error, time.monotonic() - start_s, then))

@@ -10,7 +10,7 @@ from .panels.joints import JointsPanel
 from .panels.objects import ObjectsPanel
 from .panels.recording import RecordingPanel
 from .panels.run import RunPanel
-from .requests import Outcome, Requests
+from .requests import BackgroundRequests, RequestResult
 
 TITLE = "ROS-PyBullet Interface Controls"
 REFRESH_MS = 100
@@ -39,7 +39,7 @@ class ControlsWindow(QMainWindow):
         super().__init__()
         self.setWindowTitle(TITLE)
         self._link = link
-        requests = Requests(signals.answered.emit)
+        requests = BackgroundRequests(signals.answered.emit)
         signals.answered.connect(self._on_answer)
         left: list[Panel] = [RunPanel(link, requests), JointsPanel(link, requests, first)]
         right: list[Panel] = [
@@ -81,7 +81,7 @@ class ControlsWindow(QMainWindow):
         for panel in self._panels:
             panel.close()
 
-    def _on_answer(self, outcome: Outcome) -> None:
+    def _on_answer(self, outcome: RequestResult) -> None:
         if outcome.then is not None:
             outcome.then(outcome)
         text = outcome.error or (outcome.value if isinstance(outcome.value, str) else "done")

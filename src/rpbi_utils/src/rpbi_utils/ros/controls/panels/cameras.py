@@ -7,9 +7,9 @@ from PyQt5.QtCore import Qt
 from PyQt5.QtGui import QPixmap
 from PyQt5.QtWidgets import QComboBox, QLabel, QSizePolicy, QVBoxLayout
 
-from ..link import IMAGE, SimulatorLink, Snapshot
+from ..link import IMAGE, SimulatorLink, SimulatorSnapshot
 from ..panel import Panel, named
-from ..requests import Requests
+from ..requests import BackgroundRequests
 
 NONE = "none"
 
@@ -17,7 +17,7 @@ NONE = "none"
 class CamerasPanel(Panel):
     """The colour image of the camera that is chosen; nothing is drawn as long as none is."""
 
-    def __init__(self, link: SimulatorLink, requests: Requests) -> None:
+    def __init__(self, link: SimulatorLink, requests: BackgroundRequests) -> None:
         super().__init__("Cameras", link, requests)
         self._choice = named(QComboBox(), "camera", "Camera whose colour image is shown")
         self._choice.addItem(NONE)
@@ -30,7 +30,7 @@ class CamerasPanel(Panel):
         layout.addWidget(self._image, 1)
         self._shown: Any = None
 
-    def refresh(self, snapshot: Snapshot) -> None:
+    def refresh(self, snapshot: SimulatorSnapshot) -> None:
         super().refresh(snapshot)
         offered = [NONE, *snapshot.cameras]
         if offered != [self._choice.itemText(index) for index in range(self._choice.count())]:

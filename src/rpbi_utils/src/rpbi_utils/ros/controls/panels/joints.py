@@ -25,9 +25,9 @@ from ros_pybullet_interface.msg import JointInfo
 from ros_pybullet_interface.srv import ResetJointState, RobotInfo, SetJointState
 from rpbi_utils.ros.console.running_simulator import RunningSimulator
 
-from ..link import SimulatorLink, Snapshot
+from ..link import SimulatorLink, SimulatorSnapshot
 from ..panel import Panel, named
-from ..requests import LIMIT_S, Outcome, Requests
+from ..requests import LIMIT_S, BackgroundRequests, RequestResult
 
 UNLIMITED_RAD, UNLIMITED_M = math.pi, 1.0
 """Range of the slider of a joint without limits, to both sides."""
@@ -143,7 +143,7 @@ class RobotTab(QWidget):
             line.addWidget(widget)
         layout.addLayout(line)
 
-    def refresh(self, snapshot: Snapshot, state: JointState | None) -> None:
+    def refresh(self, snapshot: SimulatorSnapshot, state: JointState | None) -> None:
         """Shows positions, and which buttons work."""
         if not self._is_known:
             self._ask_for_joints()
@@ -169,7 +169,7 @@ class RobotTab(QWidget):
         call = partial(_call, self._service("robot_info"), RobotInfo)
         self._panel.ask(f"Joints of {self._robot}", call, self._show_joints)
 
-    def _show_joints(self, outcome: Outcome) -> None:
+    def _show_joints(self, outcome: RequestResult) -> None:
         self._is_asked, self._is_known = False, not outcome.error
         if outcome.error:
             return
@@ -194,7 +194,7 @@ class RobotTab(QWidget):
             self._panel.ask(f"Send of {self._robot}", call, self._release(moved))
 
     def _release(self, moved: dict[str, float]) -> Any:
-        def release(outcome: Outcome) -> None:
+        def release(outcome: RequestResult) -> None:
             for name, position in moved.items():
                 if not outcome.error and self._rows[name].target.value() == position:  # not moved again meanwhile
                     self._rows[name].release()
@@ -226,7 +226,7 @@ class JointsPanel(Panel):
         first: Name of the robot whose tab is shown first, if there is one.
     """
 
-    def __init__(self, link: SimulatorLink, requests: Requests, first: str | None) -> None:
+    def __init__(self, link: SimulatorLink, requests: BackgroundRequests, first: str | None) -> None:
         super().__init__("Joints", link, requests)
         self._first = first
         self._tabs = named(QTabWidget(), "robots")
@@ -236,7 +236,7 @@ class JointsPanel(Panel):
         layout.addWidget(self._nothing)
         layout.addWidget(self._tabs)
 
-    def refresh(self, snapshot: Snapshot) -> None:
+    def refresh(self, snapshot: SimulatorSnapshot) -> None:
         super().refresh(snapshot)
         robots = snapshot.robots
         for index in reversed(range(self._tabs.count())):

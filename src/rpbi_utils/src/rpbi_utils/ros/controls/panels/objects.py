@@ -16,9 +16,9 @@ from PyQt5.QtWidgets import (
 from rpbi_utils.ros.console.remove import remove
 from rpbi_utils.ros.console.spawn import spawn
 
-from ..link import SimulatorLink, Snapshot
+from ..link import SimulatorLink, SimulatorSnapshot
 from ..panel import Panel, named
-from ..requests import Outcome, Requests
+from ..requests import BackgroundRequests, RequestResult
 
 ADD_LIMIT_S = 120.0
 """Longest time for adding an object [s]; a mesh may have to be simplified."""
@@ -27,7 +27,7 @@ ADD_LIMIT_S = 120.0
 class ObjectsPanel(Panel):
     """Everything in the world, with its type; files are added, what is selected is removed."""
 
-    def __init__(self, link: SimulatorLink, requests: Requests) -> None:
+    def __init__(self, link: SimulatorLink, requests: BackgroundRequests) -> None:
         super().__init__("Objects", link, requests)
         self._table = named(QTableWidget(0, 2), "objects", "What is in the world")
         self._table.setHorizontalHeaderLabels(["Name", "Type"])
@@ -58,7 +58,7 @@ class ObjectsPanel(Panel):
         grid.addWidget(self._add, 2, 2)
         grid.addWidget(self._remove, 2, 3)
 
-    def refresh(self, snapshot: Snapshot) -> None:
+    def refresh(self, snapshot: SimulatorSnapshot) -> None:
         super().refresh(snapshot)
         rows = list(snapshot.objects.items())
         if rows != self._rows():
@@ -96,5 +96,5 @@ class ObjectsPanel(Panel):
     def _on_remove(self) -> None:
         self.ask("Remove", partial(remove, *self._chosen()), self._look_again)
 
-    def _look_again(self, _: Outcome) -> None:
+    def _look_again(self, _: RequestResult) -> None:
         self.link.look()

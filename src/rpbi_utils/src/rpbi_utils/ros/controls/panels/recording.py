@@ -9,9 +9,9 @@ from std_msgs.msg import String
 
 from rpbi_utils.ros.bags.recorder import Recorder
 
-from ..link import SimulatorLink, Snapshot
+from ..link import SimulatorLink, SimulatorSnapshot
 from ..panel import Panel, named
-from ..requests import Outcome, Requests
+from ..requests import BackgroundRequests, RequestResult
 
 FOLDER = "~/rpbi_recordings"
 LIMIT_S = 60.0
@@ -26,7 +26,7 @@ IMAGES = ("/image", "/segmentation", "/pointcloud", "/compressed", "/visualizer_
 class RecordingPanel(Panel):
     """Records all topics of the simulator, and labels that mark moments."""
 
-    def __init__(self, link: SimulatorLink, requests: Requests) -> None:
+    def __init__(self, link: SimulatorLink, requests: BackgroundRequests) -> None:
         super().__init__("Recording", link, requests)
         self._recorder: Recorder | None = None
         self._is_busy, self._begin_s = False, 0.0
@@ -51,7 +51,7 @@ class RecordingPanel(Panel):
         grid.addWidget(self._told, 2, 0, 1, 2)
         grid.addWidget(self._record, 2, 2)
 
-    def refresh(self, snapshot: Snapshot) -> None:
+    def refresh(self, snapshot: SimulatorSnapshot) -> None:
         super().refresh(snapshot)
         own = rospy.resolve_name(LABEL)
         ours = rospy.resolve_name("rpbi") + "/"
@@ -89,13 +89,13 @@ class RecordingPanel(Panel):
         self._told.setText("subscribing")
         self.ask(f"Record {stem}.bag", self._recorder.start, self._on_begun, LIMIT_S)
 
-    def _on_begun(self, outcome: Outcome) -> None:
+    def _on_begun(self, outcome: RequestResult) -> None:
         self._is_busy, self._begin_s = False, time.monotonic()
         if outcome.error:
             self._recorder = None
             self._told.setText("not recording")
 
-    def _on_ended(self, outcome: Outcome) -> None:
+    def _on_ended(self, outcome: RequestResult) -> None:
         self._is_busy, self._recorder = False, None
         self._told.setText("not recorded" if outcome.error else f"saved {outcome.value}")
 

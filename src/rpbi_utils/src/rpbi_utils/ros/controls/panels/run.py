@@ -9,9 +9,9 @@ from std_srvs.srv import Trigger
 from ros_pybullet_interface.srv import SetRealTimeFactor, StepN
 from rpbi_utils.ros.console.running_simulator import RunningSimulator
 
-from ..link import SimulatorLink, Snapshot
+from ..link import SimulatorLink, SimulatorSnapshot
 from ..panel import Panel, named
-from ..requests import Outcome, Requests
+from ..requests import BackgroundRequests, RequestResult
 
 MAX_STEPS = 1_000_000
 """Largest number of steps of one request; the simulator refuses more."""
@@ -22,7 +22,7 @@ DASH = "–"
 class RunPanel(Panel):
     """Start, stop, steps, reset and pace, and how the world is doing."""
 
-    def __init__(self, link: SimulatorLink, requests: Requests) -> None:
+    def __init__(self, link: SimulatorLink, requests: BackgroundRequests) -> None:
         super().__init__("Simulation", link, requests)
         grid = QGridLayout(self)
         self._start = self._button("Start", "rpbi/start", "Lets the world run")
@@ -71,7 +71,7 @@ class RunPanel(Panel):
             grid.setColumnStretch(column, 1)
         self._asked: float | None = None
 
-    def refresh(self, snapshot: Snapshot) -> None:
+    def refresh(self, snapshot: SimulatorSnapshot) -> None:
         super().refresh(snapshot)
         stands = not snapshot.is_running
         self._start.setEnabled(self._start.isEnabled() and stands)
@@ -99,7 +99,7 @@ class RunPanel(Panel):
         for name, text in texts.items():
             self._figures[name].setText(text)
 
-    def _show_status(self, snapshot: Snapshot) -> None:
+    def _show_status(self, snapshot: SimulatorSnapshot) -> None:
         if not snapshot.is_alive:
             text, colour = "no simulator", "#a02020"
         elif not snapshot.is_running:
@@ -117,7 +117,7 @@ class RunPanel(Panel):
         self.require(service, button)
         return button
 
-    def _look_again(self, outcome: Outcome) -> None:
+    def _look_again(self, outcome: RequestResult) -> None:
         if outcome.name == "Reset" and not outcome.error:
             self.link.look()  # a reset brings back what was removed
 
