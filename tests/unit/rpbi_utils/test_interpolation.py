@@ -10,10 +10,18 @@ import numpy as np
 import pytest
 
 from custom_ros_tools.errors import ConfigError
-from robot_model.geometry import Quaternion, minus, normalized, quaternion_product, rotation_between, scaled
+from robot_model.geometry import (
+    Quaternion,
+    minus,
+    normalized,
+    quaternion_of,
+    quaternion_product,
+    rotation_between,
+    scaled,
+)
 from rpbi_utils.interpolation.config import WaypointError, WaypointMotionConfig
 from rpbi_utils.interpolation.interpolator import Interpolator, TargetSample
-from rpbi_utils.interpolation.rotation import RotationKnot, RotationPath, exponential
+from rpbi_utils.interpolation.rotation import RotationKnot, RotationPath
 from rpbi_utils.interpolation.waypoints import read_waypoints, waypoint_matrix
 
 FRAMES = {"publisher": {"header_frame_id": "world", "msg_child_frame_id": "target"}}
@@ -263,7 +271,7 @@ def test_each_representation_has_its_rotation_and_the_shortest_path_wraps():
     vector = scaled(1.3, (0.6, 0.0, 0.8))
     for name, values, quat in (
         ("euler", yaw_pitch_roll, expected),
-        ("axis_angle", vector, exponential(vector)),
+        ("axis_angle", vector, quaternion_of(vector)),
         ("quat", scaled(2.0, expected[:3]) + (2.0 * expected[3],), expected),
     ):
         config = motion(3 + len(values), {"rotation_repr": name, "rotation_vec_index": [3, 3 + len(values)]})

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robot_model.geometry import Pose
-from rpbi.control.trajectories.trajectory import Knot, State, Trajectory
+from rpbi.control.trajectories.trajectory import DesiredState, Knot, Trajectory
 
 from .config import WaypointError, WaypointMotionConfig
 from .rotation import RotationKnot, RotationPath, angular_rates
@@ -28,7 +28,7 @@ class TargetSample(NamedTuple):
     """
 
     time_s: float
-    state: State
+    state: DesiredState
     pose: Pose | None
 
 
@@ -205,11 +205,13 @@ def _scalar_knots(waypoints: Waypoints, times_s: tuple[float, ...], method: str)
         accelerations = waypoints.accelerations
         if accelerations is None:
             accelerations = _estimated_accelerations(times_s, values, rates)
-    rows = (None if each is None else [tuple(row) for row in each.tolist()] for each in (values, rates, accelerations))
-    positions, velocities, bends = rows
-    assert positions is not None
+
+    def row(table: Array | None, i: int) -> tuple[float, ...] | None:
+        return None if table is None else tuple(table[i].tolist())
+
     return [
-        Knot(time_s, positions[i], velocities and velocities[i], bends and bends[i]) for i, time_s in enumerate(times_s)
+        Knot(time_s, tuple(values[i].tolist()), row(rates, i), row(accelerations, i))
+        for i, time_s in enumerate(times_s)
     ]
 
 

@@ -66,7 +66,7 @@ def interpolate_poly_fit(
     plot_title: str = "None",
 ) -> Samples:
     """Samples the polynomial of an order that is nearest to K values; it passes through them if the order is K - 1."""
-    curve = np.poly1d(np.polyfit(time_seq, pos_seq, poly_order))
+    curve = np.poly1d(np.polyfit(np.asarray(time_seq, float), np.asarray(pos_seq, float), poly_order))
     return _sampled(curve, time_seq, pos_seq, sample_freq, plot_flag, plot_title)
 
 

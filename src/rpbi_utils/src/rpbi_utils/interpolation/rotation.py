@@ -23,11 +23,12 @@ from robot_model.geometry import (
     norm,
     normalized,
     plus,
+    quaternion_of,
     quaternion_product,
     rotation_between,
     scaled,
 )
-from rpbi.control.trajectories.trajectory import Knot, State, Trajectory
+from rpbi.control.trajectories.trajectory import DesiredState, Knot, Trajectory
 
 SMALL_RAD = 1e-3
 """Angle below which series replace the quotients of the Jacobian [rad]."""
@@ -129,13 +130,6 @@ class RotationPath:
         return RotationPath(self.segments[first:], self.end_s, self.goal)
 
 
-def exponential(turn: Vector) -> Quaternion:
-    """Returns the rotation x, y, z, w by a rotation vector [rad]."""
-    angle = norm(turn)
-    x, y, z = scaled(math.sin(0.5 * angle) / angle if angle > 1e-12 else 0.5, turn)
-    return x, y, z, math.cos(0.5 * angle)
-
-
 def angular_rates(times_s: Sequence[float], quats_xyzw: Sequence[Quaternion]) -> list[Vector]:
     """Returns smooth angular velocities at K orientations, in fixed axes [rad/s]; zero at both ends."""
     h = [after - before for before, after in zip(times_s, times_s[1:])]
@@ -165,9 +159,9 @@ def _resting(start_s: float, quat_xyzw: Quaternion, end_s: float) -> RotationSeg
     return RotationSegment(start_s, quat_xyzw, turn)
 
 
-def _turned(base: Quaternion, turn: State) -> RotationState:
+def _turned(base: Quaternion, turn: DesiredState) -> RotationState:
     phi, rate, acceleration = (_vector(each) for each in turn)
-    quat = normalized(quaternion_product(exponential(phi), base))
+    quat = normalized(quaternion_product(quaternion_of(phi), base))
     spin = plus(_with_jacobian(phi, acceleration), _jacobian_rate(phi, rate))
     return RotationState(quat, _with_jacobian(phi, rate), spin)
 

@@ -157,8 +157,8 @@ class CalibrateWrenchNode:
             if self._calibration.payload is not None and pose is None:
                 return TriggerResponse(False, f"not zeroed: {self._missing()}, which the payload's weight depends on")
             self._calibration.zero(mean, self._gravity(pose))
-            offset = self._calibration.offset
-        assert offset is not None
+            assert self._calibration.offset is not None
+            offset = self._calibration.offset.tolist()
         message = f"zero is {listed(offset[:3])} N and {listed(offset[3:], 4)} N m"
         rospy.loginfo(message)
         return TriggerResponse(True, message)
