@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import time
 from pathlib import Path
 
@@ -36,6 +37,7 @@ class Controls:
     def __init__(self, system: RosSystem, screen: Screen, folder: Path) -> None:
         self.system, self.screen, self.folder = system, screen, folder
         self._widgets = folder / "widgets.json"
+        self.simulator: subprocess.Popen[bytes] | None = None
         self.world = write_world(
             folder,
             collision=(BOX_FLOOR,),
@@ -54,7 +56,16 @@ class Controls:
         config = yaml.safe_load(Path(self.world).read_text())
         for section in ("collision_objects", "dynamic_objects", "robots"):
             config[section] = [str(self.folder / file) for file in config[section]]
-        self.simulator = self.system.simulator(config, fresh=True)
+        self.simulator = self.system.simulator(config, use_sim_time=True, fresh=True)
+
+    def have_running(self) -> None:
+        """Starts a simulator and its world, unless an earlier test did."""
+        if self.simulator is None:
+            self.start_simulator()
+        wait_until(lambda: self.text("status") in ("stopped", "running"), "the window sees the simulator")
+        if self.text("status") == "stopped":
+            self.click("start")
+        self.wait_for("status", "running")
 
     @property
     def widgets(self):
@@ -122,11 +133,12 @@ def test_start_step_and_stop(controls):
     controls.click("stop")
     controls.wait_for("status", "stopped")
     controls.click("reset")
-    controls.wait_for("tick", "0")
-    assert controls.text("resets") == "1"
+    controls.wait_for("resets", "1")
+    wait_until(lambda: controls.text("tick") == "0", "the world is at its first tick")
 
 
 def test_the_pace_is_set_and_follows_what_others_set(controls):
+    controls.have_running()
     states = controls.system.listen("/rpbi/state", SimulationState)
     controls.type("factor", "0.5")
     controls.click("set_factor")
@@ -139,8 +151,7 @@ def test_the_pace_is_set_and_follows_what_others_set(controls):
 
 def test_a_slider_with_send_moves_the_robot(controls):
     joint = "lbr_iiwa_joint_2"
-    controls.click("start")
-    controls.wait_for("status", "running")
+    controls.have_running()
     states = controls.system.listen("/rpbi/other/joint_states", JointState)
     controls.wait_for(f"measured {joint}", "rad")
     assert controls.is_enabled("send") == [False]
@@ -157,11 +168,13 @@ def test_a_slider_with_send_moves_the_robot(controls):
     shown = float(controls.text(f"measured {joint}").removesuffix(" rad"))
     assert abs(shown - goal) < 0.01
     controls.click("home")
+    controls.wait_for("message", "Home of other")
     wait_until(lambda: abs(states.messages[-1].position[index]) < 0.01, "the robot is where it started")
     states.close()
 
 
 def test_objects_are_removed_and_added(controls):
+    controls.have_running()
     controls.wait_for("objects", "box dynamic")
     controls.click("objects/box")
     controls.click("remove")
@@ -178,6 +191,7 @@ def test_objects_are_removed_and_added(controls):
 
 
 def test_the_image_of_a_camera_is_shown(controls):
+    controls.have_running()
     controls.click("camera")
     controls.screen.run("xdotool", "key", "Down", "Return")
     controls.wait_for("camera", "camera")
@@ -185,6 +199,7 @@ def test_the_image_of_a_camera_is_shown(controls):
 
 
 def test_a_recording_with_a_label(controls, tmp_path):
+    controls.have_running()
     controls.type("folder", str(tmp_path))
     controls.type("label", "push")
     controls.click("record")
@@ -200,6 +215,7 @@ def test_a_recording_with_a_label(controls, tmp_path):
 
 def test_reaction_to_a_click_beside_a_fast_world(controls):
     """Prints the time from a click to its effect on the simulator; xdotool's own start is part of it."""
+    controls.have_running()
     running = controls.system.listen("/rpbi/status", Int64)
     times = []
     for index in range(CLICKS):
@@ -222,8 +238,7 @@ def test_reaction_to_a_click_beside_a_fast_world(controls):
 
 
 def test_no_joint_state_is_lost_beside_the_window(controls):
-    if controls.text("status") != "running":
-        controls.click("start")
+    controls.have_running()
     states = controls.system.listen("/rpbi/iiwa/joint_states", JointState)
     stamps = [message.header.stamp.to_nsec() for message in states.wait_for(2000)]
     states.close()
@@ -231,6 +246,7 @@ def test_no_joint_state_is_lost_beside_the_window(controls):
 
 
 def test_buttons_go_grey_with_the_simulator_and_come_back(controls):
+    controls.have_running()
     os.killpg(controls.simulator.pid, signal.SIGKILL)
     controls.wait_for("status", "no simulator")
     assert not any(controls.is_enabled(*RUN, "add", "remove", "send", "home"))

@@ -62,6 +62,8 @@ class ControlsWindow(QMainWindow):
         self._message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._message.setWordWrap(True)
         self._message.setContentsMargins(8, 0, 8, 4)
+        two_lines = 2 * self._message.fontMetrics().lineSpacing() + 4
+        self._message.setMinimumHeight(two_lines)  # else buttons would move when a message needs a second line
         self.statusBar().addWidget(self._message, 1)
         self.resize(*(SIZE if view is None else SIZE_WITH_VIEW))
         self._timer = QTimer(self)
@@ -84,10 +86,12 @@ class ControlsWindow(QMainWindow):
     def _on_answer(self, outcome: RequestResult) -> None:
         if outcome.then is not None:
             outcome.then(outcome)
-        text = outcome.error or (outcome.value if isinstance(outcome.value, str) else "done")
-        duration = f"{1e3 * outcome.duration_s:.0f} ms" if outcome.duration_s < 1.0 else f"{outcome.duration_s:.1f} s"
-        self._message.setText(f"{outcome.name}: {text} ({duration})")
-        self._message.setStyleSheet("color: #a02020" if outcome.error else "")
+        text = outcome.error or ("done" if outcome.value is None else outcome.value)
+        if isinstance(text, str):  # data are for a panel, and replace no message
+            seconds = outcome.duration_s
+            duration = f"{1e3 * seconds:.0f} ms" if seconds < 1.0 else f"{seconds:.1f} s"
+            self._message.setText(f"{outcome.name}: {text} ({duration})")
+            self._message.setStyleSheet("color: #a02020" if outcome.error else "")
         self.refresh()
 
 
