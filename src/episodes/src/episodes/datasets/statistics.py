@@ -1,0 +1,73 @@
+"""Statistics of features, as LeRobot stores them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
+MAX_SAMPLED_FRAMES = 100
+"""Number of images of an episode that statistics are computed from."""
+MAX_SAMPLED_PIXELS = 20_000
+"""Number of pixels of each of them, spread over the image."""
+
+
+def statistics(values: Array) -> dict[str, list[Any]]:
+    """Returns minimum, maximum, mean, standard deviation, count and quantiles of each column.
+
+    Args:
+        values: Shape (n, columns).
+    """
+    values = values.astype(float)
+    found = {"min": values.min(axis=0), "max": values.max(axis=0)}
+    found |= {"mean": values.mean(axis=0), "std": values.std(axis=0)}
+    levels = np.quantile(values, list(QUANTILES.values()), axis=0)
+    found |= dict(zip(QUANTILES, levels))
+    return {**{name: each.tolist() for name, each in found.items()}, "count": [len(values)]}
+
+
+class ImageStatistics:
+    """Statistics of images, from a sample of frames and pixels.
+
+    Args:
+        frames: Number of images that there will be.
+    """
+
+    def __init__(self, frames: int) -> None:
+        self._every = max(1, -(-frames // MAX_SAMPLED_FRAMES))
+        self._seen = 0
+        self._samples: list[Array] = []
+
+    def add(self, pixels: Array) -> None:
+        """Adds an image, shape (height, width, 3), uint8."""
+        if self._seen % self._every == 0:
+            step = max(1, int(np.sqrt(pixels.shape[0] * pixels.shape[1] / MAX_SAMPLED_PIXELS)))
+            self._samples.append(pixels[::step, ::step].reshape(-1, 3).copy())
+        self._seen += 1
+
+    def result(self) -> dict[str, list[Any]]:
+        """Returns the statistics of the channels, from 0 to 1, each in the form [[[value]]]."""
+        found = statistics(np.concatenate(self._samples) / 255.0)
+        by_channel = {
+            name: [[[value]] for value in values] for name, values in found.items() if name != "count"
+        }
+        return {**by_channel, "count": [len(self._samples)]}
+
+
+def pooled(parts: list[dict[str, list[Any]]]) -> dict[str, list[Any]]:
+    """Returns the statistics of images of several episodes from those of each; quantiles are means of quantiles."""
+    counts = np.array([part["count"][0] for part in parts], float)
+    arrays = {name: np.array([part[name] for part in parts]) for name in parts[0] if name != "count"}
+
+    def mean(values: Array) -> Array:
+        return np.asarray(np.average(values, axis=0, weights=counts))
+
+    total = mean(arrays["mean"])
+    found = {"min": arrays["min"].min(axis=0), "max": arrays["max"].max(axis=0), "mean": total}
+    found["std"] = np.sqrt(mean(arrays["std"] ** 2 + (arrays["mean"] - total) ** 2))
+    found |= {name: mean(arrays[name]) for name in QUANTILES}
+    return {**{name: each.tolist() for name, each in found.items()}, "count": [int(counts.sum())]}
