@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
 from numpy.typing import NDArray
 
 from custom_ros_tools.schema import ConfigModel
@@ -18,7 +19,9 @@ Array = NDArray[Any]
 STATE, ACTION = "observation.state", "action"
 IMAGES = "observation.images."
 STAMP, TIME_ERROR = "source.stamp", "source.time_error"
-"""Features of the rows themselves: their time in the clock of the recording, and the error of each feature [s]."""
+"""Features of the rows themselves: their time in the clock of the recording, and the time error of each feature [s]."""
+STAMP_NAMES = ("sec", "nsec")
+"""Numbers of a stamp, int64; LeRobot's reader returns numbers with a point in single precision."""
 QUATERNION = ("qx", "qy", "qz", "qw")
 """Names of the four parts of a quaternion, as they follow each other in a feature."""
 
@@ -26,6 +29,12 @@ QUATERNION = ("qx", "qy", "qz", "qw")
 @dataclass(eq=False)
 class DatasetError(EpisodeError):
     """A data set cannot be written or read."""
+
+
+def stamps_of(times: Array) -> Array:
+    """Returns seconds and nanoseconds, shape (n, 2), int64, of times [s], shape (n,)."""
+    nanoseconds = np.rint(times * 1e9).astype(np.int64)
+    return np.stack(np.divmod(nanoseconds, 1_000_000_000), axis=1)
 
 
 class Feature(NamedTuple):

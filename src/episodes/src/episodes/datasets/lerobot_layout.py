@@ -26,14 +26,19 @@ ROW_COLUMNS = {
 """Columns of every data set, and their types."""
 
 
+def place(number: int) -> dict[str, int]:
+    """Returns folder and number of a file in it."""
+    return {"chunk_index": number // CHUNK, "file_index": number % CHUNK}
+
+
 def data_file(number: int) -> Path:
     """Returns the path of a data file in the data set."""
-    return Path(DATA_PATH.format(chunk_index=number // CHUNK, file_index=number % CHUNK))
+    return Path(DATA_PATH.format(**place(number)))
 
 
 def video_file(key: str, number: int) -> Path:
     """Returns the path of a video file in the data set."""
-    return Path(VIDEO_PATH.format(video_key=key, chunk_index=number // CHUNK, file_index=number % CHUNK))
+    return Path(VIDEO_PATH.format(video_key=key, **place(number)))
 
 
 def matrix(column: Any) -> Array:

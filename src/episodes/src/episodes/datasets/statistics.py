@@ -52,9 +52,7 @@ class ImageStatistics:
     def result(self) -> dict[str, list[Any]]:
         """Returns the statistics of the channels, from 0 to 1, each in the form [[[value]]]."""
         found = statistics(np.concatenate(self._samples) / 255.0)
-        by_channel = {
-            name: [[[value]] for value in values] for name, values in found.items() if name != "count"
-        }
+        by_channel = {name: [[[value]] for value in values] for name, values in found.items() if name != "count"}
         return {**by_channel, "count": [len(self._samples)]}
 
 

@@ -44,7 +44,7 @@ class VideoWriter:
     def __init__(self, path: Path, fps: int, height: int, width: int, codec: str, preset: str, crf: int) -> None:
         self._container = av.open(str(path), "w", options={"movflags": "+faststart"})
         options = {"preset": preset, "crf": str(crf), "g": str(KEY_FRAME_EVERY)}
-        stream = self._container.add_stream(ENCODERS[codec], rate=fps, options=options)
+        stream: Any = self._container.add_stream(ENCODERS[codec], rate=fps, options=options)
         stream.width, stream.height, stream.pix_fmt = width, height, PIXEL_FORMAT
         stream.codec_context.thread_count = 1
         stream.time_base = Fraction(1, fps)

@@ -262,7 +262,8 @@ class _Check:
             yield "timestamp: is late by one frame"
         elif np.abs(errors).max() > MAX_TIME_ERROR_S:
             first = int(np.argmax(np.abs(errors) > MAX_TIME_ERROR_S))
-            yield f"timestamp: expected {first / fps:.6g} s in frame {first} ({fps} fps), found {stamps[first, 0]:.6g} s"
+            found = float(stamps[first, 0])
+            yield f"timestamp: expected {first / fps:.6g} s in frame {first} ({fps} fps), found {found:.6g} s"
 
     # --- meta/stats.json
 
@@ -290,14 +291,18 @@ class _Check:
         """Checks the videos of all cameras and episodes."""
         features = {key: each for key, each in self._info["features"].items() if each["dtype"] == "video"}
         for key, feature in features.items():
-            columns = [f"videos/{key}/{name}" for name in ("chunk_index", "file_index", "from_timestamp", "to_timestamp")]
+            columns = [
+                f"videos/{key}/{name}" for name in ("chunk_index", "file_index", "from_timestamp", "to_timestamp")
+            ]
             by_file: dict[str, list[dict[str, Any]]] = {}
             for row in self.episodes:
                 if missing := [column for column in columns if row.get(column) is None]:
                     yield f"meta/episodes: episode {row['episode_index']}: expected {', '.join(missing)}, found none"
                     continue
                 place = {"video_key": key, "chunk_index": row[columns[0]], "file_index": row[columns[1]]}
-                by_file.setdefault(str(self._info.get("video_path") or layout.VIDEO_PATH).format(**place), []).append(row)
+                by_file.setdefault(str(self._info.get("video_path") or layout.VIDEO_PATH).format(**place), []).append(
+                    row
+                )
             for name, rows in by_file.items():
                 for fault in self._file_faults(self._folder / name, key, feature, rows):
                     yield f"{name}: {fault}"
@@ -352,17 +357,18 @@ class _Check:
             if not self._stored.get(row["episode_index"]):
                 continue
             try:
-                stored = read_images(self._folder, row["episode_index"]).get(key)
+                stored = read_images(self._folder, row["episode_index"])
             except ValueError as error:
                 yield f"{where}: {error}"
                 continue
             found = images[_nearest(times, wanted)]
-            if stored is not None and stored.shape == found.shape:
-                yield from (f"{where}: {fault}" for fault in image_faults(found, stored))
+            yield from (f"{where}: {fault}" for fault in image_faults(key, found, stored))
 
 
 def _is_feature(feature: Any) -> bool:
-    return isinstance(feature, dict) and isinstance(feature.get("shape"), list) and isinstance(feature.get("dtype"), str)
+    return (
+        isinstance(feature, dict) and isinstance(feature.get("shape"), list) and isinstance(feature.get("dtype"), str)
+    )
 
 
 def _unreadable(error: Exception) -> str:

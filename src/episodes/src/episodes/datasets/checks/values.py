@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from episodes.datasets.format import QUATERNION, STAMP
+from episodes.datasets.format import QUATERNION, STAMP, STAMP_NAMES
 from episodes.datasets.provenance import chain_faults, changes, episode_file, is_exported, read_episode, read_export
 
 Array = NDArray[Any]
@@ -111,5 +111,7 @@ def feature_faults(key: str, names: Sequence[str], values: Array, facts: Mapping
         yield f"expected {len(exported)} numbers a row ({', '.join(exported)}), found {values.shape[1]}"
     elif facts.get("frames") == len(values):
         yield from changes(exported, values, stored["checksums"])
-    if key == STAMP and (np.diff(values[:, 0]) <= 0).any():
-        yield f"stamps are not ascending, first at frame {int(np.argmax(np.diff(values[:, 0]) <= 0)) + 1}"
+    if key == STAMP and values.shape[1] == len(STAMP_NAMES):
+        wrong = np.flatnonzero(np.diff(values @ np.array([1_000_000_000, 1])) <= 0)
+        if len(wrong):
+            yield f"stamps are not ascending, first at frame {wrong[0] + 1}"

@@ -38,5 +38,3 @@ def format_of(folder: Path, others: tuple[str, ...] = ()) -> type[DatasetFormat]
     content = ", ".join(names[:10]) + (" ..." if len(names) > 10 else "") or "nothing"
     expected = "meta/info.json (LeRobot), an HDF5 file (robomimic), or folders with metadata.yaml (rosbag2)"
     raise DatasetError(folder, f"not a data set of a known format: expected {expected}, found {content}")
-
-

@@ -15,7 +15,7 @@ from pydantic import Field
 from custom_ros_tools.errors import MissingDependency
 from custom_ros_tools.schema import ConfigModel
 from episodes.datasets import lerobot_layout as layout
-from episodes.datasets.format import Array, Camera, DatasetFormat, ExportedEpisode, Feature, Schema
+from episodes.datasets.format import Array, Camera, DatasetFormat, ExportedEpisode, Schema
 from episodes.datasets.provenance import checksums, coarse
 from episodes.datasets.statistics import ImageStatistics, pooled, statistics
 
@@ -67,44 +67,23 @@ class LeRobot(DatasetFormat):
 
     def add(self, index: int, episode: ExportedEpisode) -> dict[str, Any]:
         """Writes the videos of an episode and keeps its rows until a data file is full."""
+        if sum(each.nbytes for each in self._pending) > MAX_DATA_BYTES:
+            self._write_rows()
         count = len(episode.times)
-        videos = {each.key: self._folder / layout.video_file(each.key, index) for each in self._schema.cameras}
-        with ExitStack() as undo:
-            for path in videos.values():
-                undo.callback(path.unlink, missing_ok=True)
-            films = {each.key: self._write_video(videos[each.key], each, episode) for each in self._schema.cameras}
-            values = episode.values({key: film.stamps for key, film in films.items()})
-            undo.pop_all()
+        films, values = self._write_videos(index, episode)
         task = self._tasks.setdefault(episode.task, len(self._tasks))
         rows = self._rows(index, task, count, values)
-        facts = {"episode_index": index, "tasks": [episode.task], "length": count}
-        facts |= {"dataset_from_index": self._frames, "dataset_to_index": self._frames + count}
-        facts |= {"data/chunk_index": self._data_file // layout.CHUNK, "data/file_index": self._data_file % layout.CHUNK}
-        for key in films:
-            place = {"chunk_index": index // layout.CHUNK, "file_index": index % layout.CHUNK}
-            place |= {"from_timestamp": 0.0, "to_timestamp": count / self._schema.fps}
-            facts |= {f"videos/{key}/{name}": value for name, value in place.items()}
-        facts |= {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0}
-        by_feature = _statistics(rows) | {key: film.statistics for key, film in films.items()}
-        for key, each in by_feature.items():
-            facts |= {f"stats/{key}/{name}": value for name, value in each.items()}
-        self._episodes.append(facts)
+        self._episodes.append(self._episode(index, episode.task, rows, films))
         for key, film in films.items():
             self._image_statistics[key].append(film.statistics)
         self._frames += count
         self._pending.append(rows)
-        if sum(each.nbytes for each in self._pending) > MAX_DATA_BYTES:
-            self._write_rows()
         columns = {
             feature.key: {"names": list(feature.names), "checksums": checksums(values[feature.key])}
             for feature in self._schema.features
         }
-        return {
-            "frames": count,
-            "fps": self._schema.fps,
-            "columns": columns,
-            "images": {key: film.coarse for key, film in films.items()},
-        }
+        images = {key: film.coarse for key, film in films.items()}
+        return {"frames": count, "fps": self._schema.fps, "columns": columns, "images": images}
 
     def close(self) -> None:
         """Writes the rows that are left and all metadata."""
@@ -135,6 +114,32 @@ class LeRobot(DatasetFormat):
         _parquet(self._folder / layout.EPISODES_PATH, [pa.Table.from_pylist(self._episodes)])
         _json(meta / "stats.json", self._all_statistics())
         _json(meta / "info.json", info)
+
+    def _write_videos(self, index: int, episode: ExportedEpisode) -> tuple[dict[str, _Film], dict[str, Array]]:
+        """Writes the videos of an episode, and returns their facts and the numbers of the episode."""
+        paths = {each.key: self._folder / layout.video_file(each.key, index) for each in self._schema.cameras}
+        with ExitStack() as undo:
+            for path in paths.values():
+                undo.callback(path.unlink, missing_ok=True)
+            films = {each.key: self._write_video(paths[each.key], each, episode) for each in self._schema.cameras}
+            values = episode.values({key: film.stamps for key, film in films.items()})
+            undo.pop_all()
+        return films, values
+
+    def _episode(self, index: int, task: str, rows: pa.Table, films: Mapping[str, _Film]) -> dict[str, Any]:
+        """Returns the row of an episode in `meta/episodes`."""
+        count = len(rows)
+        facts: dict[str, Any] = {"episode_index": index, "tasks": [task], "length": count}
+        facts |= {"dataset_from_index": self._frames, "dataset_to_index": self._frames + count}
+        facts |= {f"data/{name}": number for name, number in layout.place(self._data_file).items()}
+        for key in films:
+            facts |= {f"videos/{key}/{name}": number for name, number in layout.place(index).items()}
+            facts |= {f"videos/{key}/from_timestamp": 0.0, f"videos/{key}/to_timestamp": count / self._schema.fps}
+        facts |= {f"meta/episodes/{name}": number for name, number in layout.place(0).items()}
+        by_feature = {key: statistics(layout.matrix(rows.column(key))) for key in rows.column_names}
+        for key, each in (by_feature | {key: film.statistics for key, film in films.items()}).items():
+            facts |= {f"stats/{key}/{name}": value for name, value in each.items()}
+        return facts
 
     def _write_video(self, path: Path, camera: Camera, episode: ExportedEpisode) -> _Film:
         from episodes.datasets.video import VideoWriter  # not needed without cameras
@@ -240,10 +245,6 @@ class _Film:
 
 def _feature(dtype: str, names: tuple[str, ...] | None) -> dict[str, Any]:
     return {"dtype": dtype, "shape": [1 if names is None else len(names)], "names": list(names) if names else None}
-
-
-def _statistics(rows: pa.Table) -> dict[str, dict[str, list[Any]]]:
-    return {key: statistics(layout.matrix(rows.column(key))) for key in rows.column_names}
 
 
 def _array(values: Array) -> pa.Array:

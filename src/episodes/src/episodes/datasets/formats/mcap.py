@@ -84,8 +84,9 @@ class Mcap(DatasetFormat):
 
 def _convert(bag: Path, target: Path, types: Any) -> None:
     """Converts all topics of a ROS 1 bag; their definitions are in it."""
-    everything = {"exclude_topics": (), "include_topics": (), "exclude_msgtypes": (), "include_msgtypes": ()}
-    plain = {"compress": None, "compress_mode": "message"}
+    choices = ("exclude_topics", "include_topics", "exclude_msgtypes", "include_msgtypes")
+    everything: dict[str, Any] = dict.fromkeys(choices, ())
+    plain: dict[str, Any] = {"compress": None, "compress_mode": "message"}
     convert([bag], target, "mcap", ROSBAG2_VERSION, default_typestore=None, typestore=types, **plain, **everything)
 
 

@@ -104,8 +104,8 @@ class Robomimic(DatasetFormat):
             for each in self._schema.features
             if each.key != ACTION  # which is scaled by the values of all episodes
         }
-        images = {each.key: frame_checksums(demo[f"obs/{observation_key(each.key)}"]) for each in self._schema.cameras}
-        return {"frames": count, "fps": self._schema.fps, "columns": columns, "frame_checksums": images}
+        crcs = {each.key: frame_checksums(demo[f"obs/{observation_key(each.key)}"]) for each in self._schema.cameras}
+        return {"frames": count, "fps": self._schema.fps, "columns": columns, "frame_checksums": crcs}
 
     def _images(self, camera: Camera, episode: ExportedEpisode) -> tuple[Array, Array]:
         size = (self.config.image_width, self.config.image_height)

@@ -11,7 +11,17 @@ from pathlib import Path
 from typing import NamedTuple
 
 from custom_ros_tools.errors import InterfaceError
-from episodes.datasets.format import ACTION, STAMP, STATE, TIME_ERROR, DatasetError, DatasetFormat, Feature, Schema
+from episodes.datasets.format import (
+    ACTION,
+    STAMP,
+    STAMP_NAMES,
+    STATE,
+    TIME_ERROR,
+    DatasetError,
+    DatasetFormat,
+    Feature,
+    Schema,
+)
 from episodes.datasets.provenance import write_episode, write_export
 from episodes.errors import EpisodeError
 from episodes.folder import BAG, Episode, EpisodeFolder
@@ -125,7 +135,7 @@ def _plan(
         if key not in keys:
             raise EpisodeError(folder.path, f"no topic for '{key}' in the recordings: name one by {option} TOPIC")
     errors = (*(signal.feature.key for signal in signals), *(camera.key for camera in cameras))
-    own = (Feature(STAMP, ("stamp",), "float64"), Feature(TIME_ERROR, errors))
+    own = (Feature(STAMP, STAMP_NAMES, "int64"), Feature(TIME_ERROR, errors))
     return sources, signals, Schema(wish.fps, (*(signal.feature for signal in signals), *own), cameras)
 
 

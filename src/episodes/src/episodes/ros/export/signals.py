@@ -26,6 +26,7 @@ ACTION_NAME = re.compile(r"(.*)/(target|command|cmd_vel)")
 STATES_NAME = re.compile(r"(.*)/joint_states")
 TARGETS_NAME = re.compile(r"(.*/joint_states)/target")
 _KINDS = ("position", "velocity", "effort")
+_JOINT = re.compile(r"^(position|velocity|effort)/(?![xyzw]$)")
 _AXES = ("x", "y", "z")
 
 Tables = Mapping[str, pd.DataFrame]
@@ -125,7 +126,9 @@ def by_frame(tables: Tables, topic: str = "/tf") -> dict[str, pd.DataFrame]:
     return found
 
 
-def derive(tables: Tables, types: Mapping[str, str], namespace: str, fixed: Collection[str], choice: Choice) -> list[Signal]:
+def derive(
+    tables: Tables, types: Mapping[str, str], namespace: str, fixed: Collection[str], choice: Choice
+) -> list[Signal]:
     """Returns the features of a recording.
 
     Args:
@@ -236,7 +239,9 @@ def _joint_columns(table: pd.DataFrame, kind: str, fixed: Collection[str]) -> li
 def _names(columns: Iterable[Column]) -> tuple[str, ...]:
     """Returns names of numbers: joints by name, else the path; with the topic where that is not unique."""
     columns = list(columns)
-    short = [re.sub(rf"^({'|'.join(_KINDS)})/(?!([xyzw]|covariance)$)", "", name).replace("/", ".") for _, name in columns]
+    short = [
+        re.sub(rf"^({'|'.join(_KINDS)})/(?!([xyzw]|covariance)$)", "", name).replace("/", ".") for _, name in columns
+    ]
     if len(set(short)) == len(short):
         return tuple(short)
     return tuple(f"{label(table)}.{name}" for (table, _), name in zip(columns, short))

@@ -23,6 +23,7 @@ from episodes.datasets.format import (
     Feature,
     Frame,
     Schema,
+    stamps_of,
 )
 from episodes.datasets.provenance import file_digest, hash_chain
 from episodes.files import URDF, stored_path
@@ -158,7 +159,7 @@ class SourceEpisode(ExportedEpisode):
             if not np.isfinite(values[key]).all():
                 raise DatasetError(self.bag, f"'{key}' has values that are not finite")
         errors |= {key: self.times - stamps for key, stamps in image_stamps.items()}
-        values[STAMP] = self.times[:, None]
+        values[STAMP] = stamps_of(self.times)
         values[TIME_ERROR] = np.stack(list(errors.values()), axis=1).astype(np.float32)
         return values
 
@@ -176,7 +177,7 @@ class SourceEpisode(ExportedEpisode):
         }
 
     def _resampled(self, signal: Signal) -> tuple[Array, Array]:
-        """Returns the values of a feature, shape (n, columns), and its largest time error in each row, shape (n,) [s]."""
+        """Returns the values of a feature, shape (n, columns), and its time error in each row, shape (n,) [s]."""
         by_table: dict[str, list[str]] = {}
         for table, name in signal.columns:
             by_table.setdefault(table, []).append(name)
@@ -198,7 +199,9 @@ class SourceEpisode(ExportedEpisode):
         """Replaces what is missing before the first command by the measured position, or by 0."""
         if source.table == "":
             return np.where(np.isnan(column), 0.0, column)
-        measured = resample(self._tables[source.table][[source.name]], self.times, "linear")[source.name].to_numpy(float)
+        measured = resample(self._tables[source.table][[source.name]], self.times, "linear")[source.name].to_numpy(
+            float
+        )
         return np.where(np.isnan(column), measured, column)
 
     def _continuous_tables(self) -> list[str]:
