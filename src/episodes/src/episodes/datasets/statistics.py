@@ -12,6 +12,8 @@ Array = NDArray[Any]
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 MAX_SAMPLED_FRAMES = 100
 """Number of images of an episode that statistics are computed from."""
+LEVELS = 256
+"""Levels of brightness of a channel."""
 MAX_SAMPLED_PIXELS = 20_000
 """Number of pixels of each of them, spread over the image."""
 
@@ -31,7 +33,7 @@ def statistics(values: Array) -> dict[str, list[Any]]:
 
 
 class ImageStatistics:
-    """Statistics of images, from a sample of frames and pixels.
+    """Statistics of images, from the frequencies of brightness in a sample of frames and pixels.
 
     Args:
         frames: Number of images that there will be.
@@ -40,20 +42,33 @@ class ImageStatistics:
     def __init__(self, frames: int) -> None:
         self._every = max(1, -(-frames // MAX_SAMPLED_FRAMES))
         self._seen = 0
-        self._samples: list[Array] = []
+        self._sampled = 0
+        self._counts = np.zeros((3, LEVELS), int)
 
     def add(self, pixels: Array) -> None:
         """Adds an image, shape (height, width, 3), uint8."""
         if self._seen % self._every == 0:
             step = max(1, int(np.sqrt(pixels.shape[0] * pixels.shape[1] / MAX_SAMPLED_PIXELS)))
-            self._samples.append(pixels[::step, ::step].reshape(-1, 3).copy())
+            for channel, counts in enumerate(self._counts):
+                counts += np.bincount(pixels[::step, ::step, channel].ravel(), minlength=LEVELS)
+            self._sampled += 1
         self._seen += 1
 
     def result(self) -> dict[str, list[Any]]:
         """Returns the statistics of the channels, from 0 to 1, each in the form [[[value]]]."""
-        found = statistics(np.concatenate(self._samples) / 255.0)
-        by_channel = {name: [[[value]] for value in values] for name, values in found.items() if name != "count"}
-        return {**by_channel, "count": [len(self._samples)]}
+        levels = np.arange(LEVELS) / (LEVELS - 1)
+        found: dict[str, list[Any]] = {}
+        for counts in self._counts:
+            total = counts.sum()
+            mean = (counts * levels).sum() / total
+            there = levels[counts > 0]
+            by_name = {"min": there[0], "max": there[-1], "mean": mean}
+            by_name["std"] = np.sqrt((counts * (levels - mean) ** 2).sum() / total)
+            shares = np.cumsum(counts) / total
+            by_name |= {name: levels[np.searchsorted(shares, share)] for name, share in QUANTILES.items()}
+            for name, value in by_name.items():
+                found.setdefault(name, []).append([[float(value)]])
+        return {**found, "count": [self._sampled]}
 
 
 def pooled(parts: list[dict[str, list[Any]]]) -> dict[str, list[Any]]:

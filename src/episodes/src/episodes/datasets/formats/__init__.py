@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from custom_ros_tools.errors import MissingDependency
 from custom_ros_tools.plugins.table import PluginTable
 from episodes.datasets.format import DatasetError, DatasetFormat
 
@@ -30,10 +31,16 @@ def format_of(folder: Path, others: tuple[str, ...] = ()) -> type[DatasetFormat]
     """
     if not folder.is_dir():
         raise DatasetError(folder, "expected a folder with a data set, there is none")
+    missing: MissingDependency | None = None
     for name in (*FORMATS, *others):
-        found = FORMATS.find(name)
-        if found.recognises(folder):
-            return found
+        try:
+            found = FORMATS.find(name)
+            if found.recognises(folder):
+                return found
+        except MissingDependency as error:  # that of another format may be there
+            missing = error
+    if missing:
+        raise missing
     names = sorted(each.name for each in folder.iterdir())
     content = ", ".join(names[:10]) + (" ..." if len(names) > 10 else "") or "nothing"
     expected = "meta/info.json (LeRobot), an HDF5 file (robomimic), or folders with metadata.yaml (rosbag2)"

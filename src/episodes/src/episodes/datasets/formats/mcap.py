@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import shutil
 from collections.abc import Iterator
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -87,7 +89,8 @@ def _convert(bag: Path, target: Path, types: Any) -> None:
     choices = ("exclude_topics", "include_topics", "exclude_msgtypes", "include_msgtypes")
     everything: dict[str, Any] = dict.fromkeys(choices, ())
     plain: dict[str, Any] = {"compress": None, "compress_mode": "message"}
-    convert([bag], target, "mcap", ROSBAG2_VERSION, default_typestore=None, typestore=types, **plain, **everything)
+    with redirect_stdout(io.StringIO()):  # it names types that ROS 2 does not have, which are written all the same
+        convert([bag], target, "mcap", ROSBAG2_VERSION, default_typestore=None, typestore=types, **plain, **everything)
 
 
 def topics_of(recording: Path) -> dict[str, dict[str, Any]]:
