@@ -27,6 +27,8 @@ TABLES = (
     "safe_robot.checks",
     "rpbi_utils.ros.controls.panels",
     "motion_primitives.primitives",
+    "episodes.datasets.formats",
+    "episodes.datasets.checks",
 )
 """Packages whose classes have a file each, whoever imports them."""
 FLOORS = {

@@ -16,7 +16,11 @@ from pyarrow import parquet
 
 from episodes.datasets.video import VideoWriter, read_video
 
-DATA, TASKS, EPISODES = "data/chunk-000/file-000.parquet", "meta/tasks.parquet", "meta/episodes/chunk-000/file-000.parquet"
+DATA, TASKS, EPISODES = (
+    "data/chunk-000/file-000.parquet",
+    "meta/tasks.parquet",
+    "meta/episodes/chunk-000/file-000.parquet",
+)
 CAMERA, SIDE = "observation.images.camera_colour", "observation.images.side_colour"
 VIDEO, SIDE_VIDEO = f"videos/{CAMERA}/chunk-000/file-001.mp4", f"videos/{SIDE}/chunk-000/file-001.mp4"
 POSE, WRENCH = "observation.pose.box", "observation.wrench.arm_wrist_ft_sensor"

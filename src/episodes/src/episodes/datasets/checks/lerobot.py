@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import parquet
 
-from episodes.datasets import lerobot_layout as layout
+from episodes.datasets.layouts import lerobot as layout
 from episodes.datasets.provenance import coarse, image_faults, read_images
 from episodes.datasets.statistics import statistics
 from episodes.datasets.video import VideoFacts, read_video

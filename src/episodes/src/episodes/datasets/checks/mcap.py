@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rosbags.rosbag2 import ReaderError
 
-from episodes.datasets.formats.mcap import topics_of
+from episodes.datasets.layouts.mcap import topics_of
 
 from .values import Facts
 

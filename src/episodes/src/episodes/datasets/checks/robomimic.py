@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from episodes.datasets.format import ACTION
-from episodes.datasets.formats.robomimic import ACTIONS, observation_key
+from episodes.datasets.layouts.robomimic import ACTIONS, observation_key
 from episodes.datasets.provenance import frame_changes, frame_checksums
 
 from .values import Facts, feature_faults, number_faults

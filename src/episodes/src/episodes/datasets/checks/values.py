@@ -1,4 +1,4 @@
-"""Checks of numbers and of the facts in `rpbi/`, which all formats share."""
+"""Checks of numbers, of the facts in `rpbi/` and of the recordings, which all formats share."""
 
 from __future__ import annotations
 
@@ -9,8 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from episodes.datasets.format import QUATERNION, STAMP, STAMP_NAMES
-from episodes.datasets.provenance import chain_faults, changes, episode_file, is_exported, read_episode, read_export
+from episodes.datasets.format import QUATERNION, STAMP, STAMP_NAMES, DatasetError
+from episodes.datasets.provenance import (
+    chain_faults,
+    changes,
+    episode_file,
+    file_digest,
+    is_exported,
+    read_episode,
+    read_export,
+)
+from episodes.errors import EpisodeError
+from episodes.folder import BAG, EpisodeFolder
 
 Array = NDArray[Any]
 
@@ -115,3 +125,27 @@ def feature_faults(key: str, names: Sequence[str], values: Array, facts: Mapping
         wrong = np.flatnonzero(np.diff(values @ np.array([1_000_000_000, 1])) <= 0)
         if len(wrong):
             yield f"stamps are not ascending, first at frame {wrong[0] + 1}"
+
+
+def source_faults(dataset: Path, folder: EpisodeFolder) -> Iterator[str]:
+    """Yields a sentence for each recording that is missing or was changed since the export.
+
+    Raises:
+        DatasetError: If the data set was not exported from episodes.
+    """
+    if not is_exported(dataset):
+        raise DatasetError(dataset, "has no rpbi/: it was not exported from episodes")
+    try:
+        numbers = read_export(dataset).get("episodes", [])
+    except ValueError:  # which is named anyway
+        return
+    for index, number in enumerate(numbers):
+        try:
+            folder.read(number)
+            bag = folder.folder_of(number) / BAG
+            if file_digest(bag) != read_episode(dataset, index)["source"]["bag_sha256"]:
+                yield f"{bag}: is not the recording that episode {index} was exported from"
+        except (EpisodeError, OSError) as error:
+            yield f"episode {index}: its recording cannot be read: {error}"
+        except (ValueError, KeyError, TypeError):  # named by the check of the data set
+            continue

@@ -14,8 +14,8 @@ from pydantic import Field
 
 from custom_ros_tools.errors import MissingDependency
 from custom_ros_tools.schema import ConfigModel
-from episodes.datasets import lerobot_layout as layout
 from episodes.datasets.format import Array, Camera, DatasetFormat, ExportedEpisode, Schema
+from episodes.datasets.layouts import lerobot as layout
 from episodes.datasets.provenance import checksums, coarse
 from episodes.datasets.statistics import ImageStatistics, pooled, statistics
 

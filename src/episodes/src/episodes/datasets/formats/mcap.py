@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
 import shutil
 from collections.abc import Iterator
@@ -15,6 +14,7 @@ from pydantic import Field
 from custom_ros_tools.errors import MissingDependency
 from custom_ros_tools.schema import ConfigModel
 from episodes.datasets.format import DatasetError, DatasetFormat, ExportedEpisode, Schema
+from episodes.datasets.layouts.mcap import topics_of
 
 try:
     from rosbags.convert import ConverterError, convert
@@ -91,23 +91,6 @@ def _convert(bag: Path, target: Path, types: Any) -> None:
     plain: dict[str, Any] = {"compress": None, "compress_mode": "message"}
     with redirect_stdout(io.StringIO()):  # it names types that ROS 2 does not have, which are written all the same
         convert([bag], target, "mcap", ROSBAG2_VERSION, default_typestore=None, typestore=types, **plain, **everything)
-
-
-def topics_of(recording: Path) -> dict[str, dict[str, Any]]:
-    """Returns type, number of messages and SHA-256 of stamps and content of each topic of a recording.
-
-    Raises:
-        ReaderError: If it cannot be read.
-    """
-    found: dict[str, dict[str, Any]] = {}
-    digests: dict[str, Any] = {}
-    with Reader(recording) as reader:
-        for connection, stamp_ns, data in reader.messages():
-            each = found.setdefault(connection.topic, {"type": connection.msgtype, "messages": 0})
-            each["messages"] += 1
-            digest = digests.setdefault(connection.topic, hashlib.sha256())
-            digest.update(stamp_ns.to_bytes(8, "little", signed=True) + bytes(data))
-    return {topic: {**each, "sha256": digests[topic].hexdigest()} for topic, each in sorted(found.items())}
 
 
 def _count(recording: Path) -> int:

@@ -14,12 +14,11 @@ from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel
 from episodes.datasets.format import ACTION, Array, Camera, DatasetError, DatasetFormat, ExportedEpisode, Schema
+from episodes.datasets.layouts.robomimic import ACTIONS, FILE, observation_key, scaled
 from episodes.datasets.provenance import checksums, frame_checksums
 
-FILE = "dataset.hdf5"
 SUCCESS = "success"
 """Label of episodes whose last row has the reward 1, and filter of them in `mask`."""
-_OBSERVATION = "observation."
 
 
 class RobomimicConfig(ConfigModel):
@@ -136,27 +135,6 @@ class Robomimic(DatasetFormat):
                 data = file["data"]
                 found.append(f"robomimic {path.name}: {len(data)} episodes, {data.attrs['total']} frames")
         return "; ".join(found)
-
-
-ACTIONS = "actions"
-"""Name of the actions of an episode in the file."""
-
-
-def observation_key(key: str) -> str:
-    """Returns the name of a feature in the groups `obs` and `next_obs`."""
-    return key.removeprefix(_OBSERVATION).replace(".", "_")
-
-
-def scaled(actions: Array, low: Array, high: Array) -> Array:
-    """Returns actions in [-1, 1]; 0 where all are the same.
-
-    Args:
-        actions: Shape (n, columns).
-        low: Least action of each column.
-        high: Largest action of each column.
-    """
-    extent = np.where(high > low, high - low, 1.0)
-    return np.asarray(np.where(high > low, np.clip(2.0 * (actions - low) / extent - 1.0, -1.0, 1.0), 0.0))
 
 
 def _put_observation(demo: h5py.Group, key: str, values: Array) -> None:

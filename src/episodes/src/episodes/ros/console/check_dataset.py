@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from custom_ros_tools.console.argument import Argument
-from episodes.datasets.checks.source import source_faults
+from episodes.datasets.checks.values import source_faults
 from episodes.datasets.formats import format_of
 from episodes.datasets.provenance import is_exported
 from episodes.folder import EpisodeFolder
@@ -20,8 +20,8 @@ def check_dataset(
     """Checks a data set of LeRobot, robomimic or rosbag2, and names its faults.
 
     It prints a line a fault and ends with 1 if there is one; see docs/datasets.md. Data sets of other tools are checked
-    too, but for what only `./rpbi export` stores with them. Needs `./rpbi setup data`, but for robomimic, and no ROS
-    master.
+    too, except against the values of an export. It needs no ROS master, and `./rpbi setup data` for all formats except
+    robomimic.
 
     Args:
         folder: the data set

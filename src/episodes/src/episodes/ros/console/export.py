@@ -31,8 +31,13 @@ def export(
 
         ./rpbi export ~/demos --to lerobot --out ~/push --task "push the box to the goal" --label success
 
-    Episodes that cannot be exported are named, the others are exported, and the exit code is 1. See docs/datasets.md;
-    needs `./rpbi setup data`, but for robomimic, and no ROS master.
+    Episodes that cannot be exported are named, the others are exported, and the exit code is 1; see docs/datasets.md.
+    It needs no ROS master, and `./rpbi setup data` for all formats except robomimic.
+
+    Usage:
+        ./rpbi export DIR [--to FORMAT] [--out DIR] [--fps N] [--task TEXT] [--label LABEL ...]
+                      [--state TOPIC ...] [--action TOPIC ...] [--images [TOPIC ...]]
+                      [--option KEY=VALUE ...] [--disk-reserve-mb MB]
 
     Args:
         folder: of the episodes
