@@ -132,6 +132,10 @@ PLANTED: dict[str, tuple[Callable[[Path], object], str]] = {
         rf"{VIDEO}: 64 x 40 pixels, but meta/info.json has the shape \[48, 64, 3\]",
     ),
     "video of another rate": (refilm(list, fps=25), rf"{VIDEO}: 25 frames a second, but meta/info.json has 30"),
+    "unknown path": (
+        edit_json("meta/info.json", lambda info: put(info, "data_path", "data/{number}.parquet")),
+        r"data: has another content than expected \(KeyError: 'number'\)",
+    ),
     "wrong fps": (
         edit_json("meta/info.json", lambda info: put(info, "fps", 25)),
         r"meta/info.json: fps: 30 rows a second were exported, found 25",

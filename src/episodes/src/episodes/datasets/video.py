@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -16,6 +17,7 @@ try:
 except ImportError:
     raise MissingDependency("av", "./rpbi setup data") from None
 
+os.environ.setdefault("SVT_LOG", "1")  # the encoder of AV1 prints its settings otherwise
 Array = NDArray[Any]
 
 ENCODERS = {"h264": "libx264", "av1": "libsvtav1"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -16,9 +17,11 @@ from episodes.datasets.provenance import coarse, image_faults, read_images
 from episodes.datasets.statistics import statistics
 from episodes.datasets.video import VideoFacts, read_video
 
-from .values import Facts, feature_faults
+from .values import Facts, feature_faults, guarded
 
 Array = layout.Array
+NO_NUMBERS = ("image", "string", "audio")
+"""Types of columns, in data sets of other tools, whose values are not checked."""
 MAX_TIME_ERROR_S = 1e-4
 """Largest deviation of a time stamp from `frame_index / fps`, as the owner's reader has it [s]."""
 MAX_STATISTIC_ERROR = 1e-4
@@ -38,15 +41,15 @@ REQUIRED = (
 def lerobot_faults(folder: Path) -> Iterator[str]:
     """Yields a sentence for each fault of a LeRobot data set."""
     check = _Check(folder)
-    yield from check.info_faults()
+    yield from guarded("meta/info.json", check.info_faults())
     if not check.is_readable:
         return
-    yield from check.task_faults()
-    yield from check.episode_faults()
-    yield from check.data_faults()
-    yield from check.statistics_faults()
-    yield from check.video_faults()
-    yield from check.facts.total_faults(len(check.episodes))
+    yield from guarded("meta/tasks.parquet", check.task_faults())
+    yield from guarded("meta/episodes", check.episode_faults())
+    yield from guarded("data", check.data_faults())
+    yield from guarded("meta/stats.json", check.statistics_faults())
+    yield from guarded("videos", check.video_faults())
+    yield from guarded("rpbi/export.json", check.facts.total_faults(len(check.episodes)))
     yield from check.facts.faults
 
 
@@ -209,7 +212,7 @@ class _Check:
             yield f"'{key}' is not in meta/info.json"
         columns: dict[str, Array] = {}
         for key in table.column_names:
-            if key in features:
+            if key in features and features[key]["dtype"] not in NO_NUMBERS:
                 try:
                     columns[key] = layout.matrix(table.column(key))
                 except ValueError as error:
@@ -376,7 +379,7 @@ def _unreadable(error: Exception) -> str:
 
 
 def _type_faults(key: str, feature: Mapping[str, Any], values: Array) -> Iterator[str]:
-    if feature["shape"] != [values.shape[1]]:
+    if math.prod(feature["shape"]) != values.shape[1]:
         yield f"'{key}' has {values.shape[1]} numbers a row, but meta/info.json has the shape {feature['shape']}"
     if str(values.dtype) != feature["dtype"]:
         yield f"'{key}' is of type {values.dtype}, but meta/info.json has {feature['dtype']}"

@@ -9,12 +9,17 @@ from rosbags.rosbag2 import ReaderError
 
 from episodes.datasets.layouts.mcap import topics_of
 
-from .values import Facts
+from .values import Facts, guarded
 
 
 def mcap_faults(folder: Path) -> Iterator[str]:
     """Yields a sentence for each fault of a folder of recordings."""
     facts = Facts(folder)
+    yield from guarded("rpbi", _recording_faults(folder, facts))
+    yield from facts.faults
+
+
+def _recording_faults(folder: Path, facts: Facts) -> Iterator[str]:
     names = sorted(each.name for each in folder.iterdir() if each.is_dir() and each.name != "rpbi")
     for index, name in enumerate(names):
         stored = facts.episode(index)
@@ -37,4 +42,3 @@ def mcap_faults(folder: Path) -> Iterator[str]:
             elif ours != theirs:
                 yield f"{name}: {topic}: stamps or contents were changed after the export"
     yield from facts.total_faults(len(names))
-    yield from facts.faults

@@ -14,7 +14,7 @@ from episodes.datasets.format import ACTION
 from episodes.datasets.layouts.robomimic import ACTIONS, observation_key
 from episodes.datasets.provenance import frame_changes, frame_checksums
 
-from .values import Facts, feature_faults, number_faults
+from .values import Facts, feature_faults, guarded, number_faults
 
 MAX_SCALING_ERROR = 1e-6
 """Largest deviation of the largest or least scaled action from 1 or -1."""
@@ -27,12 +27,12 @@ def robomimic_faults(folder: Path) -> Iterator[str]:
     for path in sorted(folder.glob("*.hdf5")):
         try:
             with h5py.File(path) as file:
-                for fault in _file_faults(file, facts):
+                for fault in guarded("data", _file_faults(file, facts)):
                     yield f"{path.name}: {fault}"
                 episodes += len(file.get("data", ()))
         except (OSError, RuntimeError, KeyError) as error:  # h5py has errors of all kinds for a broken file
             yield f"{path.name}: cannot be read: {' '.join(str(error).split())}"
-    yield from facts.total_faults(episodes)
+    yield from guarded("rpbi/export.json", facts.total_faults(episodes))
     yield from facts.faults
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from custom_ros_tools.errors import shortened
 from episodes.datasets.format import QUATERNION, STAMP, STAMP_NAMES, DatasetError
 from episodes.datasets.provenance import (
     chain_faults,
@@ -52,6 +53,15 @@ def _quaternion_faults(quats: Array) -> Iterator[str]:
     flips = np.flatnonzero((quats[1:] * quats[:-1]).sum(axis=1) < 0.0)
     if len(flips):
         yield f"the quaternion changes its sign {len(flips)} times, first from frame {flips[0]} to {flips[0] + 1}"
+
+
+def guarded(part: str, faults: Iterator[str]) -> Iterator[str]:
+    """Yields faults; if their search fails at content of another kind than expected, a sentence about that instead."""
+    try:
+        yield from faults
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+        words = " ".join(str(error).split()) or "none"
+        yield f"{part}: has another content than expected ({type(error).__name__}: {shortened(words)})"
 
 
 class Facts:

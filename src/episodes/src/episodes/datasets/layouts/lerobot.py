@@ -50,13 +50,13 @@ def matrix(column: Any) -> Array:
     array = column.combine_chunks()
     if array.null_count:
         raise ValueError(f"{array.null_count} rows have no value")
-    if hasattr(array, "flatten") and hasattr(array.type, "value_type"):
-        flat = np.asarray(array.flatten())
-        if len(array) and len(flat) % len(array):
-            raise ValueError("rows differ in length")
-        flat = flat.reshape(len(array), -1) if len(array) else flat.reshape(0, 0)
-    else:
-        flat = np.asarray(array)[:, None]
+    rows = len(array)
+    while hasattr(array.type, "value_type"):
+        array = array.flatten()
+    flat = np.asarray(array)
+    if rows and len(flat) % rows:
+        raise ValueError("rows differ in length")
+    flat = flat.reshape(rows, -1) if rows else flat.reshape(0, 1)
     if flat.dtype.kind not in "iufb":
         raise ValueError(f"expected numbers, got {array.type}")
     return flat

@@ -27,6 +27,7 @@ STATES_NAME = re.compile(r"(.*)/joint_states")
 TARGETS_NAME = re.compile(r"(.*/joint_states)/target")
 _KINDS = ("position", "velocity", "effort")
 _JOINT = re.compile(r"^(position|velocity|effort)/(?![xyzw]$)")
+_OF_ROBOT = re.compile(r"/joint_states(/target)?$")
 _AXES = ("x", "y", "z")
 
 Tables = Mapping[str, pd.DataFrame]
@@ -237,11 +238,12 @@ def _joint_columns(table: pd.DataFrame, kind: str, fixed: Collection[str]) -> li
 
 
 def _names(columns: Iterable[Column]) -> tuple[str, ...]:
-    """Returns names of numbers: joints by name, else the path; with the topic where that is not unique."""
+    """Returns names of numbers: joints by name, else the path; with the robot or topic where that is not unique."""
     columns = list(columns)
     short = [
         re.sub(rf"^({'|'.join(_KINDS)})/(?!([xyzw]|covariance)$)", "", name).replace("/", ".") for _, name in columns
     ]
     if len(set(short)) == len(short):
         return tuple(short)
-    return tuple(f"{label(table)}.{name}" for (table, _), name in zip(columns, short))
+    robots = [label(_OF_ROBOT.sub("", table)) for table, _ in columns]
+    return tuple(f"{robot}.{name}" for robot, name in zip(robots, short))
