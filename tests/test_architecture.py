@@ -196,6 +196,7 @@ FAMILIES = {
     "mapping": ("operator_node.mappings:MAPPINGS", "operator_node.mappings.mapping:Mapping", "teleoperation.md"),
     "check": ("safe_robot.checks:CHECKS", "safe_robot.check:Check", "safety.md"),
     "primitive": ("motion_primitives.primitives:PRIMITIVES", "motion_primitives.primitive:Primitive", "learning.md"),
+    "format": ("episodes.datasets.formats:FORMATS", "episodes.datasets.format:DatasetFormat", "datasets.md"),
 }
 """Table, base class and page of each family of plug-ins; their files are where the table is."""
 

@@ -32,6 +32,8 @@ TABLES = (
     "rpbi_utils.ros.console",
     "episodes.ros.console",
     "rpbi_examples.ros.console",
+    "episodes.datasets.formats",
+    "episodes.datasets.checks",
 )
 """Packages whose classes or commands have a file each, whoever imports them."""
 FLOORS = {

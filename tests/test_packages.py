@@ -20,6 +20,7 @@ OF_ROS = re.compile(r"ros(?!pkg)[a-z_]*|tf2?(_\w+)?|gen(py|msg)|actionlib|intera
 NOT_IN_DEBIAN = {
     "control_msgs",  # optional: trajectory actions are there if the user has it
     "depth_image_proc", "nodelet",  # optional: off unless the user asks
+    "rosbags",  # of the extra data
 }  # fmt: skip
 
 REPLACEABLE = {

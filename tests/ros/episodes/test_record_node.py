@@ -124,9 +124,9 @@ def test_episodes_are_recorded_listed_verified_and_a_changed_file_is_named(ros: 
 
 
 def test_with_resets_by_a_button_and_a_changed_urdf(ros: Any, tmp_path: Path) -> None:
-    session = _Session(ros, tmp_path, reset=True, start_button=1)
+    session = _Session(ros, tmp_path, reset=True, start_button=1, also=["joy"])
     session.move(0.4)
-    with publishing("/joy", Joy) as joy:
+    with publishing("/joy", Joy) as joy, publishing("/rpbi/iiwa/joint_states/target", JointState):
         for is_recording in (False, True, False):
             joy.publish(Joy(buttons=[0, 1]))
             joy.publish(Joy(buttons=[0, 0]))
@@ -134,8 +134,16 @@ def test_with_resets_by_a_button_and_a_changed_urdf(ros: Any, tmp_path: Path) ->
             if is_recording:
                 session.move(-0.4)
     folder = session.folder
+    assert "/joy" in folder.read(folder.numbers()[-1]).topics
     code, text = _run("verify", folder.path)
     assert code == 0, text
+    folder.relabel(1, "success")  # the recorder is connected to the target from its beginning
+    for to in ("robomimic", "mcap", "lerobot"):
+        out = tmp_path / to
+        code, text = _run("export", folder.path, "--to", to, "--out", out, "--label", "success")
+        assert code == 0, text
+        code, text = _run("check_dataset", out, "--source", folder.path)
+        assert code == 0, text
     [urdf] = [each for each in folder.files.glob("*.urdf")]
     urdf.write_text(urdf.read_text().replace('<mass value="', '<mass value="1'))
     code, text = _run("verify", folder.path)

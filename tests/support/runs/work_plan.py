@@ -27,6 +27,9 @@ EXTRA_OF = {
     "cv2": "tags",
     "nbclient": "notebook",
     "nbformat": "notebook",
+    "av": "data",
+    "pyarrow": "data",
+    "rosbags": "data",
 }
 """Extra that has a module."""
 

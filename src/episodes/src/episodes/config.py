@@ -18,6 +18,7 @@ class RecordParameters(ConfigModel):
     topics: ListOf[Text] | Text = Field(
         DEFAULT_TOPICS, description="A list of topics, or a regular expression that the whole name matches."
     )
+    also: ListOf[Text] = Field((), description="Further topics, such as images of cameras.")
     namespace: Text = Field("/", description="Namespace of the simulator.")
     reset: Switch = Field(False, description="Whether the world is reset before each episode.")
     disk_reserve_mb: Positive = Field(1000.0, description="Free space of the disk that is never used [MB].")

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from custom_ros_tools.plugins.table import PluginTable
+from episodes.datasets.formats import FORMATS
 from ik_ros.solvers import SOLVERS
 from ik_ros.tasks import TASKS
 from motion_primitives.primitives import PRIMITIVES
@@ -27,6 +28,7 @@ TABLES: tuple[tuple[str, PluginTable, str], ...] = (
     ("Mappings", MAPPINGS, "[teleoperation](teleoperation.md)"),
     ("Checks", CHECKS, "[safety](safety.md)"),
     ("Primitives", PRIMITIVES, "[learning](learning.md)"),
+    ("Data set formats", FORMATS, "[data sets](datasets.md)"),
 )
 """Heading, table and page of each kind of plug-in."""
 HEAD = """\

@@ -140,7 +140,7 @@ class RecordNode:
 
     def __init__(self) -> None:
         self._parameters = private_parameters(RecordParameters)
-        self._topics = _matcher(self._parameters.topics)
+        self._topics = _matcher(self._parameters.topics, self._parameters.also)
         self._folder = EpisodeFolder(Path(self._parameters.folder).expanduser().absolute())
         self._lock = threading.RLock()
         self._recorder: Recorder | None = None
@@ -346,15 +346,16 @@ def _do(action: Callable[[], str]) -> None:
     (rospy.loginfo if done else rospy.logwarn)("%s", text)
 
 
-def _matcher(topics: tuple[str, ...] | str) -> Callable[[str], bool] | tuple[str, ...]:
+def _matcher(topics: tuple[str, ...] | str, also: tuple[str, ...]) -> Callable[[str], bool] | tuple[str, ...]:
     """Returns the names of topics, or the function that decides whether one is recorded."""
+    further = tuple(rospy.resolve_name(each) for each in also)
     if not isinstance(topics, str):
-        return tuple(rospy.resolve_name(each) for each in topics)
+        return (*(rospy.resolve_name(each) for each in topics), *further)
     try:
         pattern = re.compile(topics)
     except re.error as error:
         raise InterfaceError(f"~topics: expected a regular expression, got '{topics}': {error}") from error
-    return lambda topic: pattern.fullmatch(topic) is not None
+    return lambda topic: topic in further or pattern.fullmatch(topic) is not None
 
 
 def _existing_topics(wanted: Callable[[str], bool] | tuple[str, ...]) -> list[str]:

@@ -66,7 +66,11 @@ def decode_image(message_type: MessageType, raw: bytes) -> Array:
         )
     rows = np.frombuffer(raw, np.uint8, step * height, start).reshape(height, step)[:, :row_bytes]
     pixels = np.ascontiguousarray(rows).view(dtype).astype(dtype.newbyteorder("="), copy=False)
-    return pixels if len(channels) == 1 else pixels.reshape(height, width, len(channels))[..., list(channels)]
+    if len(channels) == 1:
+        return pixels
+    pixels = pixels.reshape(height, width, len(channels))
+    is_in_order = channels == tuple(range(len(channels)))
+    return pixels.copy() if is_in_order else np.take(pixels, channels, axis=2)
 
 
 def _number(layout: Layout, raw: bytes, field: str, dtype: str) -> int:

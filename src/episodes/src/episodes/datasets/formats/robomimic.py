@@ -1,0 +1,143 @@
+"""Data sets of robomimic: one HDF5 file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from PIL import Image
+from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel
+from episodes.datasets.format import ACTION, Array, Camera, DatasetError, DatasetFormat, ExportedEpisode, Schema
+from episodes.datasets.layouts.robomimic import ACTIONS, FILE, observation_key, scaled
+from episodes.datasets.provenance import checksums, frame_checksums
+
+SUCCESS = "success"
+"""Label of episodes whose last row has the reward 1, and filter of them in `mask`."""
+
+
+class RobomimicConfig(ConfigModel):
+    """Options of robomimic data sets."""
+
+    image_height: int = Field(84, ge=1, description="Rows of pixels of images, which are scaled.")
+    image_width: int = Field(84, ge=1, description="Columns of pixels.")
+    success: str = Field(SUCCESS, description="Label of episodes whose last row has the reward 1.")
+
+
+class Robomimic(DatasetFormat):
+    """A robomimic data set: one HDF5 file with actions scaled to [-1, 1]."""
+
+    Config = RobomimicConfig
+
+    def open(self, folder: Path, schema: Schema | None) -> None:
+        """Begins the data set."""
+        assert schema is not None
+        if all(each.key != ACTION for each in schema.features):
+            raise DatasetError(folder, f"expected a feature '{ACTION}', found none")
+        self._schema = schema
+        self._file = h5py.File(folder / FILE, "w")
+        self._data = self._file.create_group("data")
+        self._success: list[str] = []
+        self._total = 0
+
+    def add(self, index: int, episode: ExportedEpisode) -> dict[str, Any]:
+        """Writes an episode."""
+        name = f"demo_{index}"
+        demo = self._data.create_group(name)
+        try:
+            facts = self._fill(demo, episode)
+            self._file.flush()
+        except BaseException:
+            del self._data[name]
+            raise
+        self._total += len(episode.times)
+        if episode.label == self.config.success:
+            self._success.append(name)
+        return facts
+
+    def close(self) -> None:
+        """Scales all actions, and writes the facts on the whole data set."""
+        demos = list(self._data.values())
+        low = np.min([demo[ACTIONS][:].min(axis=0) for demo in demos], axis=0)
+        high = np.max([demo[ACTIONS][:].max(axis=0) for demo in demos], axis=0)
+        for demo in demos:
+            demo[ACTIONS][...] = scaled(demo[ACTIONS][:], low, high)
+        scaling = self._file.create_group("action_scaling")
+        scaling["low"], scaling["high"] = low, high
+        scaling.attrs["names"] = json.dumps(next(each.names for each in self._schema.features if each.key == ACTION))
+        scaling.attrs["formula"] = "low + (actions + 1) / 2 * (high - low)"
+        self._data.attrs["total"] = self._total
+        self._data.attrs["env_args"] = json.dumps(
+            {"env_name": "ros_pybullet_interface", "type": 2, "env_kwargs": {"fps": self._schema.fps}}
+        )
+        names = {observation_key(each.key): list(each.names) for each in self._schema.features if each.key != ACTION}
+        self._data.attrs["observation_names"] = json.dumps(names)
+        if self._success:
+            self._file["mask/success"] = np.array(self._success, dtype="S")
+        self._file.close()
+
+    def _fill(self, demo: h5py.Group, episode: ExportedEpisode) -> dict[str, Any]:
+        count = len(episode.times)
+        stamps: dict[str, Array] = {}
+        for camera in self._schema.cameras:
+            images, stamps[camera.key] = self._images(camera, episode)
+            _put_observation(demo, observation_key(camera.key), images)
+        values = episode.values(stamps)
+        for feature in self._schema.features:
+            if feature.key == ACTION:
+                demo[ACTIONS] = values[ACTION]
+            else:
+                _put_observation(demo, observation_key(feature.key), values[feature.key])
+        last = np.arange(count) == count - 1
+        demo["rewards"] = (last & (episode.label == self.config.success)).astype(np.float32)
+        demo["dones"] = last.astype(np.int64)
+        demo.attrs["num_samples"] = count
+        demo.attrs["task"], demo.attrs["label"] = episode.task, episode.label
+        columns = {
+            each.key: {"names": list(each.names), "checksums": checksums(values[each.key])}
+            for each in self._schema.features
+            if each.key != ACTION  # which is scaled by the values of all episodes
+        }
+        crcs = {each.key: frame_checksums(demo[f"obs/{observation_key(each.key)}"]) for each in self._schema.cameras}
+        return {"frames": count, "fps": self._schema.fps, "columns": columns, "frame_checksums": crcs}
+
+    def _images(self, camera: Camera, episode: ExportedEpisode) -> tuple[Array, Array]:
+        size = (self.config.image_width, self.config.image_height)
+        images, stamps = [], []
+        for pixels, stamp in episode.frames(camera.key):
+            images.append(np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BILINEAR)))
+            stamps.append(stamp)
+        return np.array(images), np.array(stamps)
+
+    @classmethod
+    def recognises(cls, folder: Path) -> bool:
+        """Returns whether there is an HDF5 file, even a broken one."""
+        return bool(list(folder.glob("*.hdf5")))
+
+    @classmethod
+    def faults(cls, folder: Path) -> Iterator[str]:
+        """Yields a sentence for each fault."""
+        from episodes.datasets.checks.robomimic import robomimic_faults
+
+        return robomimic_faults(folder)
+
+    @classmethod
+    def summary(cls, folder: Path) -> str:
+        """Returns episodes and rows of each file."""
+        found = []
+        for path in sorted(folder.glob("*.hdf5")):
+            with h5py.File(path) as file:
+                data = file["data"]
+                found.append(f"robomimic {path.name}: {len(data)} episodes, {data.attrs['total']} frames")
+        return "; ".join(found)
+
+
+def _put_observation(demo: h5py.Group, key: str, values: Array) -> None:
+    options: Mapping[str, Any] = {"compression": "gzip", "chunks": (1, *values.shape[1:])} if values.ndim > 2 else {}
+    demo.create_dataset(f"obs/{key}", data=values, **options)
+    demo.create_dataset(f"next_obs/{key}", data=np.concatenate([values[1:], values[-1:]]), **options)

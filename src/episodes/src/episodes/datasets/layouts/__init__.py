@@ -1,0 +1,1 @@
+"""Files and names of the formats, which writers and checks share."""

@@ -1,0 +1,272 @@
+"""Sources of the episodes of a data set, stored beside them in the folder `rpbi`.
+
+`rpbi/export.json` describes the data set, `rpbi/episode_000000.json` an episode: its source, its chain of state hashes,
+and checksums, by which checks find values that were changed, swapped or shifted. `rpbi/episode_000000.npz` has coarse
+images, with which the frames of videos are compared.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import zipfile
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+FOLDER, EXPORT = "rpbi", "export.json"
+VERSION = 1
+"""Version of these files."""
+COARSE = 8
+"""Rows and columns of a coarse image."""
+_BRIGHTNESS = (0.299, 0.587, 0.114)
+"""Shares of red, green and blue, as codecs have them; compression keeps brightness better than colours."""
+_STRIDE = 2
+"""Of the pixels of an image, one in this many rows and columns counts for its coarse image."""
+
+
+def file_digest(path: Path) -> str:
+    """Returns the SHA-256 of a file."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+# --- Chains of state hashes
+
+
+def hash_chain(states: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Returns states with a `link` each, the SHA-256 of the link before and of the state.
+
+    Args:
+        states: `stamp` [s], `resets`, `tick`, `commands` and `hash` of each, in order.
+    """
+    chain: list[dict[str, Any]] = []
+    link = ""
+    for state in states:
+        link = _link(link, state)
+        chain.append({**state, "link": link})
+    return chain
+
+
+def chain_faults(chain: Sequence[Mapping[str, Any]], last: str) -> Iterator[str]:
+    """Yields a sentence if a chain of state hashes is broken.
+
+    Args:
+        chain: As `hash_chain` returned it.
+        last: Its last link, stored by itself; empty for an empty chain.
+    """
+    link = ""
+    for state in chain:
+        link = _link(link, {key: value for key, value in state.items() if key != "link"})
+        if link != state.get("link"):
+            yield f"the chain of state hashes is broken at tick {state.get('tick')}"
+            return
+    if link != last:
+        yield f"the chain of state hashes is incomplete: it ends with {len(chain)} states"
+
+
+def _link(before: str, state: Mapping[str, Any]) -> str:
+    text = json.dumps([before, *(state.get(key) for key in ("stamp", "resets", "tick", "commands", "hash"))])
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+# --- Checksums of columns
+
+
+def checksums(values: Array) -> list[list[int]]:
+    """Returns three checksums of each column: of all rows, of all but the last, of all but the first.
+
+    Args:
+        values: Shape (n, columns).
+    """
+    return [[_crc(column), _crc(column[:-1]), _crc(column[1:])] for column in values.T]
+
+
+def changes(names: Sequence[str], values: Array, stored: Sequence[Sequence[int]]) -> Iterator[str]:
+    """Yields a sentence for each column that differs from its checksums.
+
+    Args:
+        names: Names of the columns.
+        values: Shape (n, columns), of the type with which the checksums were computed.
+        stored: As `checksums` returned them for the same number of rows.
+    """
+    by_whole = {whole: name for name, (whole, _, _) in zip(names, stored)}
+    for name, column, (whole, without_last, without_first) in zip(names, values.T, stored):
+        found = _crc(column)
+        if found == whole:
+            continue
+        if found in by_whole:
+            yield f"'{name}' has the values that were exported as '{by_whole[found]}'"
+        elif len(column) > 1 and _crc(column[1:]) == without_last:
+            yield f"'{name}' is late by one frame"
+        elif len(column) > 1 and _crc(column[:-1]) == without_first:
+            yield f"'{name}' is early by one frame"
+        else:
+            yield f"'{name}' was changed after the export"
+
+
+def frame_checksums(images: Iterable[Array]) -> list[int]:
+    """Returns a checksum of each image."""
+    return [_crc(np.asarray(pixels)) for pixels in images]
+
+
+def frame_changes(found: Sequence[int], stored: Sequence[int]) -> Iterator[str]:
+    """Yields a sentence if images differ from their checksums."""
+    if found == stored:
+        return
+    if len(found) != len(stored):
+        yield f"expected {len(stored)} images, found {len(found)}"
+    elif found[1:] == stored[:-1]:
+        yield "its images are late by one frame"
+    elif found[:-1] == stored[1:]:
+        yield "its images are early by one frame"
+    else:
+        first = next(number for number, (one, other) in enumerate(zip(found, stored)) if one != other)
+        yield f"the image of frame {first} is another than was exported"
+
+
+def _crc(column: Array) -> int:
+    return zlib.crc32(np.ascontiguousarray(column, column.dtype.newbyteorder("<")).tobytes())
+
+
+# --- Coarse images
+
+
+def coarse(pixels: Array) -> Array:
+    """Returns the mean brightness of 8 by 8 parts of an image.
+
+    Args:
+        pixels: Shape (height, width, 3), uint8.
+
+    Returns:
+        Shape (8, 8), float16.
+    """
+    part = pixels[::_STRIDE, ::_STRIDE]
+    rows = np.linspace(0, part.shape[0], COARSE + 1).astype(int)[:-1]
+    columns = np.linspace(0, part.shape[1], COARSE + 1).astype(int)[:-1]
+    counts = np.outer(np.diff([*rows, part.shape[0]]), np.diff([*columns, part.shape[1]]))
+    by_row = np.add.reduceat(part, rows, axis=0, dtype=np.uint32)
+    sums = np.add.reduceat(by_row, columns, axis=1) @ np.array(_BRIGHTNESS)
+    return (sums / counts).astype(np.float16)
+
+
+MAX_IMAGE_DIFFERENCE = 12.0
+"""Largest difference between a frame and its image, of 255, as the root mean square over the parts."""
+MIN_IMAGE_DIFFERENCE = 3.0
+"""Least such difference that is reported; in between, one that is a multiple of the median of the video is."""
+MEDIANS = 5.0
+"""That multiple."""
+MIN_GAIN = 0.5
+"""Another order of frames, or another camera, is reported if it leaves less than this share of squared differences."""
+MIN_MOTION = 1e-2
+"""Mean squared difference, of 255 squared, below which neither is reported."""
+
+
+def image_faults(key: str, found: Array, stored: Mapping[str, Array]) -> Iterator[str]:
+    """Yields a sentence if the frames of a video are not the images that were exported.
+
+    Args:
+        key: The camera.
+        found: Coarse images of the frames, shape (n, 8, 8).
+        stored: Coarse images of the images of all cameras.
+    """
+    found = found.astype(float)
+    images = {camera: each.astype(float) for camera, each in stored.items() if each.shape == found.shape}
+    if key not in images:
+        return
+    own = images.pop(key)
+    rest = _mean_square(found - own)
+    for other, each in images.items():
+        if rest > MIN_MOTION and _mean_square(found - each) < MIN_GAIN * rest:
+            yield f"its frames are the images of '{other}'"
+            return
+    if len(found) > 2:
+        at, right = found - found.mean(axis=0), own - own.mean(axis=0)
+        rest = _mean_square(at[1:-1] - right[1:-1])
+        for words, shifted in (("late", right[:-2]), ("early", right[2:])):
+            if rest > MIN_MOTION and _mean_square(at[1:-1] - shifted) < MIN_GAIN * rest:
+                yield f"its frames are {words} by one frame"
+                return
+    differences = np.sqrt(((found - own) ** 2).mean(axis=(1, 2)))
+    limit = min(max(MIN_IMAGE_DIFFERENCE, MEDIANS * float(np.median(differences))), MAX_IMAGE_DIFFERENCE)
+    wrong = np.flatnonzero(differences > limit)
+    if len(wrong):
+        yield f"{len(wrong)} frames show another image than was exported, first frame {wrong[0]}"
+
+
+def _mean_square(values: Array) -> float:
+    return float((values**2).mean())
+
+
+# --- Files
+
+
+def episode_file(folder: Path, index: int) -> Path:
+    """Returns the file with the facts of an episode of a data set."""
+    return folder / FOLDER / f"episode_{index:06d}.json"
+
+
+def write_export(folder: Path, facts: Mapping[str, Any]) -> None:
+    """Writes the description of a data set."""
+    _write(folder / FOLDER / EXPORT, {"version": VERSION, **facts})
+
+
+def write_episode(folder: Path, index: int, facts: Mapping[str, Any], images: Mapping[str, Array]) -> None:
+    """Writes the facts of an episode, and its coarse images by camera."""
+    path = episode_file(folder, index)
+    _write(path, facts)
+    if images:
+        data = io.BytesIO()
+        np.savez_compressed(data, **images)
+        path.with_suffix(".npz").write_bytes(data.getvalue())
+
+
+def _write(path: Path, facts: Mapping[str, Any]) -> None:
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(json.dumps(facts, indent=1), encoding="utf-8")
+
+
+def is_exported(folder: Path) -> bool:
+    """Returns whether a data set was made by this project."""
+    return (folder / FOLDER).is_dir()
+
+
+def read_export(folder: Path) -> dict[str, Any]:
+    """Returns the description of a data set; raises ValueError if it cannot be read."""
+    return _read(folder / FOLDER / EXPORT)
+
+
+def read_episode(folder: Path, index: int) -> dict[str, Any]:
+    """Returns the facts of an episode; raises ValueError if they cannot be read."""
+    return _read(episode_file(folder, index))
+
+
+def read_images(folder: Path, index: int) -> dict[str, Array]:
+    """Returns the coarse images of an episode by camera; raises ValueError if they cannot be read."""
+    path = episode_file(folder, index).with_suffix(".npz")
+    try:
+        with np.load(path) as data:
+            return dict(data)
+    except (OSError, ValueError, zipfile.BadZipFile, zlib.error) as error:
+        raise ValueError(f"{FOLDER}/{path.name} cannot be read: {' '.join(str(error).split())}") from error
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        words = getattr(error, "strerror", None) or " ".join(str(error).split())
+        raise ValueError(f"{FOLDER}/{path.name} cannot be read: {words}") from error
+    if not isinstance(data, dict):
+        raise ValueError(f"{FOLDER}/{path.name}: expected a mapping")
+    return data

@@ -1,0 +1,86 @@
+"""Statistics of features, as LeRobot stores them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
+MAX_SAMPLED_FRAMES = 100
+"""Number of images of an episode that statistics are computed from."""
+LEVELS = 256
+"""Levels of brightness of a channel."""
+MAX_SAMPLED_PIXELS = 20_000
+"""Number of pixels of each of them, spread over the image."""
+
+
+def statistics(values: Array) -> dict[str, list[Any]]:
+    """Returns minimum, maximum, mean, standard deviation, count and quantiles of each column.
+
+    Args:
+        values: Shape (n, columns).
+    """
+    values = values.astype(float)
+    found = {"min": values.min(axis=0), "max": values.max(axis=0)}
+    found |= {"mean": values.mean(axis=0), "std": values.std(axis=0)}
+    levels = np.quantile(values, list(QUANTILES.values()), axis=0)
+    found |= dict(zip(QUANTILES, levels))
+    return {**{name: each.tolist() for name, each in found.items()}, "count": [len(values)]}
+
+
+class ImageStatistics:
+    """Statistics of images, from the frequencies of brightness in a sample of frames and pixels.
+
+    Args:
+        frames: Number of images that there will be.
+    """
+
+    def __init__(self, frames: int) -> None:
+        self._every = max(1, -(-frames // MAX_SAMPLED_FRAMES))
+        self._seen = 0
+        self._sampled = 0
+        self._counts = np.zeros((3, LEVELS), int)
+
+    def add(self, pixels: Array) -> None:
+        """Adds an image, shape (height, width, 3), uint8."""
+        if self._seen % self._every == 0:
+            step = max(1, int(np.sqrt(pixels.shape[0] * pixels.shape[1] / MAX_SAMPLED_PIXELS)))
+            for channel, counts in enumerate(self._counts):
+                counts += np.bincount(pixels[::step, ::step, channel].ravel(), minlength=LEVELS)
+            self._sampled += 1
+        self._seen += 1
+
+    def result(self) -> dict[str, list[Any]]:
+        """Returns the statistics of the channels, from 0 to 1, each in the form [[[value]]]."""
+        levels = np.arange(LEVELS) / (LEVELS - 1)
+        found: dict[str, list[Any]] = {}
+        for counts in self._counts:
+            total = counts.sum()
+            mean = (counts * levels).sum() / total
+            there = levels[counts > 0]
+            by_name = {"min": there[0], "max": there[-1], "mean": mean}
+            by_name["std"] = np.sqrt((counts * (levels - mean) ** 2).sum() / total)
+            shares = np.cumsum(counts) / total
+            by_name |= {name: levels[np.searchsorted(shares, share)] for name, share in QUANTILES.items()}
+            for name, value in by_name.items():
+                found.setdefault(name, []).append([[float(value)]])
+        return {**found, "count": [self._sampled]}
+
+
+def pooled(parts: list[dict[str, list[Any]]]) -> dict[str, list[Any]]:
+    """Returns the statistics of images of several episodes from those of each; quantiles are means of quantiles."""
+    counts = np.array([part["count"][0] for part in parts], float)
+    arrays = {name: np.array([part[name] for part in parts]) for name in parts[0] if name != "count"}
+
+    def mean(values: Array) -> Array:
+        return np.asarray(np.average(values, axis=0, weights=counts))
+
+    total = mean(arrays["mean"])
+    found = {"min": arrays["min"].min(axis=0), "max": arrays["max"].max(axis=0), "mean": total}
+    found["std"] = np.sqrt(mean(arrays["std"] ** 2 + (arrays["mean"] - total) ** 2))
+    found |= {name: mean(arrays[name]) for name in QUANTILES}
+    return {**{name: each.tolist() for name, each in found.items()}, "count": [int(counts.sum())]}

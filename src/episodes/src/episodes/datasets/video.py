@@ -1,0 +1,117 @@
+"""Videos of cameras, written and read by PyAV."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from custom_ros_tools.errors import MissingDependency
+
+try:
+    import av
+except ImportError:
+    raise MissingDependency("av", "./rpbi setup data") from None
+
+os.environ.setdefault("SVT_LOG", "1")  # the encoder of AV1 prints its settings otherwise
+Array = NDArray[Any]
+
+ENCODERS = {"h264": "libx264", "av1": "libsvtav1"}
+"""Encoder of each codec."""
+PIXEL_FORMAT = "yuv420p"
+KEY_FRAME_EVERY = 2
+"""Frames from one key frame to the next; a reader that jumps to a frame decodes at most so many."""
+
+
+class VideoWriter:
+    """A video of a constant rate, as a context that closes it.
+
+    Args:
+        path: The file.
+        fps: Frames a second.
+        height: Rows of pixels.
+        width: Columns of pixels.
+        codec: A codec of `ENCODERS`.
+        preset: Preset of the encoder: a name of x264 such as `ultrafast`, or 0 (best) to 13 (fastest) for AV1.
+        crf: Quantisation; a lower number is a better picture and a larger file.
+
+    Raises:
+        OSError: If the file cannot be written, here and in all methods.
+    """
+
+    def __init__(self, path: Path, fps: int, height: int, width: int, codec: str, preset: str, crf: int) -> None:
+        self._container = av.open(str(path), "w", options={"movflags": "+faststart"})
+        options = {"preset": preset, "crf": str(crf), "g": str(KEY_FRAME_EVERY)}
+        stream: Any = self._container.add_stream(ENCODERS[codec], rate=fps, options=options)
+        stream.width, stream.height, stream.pix_fmt = width, height, PIXEL_FORMAT
+        stream.codec_context.thread_count = 1
+        stream.time_base = Fraction(1, fps)
+        self._stream = stream
+
+    def __enter__(self) -> VideoWriter:
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        try:
+            if kind is None:
+                self._container.mux(self._stream.encode(None))
+        finally:
+            self._container.close()
+
+    def add(self, pixels: Array) -> None:
+        """Adds an image, shape (height, width, 3), uint8."""
+        frame = av.VideoFrame.from_ndarray(pixels, format="rgb24")
+        self._container.mux(self._stream.encode(frame))
+
+
+class VideoFacts:
+    """Rate, size and codec of a video file.
+
+    Args:
+        path: The file.
+
+    Raises:
+        ValueError: If it cannot be read, or is no video.
+    """
+
+    def __init__(self, path: Path) -> None:
+        with _opened(path) as container:
+            stream = container.streams.video[0]
+            self.fps = float(stream.average_rate or 0)
+            self.height, self.width = int(stream.height), int(stream.width)
+            self.codec = str(stream.codec_context.name)
+
+
+def read_video(path: Path) -> Iterator[tuple[float, Array]]:
+    """Yields time [s] and pixels, shape (height, width, 3), of each frame of a video.
+
+    Raises:
+        ValueError: If it cannot be read, at the frame where it cannot.
+    """
+    count = 0
+    with _opened(path) as container:
+        try:
+            for frame in container.decode(video=0):
+                yield float(frame.time or 0.0), frame.to_ndarray(format="rgb24")
+                count += 1
+        except (av.FFmpegError, OSError) as error:
+            raise ValueError(f"cannot be decoded after {count} frames: {_words(error)}") from error
+
+
+def _opened(path: Path) -> Any:
+    try:
+        container = av.open(str(path))
+    except (av.FFmpegError, OSError) as error:
+        raise ValueError(f"cannot be read: {_words(error)}") from error
+    if not container.streams.video:
+        container.close()
+        raise ValueError("has no video in it")
+    return container
+
+
+def _words(error: Exception) -> str:
+    return getattr(error, "strerror", None) or " ".join(str(error).split())

@@ -1,0 +1,81 @@
+"""The command `export`."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import yaml
+
+from custom_ros_tools.console.argument import Argument, UsageError, number
+from episodes.datasets.formats import FORMATS
+from episodes.folder import EpisodeFolder
+from episodes.ros.export.folder import Wish, export_folder
+from episodes.ros.export.signals import Choice
+
+
+def export(
+    folder: Annotated[Path, Argument("DIR", parse=Path)],
+    *,
+    to: Annotated[str, Argument("FORMAT")] = "lerobot",
+    out: Annotated[Path | None, Argument("DIR", parse=Path)] = None,
+    fps: Annotated[int, Argument("N", parse=int)] = 30,
+    task: Annotated[str, Argument("TEXT")] = "",
+    label: Annotated[Sequence[str], Argument("LABEL ...")] = (),
+    state: Annotated[Sequence[str] | None, Argument("TOPIC ...")] = None,
+    action: Annotated[Sequence[str] | None, Argument("TOPIC ...")] = None,
+    images: Annotated[Sequence[str] | None, Argument("[TOPIC ...]")] = None,
+    option: Annotated[Sequence[str], Argument("KEY=VALUE ...")] = (),
+    disk_reserve_mb: Annotated[float, Argument("MB", parse=number)] = 200.0,
+) -> int:
+    """Exports the episodes of a folder as a data set of another project.
+
+        ./rpbi export ~/demos --to lerobot --out ~/push --task "push the box to the goal" --label success
+
+    Episodes that cannot be exported are named, the others are exported, and the exit code is 1; see docs/datasets.md.
+    It needs no ROS master, and `./rpbi setup data` for all formats except robomimic.
+
+    Usage:
+        ./rpbi export DIR [--to FORMAT] [--out DIR] [--fps N] [--task TEXT] [--label LABEL ...]
+                      [--state TOPIC ...] [--action TOPIC ...] [--images [TOPIC ...]]
+                      [--option KEY=VALUE ...] [--disk-reserve-mb MB]
+
+    Args:
+        folder: of the episodes
+        to: lerobot, robomimic or mcap, or module:Class of a format of your own; lerobot without it
+        out: the data set, a folder that does not exist; DIR_FORMAT without it
+        fps: rows a second; 30 without it
+        task: the task in words; the name of DIR without it
+        label: only episodes with one of these labels
+        state: topics of observation.state; the positions of all joints without it
+        action: topics of action; the targets of all joints without it
+        images: topics of images; all cameras without it, none without a topic
+        option: options of the format, such as codec=av1
+        disk_reserve_mb: free space of the disk that is never used; 200 without it
+    """
+    if fps < 1:
+        raise UsageError(f"--fps: expected at least 1, got {fps}")
+    found = FORMATS.configured(to, "--to")
+    made: Any = found
+    choice = Choice(*(None if each is None else tuple(each) for each in (state, action, images)))
+    wish = Wish(fps, task or folder.absolute().name, tuple(label), choice, disk_reserve_mb)
+    target = out or folder.absolute().with_name(f"{folder.absolute().name}_{to.rpartition(':')[2]}")
+    format_ = made(made.Config.parse(_options(option), "--option"))
+    result = export_folder(EpisodeFolder(folder), target, to, format_, wish, lambda line: print(line, flush=True))
+    for fault in result.faults:
+        print(fault)
+    print(f"{len(result.exported)} episodes are in {target}")
+    return 1 if result.faults else 0
+
+
+def _options(words: Sequence[str]) -> dict[str, Any]:
+    """Returns options by key; values are YAML."""
+    found = {}
+    for word in words:
+        key, equals, value = word.partition("=")
+        if not equals:
+            raise UsageError(f"--option: expected KEY=VALUE, got {word}")
+        try:
+            found[key] = yaml.safe_load(value)
+        except yaml.YAMLError:
+            found[key] = value
+    return found

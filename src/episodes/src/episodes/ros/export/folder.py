@@ -1,0 +1,220 @@
+"""The export of a folder of episodes."""
+
+from __future__ import annotations
+
+import errno
+import shutil
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+from custom_ros_tools.errors import InterfaceError
+from episodes.datasets.format import (
+    ACTION,
+    STAMP,
+    STAMP_NAMES,
+    STATE,
+    TIME_ERROR,
+    DatasetError,
+    DatasetFormat,
+    Feature,
+    Schema,
+)
+from episodes.datasets.provenance import write_episode, write_export
+from episodes.errors import EpisodeError
+from episodes.folder import BAG, Episode, EpisodeFolder
+
+from .signals import Choice, Signal
+from .source import SourceEpisode
+
+DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
+class Wish(NamedTuple):
+    """Content of a data set, as the user wants it.
+
+    Attributes:
+        fps: Rows a second.
+        task: The task in words.
+        labels: Labels of the episodes to export; empty for all.
+        choice: Topics of features.
+        disk_reserve_mb: Free space of the disk that is never used [MB].
+    """
+
+    fps: int
+    task: str
+    labels: tuple[str, ...] = ()
+    choice: Choice = Choice()
+    disk_reserve_mb: float = 200.0
+
+
+@dataclass
+class Result:
+    """Result of an export.
+
+    Attributes:
+        exported: Numbers of the episodes in the data set, in its order.
+        faults: Sentences on episodes that are not in it.
+    """
+
+    exported: list[int] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+
+
+def export_folder(
+    folder: EpisodeFolder, target: Path, name: str, format_: DatasetFormat, wish: Wish, report: Callable[[str], None]
+) -> Result:
+    """Exports the episodes of a folder as a data set.
+
+    Episodes that cannot be exported are left out. The data set gets its name when it is complete.
+
+    Args:
+        folder: The folder.
+        target: Folder of the data set; it must not exist.
+        name: Name of the format.
+        format_: The format.
+        wish: Content of the data set.
+        report: Is called with a sentence for each episode.
+
+    Raises:
+        EpisodeError: If there is no such folder, the target exists, or no episode can be exported.
+        OSError: If the data set cannot be written; there is none then.
+    """
+    if target.exists():
+        raise DatasetError(target, "exists already: name a folder that does not")
+    result = Result()
+    sources, signals, schema = _plan(folder, format_, wish, result)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    part = target.parent / f".{target.name}.part"
+    shutil.rmtree(part, ignore_errors=True)  # of an export that was killed
+    part.mkdir()
+    try:
+        format_.open(part, schema)
+        _add_all(part, format_, sources, signals, schema, wish, result, report)
+        if not result.exported:
+            raise EpisodeError(folder.path, "\n".join(["no episode was exported", *result.faults]))
+        format_.close()
+        write_export(part, _facts(folder, name, wish, schema, signals, result))
+        part.rename(target)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    return result
+
+
+def _plan(
+    folder: EpisodeFolder, format_: DatasetFormat, wish: Wish, result: Result
+) -> tuple[list[SourceEpisode], tuple[Signal, ...], Schema | None]:
+    """Returns the episodes to export, and the features that most of them have."""
+    sources = []
+    for number in folder.numbers():
+        try:
+            episode = folder.read(number)
+            if wish.labels and episode.label not in wish.labels:
+                continue
+            _require_complete(folder, episode)
+            source = SourceEpisode(folder, episode, wish.choice, wish.task)
+            if format_.has_rows:
+                source.signals, source.cameras  # noqa: B018 (reads the bag)
+                _forget(source)
+            sources.append(source)
+        except (InterfaceError, OSError, ValueError) as error:
+            result.faults.append(_fault(number, error))
+    if not sources:
+        wanted = f" with the label {' or '.join(wish.labels)}" if wish.labels else ""
+        raise EpisodeError(folder.path, "\n".join([f"no episode{wanted} can be exported", *result.faults]))
+    if not format_.has_rows:
+        return sources, (), None
+    features = Counter((tuple(signal.feature for signal in each.signals), each.cameras) for each in sources)
+    (_, cameras), _ = features.most_common(1)[0]
+    best = features.most_common(1)[0][0]
+    signals = next(each.signals for each in sources if (tuple(s.feature for s in each.signals), each.cameras) == best)
+    keys = {signal.feature.key for signal in signals}
+    for key, option in ((STATE, "--state"), (ACTION, "--action")):
+        if key not in keys:
+            raise EpisodeError(folder.path, f"no topic for '{key}' in the recordings: name one by {option} TOPIC")
+    errors = (*(signal.feature.key for signal in signals), *(camera.key for camera in cameras))
+    own = (Feature(STAMP, STAMP_NAMES, "int64"), Feature(TIME_ERROR, errors))
+    return sources, signals, Schema(wish.fps, (*(signal.feature for signal in signals), *own), cameras)
+
+
+def _require_complete(folder: EpisodeFolder, episode: Episode) -> None:
+    if episode.state == "incomplete":
+        raise EpisodeError(folder.folder_of(episode.number), f"is incomplete: {episode.note}")
+    bag = folder.folder_of(episode.number) / BAG
+    if not bag.exists():
+        raise EpisodeError(bag, "there is none")
+
+
+def _add_all(
+    part: Path,
+    format_: DatasetFormat,
+    sources: Sequence[SourceEpisode],
+    signals: Sequence[Signal],
+    schema: Schema | None,
+    wish: Wish,
+    result: Result,
+    report: Callable[[str], None],
+) -> None:
+    """Adds episodes until the disk is full."""
+    place = EpisodeFolder(part)
+    for position, source in enumerate(sources):
+        number, index = source.episode.number, len(result.exported)
+        if (free := place.free_mb()) < wish.disk_reserve_mb:
+            left = ", ".join(str(each.episode.number) for each in sources[position:])
+            full = f"{free:.0f} MB free on the disk, less than the reserve of {wish.disk_reserve_mb:.0f} MB"
+            result.faults.append(f"{full}: episodes {left} are not exported")
+            return
+        try:
+            if schema is not None:
+                source.use(schema, signals)
+            facts = source.facts()
+            facts |= format_.add(index, source)
+        except (InterfaceError, OSError, ValueError) as error:
+            result.faults.append(_fault(number, error))
+            if getattr(error, "errno", None) in DISK_FULL:
+                left = ", ".join(str(each.episode.number) for each in sources[position + 1 :])
+                result.faults += [f"episodes {left} are not exported"] if left else []
+                return
+            continue
+        finally:
+            _forget(source)
+        images = facts.pop("images", {})
+        write_episode(part, index, facts, images)
+        result.exported.append(number)
+        report(_line(source, index, facts))
+
+
+def _line(source: SourceEpisode, index: int, facts: dict[str, object]) -> str:
+    note = f" ({sum(source.episode.lost.values())} messages lost in the recording)" if source.episode.lost else ""
+    size = f"{facts['frames']} frames" if "frames" in facts else "all messages"
+    return f"episode {source.episode.number}: {size}, as {index}{note}"
+
+
+def _forget(source: SourceEpisode) -> None:
+    """Frees the tables of an episode."""
+    source.__dict__.pop("_tables", None)
+    source.__dict__.pop("times", None)
+
+
+def _fault(number: int, error: Exception) -> str:
+    return f"episode {number}: {'; '.join(str(error).splitlines())}"
+
+
+def _facts(
+    folder: EpisodeFolder, name: str, wish: Wish, schema: Schema | None, signals: Sequence[Signal], result: Result
+) -> dict[str, object]:
+    sources = {each.feature.key: sorted({table for table, _ in each.columns}) for each in signals}
+    return {
+        "format": name,
+        "source": str(folder.path.absolute()),
+        "episodes": result.exported,
+        "left_out": result.faults,
+        "task": wish.task,
+        "fps": schema.fps if schema else None,
+        "features": {each.key: list(each.names) for each in schema.features} if schema else {},
+        "cameras": {each.key: [each.height, each.width, 3] for each in schema.cameras} if schema else {},
+        "topics": sources,
+        "methods": {each.feature.key: each.method for each in signals},
+    }

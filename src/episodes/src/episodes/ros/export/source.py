@@ -1,0 +1,276 @@
+"""Rows of one rate from the bag of an episode."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from custom_ros_tools.errors import ConfigError
+from episodes.datasets.format import (
+    QUATERNION,
+    STAMP,
+    TIME_ERROR,
+    Array,
+    Camera,
+    DatasetError,
+    ExportedEpisode,
+    Feature,
+    Frame,
+    Schema,
+    stamps_of,
+)
+from episodes.datasets.provenance import file_digest, hash_chain
+from episodes.files import URDF, stored_path
+from episodes.folder import BAG, Episode, EpisodeFolder
+from robot_model.urdf.document import UrdfDocument
+from rpbi_utils.bags.images import decode_image
+from rpbi_utils.bags.resampling import TIME_ERROR as RESAMPLING_ERROR
+from rpbi_utils.bags.resampling import resample
+from rpbi_utils.ros.bags.bag_reader import BagReader
+from rpbi_utils.ros.bags.dataframes import bag_to_dataframes
+from rpbi_utils.ros.bags.topic_report import message_time
+
+from .signals import Choice, Signal, by_frame, derive, image_topics, wanted_topics
+
+
+class SourceEpisode(ExportedEpisode):
+    """An episode of a folder, resampled at the rate of a schema.
+
+    Args:
+        folder: The folder.
+        episode: The episode.
+        choice: Topics that the user names.
+        task: The task in words.
+    """
+
+    def __init__(self, folder: EpisodeFolder, episode: Episode, choice: Choice, task: str) -> None:
+        self.folder, self.episode, self.task, self.label = folder, episode, task, episode.label
+        self.bag: Path = folder.folder_of(episode.number) / BAG
+        self._choice = choice
+        self._schema = Schema(0, ())
+        self._signals: tuple[Signal, ...] = ()
+
+    @cached_property
+    def signals(self) -> tuple[Signal, ...]:
+        """The features of its topics.
+
+        Raises:
+            BagError: If the bag cannot be read.
+            UnknownNameError: If there is no topic that the user named.
+        """
+        return tuple(derive(self._tables, self._types, self.episode.namespace, self._fixed_joints(), self._choice))
+
+    @cached_property
+    def cameras(self) -> tuple[Camera, ...]:
+        """The cameras of 8 bits of its topics; those with another kind of pixels are left out unless they are named."""
+        found = []
+        for key, topic in self._image_topics.items():
+            first = next(self._images(topic), None)
+            if first is None:
+                continue
+            try:
+                pixels = _rgb(first[0]())
+            except ValueError as error:
+                if self._choice.images is not None:
+                    raise DatasetError(self.bag, f"{topic}: {error}") from error
+                continue
+            found.append(Camera(key, pixels.shape[0], pixels.shape[1]))
+        return tuple(found)
+
+    def use(self, schema: Schema, signals: Sequence[Signal]) -> None:
+        """Sets the rows that `times`, `frames` and `values` return.
+
+        Raises:
+            DatasetError: If a feature or a camera is not in the recording, or its images have another size.
+        """
+        here = {signal.feature.key: signal for signal in self.signals}
+        for signal in signals:
+            if signal.feature.key not in here:
+                raise DatasetError(self.bag, f"no messages for '{signal.feature.key}', which other episodes have")
+            if here[signal.feature.key].feature != signal.feature:
+                others, own = (", ".join(each.feature.names) for each in (signal, here[signal.feature.key]))
+                raise DatasetError(self.bag, f"'{signal.feature.key}' is of {own}, in other episodes of {others}")
+        for camera in schema.cameras:
+            if camera not in self.cameras:
+                size = f"{camera.width} x {camera.height} pixels"
+                raise DatasetError(self.bag, f"no images for '{camera.key}' of {size}, which other episodes have")
+        self._schema, self._signals = schema, tuple(signals)
+
+    @cached_property
+    def times(self) -> Array:
+        """Times of the rows: where all features but actions have values, shape (n,) [s].
+
+        Raises:
+            DatasetError: If there is none.
+        """
+        tables = {name: self._tables[name] for name in self._continuous_tables()}
+        starts = [table.index[0] for table in tables.values()]
+        starts += [next(self._images(self._image_topics[camera.key]))[1] for camera in self._schema.cameras]
+        start, end = max(starts), min(table.index[-1] for table in tables.values())
+        count = int((end - start) * self._schema.fps * (1 + 1e-12)) + 1 if end > start else 0
+        if count < 2:
+            last = max(tables, key=lambda name: tables[name].index[0])
+            raise DatasetError(self.bag, f"its topics have no time in common; the last one to begin is {last}")
+        return np.asarray(start + np.arange(count) / self._schema.fps)
+
+    @property
+    def left_out_s(self) -> float:
+        """Time of the recording of joint states and the like that is not in the rows [s]."""
+        tables = [self._tables[name] for name in self._continuous_tables()]
+        whole = max(table.index[-1] for table in tables) - min(table.index[0] for table in tables)
+        return float(whole - (self.times[-1] - self.times[0]))
+
+    def frames(self, key: str) -> Iterator[Frame]:
+        """Yields the newest image of a camera at the time of each row."""
+        (camera,) = (each for each in self._schema.cameras if each.key == key)
+        topic = self._image_topics[key]
+        images = self._images(topic)
+        coming = next(images, None)
+        shown: Frame | None = None
+        newest = coming
+        for time_s in self.times:
+            while coming is not None and coming[1] <= time_s:
+                newest, coming = coming, next(images, None)
+            assert newest is not None
+            if shown is None or newest[1] != shown.stamp:
+                try:
+                    pixels = _rgb(newest[0]())
+                except ValueError as error:
+                    raise DatasetError(self.bag, f"{topic}: the image at {newest[1]} s: {error}") from error
+                if pixels.shape[:2] != camera[1:]:
+                    got, expected = (f"{width} x {height}" for height, width in (pixels.shape[:2], camera[1:]))
+                    raise DatasetError(self.bag, f"{topic}: the image at {newest[1]} s: expected {expected}, got {got}")
+                shown = Frame(pixels, newest[1])
+            yield shown
+
+    def values(self, image_stamps: Mapping[str, Array]) -> dict[str, Array]:
+        """Returns the numbers of all features at the times of the rows."""
+        values: dict[str, Array] = {}
+        errors: dict[str, Array] = {}
+        for signal in self._signals:
+            key = signal.feature.key
+            values[key], errors[key] = self._resampled(signal)
+            if not np.isfinite(values[key]).all():
+                raise DatasetError(self.bag, f"'{key}' has values that are not finite")
+        errors |= {key: self.times - stamps for key, stamps in image_stamps.items()}
+        values[STAMP] = stamps_of(self.times)
+        values[TIME_ERROR] = np.stack(list(errors.values()), axis=1).astype(np.float32)
+        return values
+
+    def facts(self) -> dict[str, Any]:
+        """Returns its source and its chain of state hashes, as they are stored with the data set."""
+        episode = self.episode
+        chain = hash_chain(self._states())
+        source = {"folder": str(self.folder.path), "episode": episode.number, "bag_sha256": file_digest(self.bag)}
+        source |= {"label": episode.label, "started": episode.started, "seeds": episode.seeds, "git": episode.git}
+        source["versions"] = episode.versions
+        return {
+            "source": source,
+            "task": self.task,
+            "state_hashes": {"chain": chain, "last": chain[-1]["link"] if chain else ""},
+        }
+
+    def _resampled(self, signal: Signal) -> tuple[Array, Array]:
+        """Returns the values of a feature, shape (n, columns), and its time error in each row, shape (n,) [s]."""
+        by_table: dict[str, list[str]] = {}
+        for table, name in signal.columns:
+            by_table.setdefault(table, []).append(name)
+        found = {
+            table: resample(self._tables[table].reindex(columns=names), self.times, signal.method)
+            for table, names in by_table.items()
+        }
+        columns = [found[table][name].to_numpy(float) for table, name in signal.columns]
+        error = np.zeros(len(self.times))
+        for table in found.values():
+            error = np.fmax(error, table[RESAMPLING_ERROR].to_numpy(float))
+        if signal.held:
+            columns = [self._held(column, source) for column, source in zip(columns, signal.held)]
+        matrix = np.stack(columns, axis=1)
+        _make_continuous(matrix, signal.feature)
+        return matrix.astype(signal.feature.dtype), error.astype(np.float32)
+
+    def _held(self, column: Array, source: Any) -> Array:
+        """Replaces what is missing before the first command by the measured position, or by 0."""
+        if source.table == "":
+            return np.where(np.isnan(column), 0.0, column)
+        measured = resample(self._tables[source.table][[source.name]], self.times, "linear")[source.name].to_numpy(
+            float
+        )
+        return np.where(np.isnan(column), measured, column)
+
+    def _continuous_tables(self) -> list[str]:
+        """Returns the names of the tables that rows begin and end with."""
+        signals = [signal for signal in self._signals if signal.begins_at_once] or self._signals
+        return sorted({table for signal in signals for table, _ in signal.columns})
+
+    @cached_property
+    def _tables(self) -> dict[str, pd.DataFrame]:
+        topics = wanted_topics(self._types, self._choice)
+        return by_frame(bag_to_dataframes(self.bag, topics, any_size=True)) if topics else {}
+
+    @cached_property
+    def _types(self) -> dict[str, str]:
+        with BagReader(self.bag, any_size=True) as bag:
+            return {topic: "|".join(sorted(each.name for each in types)) for topic, types in bag.types.items()}
+
+    @cached_property
+    def _image_topics(self) -> dict[str, str]:
+        return image_topics(self._types, self._choice)
+
+    def _images(self, topic: str) -> Iterator[tuple[Any, float]]:
+        """Yields a function that returns the pixels, and the stamp [s], of each image."""
+        with BagReader(self.bag, any_size=True) as bag:
+            for message in bag.messages([topic]):
+                yield (lambda message=message: decode_image(message.type, message.raw)), message_time(message)
+
+    def _states(self) -> Iterator[dict[str, Any]]:
+        topic = f"/{self.episode.namespace.strip('/')}/rpbi/state".replace("//", "/")
+        if topic not in self._types:
+            return
+        table = bag_to_dataframes(self.bag, topic, any_size=True)[topic]
+        if "state_hash" not in table:
+            return
+        for row in table[table["state_hash"].astype(bool)].itertuples():
+            counts = {"resets": int(row.resets), "tick": int(row.tick), "commands": int(row.commands)}
+            yield {"stamp": float(row.Index), **counts, "hash": str(row.state_hash)}
+
+    def _fixed_joints(self) -> set[str]:
+        fixed: set[str] = set()
+        movable: set[str] = set()
+        for each in self.episode.files:
+            if each["path"].lower().endswith(URDF) and each["sha256"]:
+                with suppress(ConfigError):
+                    copy = stored_path(self.folder.files, each["path"], each["sha256"])
+                    for name, kind in UrdfDocument(str(copy)).joint_types.items():
+                        (fixed if kind == "fixed" else movable).add(name)
+        return fixed - movable
+
+
+def _rgb(pixels: Array) -> Array:
+    """Returns pixels in red, green and blue, with an even number of rows and columns.
+
+    Raises:
+        ValueError: If they are not of 8 bits.
+    """
+    if pixels.dtype != np.uint8:
+        raise ValueError(f"expected images of 8 bits a channel, got {pixels.dtype}")
+    if pixels.ndim == 2:
+        pixels = np.repeat(pixels[:, :, None], 3, axis=2)
+    height, width = (size // 2 * 2 for size in pixels.shape[:2])
+    return np.ascontiguousarray(pixels[:height, :width, :3])
+
+
+def _make_continuous(values: Array, feature: Feature) -> None:
+    """Gives the quaternions of a feature the signs by which each is nearest to the one before; the first has w >= 0."""
+    names = feature.names
+    for first in range(len(names) - 3):
+        if names[first : first + 4] == QUATERNION:
+            quats = values[:, first : first + 4]
+            signs = np.where((quats[1:] * quats[:-1]).sum(axis=1) < 0, -1.0, 1.0)
+            quats *= np.cumprod([1.0 if quats[0, 3] >= 0 else -1.0, *signs])[:, None]

@@ -1,0 +1,245 @@
+"""Episodes exported as data sets: their content, bad episodes, a full disk, and formats of a user's own."""
+
+from __future__ import annotations
+
+import json
+import resource
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from pyarrow import parquet
+from rosbags.highlevel import AnyReader
+from scipy.spatial.transform import Rotation
+from written_episodes import CAMERA, JOINTS, write_episode
+
+from episodes import EpisodeFolder
+from episodes.datasets.video import read_video
+from rpbi_utils import bag_to_dataframes, bag_to_images
+
+VIDEO = "videos/observation.images.camera_colour/chunk-000/file-{:03d}.mp4"
+START_S = 1.002
+"""Time of the first joint states and images."""
+
+
+@pytest.fixture(scope="module")
+def rows(exported):
+    """The rows of the LeRobot data set as columns, and its description."""
+    folder = exported("lerobot")
+    table = parquet.read_table(folder / "data/chunk-000/file-000.parquet")
+    columns = {key: np.array(table.column(key).to_pylist()) for key in table.column_names}
+    return columns, json.loads((folder / "meta/info.json").read_text())
+
+
+def first_of(columns, episode):
+    return columns["episode_index"] == episode
+
+
+def test_features_are_derived_from_the_topics(rows):
+    _, info = rows
+    features = {key: each["names"] for key, each in info["features"].items() if each["dtype"] != "video"}
+    joints = list(JOINTS)
+    assert features["observation.state"] == features["observation.velocity"] == joints
+    assert features["observation.effort"] == features["action"] == joints
+    forces = [f"force.{axis}" for axis in "xyz"]
+    assert features["observation.wrench.arm_wrist_ft_sensor"] == forces + [f"torque.{axis}" for axis in "xyz"]
+    assert features["observation.contact_force.box"] == forces
+    assert features["observation.pose.box"] == ["x", "y", "z", "qx", "qy", "qz", "qw"]
+    assert {key for key, each in info["features"].items() if each["dtype"] == "video"} == {
+        "observation.images.camera_colour",
+        "observation.images.side_colour",
+    }
+    assert (info["fps"], info["total_episodes"], info["total_frames"]) == (30, 3, 126)
+
+
+def test_rows_are_resampled_and_have_true_stamps_and_errors(rows, demos):
+    columns, info = rows
+    own = first_of(columns, 1)
+    times = columns["source.stamp"][own] @ np.array([1.0, 1e-9])
+    assert times == pytest.approx(START_S + np.arange(own.sum()) / 30, abs=1e-9)
+    assert columns["timestamp"][own] == pytest.approx(np.arange(own.sum()) / 30, abs=1e-6)
+    states = bag_to_dataframes(demos.folder_of(1) / "episode.bag", "/rpbi/arm/joint_states")["/rpbi/arm/joint_states"]
+    for number, joint in enumerate(JOINTS):
+        expected = np.interp(times, states.index, states[f"position/{joint}"])
+        assert columns["observation.state"][own][:, number] == pytest.approx(expected, abs=1e-6)
+    errors = columns["source.time_error"][own]
+    names = info["features"]["source.time_error"]["names"]
+    assert errors[:, names.index("observation.state")].max() <= 0.005 + 1e-6
+    nearest = np.abs(states.index.to_numpy()[:, None] - times).min(axis=0)
+    assert errors[:, names.index("observation.state")] == pytest.approx(nearest, abs=1e-6)
+    assert 0.01 < errors[:, names.index("observation.images.camera_colour")].max() < 0.04
+
+
+def test_actions_are_the_newest_targets_and_before_them_the_measured_positions(rows, demos):
+    columns, _ = rows
+    own = first_of(columns, 0)
+    times = columns["source.stamp"][own] @ np.array([1.0, 1e-9])
+    targets = bag_to_dataframes(demos.folder_of(0) / "episode.bag", "/rpbi/arm/joint_states/target")
+    (targets,) = targets.values()
+    actions, states = columns["action"][own], columns["observation.state"][own]
+    before = times < targets.index[0]
+    assert before.any() and not before.all()
+    assert np.array_equal(actions[before], states[before])
+    newest = np.searchsorted(targets.index, times[~before], side="right") - 1
+    for number, joint in enumerate(JOINTS[:2]):
+        assert actions[~before][:, number] == pytest.approx(targets[f"position/{joint}"].to_numpy()[newest], abs=1e-6)
+    assert np.array_equal(actions[:, 2], states[:, 2])  # which never gets a target
+
+
+def test_quaternions_do_not_jump(rows):
+    columns, _ = rows
+    for episode in range(3):
+        quats = columns["observation.pose.box"][first_of(columns, episode)][:, 3:]
+        assert (np.einsum("ij,ij->i", quats[1:], quats[:-1]) > 0.9).all()
+        assert np.linalg.norm(quats, axis=1) == pytest.approx(1.0, abs=1e-6)
+    times = columns["source.stamp"] @ np.array([1.0, 1e-9]) - 1.0
+    phase = 0.4 * columns["episode_index"]
+    found = Rotation.from_quat(columns["observation.pose.box"][:, 3:])
+    difference = found * Rotation.from_euler("z", 4.0 * times + phase).inv()
+    assert difference.magnitude().max() < 1e-3
+
+
+def test_videos_show_the_newest_images(rows, exported, demos):
+    columns, _ = rows
+    times = columns["source.stamp"][first_of(columns, 2)] @ np.array([1.0, 1e-9])
+    images = list(bag_to_images(demos.folder_of(2) / "episode.bag", CAMERA))
+    stamps = np.array([stamp for stamp, _ in images])
+    film = list(read_video(exported("lerobot") / VIDEO.format(2)))
+    assert [time_s for time_s, _ in film] == pytest.approx(np.arange(len(times)) / 30, abs=1e-6)
+    for time_s, (_, pixels) in zip(times, film, strict=True):
+        wanted = images[np.searchsorted(stamps, time_s, side="right") - 1][1]
+        assert np.abs(pixels.astype(int) - wanted)[..., 1].mean() < 4.0
+
+
+def test_each_episode_has_its_hash_chain_and_its_source(exported, demos):
+    for name in ("lerobot", "robomimic", "mcap"):
+        facts = json.loads((exported(name) / "rpbi/episode_000001.json").read_text())
+        assert (facts["source"]["episode"], facts["source"]["label"], facts["source"]["seeds"]) == (1, "failure", "7")
+        states = bag_to_dataframes(demos.folder_of(1) / "episode.bag", "/rpbi/state")["/rpbi/state"]
+        chain = facts["state_hashes"]["chain"]
+        assert [(each["tick"], each["hash"]) for each in chain] == list(zip(states["tick"], states["state_hash"]))
+
+
+def test_robomimic_has_scaled_actions_rewards_and_a_mask(rows, exported):
+    columns, _ = rows
+    with h5py.File(exported("robomimic") / "dataset.hdf5") as file:
+        low, high = file["action_scaling/low"][:], file["action_scaling/high"][:]
+        for index in range(3):
+            demo = file[f"data/demo_{index}"]
+            actions = demo["actions"][:]
+            assert np.abs(actions).max() <= 1.0
+            wanted = columns["action"][first_of(columns, index)]
+            assert low + (actions + 1) / 2 * (high - low) == pytest.approx(wanted, abs=1e-6)
+            assert np.array_equal(demo["obs/state"][:], columns["observation.state"][first_of(columns, index)])
+            assert demo["rewards"][-1] == (index != 1) and demo["dones"][-1] == 1
+            assert demo["obs/images_camera_colour"].shape == (len(actions), 84, 84, 3)
+        assert [each.decode() for each in file["mask/success"]] == ["demo_0", "demo_2"]
+        assert json.loads(file["data"].attrs["env_args"])["env_name"] == "ros_pybullet_interface"
+
+
+def test_mcap_has_all_messages(exported, demos):
+    with AnyReader([exported("mcap") / "episode_000000"]) as reader:
+        counts = {each.topic: each.msgcount for each in reader.connections}
+        (states,) = [each for each in reader.connections if each.topic == "/rpbi/arm/joint_states"]
+        assert states.msgtype == "sensor_msgs/msg/JointState"
+        _, stamp_ns, raw = next(reader.messages([states]))
+        message = reader.deserialize(raw, states.msgtype)
+    assert counts == {topic: each["messages"] for topic, each in demos.read(0).topics.items()}
+    assert list(message.name) == list(JOINTS) and stamp_ns == 1_002_000_000
+
+
+def test_bad_episodes_are_named_and_the_others_exported(tmp_path, run):
+    folder = EpisodeFolder(tmp_path / "demos")
+    for index in range(5):
+        write_episode(folder, "good" if index else "bad", seconds=0.5, cameras=(), has_targets=index != 2)
+    bag = folder.folder_of(0) / "episode.bag"
+    bag.write_bytes(bag.read_bytes()[:9000])
+    (folder.folder_of(3) / "episode.yaml").write_text("[")
+    code, text = run("export", folder.path, "--to", "robomimic", "--out", tmp_path / "out")
+    assert code == 1
+    assert f"episode 0: {bag}: has no index" in text
+    assert "episode 2: " in text and "no messages for 'action', which other episodes have" in text
+    assert f"episode 3: {folder.folder_of(3) / 'episode.yaml'}: cannot be read" in text
+    assert "2 episodes are in " in text
+    with h5py.File(tmp_path / "out/dataset.hdf5") as file:
+        assert list(file["data"]) == ["demo_0", "demo_1"]
+    assert run("check_dataset", tmp_path / "out")[0] == 0
+    code, text = run("export", folder.path, "--to", "robomimic", "--out", tmp_path / "out")
+    assert code == 1 and "exists already" in text
+    code, text = run("export", folder.path, "--to", "robomimic", "--out", tmp_path / "none", "--label", "perfect")
+    assert code == 1 and "no episode with the label perfect can be exported" in text
+    code, text = run("export", folder.path, "--to", "robomimic", "--out", tmp_path / "none", "--state", "/wrong")
+    assert code == 1 and "unknown topic '/wrong'" in text
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["demos", "out"]
+
+
+@pytest.fixture
+def file_limit():
+    """Limits the size of files that this process writes, and lifts the limit at the end."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def test_a_full_disk_is_named_and_what_is_complete_is_kept(demos, tmp_path, run, file_limit):
+    code, text = run("export", demos.path, "--out", tmp_path / "none", "--disk-reserve-mb", "1e9")
+    assert code == 1 and "MB free on the disk, less than the reserve" in text
+    folder = EpisodeFolder(tmp_path / "demos")
+    for seconds in (0.6, 20.0, 0.6):
+        write_episode(folder, seconds=seconds)
+    file_limit(120_000)
+    code, text = run("export", folder.path, "--out", tmp_path / "out", "--option", "preset=ultrafast", "crf=0")
+    assert code == 1
+    assert "episode 1: " in text and "File too large" in text and "episodes 2 are not exported" in text
+    assert "1 episodes are in " in text
+    file_limit(1_000)
+    code, text = run("export", folder.path, "--to", "mcap", "--out", tmp_path / "none")
+    assert code == 1 and "File too large" in text
+    file_limit(resource.RLIM_INFINITY)
+    assert run("check_dataset", tmp_path / "out")[0] == 0
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["demos", "out"]
+
+
+def test_options_and_topics_can_be_chosen(demos, tmp_path, run):
+    words = ("--fps", "10", "--label", "failure", "--images", "--action", "/rpbi/arm/wrist/ft_sensor")
+    code, text = run("export", demos.path, "--out", tmp_path / "out", *words, "--option", "robot_type=arm")
+    assert code == 0, text
+    info = json.loads((tmp_path / "out/meta/info.json").read_text())
+    assert (info["fps"], info["robot_type"], info["total_episodes"], info["total_frames"]) == (10, "arm", 1, 14)
+    assert info["features"]["action"]["names"][0] == "wrench.force.x" and not (tmp_path / "out/videos").exists()
+    assert parquet.read_table(tmp_path / "out/meta/tasks.parquet").to_pandas().index.tolist() == ["demos"]
+    assert run("check_dataset", tmp_path / "out")[0] == 0
+    code, text = run("export", demos.path, "--out", tmp_path / "none", "--option", "codec=vp9")
+    assert code == 1 and "--option: codec: " in text and not (tmp_path / "none").exists()
+    code, text = run("export", demos.path, "--to", "lerobo", "--out", tmp_path / "none")
+    assert code == 1 and "unknown data set format 'lerobo'" in text
+
+
+def test_videos_can_be_av1(demos, tmp_path, run):
+    code, text = run("export", demos.path, "--out", tmp_path / "out", "--label", "failure", "--option", "codec=av1")
+    assert code == 0, text
+    code, text = run("check_dataset", tmp_path / "out")
+    assert code == 0, text
+
+
+def test_a_format_of_a_users_own(demos, tmp_path, run):
+    words = ("--images", "--option", "digits=3")
+    code, text = run("export", demos.path, "--to", "table_format:TableFormat", "--out", tmp_path / "out", *words)
+    assert code == 0, text
+    assert (tmp_path / "out/1.csv").read_text().count("\n") == 42
+    code, text = run("check_dataset", tmp_path / "out", "--formats", "table_format:TableFormat")
+    assert (code, text) == (0, "3 tables: no fault\n")
+    (tmp_path / "out/1.csv").write_text("")
+    assert run("check_dataset", tmp_path / "out", "--formats", "table_format:TableFormat")[0] == 1
+
+
+def test_a_killed_export_leaves_nothing_under_the_name(demos, tmp_path, run):
+    part = tmp_path / ".out.part"
+    part.mkdir()
+    (part / "half").write_text("")
+    assert run("export", demos.path, "--to", "robomimic", "--out", tmp_path / "out", "--images")[0] == 0
+    assert [each.name for each in tmp_path.iterdir()] == ["out"]
+    shutil.rmtree(tmp_path / "out")
+    assert not Path(part).exists()
