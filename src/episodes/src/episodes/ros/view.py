@@ -17,7 +17,7 @@ from episodes.view.bodies import add_later_bodies, links_of
 from episodes.view.forces import contact_arrows, force_panels, wrench_arrows
 from episodes.view.frames import Frames
 from episodes.view.meshes import meshes_of
-from episodes.view.scene import MAX_HZ, MAX_TIMES, Array, Link, Scene
+from episodes.view.scene import MAX_HZ, MAX_POSES, Array, Link, Scene
 from robot_model.geometry import Vector
 from rpbi.replay.session import Recording
 from rpbi.world import World
@@ -80,24 +80,29 @@ def _scene(title: str, bag: Path, namespace: str, recording: Recording, any_size
     joints = [topic for topic in of_type[JOINTS] if topic.startswith(prefix) and topic.endswith("/joint_states")]
     forces = [*of_type[CONTACTS], *of_type[WRENCHES]]
     tables = bag_to_dataframes(bag, sorted({*of_type[TF], *state, *joints, *forces}), any_size=any_size)
-    start_s, times = _times(bag, {topic: table for topic, table in tables.items() if topic.startswith(prefix)})
     world = recording.description.build()
     try:
         at_start = list(world.bodies)
         notes = [*recording.description.warnings, *add_later_bodies(world, recording.commands)]
+        links = sum(1 + len(body.link_indices) for body in world.bodies.values())
+        of_simulator = {topic: table for topic, table in tables.items() if topic.startswith(prefix)}
+        start_s, times = _times(bag, of_simulator, MAX_POSES // max(1, links))
         frames = Frames(tables, world.frames(), start_s + times)
         of_body = {topic.removeprefix(prefix).removesuffix("/joint_states"): tables[topic] for topic in joints}
         states = tables[state[0]] if state else None
-        links, more = links_of(world, at_start, recording.commands, states, frames, of_body)
-        scene = Scene(title, start_s, times, _camera(world, links), links, notes=[*notes, *more])
+        shown, more = links_of(world, at_start, recording.commands, states, frames, of_body)
+        scene = Scene(title, start_s, times, _camera(world, shown), shown, notes=[*notes, *more])
     finally:
         world.close()
-    scene.meshes, of_meshes = meshes_of(shape for link in links for shape in link.shapes)
+    scene.meshes, of_meshes = meshes_of(shape for link in shown for shape in link.shapes)
     scene.notes += of_meshes
     scene.arrows = [contact_arrows(topic, tables[topic], frames.times) for topic in of_type[CONTACTS]]
     for topic in of_type[WRENCHES]:
         found = wrench_arrows(topic, tables[topic], frames)
-        (scene.notes if isinstance(found, str) else scene.arrows).append(found)
+        if isinstance(found, str):
+            scene.notes.append(found)
+        else:
+            scene.arrows.append(found)
     scene.panels = force_panels({topic: tables[topic] for topic in forces}, start_s)
     scene.notes += frames.notes
     hz = (len(times) - 1) / times[-1]
@@ -106,14 +111,14 @@ def _scene(title: str, bag: Path, namespace: str, recording: Recording, any_size
     return scene
 
 
-def _times(bag: Path, tables: Mapping[str, pd.DataFrame]) -> tuple[float, Array]:
-    """Returns the start [s], and times since then [s] that are evenly spaced over the messages of a simulator."""
+def _times(bag: Path, tables: Mapping[str, pd.DataFrame], most: int) -> tuple[float, Array]:
+    """Returns the start [s], and at most so many evenly spaced times since then [s], up to the last message."""
     stamps = [table.index for table in tables.values() if len(table) > 1]
     start_s = min((float(each[0]) for each in stamps), default=0.0)
     seconds = max((float(each[-1]) for each in stamps), default=0.0) - start_s
     if seconds <= 0.0:
         raise BagError(bag, "expected joint states, contacts or states of the simulator over some time, found none")
-    count = min(math.ceil(seconds * MAX_HZ), MAX_TIMES - 1) + 1
+    count = max(2, min(math.ceil(seconds * MAX_HZ) + 1, most))
     return start_s, np.linspace(0.0, seconds, count)
 
 

@@ -66,7 +66,7 @@ def force_panels(tables: Mapping[str, pd.DataFrame], start_s: float) -> dict[str
         tables: Tables of contacts and stamped wrenches by topic.
         start_s: The start [s].
     """
-    found = {}
+    found: dict[str, Mapping[str, pd.Series]] = {}
     for topic, table in tables.items():
         for _, panels in panels_of(table.set_index(table.index - start_s)):
             found |= {f"{topic}: {label}": lines for label, lines in panels.items() if lines}

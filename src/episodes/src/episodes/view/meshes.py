@@ -19,7 +19,7 @@ try:
 except ImportError as error:
     raise MissingDependency(error.name or "trimesh", "./rpbi setup html") from None
 
-MAX_TRIANGLES = 24_000
+MAX_TRIANGLES = 16_000
 """Number of triangles of all meshes of a page; with more, all are simplified."""
 MIN_TRIANGLES = 200
 """Number of triangles below which no mesh is simplified."""
@@ -38,7 +38,7 @@ def meshes_of(shapes: Iterable[BodyShape]) -> tuple[dict[BodyShape, Mesh], list[
     Returns:
         Meshes by shape, and sentences on those that cannot be read, and on the simplification.
     """
-    read: dict[object, Trimesh] = {}
+    read: dict[object, Trimesh | None] = {}
     notes = []
     wanted = [shape for shape in shapes if shape.kind in (ShapeKind.MESH, ShapeKind.TRIANGLES)]
     for shape in wanted:

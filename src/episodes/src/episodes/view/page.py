@@ -34,8 +34,8 @@ LONG_ARROW_M, MAX_ARROW_M = 0.4, 0.8
 CONTACT_RGB, SENSOR_RGB = (214, 39, 40), (31, 119, 180)
 SHAFT_M, HEAD_M, HEAD_LENGTH_M = 0.006, 0.014, 0.035
 """Radii of shaft and head of an arrow, and length of its head [m]."""
-MAX_LINE_POINTS = 1500
-"""Number of points of a line in a plot; with more, the smallest and largest of short ranges are drawn."""
+MAX_LINE_POINTS, MAX_POINTS = 1500, 30_000
+"""Number of points of a line in a plot, and of all; with more, the smallest and largest of short ranges are drawn."""
 _WXYZ = [3, 0, 1, 2]
 
 
@@ -57,7 +57,7 @@ def _record(server: Any, recording: Any, scene: Scene, metres_per_newton: float)
     server.scene.set_up_direction("+z")
     server.initial_camera.position, server.initial_camera.look_at = scene.camera
     server.initial_camera.fov = FOV_RAD
-    players = [_LinkPlayer(server.scene, link, scene.meshes) for link in scene.links]
+    players: list[_LinkPlayer | _ArrowPlayer] = [_LinkPlayer(server.scene, link, scene.meshes) for link in scene.links]
     players += [_ArrowPlayer(server.scene, arrows, metres_per_newton) for arrows in scene.arrows]
     for number, time_s in enumerate(scene.times):
         recording.insert_sleep(float(time_s - scene.times[max(number - 1, 0)]))
@@ -157,13 +157,14 @@ def _rounded(values: Array, step: float) -> Array:
 
 def _with_plots(text: str, scene: Scene, metres_per_newton: float) -> str:
     """Returns viser's page with plots below its view."""
+    count = min(MAX_LINE_POINTS, MAX_POINTS // max(1, sum(map(len, scene.panels.values()))))
     data = {
         "title": scene.title,
         "seconds": round(float(scene.times[-1]), 6),
         "legend": f"arrows: 0.1 m is {0.1 / metres_per_newton:g} N" if scene.arrows else "no forces were recorded",
         "notes": scene.notes,
         "panels": [
-            {"title": title, "lines": [{"name": name, **_points(line)} for name, line in lines.items()]}
+            {"title": title, "lines": [{"name": name, **_points(line, count)} for name, line in lines.items()]}
             for title, lines in scene.panels.items()
         ],
     }
@@ -174,12 +175,12 @@ def _with_plots(text: str, scene: Scene, metres_per_newton: float) -> str:
     return f"{text[:end]}<script>const EPISODE={content};</script>{BODY}{text[end:]}"
 
 
-def _points(line: pd.Series) -> dict[str, list[float]]:
-    """Returns the points of a line as lists x and y; of long lines the extremes of short ranges."""
+def _points(line: pd.Series, count: int) -> dict[str, list[float]]:
+    """Returns about so many points of a line as lists x and y; of long lines the extremes of short ranges."""
     values = line.dropna()
     x, y = values.index.to_numpy(float), values.to_numpy(float)
-    if len(y) > MAX_LINE_POINTS:
-        starts = np.linspace(0, len(y), MAX_LINE_POINTS // 2 + 1).astype(int)
+    if len(y) > count:
+        starts = np.linspace(0, len(y), count // 2 + 1).astype(int)
         chosen = [
             begin + each
             for begin, end in zip(starts[:-1], starts[1:], strict=True)

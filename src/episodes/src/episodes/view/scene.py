@@ -18,8 +18,8 @@ Array = NDArray[Any]
 
 MAX_HZ = 25.0
 """Largest rate of poses and arrows on a page [Hz]."""
-MAX_TIMES = 1501
-"""Largest number of them; a page of a longer recording has fewer a second."""
+MAX_POSES = 25_000
+"""Number of poses of all links of a page; a longer recording has fewer a second."""
 
 
 class Poses(NamedTuple):
