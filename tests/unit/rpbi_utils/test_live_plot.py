@@ -66,7 +66,7 @@ def test_a_joint_is_found_again_where_the_order_changes(
     ("path", "words"),
     [
         ("positon/0", "unknown field 'positon/0'; did you mean 'position/0'?"),
-        ("zzz", "unknown field 'zzz'; known are header/seq, header/stamp, position/0, "),
+        ("zzz", "unknown field 'zzz'; known are header/seq, header/stamp, position/left, "),
         ("name/0", "expected a number, 'name/0' is text"),
         ("position/middle", "unknown field 'position/middle'"),
     ],
@@ -78,6 +78,12 @@ def test_wrong_fields_are_named_in_one_line(
         FieldReader("/arm", path).read(joint_state_type, pack_joint_state(0, LEFT, RIGHT))
     assert str(caught.value).startswith(f"/arm (sensor_msgs/JointState): {words}")
     assert "\n" not in str(caught.value)
+
+
+def test_a_message_without_numbers_is_refused() -> None:
+    text = MessageType.parse("std_msgs/String", "string data\n")
+    with pytest.raises(FieldError, match="expected numbers, there are none in it"):
+        FieldReader("/text", "").read(text, struct.pack("<I", 1) + b"a")
 
 
 def test_too_many_numbers_are_refused() -> None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from custom_ros_tools.errors import InterfaceError, hint, shortened
 from rpbi_utils.bags.layout import NUMBER_DTYPES, Leaf, lay_out
-from rpbi_utils.bags.message_type import SCALAR, MessageType
+from rpbi_utils.bags.message_type import SCALAR, Field, MessageType
 from rpbi_utils.bags.row_plan import STAMP, plan_rows
 
 MAX_LINES = 16
@@ -110,13 +110,15 @@ class FieldReader:
             below = {name: leaf for name, leaf in below.items() if not name.startswith("header/")}
         one_each = {leaf.start: name for name, leaf in reversed(below.items())}  # by the names of joints, if there are
         chosen = [name for name in below if name in one_each.values()]
-        if chosen or _is_declared(message_type, self.path):
+        if chosen or _may_have_numbers(message_type, self.path):
             if len(chosen) > MAX_LINES:
                 raise self._error(
                     message_type, f"'{self.path}' has {len(chosen)} numbers: expected at most {MAX_LINES}, name some"
                 )
             return {name: below[name] for name in chosen}
         numbers = [name for name, leaf in leaves.items() if _is_number(leaf)]
+        if not self.path:
+            raise self._error(message_type, "expected numbers, there are none in it")
         asked = hint(self.path, numbers)
         if asked.startswith("; known"):
             asked = f"; known are {', '.join(numbers[:MAX_OFFERED])}{', ...' if len(numbers) > MAX_OFFERED else ''}"
@@ -169,16 +171,21 @@ def _is_number(leaf: Leaf) -> bool:
     return leaf.kind in NUMBER_DTYPES or leaf.kind in _TIMES
 
 
-def _is_declared(message_type: MessageType, path: str) -> bool:
-    """Returns whether a type has a path, whatever the lengths of its arrays."""
+def _may_have_numbers(field_type: str | MessageType, path: str) -> bool:
+    """Returns whether a type has numbers at or below a path, whatever the lengths of its arrays."""
+    if not isinstance(field_type, MessageType):
+        return not path and field_type != "string"
+    paths = ((field, _path_below(field, path)) for field in field_type.fields)
+    return any(below is not None and _may_have_numbers(field.type, below) for field, below in paths)
+
+
+def _path_below(field: Field, path: str) -> str | None:
+    """Returns the path from an element of a field on; None if a path leads elsewhere. All fields but headers are below
+    the empty path."""
     if not path:
-        return True
+        return None if field.name == "header" else ""
     name, _, rest = path.partition("/")
-    field = next((each for each in message_type.fields if each.name == name), None)
-    if field is None:
-        return False
-    if field.length != SCALAR:
+    index = "0"
+    if field.length != SCALAR and rest:
         index, _, rest = rest.partition("/")
-        if index and not index.isdecimal():
-            return False
-    return isinstance(field.type, MessageType) and _is_declared(field.type, rest) if rest else True
+    return rest if name == field.name and index.isdecimal() else None

@@ -24,19 +24,21 @@ class Line(NamedTuple):
         times: Times of its samples [s], ascending.
         values: Their values.
         note: The reason; empty for a line.
+        number: Its number in the order in which lines began, for its colour.
     """
 
     name: str
     times: Array
     values: Array
     note: str
+    number: int = 0
 
 
 class _Samples:
-    """The newest samples of a line, which has a rank among all."""
+    """The newest samples of a line, which has a rank and a number among all."""
 
-    def __init__(self, rank: int) -> None:
-        self.rank = rank
+    def __init__(self, rank: int, number: int) -> None:
+        self.rank, self.number = rank, number
         self._times, self._values = np.empty(2 * MAX_SAMPLES), np.empty(2 * MAX_SAMPLES)
         self._end = 0
 
@@ -88,7 +90,7 @@ class LivePlot:
             self._newest_s = max(self._newest_s, time_s)
             samples = self._samples.get(name)
             if samples is None:
-                samples = self._samples[name] = _Samples(rank)
+                samples = self._samples[name] = _Samples(rank, len(self._samples))
             samples.append(time_s, value)
             self.count += 1
             self.changes += 1
@@ -117,7 +119,7 @@ class LivePlot:
             empty = np.empty(0)
             faults = [Line(name, empty, empty, text) for name, text in self._notes.items() if text]
             ranked = sorted(self._samples.items(), key=lambda each: each[1].rank)
-            lines = [Line(name, *each.since(end_s - seconds), "") for name, each in ranked]
+            lines = [Line(name, *each.since(end_s - seconds), "", each.number) for name, each in ranked]
         return end_s, [*faults, *lines]
 
 

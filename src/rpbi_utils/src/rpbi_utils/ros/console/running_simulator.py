@@ -1,4 +1,4 @@
-"""A simulator that runs: whether there is one, what is in it, and how its services are called; arguments of its commands."""
+"""A simulator that runs: what is in it, how its services are called, and arguments of the commands for it."""
 
 from collections.abc import Sequence
 from typing import Annotated, Any

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -92,8 +93,8 @@ class Canvas(QWidget):
         painter = QPainter(self)
         painter.drawPixmap(0, 0, self._background(low, high))
         painter.setClipRect(QRectF(LEFT, TOP, width, height))
-        for number, (places, values) in enumerate(drawn):
-            painter.setPen(QPen(QColor(COLOURS[number % len(COLOURS)]), 1.0))
+        for line, (places, values) in zip(lines, drawn, strict=True):
+            painter.setPen(QPen(_colour(line), 1.0))
             painter.drawPolyline(_polygon(LEFT + places, TOP + (high - values) * (height / (high - low))))
         painter.setClipping(False)
         self._draw_legend(painter, lines)
@@ -140,7 +141,7 @@ class Canvas(QWidget):
             painter.drawText(QRectF(x - 40, bottom + 4, 80, 16), int(centre), f"{time_s:.{digits}f} s")
 
     def _draw_legend(self, painter: QPainter, lines: list[Line]) -> None:
-        rows = [self._legend_row(line, number) for number, line in enumerate(lines[:MAX_LEGEND])]
+        rows = [_legend_row(line) for line in lines[:MAX_LEGEND]]
         if len(lines) > MAX_LEGEND:
             rows.append((f"and {len(lines) - MAX_LEGEND} more", INK))
         for number, (text, colour) in enumerate(rows):
@@ -149,12 +150,6 @@ class Canvas(QWidget):
             painter.fillRect(painter.boundingRect(room, alignment, text), PAPER)
             painter.setPen(colour)
             painter.drawText(room, alignment, text)
-
-    def _legend_row(self, line: Line, number: int) -> tuple[str, QColor]:
-        if line.note:
-            return f"{line.name}: {line.note}", FAULT
-        newest = f"{line.values[-1]:.4g}" if len(line.values) else ""
-        return f"{line.name}  {newest}", QColor(COLOURS[number % len(COLOURS)])
 
 
 class LivePlotWindow(QMainWindow):
@@ -229,7 +224,7 @@ class LivePlotWindow(QMainWindow):
 
     def _save(self, suffix: str, write: Callable[[Path], None]) -> None:
         """Writes what is shown into a new file, beside its name first."""
-        path = self._folder / f"live_plot_{time.strftime('%Y%m%d_%H%M%S')}.{suffix}"
+        path = self._folder / f"live_plot_{datetime.now().strftime('%Y%m%d_%H%M%S_%f')}.{suffix}"
         part = path.with_name(f".{path.name}.new")
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -258,6 +253,15 @@ class LivePlotWindow(QMainWindow):
 def _named(widget: QWidget, name: str) -> QWidget:
     widget.setObjectName(name)
     return widget
+
+
+def _colour(line: Line) -> QColor:
+    return FAULT if line.note else QColor(COLOURS[line.number % len(COLOURS)])
+
+
+def _legend_row(line: Line) -> tuple[str, QColor]:
+    newest = f"{line.values[-1]:.4g}" if len(line.values) else ""
+    return f"{line.name}: {line.note}" if line.note else f"{line.name}  {newest}", _colour(line)
 
 
 def _range(values: list[np.ndarray]) -> tuple[float, float]:
