@@ -25,6 +25,11 @@ EXTRA_OF = {
     "daqp": "ik",
     "casadi": "mpc",
     "cv2": "tags",
+    "viser": "html",
+    "trimesh": "html",
+    "fast_simplification": "html",
+    "msgspec": "html",
+    "zstandard": "html",
     "nbclient": "notebook",
     "nbformat": "notebook",
 }
