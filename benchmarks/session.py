@@ -128,6 +128,14 @@ class Session:
         path = self.folder / f"{self._processes.index(process)}.log"
         return path.read_text(errors="replace")
 
+    def wait_for_output(self, process: subprocess.Popen[bytes], text: str) -> None:
+        """Waits until a process has printed a text.
+
+        Raises:
+            RuntimeError: If it does not; with what it has printed.
+        """
+        self._until(lambda: text in self.output(process), f"it printed '{text}'", process)
+
     def result_of(self, process: subprocess.Popen[bytes], timeout_s: float = 600.0) -> Any:
         """Waits for one of `programs/` to end and returns what it prints after `result: `, as JSON.
 

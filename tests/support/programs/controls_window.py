@@ -1,6 +1,7 @@
-"""The controls window on a virtual screen: its widgets are observed, mouse and keys are real.
+"""A node's window on a virtual screen: its widgets are observed, mouse and keys are real.
 
-Run as a program, it is the node, and writes what its widgets show into the file that WIDGETS names.
+Run as a program, it is the node, and writes what its widgets show into the file that WIDGETS names. It is the controls
+window, or that of the module in WINDOW.
 """
 
 from __future__ import annotations
@@ -8,10 +9,11 @@ from __future__ import annotations
 import json
 import os
 import sys
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
-FILE = "WIDGETS"
+FILE, MODULE = "WIDGETS", "WINDOW"
 PERIOD_MS = 30
 
 
@@ -78,8 +80,7 @@ def _observe(window: Any, path: Path) -> Any:
 
 def main() -> None:
     """Runs the node as its own script does."""
-    from rpbi_utils.ros.controls import node
-
+    node: Any = import_module(os.environ.get(MODULE, "rpbi_utils.ros.controls.node"))
     show = node._show
 
     def show_observed(opened: Any) -> None:

@@ -28,8 +28,9 @@ def _lines(figure: Figure) -> dict[str, dict[str, list[float]]]:
 @pytest.fixture(scope="module")
 def figures() -> dict[str, Figure]:
     force = {f"{kind}/{axis}": np.full(5, float(i)) for kind in ("force", "torque") for i, axis in enumerate("xyz")}
+    place = {f"position/{axis}": 0.5 for axis in "xyz"}
     contacts = _table(
-        link="a", other_body=["b", "c", "b", None, "b"], normal_force=[1.0, 2.0, 3.0, np.nan, 4.0], **force
+        link="a", other_body=["b", "c", "b", None, "b"], normal_force=[1.0, 2.0, 3.0, np.nan, 4.0], **place, **force
     )
     moving = dict(zip(TRANSLATION, (np.arange(5.0), np.zeros(5), np.ones(5)), strict=True))
     still = dict(zip(TRANSLATION, np.ones((3, 5)), strict=True))
@@ -52,7 +53,7 @@ def test_each_kind_of_table_has_its_figures(figures: dict[str, Figure]) -> None:
 
 
 def test_times_without_contact_have_no_force(figures: dict[str, Figure]) -> None:
-    assert _lines(figures["contacts"]) == {"normal force [N]": {"on b": [1, 0, 3, 0, 4], "on c": [0, 2, 0, 0, 0]}}
+    assert _lines(figures["contacts"]) == {"normal force [N]": {"by b": [1, 0, 3, 0, 4], "by c": [0, 2, 0, 0, 0]}}
 
 
 def test_time_starts_at_the_first_row(figures: dict[str, Figure]) -> None:

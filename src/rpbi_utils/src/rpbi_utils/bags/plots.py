@@ -39,7 +39,7 @@ def plot_tables(tables: Mapping[str, pd.DataFrame], new_figure: Callable[..., Fi
     relative = {topic: table.set_index(table.index - start_s) for topic, table in filled.items()}
     stems = file_stems(relative)
     for topic, table in relative.items():
-        for suffix, panels in _panels(table):
+        for suffix, panels in panels_of(table):
             yield f"{stems[topic]}{suffix}", _figure(new_figure, topic, panels)
     if relative:
         yield "rates", _figure(new_figure, "time between messages", {"[ms]": _intervals(relative)}, scale="log")
@@ -52,19 +52,19 @@ Lines = Mapping[str, pd.Series]
 """Values over time [s] by the names of the lines."""
 
 
-def _panels(table: pd.DataFrame) -> Iterator[tuple[str, Mapping[str, Lines]]]:
-    """Yields the end of a file name, and panels by the labels of their y axes."""
+def panels_of(table: pd.DataFrame) -> Iterator[tuple[str, Mapping[str, Lines]]]:
+    """Yields figures of a table: the end of a file name, and panels by the labels of their y axes."""
+    if {"link", "other_body", "normal_force"} <= set(table.columns):
+        forces = table.groupby([table.index, "other_body"])["normal_force"].sum().unstack(fill_value=0.0)
+        every = forces.reindex(table.index.unique(), fill_value=0.0)
+        yield "", {"normal force [N]": {f"by {body}": every[body] for body in every}}
+        return
     joints = {
         label: _by_last_name(table.filter(regex=f"^{field}/"))
         for field, label in (("position", "position [rad, m]"), ("velocity", "velocity"), ("effort", "effort [N m, N]"))
     }
     if any(joints.values()):
         yield "", {label: lines for label, lines in joints.items() if lines}
-    if {"link", "other_body", "normal_force"} <= set(table.columns):
-        forces = table.groupby([table.index, "other_body"])["normal_force"].sum().unstack(fill_value=0.0)
-        every = forces.reindex(table.index.unique(), fill_value=0.0)
-        yield "", {"normal force [N]": {f"on {body}": every[body] for body in every}}
-        return
     force = _vector(table, ("wrench/force", "force"))
     torque = _vector(table, ("wrench/torque", "torque"))
     if force and torque:

@@ -6,8 +6,7 @@ from custom_ros_tools.console.argument import Argument, number
 from ros_pybullet_interface.msg import Attachment
 from ros_pybullet_interface.srv import Attach
 
-from .arguments import OBJECTS, Namespace
-from .running_simulator import RunningSimulator
+from .running_simulator import OBJECTS, Namespace, RunningSimulator
 
 
 def attach(

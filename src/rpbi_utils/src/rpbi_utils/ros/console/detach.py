@@ -6,8 +6,7 @@ from cob_srvs.srv import SetString
 
 from custom_ros_tools.console.argument import Argument
 
-from .arguments import OBJECTS, Namespace
-from .running_simulator import RunningSimulator
+from .running_simulator import OBJECTS, Namespace, RunningSimulator
 
 
 def detach(*names: Annotated[str, Argument("NAME ...", offers=OBJECTS)], ns: Namespace = None) -> str:

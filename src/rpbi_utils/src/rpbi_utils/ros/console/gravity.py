@@ -7,8 +7,7 @@ from geometry_msgs.msg import Vector3
 from custom_ros_tools.console.argument import Argument, number
 from ros_pybullet_interface.srv import SetGravity
 
-from .arguments import Namespace
-from .running_simulator import RunningSimulator
+from .running_simulator import Namespace, RunningSimulator
 
 
 def gravity(

@@ -1,7 +1,6 @@
 """The command `list`."""
 
-from .arguments import Namespace
-from .running_simulator import RunningSimulator
+from .running_simulator import Namespace, RunningSimulator
 
 
 def list(*, ns: Namespace = None) -> str:

@@ -13,8 +13,7 @@ from custom_ros_tools.transforms import quat_of
 from ros_pybullet_interface.msg import CalculateInverseKinematicsProblem
 from ros_pybullet_interface.srv import ResetEffState, ResetJointState
 
-from .arguments import OBJECTS, Namespace, joint_values
-from .running_simulator import RunningSimulator
+from .running_simulator import OBJECTS, Namespace, RunningSimulator, joint_values
 
 
 def move(

@@ -7,8 +7,7 @@ from cob_srvs.srv import SetString
 from custom_ros_tools.console.argument import Argument
 from custom_ros_tools.errors import UnknownNameError
 
-from .arguments import OBJECTS, Namespace
-from .running_simulator import RunningSimulator
+from .running_simulator import OBJECTS, Namespace, RunningSimulator
 
 
 def remove(*names: Annotated[str, Argument("NAME ...", offers=OBJECTS)], ns: Namespace = None) -> str:

@@ -1,15 +1,20 @@
-"""A simulator that runs: whether there is one, what is in it, and how its services are called."""
+"""A simulator that runs: what is in it, how its services are called, and arguments of the commands for it."""
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Annotated, Any
 
 import rosgraph
 import rospy
 
+from custom_ros_tools.console.argument import Argument, number
 from custom_ros_tools.errors import InterfaceError, UnknownNameError
-from ros_pybullet_interface.srv import ListObjects
+from ros_pybullet_interface.srv import ListObjects, RobotInfo
 
 LIST = "rpbi/list_objects"
 """A service that every simulator has, and nobody else."""
+OBJECTS = "objects"
+"""Offer of completion: what is in the running world."""
+Namespace = Annotated[str | None, Argument("NAMESPACE")]
 
 
 class RunningSimulator:
@@ -83,3 +88,24 @@ class RunningSimulator:
                 raise UnknownNameError("object", body, list(objects))
             raise InterfaceError(f"'{body}' is of type {objects[body]}, expected {what}")
         return wanted
+
+
+def joint_values(simulator: RunningSimulator, robot: str, words: Sequence[str]) -> dict[str, float]:
+    """Returns values by joint, from words like `JOINT:=VALUE`.
+
+    Raises:
+        InterfaceError: If a word is no such value, or there is none.
+        UnknownNameError: If the robot lacks a joint.
+    """
+    known = simulator.call(simulator.require(robot, "robot_info", "a robot"), RobotInfo).current_joint_state.name
+    values = {}
+    for word in words:
+        joint, is_value, value = word.partition(":=")
+        if not is_value:
+            raise InterfaceError(f"expected JOINT:=VALUE, got {word.strip()}")
+        if joint not in known:
+            raise UnknownNameError("joint", joint, known)
+        values[joint] = number(value)
+    if not values:
+        raise InterfaceError(f"expected JOINT:=VALUE ...; the joints of '{robot}' are {', '.join(known)}")
+    return values

@@ -12,8 +12,7 @@ from custom_ros_tools.console.argument import Argument, number
 from custom_ros_tools.errors import InterfaceError
 from ros_pybullet_interface.srv import ApplyWrench
 
-from .arguments import OBJECTS, Namespace, joint_values
-from .running_simulator import RunningSimulator
+from .running_simulator import OBJECTS, Namespace, RunningSimulator, joint_values
 
 SEND_HZ = 50.0
 CONNECT_S = 5.0

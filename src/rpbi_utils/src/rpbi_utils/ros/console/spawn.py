@@ -17,8 +17,7 @@ from ros_pybullet_interface.msg import PybulletObject
 from ros_pybullet_interface.srv import AddPybulletObject
 from rpbi.config.object_entry import FILE
 
-from .arguments import Namespace
-from .running_simulator import RunningSimulator
+from .running_simulator import Namespace, RunningSimulator
 
 CAMERA = "camera"
 Numbers = list[float] | None

@@ -1,8 +1,5 @@
 """The node that opens the controls window."""
 
-import ctypes
-import ctypes.util
-import os
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +12,7 @@ from pydantic import Field
 from custom_ros_tools.ros.lifecycle.parameters import private_parameters
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.schema import ConfigModel, Switch, Text, optional
+from rpbi_utils.ros.windows import missing_for_windows
 
 NAME = "rpbi_controls_node"
 
@@ -31,28 +29,9 @@ class ControlsParameters(ConfigModel):
 
 def main() -> None:
     """Runs the node; exits with 1 if it cannot start or has no display, with 0 when it is interrupted or closed."""
-    missing = _missing()
-    if missing:
+    if missing := missing_for_windows():
         sys.exit(f"{NAME}: {missing}")
     run_node(NAME, _open, _show, ros_time=False, loggers=["rpbi_utils"])
-
-
-def _missing() -> str:
-    """Returns what the window lacks here; empty if nothing."""
-    try:
-        import PyQt5.QtWidgets  # noqa: F401
-    except ImportError:
-        return "PyQt5 is missing: apt install python3-pyqt5"
-    if os.environ.get("QT_QPA_PLATFORM") or os.environ.get("WAYLAND_DISPLAY"):
-        return ""
-    x11 = ctypes.CDLL(ctypes.util.find_library("X11") or "libX11.so.6")
-    x11.XOpenDisplay.restype = ctypes.c_void_p
-    display = x11.XOpenDisplay(None)
-    if not display:  # Qt would abort
-        given = os.environ.get("DISPLAY")
-        return f"no display for its window: DISPLAY is {given!r}; on a computer without a screen use xvfb-run"
-    x11.XCloseDisplay(ctypes.c_void_p(display))
-    return ""
 
 
 def _open() -> tuple[Any, Any, Any]:

@@ -30,6 +30,7 @@ def read_recording(
     *,
     earlier: Path | None = None,
     relocate: Callable[[str], str] = lambda description: description,
+    needs_states: bool = True,
 ) -> Recording:
     """Returns the session of one simulator that a bag holds.
 
@@ -39,14 +40,15 @@ def read_recording(
         any_size: Whether to read a bag that exceeds the limit on unpacked bytes, see `BagReader`.
         earlier: A bag of `rpbi/commands` before the recording, if there is one.
         relocate: Returns the world's description with other names of its files.
+        needs_states: Whether states to compare have to be in the bag, as for a replay.
 
     Raises:
-        BagError: If there is no such bag, it is damaged, or it lacks a topic that a replay needs.
+        BagError: If there is no such bag, it is damaged, or it lacks a topic that is needed.
     """
     prefix = f"/{namespace.strip('/')}/" if namespace.strip("/") else "/"
     topics = {f"{prefix}{name}": message_type for name, message_type in _TYPES.items()}
     with BagReader(path, any_size) as bag:
-        _check(bag, topics, prefix)
+        _check(bag, topics, prefix, needs_states)
         descriptions: list[str] = []
         checkpoints: set[Checkpoint] = set()
         commands: _Commands = {}
@@ -64,8 +66,8 @@ def read_recording(
             else:
                 _add_commands(message, commands)
     if len(set(descriptions)) != 1:
-        raise BagError(path, "the simulator was started anew during the recording; a replay needs a bag of one session")
-    if not any(checkpoint.tick for checkpoint in checkpoints):
+        raise BagError(path, "the simulator was started anew during the recording; expected a bag of one session")
+    if needs_states and not any(checkpoint.tick for checkpoint in checkpoints):
         raise BagError(path, "no hashes in rpbi/state to compare (state_hash_hz in the main file is their rate)")
     try:
         if earlier is not None:
@@ -92,14 +94,15 @@ def _add_commands(message: WorldCommands, commands: _Commands) -> None:
     of_life.update({i: RecordedCommand(one.tick, one.name, one.what, one.data) for i, one in numbered})
 
 
-def _check(bag: BagReader, topics: dict[str, Any], prefix: str) -> None:
+def _check(bag: BagReader, topics: dict[str, Any], prefix: str, needs_states: bool) -> None:
     """Raises a BagError if the bag lacks a topic or holds one with the message definition of another version."""
-    needed = [f"{prefix}rpbi/world_description", f"{prefix}rpbi/state"]
+    needed = [f"{prefix}rpbi/world_description", *([f"{prefix}rpbi/state"] if needs_states else ())]
     missing = [topic for topic in needed if not bag.counts.get(topic)]
     if missing:
         others = sorted(topic for topic in bag.types if topic.endswith("/rpbi/world_description"))
         elsewhere = f"; it has {', '.join(others)}: use --ns" if others else ""
-        raise BagError(bag.path, f"no messages of {', '.join(missing)}, which a replay needs{elsewhere}")
+        reason = "which a replay needs" if needs_states else "which describes the world"
+        raise BagError(bag.path, f"no messages of {', '.join(missing)}, {reason}{elsewhere}")
     for topic, message_type in topics.items():
         for md5sum in bag.md5sums.get(topic, ()):
             if md5sum != message_type._md5sum:

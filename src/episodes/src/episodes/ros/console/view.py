@@ -1,0 +1,57 @@
+"""The command `view`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from custom_ros_tools.console.argument import Argument, UsageError
+from custom_ros_tools.plugins import trust_only
+from episodes.errors import EpisodeError
+from episodes.folder import EpisodeFolder
+
+
+def view(
+    recording: Annotated[Path, Argument("DIR|BAG", parse=Path, files="*.bag")],
+    number: Annotated[int | None, Argument("N", parse=int)] = None,
+    *,
+    out: Annotated[Path | None, Argument("FILE.html", parse=Path, files="*.html")] = None,
+    ns: Annotated[str, Argument("NAMESPACE")] = "/",
+    trust: Annotated[Sequence[str], Argument("PACKAGE ...")] = (),
+    any_size: Annotated[bool, Argument("")] = False,
+) -> str:
+    """Writes an episode as one HTML file: its world in 3-D with a time line, forces as arrows and as plots.
+
+    A browser opens the file without a network. Needs ./rpbi setup html; needs no ROS master.
+
+    Args:
+        DIR|BAG: a folder of episodes, or a bag with rpbi/world_description
+        N: the episode; not with a bag
+        out: episode_N.html, or BAG.html for BAG.bag, without it
+        ns: of the simulator that was recorded, for a bag
+        trust: Python packages that the recording may import, for types of your own
+        any_size: also a bag that unfolds to more than 1 GiB and 255 times its size
+    """
+    from episodes.ros.view import scene_of_bag, scene_of_episode  # needs an extra
+    from episodes.view.page import page_of
+
+    trust_only({"rpbi", *trust}, "--trust PACKAGE, if you know who made the recording")
+    is_folder = recording.is_dir()
+    if is_folder == (number is None):
+        raise UsageError(f"expected a folder and the number of an episode, or a bag, got {recording}")
+    if number is not None:
+        scene = scene_of_episode(EpisodeFolder(recording), number, any_size=any_size)
+    else:
+        scene = scene_of_bag(recording, ns, any_size=any_size)
+    page = page_of(scene)
+    target = out or Path(recording.with_suffix(".html").name if number is None else f"episode_{number}.html")
+    written = target.with_name(f".{target.name}.new")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        written.write_text(page, encoding="utf-8")
+        written.rename(target)
+    except OSError as error:
+        raise EpisodeError(target, f"cannot be written: {error.strerror or error}") from error
+    lines = [f"note: {note}" for note in scene.notes]
+    return "\n".join([f"{target}: {scene.times[-1]:.1f} s, {target.stat().st_size / 1e6:.2f} MB", *lines])

@@ -1,0 +1,140 @@
+"""Reads what a page shows from a bag."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from episodes.errors import EpisodeError
+from episodes.files import with_stored_files
+from episodes.folder import BAG, EARLIER, EpisodeFolder
+from episodes.view.bodies import add_later_bodies, links_of
+from episodes.view.forces import contact_arrows, force_panels, wrench_arrows
+from episodes.view.frames import Frames
+from episodes.view.meshes import meshes_of
+from episodes.view.scene import MAX_HZ, MAX_POSES, Array, Link, Scene
+from robot_model.geometry import Vector
+from rpbi.replay.session import Recording
+from rpbi.world import World
+from rpbi_utils.bags.errors import BagError
+from rpbi_utils.ros.bags.bag_reader import BagReader
+from rpbi_utils.ros.bags.dataframes import bag_to_dataframes
+from rpbi_utils.ros.replay.recorded_session import read_recording
+
+CONTACTS, WRENCHES, JOINTS, TF = (
+    "ros_pybullet_interface/Contacts",
+    "geometry_msgs/WrenchStamped",
+    "sensor_msgs/JointState",
+    "tf2_msgs/TFMessage",
+)
+MIN_DISTANCE_M = 0.8
+"""Smallest distance of the camera from the middle of the scene [m], where the world has no camera of its own."""
+
+
+def scene_of_episode(folder: EpisodeFolder, number: int, *, any_size: bool = False) -> Scene:
+    """Returns the scene of an episode, built with the files that are stored with it.
+
+    Raises:
+        EpisodeError: If there is no such episode, or it has no bag.
+        BagError: If its bag cannot be read.
+        ConfigError: If its world cannot be built.
+    """
+    episode, place = folder.read(number), folder.folder_of(number)
+    bag, earlier = place / BAG, place / EARLIER
+    if not bag.exists():
+        raise EpisodeError(place, episode.note or "has no bag")
+    with tempfile.TemporaryDirectory(prefix="view-") as files:
+        recording = read_recording(
+            bag,
+            episode.namespace,
+            any_size,
+            earlier=earlier if earlier.exists() else None,
+            relocate=lambda text: with_stored_files(text, episode.files, folder.files, Path(files)),
+            needs_states=False,
+        )
+        title = f"Episode {number}{f' ({episode.label})' if episode.label else ''} of {folder.path.resolve().name}"
+        return _scene(title, bag, episode.namespace, recording, any_size)
+
+
+def scene_of_bag(bag: Path, namespace: str = "/", *, any_size: bool = False) -> Scene:
+    """Returns the scene of a bag with `rpbi/world_description`, built with the files that are on the disk.
+
+    Raises:
+        BagError: If it cannot be read, or lacks the description.
+        ConfigError: If its world cannot be built.
+    """
+    return _scene(bag.name, bag, namespace, read_recording(bag, namespace, any_size, needs_states=False), any_size)
+
+
+def _scene(title: str, bag: Path, namespace: str, recording: Recording, any_size: bool) -> Scene:
+    prefix = f"/{namespace.strip('/')}/rpbi/" if namespace.strip("/") else "/rpbi/"
+    with BagReader(bag, any_size) as reader:
+        types = {topic: {each.name for each in of_topic} for topic, of_topic in reader.types.items()}
+    of_type = {wanted: [each for each in types if wanted in types[each]] for wanted in (CONTACTS, WRENCHES, JOINTS, TF)}
+    state = [topic for topic in types if topic == f"{prefix}state"]
+    joints = [topic for topic in of_type[JOINTS] if topic.startswith(prefix) and topic.endswith("/joint_states")]
+    forces = [*of_type[CONTACTS], *of_type[WRENCHES]]
+    tables = bag_to_dataframes(bag, sorted({*of_type[TF], *state, *joints, *forces}), any_size=any_size)
+    world = recording.description.build()
+    try:
+        at_start = list(world.bodies)
+        notes = [*recording.description.warnings, *add_later_bodies(world, recording.commands)]
+        links = sum(1 + len(body.link_indices) for body in world.bodies.values())
+        of_simulator = {topic: table for topic, table in tables.items() if topic.startswith(prefix)}
+        start_s, times = _times(bag, of_simulator, MAX_POSES // max(1, links))
+        frames = Frames(tables, world.frames(), start_s + times)
+        of_body = {topic.removeprefix(prefix).removesuffix("/joint_states"): tables[topic] for topic in joints}
+        states = tables[state[0]] if state else None
+        shown, more = links_of(world, at_start, recording.commands, states, frames, of_body)
+        scene = Scene(title, start_s, times, _camera(world, shown), shown, notes=[*notes, *more])
+    finally:
+        world.close()
+    scene.meshes, of_meshes = meshes_of(shape for link in shown for shape in link.shapes)
+    scene.notes += of_meshes
+    scene.arrows = [contact_arrows(topic, tables[topic], frames.times) for topic in of_type[CONTACTS]]
+    for topic in of_type[WRENCHES]:
+        found = wrench_arrows(topic, tables[topic], frames)
+        if isinstance(found, str):
+            scene.notes.append(found)
+        else:
+            scene.arrows.append(found)
+    scene.panels = force_panels({topic: tables[topic] for topic in forces}, start_s)
+    scene.notes += frames.notes
+    hz = (len(times) - 1) / times[-1]
+    if hz < MAX_HZ - 1.0:
+        scene.notes.append(f"the view has {hz:.3g} poses a second, since the recording is long; the plots have all")
+    return scene
+
+
+def _times(bag: Path, tables: Mapping[str, pd.DataFrame], most: int) -> tuple[float, Array]:
+    """Returns the start [s], and at most so many evenly spaced times since then [s], up to the last message."""
+    stamps = [table.index for table in tables.values() if len(table) > 1]
+    start_s = min((float(each[0]) for each in stamps), default=0.0)
+    seconds = max((float(each[-1]) for each in stamps), default=0.0) - start_s
+    if seconds <= 0.0:
+        raise BagError(bag, "expected joint states, contacts or states of the simulator over some time, found none")
+    count = max(2, min(math.ceil(seconds * MAX_HZ) + 1, most))
+    return start_s, np.linspace(0.0, seconds, count)
+
+
+def _camera(world: World, links: Sequence[Link]) -> tuple[Vector, Vector]:
+    """Returns the position of the camera and the point that it looks at: the world's own, else so that links are seen.
+
+    The world's own is that of PyBullet's window, `resetDebugVisualizerCamera`.
+    """
+    own = world.config.resetDebugVisualizerCamera
+    if own is not None:
+        target = np.array(own.cameraTargetPosition)
+        distance, yaw, pitch = own.cameraDistance, math.radians(own.cameraYaw), math.radians(own.cameraPitch)
+    else:
+        places = np.concatenate([link.poses.position for link in links] or [np.zeros((1, 3))])
+        low, high = places.min(axis=0), places.max(axis=0)
+        target, yaw, pitch = (low + high) / 2, math.radians(45.0), math.radians(-30.0)
+        distance = max(MIN_DISTANCE_M, 1.5 * float(np.linalg.norm(high - low)))
+    forward = np.array([-math.sin(yaw) * math.cos(pitch), math.cos(yaw) * math.cos(pitch), math.sin(pitch)])
+    return tuple(target - distance * forward), tuple(target)

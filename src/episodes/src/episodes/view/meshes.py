@@ -1,0 +1,90 @@
+"""Meshes of a page, with few enough triangles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from custom_ros_tools.errors import MissingDependency
+from rpbi.bodies.visual_shapes import BodyShape, ShapeKind
+from rpbi.meshes.triangles import read_triangles
+
+from .scene import Array, Mesh
+
+try:
+    from fast_simplification import simplify
+    from trimesh import Trimesh
+    from trimesh.graph import smooth_shade
+except ImportError as error:
+    raise MissingDependency(error.name or "trimesh", "./rpbi setup html") from None
+
+MAX_TRIANGLES = 16_000
+"""Number of triangles of all meshes of a page; with more, all are simplified."""
+MIN_TRIANGLES = 200
+"""Number of triangles below which no mesh is simplified."""
+CREASE_RAD = 0.6
+"""Angle between two triangles above which there is an edge to be seen [rad]."""
+_SAME_M = 1e-6
+"""Distance below which two corners of a mesh are one [m, in the units of the file]."""
+
+
+def meshes_of(shapes: Iterable[BodyShape]) -> tuple[dict[BodyShape, Mesh], list[str]]:
+    """Returns the meshes of shapes, simplified together if they have too many triangles.
+
+    Args:
+        shapes: The shapes; those that are no meshes are left out.
+
+    Returns:
+        Meshes by shape, and sentences on those that cannot be read, and on the simplification.
+    """
+    read: dict[object, Trimesh | None] = {}
+    notes = []
+    wanted = [shape for shape in shapes if shape.kind in (ShapeKind.MESH, ShapeKind.TRIANGLES)]
+    for shape in wanted:
+        if _key(shape) not in read:
+            try:
+                read[_key(shape)] = _merged(_corners(shape))
+            except (ValueError, OSError) as error:
+                read[_key(shape)] = None
+                notes.append(f"a mesh is not shown: {' '.join(str(error).split())}")
+    found = {key: mesh for key, mesh in read.items() if mesh is not None}
+    total = sum(len(mesh.faces) for mesh in found.values())
+    share = MAX_TRIANGLES / max(total, MAX_TRIANGLES)
+    shown = {key: smooth_shade(_simplified(mesh, share), angle=CREASE_RAD) for key, mesh in found.items()}
+    left = sum(len(mesh.faces) for mesh in shown.values())
+    if left < total:
+        notes.append(f"meshes are simplified: they have {left:,} instead of {total:,} triangles")
+    return {shape: _scaled(shown[_key(shape)], shape) for shape in wanted if _key(shape) in shown}, notes
+
+
+def _scaled(mesh: Trimesh, shape: BodyShape) -> Mesh:
+    return Mesh((mesh.vertices * shape.size).astype(np.float32), mesh.faces.astype(np.uint32))
+
+
+def _key(shape: BodyShape) -> object:
+    return shape.mesh_file if shape.kind is ShapeKind.MESH else shape.corners
+
+
+def _corners(shape: BodyShape) -> Array:
+    """Returns the corners of the triangles of a shape, shape (n, 3, 3)."""
+    if shape.kind is ShapeKind.MESH:
+        return np.concatenate(read_triangles(shape.mesh_file))
+    return np.reshape(shape.corners, (-1, 3, 3))
+
+
+def _merged(corners: Array) -> Trimesh:
+    """Returns a mesh whose triangles share their corners."""
+    numbers = np.round(corners.reshape(-1, 3) / _SAME_M).astype(np.int64)
+    _, first, inverse = np.unique(numbers, axis=0, return_index=True, return_inverse=True)
+    faces = inverse.reshape(-1, 3)
+    is_flat = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+    return Trimesh(corners.reshape(-1, 3)[first], faces[~is_flat], process=False)
+
+
+def _simplified(mesh: Trimesh, share: float) -> Trimesh:
+    wanted = max(MIN_TRIANGLES, int(share * len(mesh.faces)))
+    if wanted >= len(mesh.faces):
+        return mesh
+    points, faces = simplify(mesh.vertices.astype(np.float32), mesh.faces.astype(np.int32), target_count=wanted)[:2]
+    return Trimesh(points, faces, process=False)

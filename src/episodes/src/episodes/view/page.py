@@ -1,0 +1,190 @@
+"""A scene as one HTML page, by viser."""
+
+from __future__ import annotations
+
+import contextlib
+import html
+import io
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from custom_ros_tools.errors import MissingDependency
+from rpbi.bodies.visual_shapes import BodyShape, ShapeKind
+
+from .page_parts import BODY, HEAD
+from .scene import Array, Arrows, Link, Mesh, Scene
+
+try:
+    import viser
+except ImportError as error:
+    raise MissingDependency(error.name or "viser", "./rpbi setup html") from None
+
+FOV_RAD = np.radians(45.0)
+"""Vertical angle of view at the start [rad]."""
+STILL = 1e-5
+"""Smallest motion between two times that is shown [m, and parts of a quaternion]."""
+POSE_STEP, ARROW_STEP = 2.0**-15, 2.0**-12
+"""Steps to which poses and arrows are rounded, since numbers of few digits need less space [m]."""
+LONG_ARROW_M, MAX_ARROW_M = 0.4, 0.8
+"""Length of an arrow that only one in twenty exceeds, and the length at which arrows are cut off [m]."""
+CONTACT_RGB, SENSOR_RGB = (214, 39, 40), (31, 119, 180)
+SHAFT_M, HEAD_M, HEAD_LENGTH_M = 0.006, 0.014, 0.035
+"""Radii of shaft and head of an arrow, and length of its head [m]."""
+MAX_LINE_POINTS, MAX_POINTS = 1500, 30_000
+"""Number of points of a line in a plot, and of all; with more, the smallest and largest of short ranges are drawn."""
+_WXYZ = [3, 0, 1, 2]
+
+
+def page_of(scene: Scene) -> str:
+    """Returns the text of the page."""
+    metres_per_newton = _arrow_scale(scene.arrows)
+    with contextlib.redirect_stdout(io.StringIO()):  # viser prints its address
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        try:
+            recording = server.get_scene_serializer()
+            _record(server, recording, scene, metres_per_newton)
+            text: str = recording.as_html()
+        finally:
+            server.stop()
+    return _with_plots(text, scene, metres_per_newton)
+
+
+def _record(server: Any, recording: Any, scene: Scene, metres_per_newton: float) -> None:
+    server.scene.set_up_direction("+z")
+    server.initial_camera.position, server.initial_camera.look_at = scene.camera
+    server.initial_camera.fov = FOV_RAD
+    players: list[_LinkPlayer | _ArrowPlayer] = [_LinkPlayer(server.scene, link, scene.meshes) for link in scene.links]
+    players += [_ArrowPlayer(server.scene, arrows, metres_per_newton) for arrows in scene.arrows]
+    for number, time_s in enumerate(scene.times):
+        recording.insert_sleep(float(time_s - scene.times[max(number - 1, 0)]))
+        for player in players:
+            player.show(number)
+
+
+class _LinkPlayer:
+    """Shows a link at the times of the scene."""
+
+    def __init__(self, api: Any, link: Link, meshes: Mapping[BodyShape, Mesh]) -> None:
+        name = f"/{link.body}/{link.name}"
+        self._position = _rounded(link.poses.position, POSE_STEP)
+        self._wxyz = _rounded(link.poses.rotation.as_quat()[:, _WXYZ], POSE_STEP)
+        self._is_there = link.is_there
+        self._frame = api.add_frame(
+            name, show_axes=False, position=self._position[0], wxyz=self._wxyz[0], visible=bool(link.is_there[0])
+        )
+        for number, shape in enumerate(link.shapes):
+            _add_shape(api, f"{name}/{number}", shape, meshes)
+
+    def show(self, number: int) -> None:
+        self._frame.visible = bool(self._is_there[number])
+        if np.abs(self._position[number] - self._frame.position).max() > STILL:
+            self._frame.position = self._position[number]
+        if np.abs(self._wxyz[number] - self._frame.wxyz).max() > STILL:
+            self._frame.wxyz = self._wxyz[number]
+
+
+class _ArrowPlayer:
+    """Shows the forces of a topic at the times of the scene."""
+
+    def __init__(self, api: Any, arrows: Arrows, metres_per_newton: float) -> None:
+        self._segments = [
+            _rounded(_segments(points, forces * metres_per_newton), ARROW_STEP).astype(np.float32)
+            for points, forces in zip(arrows.points, arrows.forces, strict=True)
+        ]
+        self._handle = api.add_arrows(
+            f"/forces/{arrows.topic.strip('/').replace('/', '.')}",
+            self._segments[0] if len(self._segments[0]) else np.zeros((1, 2, 3), np.float32),
+            CONTACT_RGB if arrows.is_contact else SENSOR_RGB,
+            shaft_radius=SHAFT_M,
+            head_radius=HEAD_M,
+            head_length=HEAD_LENGTH_M,
+            visible=bool(len(self._segments[0])),
+        )
+
+    def show(self, number: int) -> None:
+        segments = self._segments[number]
+        self._handle.visible = bool(len(segments))
+        if len(segments) and not np.array_equal(segments, self._handle.points):
+            self._handle.points = segments
+
+
+def _segments(points: Array, arrows: Array) -> Array:
+    """Returns start and end of arrows, shape (k, 2, 3) [m]; those that are too long are cut off."""
+    length = np.linalg.norm(arrows, axis=1, keepdims=True)
+    cut = arrows * np.minimum(1.0, MAX_ARROW_M / np.maximum(length, 1e-9))
+    return np.stack([points, points + cut], axis=1)[length[:, 0] > HEAD_M]
+
+
+def _arrow_scale(arrows: list[Arrows]) -> float:
+    """Returns the length of arrows: 1, 2 or 5 times a power of ten [m/N]."""
+    forces = np.concatenate([np.empty((0, 3)), *(each for of_topic in arrows for each in of_topic.forces)])
+    sizes = np.linalg.norm(forces, axis=1)
+    sizes = sizes[sizes > 0.0]
+    if not len(sizes):
+        return 0.01
+    exponent = np.log10(LONG_ARROW_M / float(np.percentile(sizes, 95.0)))
+    power = np.floor(exponent)
+    return float(min((step * 10.0**power for step in (1, 2, 5, 10)), key=lambda each: abs(np.log10(each) - exponent)))
+
+
+def _add_shape(api: Any, name: str, shape: BodyShape, meshes: Mapping[BodyShape, Mesh]) -> None:
+    x, y, z, w = shape.pose_in_link.quat_xyzw
+    size = shape.size
+    *rgb, alpha = shape.rgba
+    common: dict[str, Any] = {
+        "color": tuple(round(255 * each) for each in rgb),
+        "opacity": None if alpha >= 1.0 else alpha,
+        "position": shape.pose_in_link.position,
+        "wxyz": (w, x, y, z),
+    }
+    if shape.kind is ShapeKind.BOX:
+        api.add_box(name, dimensions=size, **common)
+    elif shape.kind is ShapeKind.SPHERE:
+        api.add_icosphere(name, radius=size[0] / 2, **common)
+    elif shape.kind is ShapeKind.CYLINDER:
+        api.add_cylinder(name, radius=size[0] / 2, height=size[2], **common)
+    elif shape in meshes:
+        api.add_mesh_simple(name, *meshes[shape], side="double", **common)
+
+
+def _rounded(values: Array, step: float) -> Array:
+    return np.asarray(np.round(values / step) * step)
+
+
+def _with_plots(text: str, scene: Scene, metres_per_newton: float) -> str:
+    """Returns viser's page with plots below its view."""
+    count = min(MAX_LINE_POINTS, MAX_POINTS // max(1, sum(map(len, scene.panels.values()))))
+    data = {
+        "title": scene.title,
+        "seconds": round(float(scene.times[-1]), 6),
+        "legend": f"arrows: 0.1 m is {0.1 / metres_per_newton:g} N" if scene.arrows else "no forces were recorded",
+        "notes": scene.notes,
+        "panels": [
+            {"title": title, "lines": [{"name": name, **_points(line, count)} for name, line in lines.items()]}
+            for title, lines in scene.panels.items()
+        ],
+    }
+    content = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")  # a text may hold </script>
+    text = text.replace("<title>Viser</title>", f"<title>{html.escape(scene.title)}</title>", 1)
+    text = text.replace("</head>", f"{HEAD}</head>", 1)
+    end = text.rindex("</body>")
+    return f"{text[:end]}<script>const EPISODE={content};</script>{BODY}{text[end:]}"
+
+
+def _points(line: pd.Series, count: int) -> dict[str, list[float]]:
+    """Returns about so many points of a line as lists x and y; of long lines the extremes of short ranges."""
+    values = line.dropna()
+    x, y = values.index.to_numpy(float), values.to_numpy(float)
+    if len(y) > count:
+        starts = np.linspace(0, len(y), count // 2 + 1).astype(int)
+        chosen = [
+            begin + each
+            for begin, end in zip(starts[:-1], starts[1:], strict=True)
+            for each in sorted({int(y[begin:end].argmin()), int(y[begin:end].argmax())})
+        ]
+        x, y = x[chosen], y[chosen]
+    return {"x": [round(each, 3) for each in x.tolist()], "y": [float(f"{each:.4g}") for each in y.tolist()]}

@@ -1,0 +1,159 @@
+"""Lines that grow while messages come, and the part of them that is shown."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+MAX_SAMPLES = 120_000
+"""Number of newest samples that a line keeps; at 1 kHz those of two minutes."""
+ANEW_S = 1.0
+"""Time by which stamps have to go back to begin anew [s]; samples that are less late are dropped."""
+
+
+class Line(NamedTuple):
+    """A line as it is shown, or the reason why there is none.
+
+    Attributes:
+        name: Its name, of topic and field; of a reason the name that the user gave.
+        times: Times of its samples [s], ascending.
+        values: Their values.
+        note: The reason; empty for a line.
+        number: Its number in the order in which lines began, for its colour.
+    """
+
+    name: str
+    times: Array
+    values: Array
+    note: str
+    number: int = 0
+
+
+class _Samples:
+    """The newest samples of a line, which has a rank and a number among all."""
+
+    def __init__(self, rank: int, number: int) -> None:
+        self.rank, self.number = rank, number
+        self._times, self._values = np.empty(2 * MAX_SAMPLES), np.empty(2 * MAX_SAMPLES)
+        self._end = 0
+
+    def append(self, time_s: float, value: float) -> None:
+        if self._end and time_s < self._times[self._end - 1]:
+            return
+        if self._end == len(self._times):
+            self._times[:MAX_SAMPLES], self._values[:MAX_SAMPLES] = (
+                self._times[-MAX_SAMPLES:],
+                self._values[-MAX_SAMPLES:],
+            )
+            self._end = MAX_SAMPLES
+        self._times[self._end], self._values[self._end] = time_s, value
+        self._end += 1
+
+    def since(self, start_s: float) -> tuple[Array, Array]:
+        """Returns copies of times and values from a time on, and of the sample before."""
+        times = self._times[: self._end]
+        first = max(0, int(np.searchsorted(times, start_s)) - 1)
+        return times[first:].copy(), self._values[first : self._end].copy()
+
+
+class LivePlot:
+    """Lines by name, filled by some threads and shown by another one."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._samples: dict[str, _Samples] = {}
+        self._notes: dict[str, str] = {}
+        self._newest_s = -np.inf
+        self.count = 0
+        """Number of values that came."""
+        self.changes = 0
+        """Number of changes of what there is to show."""
+
+    def add(self, name: str, time_s: float, value: float, rank: int = 0) -> None:
+        """Appends a sample to a line, which begins with its first one; all begin anew if time goes back.
+
+        Args:
+            name: Name of the line.
+            time_s: Time of the sample [s].
+            value: Its value.
+            rank: Lines of a smaller rank come first.
+        """
+        with self._lock:
+            if time_s < self._newest_s - ANEW_S:
+                self._samples.clear()
+                self._newest_s = time_s
+            self._newest_s = max(self._newest_s, time_s)
+            samples = self._samples.get(name)
+            if samples is None:
+                samples = self._samples[name] = _Samples(rank, len(self._samples))
+            samples.append(time_s, value)
+            self.count += 1
+            self.changes += 1
+
+    def note(self, name: str, text: str) -> None:
+        """Sets the reason why lines of a name do not grow; an empty one if they do."""
+        with self._lock:
+            if self._notes.get(name, "") != text:
+                self._notes[name] = text
+                self.changes += 1
+
+    def clear(self) -> None:
+        """Drops all samples."""
+        with self._lock:
+            self._samples.clear()
+            self.changes += 1
+
+    def view(self, seconds: float) -> tuple[float, list[Line]]:
+        """Returns the time of the newest sample [s], and the reasons and lines with the samples of some time before.
+
+        Args:
+            seconds: Length of that time [s].
+        """
+        with self._lock:
+            end_s = self._newest_s if np.isfinite(self._newest_s) else 0.0
+            empty = np.empty(0)
+            faults = [Line(name, empty, empty, text) for name, text in self._notes.items() if text]
+            ranked = sorted(self._samples.items(), key=lambda each: each[1].rank)
+            lines = [Line(name, *each.since(end_s - seconds), "", each.number) for name, each in ranked]
+        return end_s, [*faults, *lines]
+
+
+def thinned(times: Array, values: Array, start_s: float, end_s: float, columns: int) -> tuple[Array, Array]:
+    """Returns points that look the same on a picture: of many in one column only the lowest and the highest.
+
+    Args:
+        times: Ascending [s].
+        values: As many.
+        start_s: Time of the left edge [s].
+        end_s: Time of the right edge [s].
+        columns: Width of the picture [px].
+
+    Returns:
+        Horizontal places [px] and values.
+    """
+    places = (times - start_s) * (columns / (end_s - start_s))
+    if len(places) <= 2 * columns:
+        return places, values
+    first = np.flatnonzero(np.diff(np.floor(places), prepend=-np.inf))
+    lowest, highest = np.fmin.reduceat(values, first), np.fmax.reduceat(values, first)
+    return np.repeat(places[first], 2), np.column_stack([lowest, highest]).ravel()
+
+
+def ticks(low: float, high: float, count: float) -> tuple[list[float], int]:
+    """Returns round numbers in a range, and the number of their decimals.
+
+    Args:
+        low: Lower end.
+        high: Upper end, above the lower one.
+        count: Largest number of intervals between them.
+    """
+    raw = (high - low) / count
+    power = 10.0 ** np.floor(np.log10(raw))
+    step = float(next(each * power for each in (1, 2, 5, 10) if each * power >= raw * (1 - 1e-9)))
+    first, last = int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9))
+    return [number * step for number in range(first, last + 1)], max(0, -int(np.floor(np.log10(step) + 1e-9)))

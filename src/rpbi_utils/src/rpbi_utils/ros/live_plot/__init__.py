@@ -1,0 +1,1 @@
+"""A window with numeric fields of running topics as lines over time."""

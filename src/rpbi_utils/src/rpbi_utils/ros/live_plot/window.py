@@ -1,0 +1,287 @@
+"""The window with the lines, its buttons and keys."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from PyQt5.QtCore import QPointF, QRectF, Qt, QTimer
+from PyQt5.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap, QPolygonF, QResizeEvent
+from PyQt5.QtWidgets import QHBoxLayout, QLabel, QMainWindow, QPushButton, QVBoxLayout, QWidget
+
+from rpbi_utils.live_plot.plot import Line, LivePlot, thinned, ticks
+
+TITLE = "Live plot"
+PERIOD_MS = 16
+"""Time between two redraws [ms]."""
+STATUS_S = 0.5
+SIZE = (960, 480)
+MIN_SECONDS, MAX_SECONDS = 0.5, 120.0
+"""Shortest and longest time that the window shows [s]."""
+COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b", "#e377c2", "#17becf", "#7f7f7f", "#bcbd22")
+LEFT, RIGHT, TOP, BOTTOM = 70, 12, 8, 28
+"""Margins of the lines [px]."""
+ROW = 17
+"""Height of a row of the legend [px]."""
+MAX_LEGEND = 10
+"""Largest number of rows of the legend."""
+GRID, INK, FAULT, PAPER = QColor("#e0e0e0"), QColor("#303030"), QColor("#a02020"), QColor(255, 255, 255, 200)
+
+
+class Canvas(QWidget):
+    """Draws lines over the last seconds, as fast as they come."""
+
+    def __init__(self, plot: LivePlot, seconds: float) -> None:
+        super().__init__()
+        self._plot = plot
+        self.seconds = seconds
+        self.redraws = 0
+        self._shown = -1
+        self._frozen: tuple[float, list[Line]] | None = None
+        self._grid: QPixmap | None = None
+        self._grid_of: tuple[float, ...] = ()
+        self.setMinimumSize(320, 200)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
+
+    @property
+    def is_paused(self) -> bool:
+        """Whether the view stands still; samples are collected on."""
+        return self._frozen is not None
+
+    def pause(self) -> None:
+        """Holds the view, or lets it go on."""
+        self._frozen = self._plot.view(MAX_SECONDS) if self._frozen is None else None
+        self.update()
+
+    def clear(self) -> None:
+        """Drops all samples."""
+        self._plot.clear()
+        if self._frozen is not None:
+            self._frozen = self._plot.view(MAX_SECONDS)
+        self.update()
+
+    def zoom(self, factor: float) -> None:
+        """Multiplies the time that is shown."""
+        self.seconds = float(np.clip(self.seconds * factor, MIN_SECONDS, MAX_SECONDS))
+        self.update()
+
+    def look(self) -> None:
+        """Draws anew if there is something new."""
+        if self._frozen is None and self._plot.changes != self._shown:
+            self.update()
+
+    def view(self) -> tuple[float, list[Line]]:
+        """Returns the time of the right edge [s], and the lines."""
+        return self._plot.view(self.seconds) if self._frozen is None else self._frozen
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 (Qt's name)
+        self._grid_of = ()
+        super().resizeEvent(event)
+
+    def paintEvent(self, _: QPaintEvent) -> None:  # noqa: N802 (Qt's name)
+        self._shown = self._plot.changes
+        self.redraws += 1
+        end_s, lines = self.view()
+        width, height = self.width() - LEFT - RIGHT, self.height() - TOP - BOTTOM
+        drawn = [self._points(line, end_s, width) for line in lines]
+        low, high = _range([values for _, values in drawn])
+        painter = QPainter(self)
+        painter.drawPixmap(0, 0, self._background(low, high))
+        painter.setClipRect(QRectF(LEFT, TOP, width, height))
+        for line, (places, values) in zip(lines, drawn, strict=True):
+            painter.setPen(QPen(_colour(line), 1.0))
+            painter.drawPolyline(_polygon(LEFT + places, TOP + (high - values) * (height / (high - low))))
+        painter.setClipping(False)
+        self._draw_legend(painter, lines)
+        painter.end()
+
+    def _points(self, line: Line, end_s: float, width: int) -> tuple[np.ndarray, np.ndarray]:
+        is_finite = np.isfinite(line.values)
+        start_s = end_s - self.seconds
+        first = int(np.searchsorted(line.times, start_s))
+        chosen = slice(max(0, first - 1), None)
+        times, values = line.times[chosen][is_finite[chosen]], line.values[chosen][is_finite[chosen]]
+        return thinned(times, values, start_s, end_s, width)
+
+    def _background(self, low: float, high: float) -> QPixmap:
+        """Returns the axes, which are drawn only when they change."""
+        wanted = (low, high, self.seconds, self.width(), self.height())
+        if self._grid is None or wanted != self._grid_of:
+            self._grid_of = wanted
+            self._grid = QPixmap(self.size())
+            self._grid.fill(QColor("white"))
+            painter = QPainter(self._grid)
+            self._draw_axes(painter, low, high)
+            painter.end()
+        return self._grid
+
+    def _draw_axes(self, painter: QPainter, low: float, high: float) -> None:
+        width, height = self.width() - LEFT - RIGHT, self.height() - TOP - BOTTOM
+        bottom = TOP + height
+        right, centre = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, Qt.AlignmentFlag.AlignHCenter
+        values, digits = ticks(low, high, max(2.0, height / 45))
+        for value in values:
+            y = TOP + (high - value) * height / (high - low)
+            painter.setPen(GRID)
+            painter.drawLine(QPointF(LEFT, y), QPointF(LEFT + width, y))
+            painter.setPen(INK)
+            text = f"{value:.{digits}f}" if abs(value) < 1e6 and digits < 7 else f"{value:.3g}"
+            painter.drawText(QRectF(0, y - 8, LEFT - 6, 16), int(right), text)
+        times, digits = ticks(-self.seconds, 0.0, max(2.0, width / 90))
+        for time_s in times:
+            x = LEFT + width + time_s * width / self.seconds
+            painter.setPen(GRID)
+            painter.drawLine(QPointF(x, TOP), QPointF(x, bottom))
+            painter.setPen(INK)
+            painter.drawText(QRectF(x - 40, bottom + 4, 80, 16), int(centre), f"{time_s:.{digits}f} s")
+
+    def _draw_legend(self, painter: QPainter, lines: list[Line]) -> None:
+        rows = [_legend_row(line) for line in lines[:MAX_LEGEND]]
+        if len(lines) > MAX_LEGEND:
+            rows.append((f"and {len(lines) - MAX_LEGEND} more", INK))
+        for number, (text, colour) in enumerate(rows):
+            room = QRectF(LEFT + 6, TOP + 4 + ROW * number, self.width() - LEFT - RIGHT - 12, ROW)
+            alignment = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+            painter.fillRect(painter.boundingRect(room, alignment, text), PAPER)
+            painter.setPen(colour)
+            painter.drawText(room, alignment, text)
+
+
+class LivePlotWindow(QMainWindow):
+    """Canvas, buttons, and a line with the newest event and the rates.
+
+    Args:
+        plot: The lines.
+        seconds: Time that is shown [s].
+        folder: Folder of saved files.
+    """
+
+    def __init__(self, plot: LivePlot, seconds: float, folder: Path) -> None:
+        super().__init__()
+        self.setWindowTitle(TITLE)
+        self.plot, self._folder = plot, folder
+        self.canvas = Canvas(plot, seconds)
+        self._status = _named(QLabel(), "status")
+        self._message = _named(QLabel("Space: pause; C: clear; P: picture; D: data; + and -: time"), "message")
+        buttons = QHBoxLayout()
+        self._pause = self._button(buttons, "Pause", "Space", self._on_pause)
+        self._button(buttons, "Clear", "C", self._on_clear)
+        self._button(buttons, "Save PNG", "P", lambda: self._save("png", self._write_picture))
+        self._button(buttons, "Save CSV", "D", lambda: self._save("csv", self._write_data))
+        self._button(buttons, "+", "+", lambda: self.canvas.zoom(0.5))
+        self._button(buttons, "-", "-", lambda: self.canvas.zoom(2.0))
+        buttons.addWidget(self._message, 1)
+        buttons.addWidget(self._status)
+        layout = QVBoxLayout()
+        layout.addWidget(self.canvas, 1)
+        layout.addLayout(buttons)
+        centre = QWidget()
+        centre.setLayout(layout)
+        self.setCentralWidget(centre)
+        self.resize(*SIZE)
+        self._since_s, self._redraws, self._values = time.monotonic(), 0, 0
+        self._timer = QTimer(self)
+        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
+        self._timer.timeout.connect(self._look)
+        self._timer.start(PERIOD_MS)
+
+    def end(self) -> None:
+        """Stops drawing."""
+        self._timer.stop()
+
+    def _look(self) -> None:
+        self.canvas.look()
+        passed_s = time.monotonic() - self._since_s
+        if passed_s > STATUS_S:
+            redraws, values = self.canvas.redraws - self._redraws, self.plot.count - self._values
+            self._status.setText(f"{redraws / passed_s:.0f} redraws/s, {values / passed_s:.0f} values/s")
+            self._redraws, self._values = self.canvas.redraws, self.plot.count
+            self._since_s = time.monotonic()
+
+    def _button(self, layout: QHBoxLayout, title: str, key: str, action: Callable[[], None]) -> QPushButton:
+        button: QPushButton = _named(QPushButton(title), title.lower())
+        button.setToolTip(key)
+        button.setShortcut(key)
+        button.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # else Space would press the one that was used last
+        button.clicked.connect(lambda: action())
+        layout.addWidget(button)
+        return button
+
+    def _on_pause(self) -> None:
+        self.canvas.pause()
+        self._pause.setText("Go on" if self.canvas.is_paused else "Pause")
+        self._pause.setShortcut("Space")  # which Qt drops with the text
+        self._message.setText("paused" if self.canvas.is_paused else "goes on")
+
+    def _on_clear(self) -> None:
+        self.canvas.clear()
+        self._message.setText("cleared")
+
+    def _save(self, suffix: str, write: Callable[[Path], None]) -> None:
+        """Writes what is shown into a new file, beside its name first."""
+        path = self._folder / f"live_plot_{datetime.now().strftime('%Y%m%d_%H%M%S_%f')}.{suffix}"
+        part = path.with_name(f".{path.name}.new")
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            write(part)
+            part.rename(path)
+        except OSError as error:
+            self._message.setText(f"{path}: not saved: {error.strerror or error}")
+            return
+        self._message.setText(f"saved {path}")
+
+    def _write_picture(self, path: Path) -> None:
+        if not self.canvas.grab().save(str(path), "PNG"):
+            raise OSError("the picture cannot be written")
+
+    def _write_data(self, path: Path) -> None:
+        end_s, lines = self.canvas.view()
+        tables = [
+            pd.DataFrame({"time": line.times, "field": line.name, "value": line.values})
+            for line in lines
+            if not line.note
+        ]
+        table = pd.concat([pd.DataFrame({"time": [], "field": [], "value": []}), *tables])
+        table[table["time"] >= end_s - self.canvas.seconds].to_csv(path, index=False)
+
+
+def _named(widget: QWidget, name: str) -> QWidget:
+    widget.setObjectName(name)
+    return widget
+
+
+def _colour(line: Line) -> QColor:
+    return FAULT if line.note else QColor(COLOURS[line.number % len(COLOURS)])
+
+
+def _legend_row(line: Line) -> tuple[str, QColor]:
+    newest = f"{line.values[-1]:.4g}" if len(line.values) else ""
+    return f"{line.name}: {line.note}" if line.note else f"{line.name}  {newest}", _colour(line)
+
+
+def _range(values: list[np.ndarray]) -> tuple[float, float]:
+    """Returns ends of the vertical axis at round numbers, so that they change seldom."""
+    filled = [each for each in values if len(each)]
+    low = min((float(each.min()) for each in filled), default=0.0)
+    high = max((float(each.max()) for each in filled), default=1.0)
+    if high - low < 1e-9 * max(1.0, abs(low), abs(high)):
+        margin = 0.1 * abs(high) or 1.0
+        low, high = low - margin, high + margin
+    marks, _ = ticks(low, high, 8)
+    step = marks[1] - marks[0]
+    return float(np.floor(low / step) * step), float(np.ceil(high / step) * step)
+
+
+def _polygon(x: np.ndarray, y: np.ndarray) -> QPolygonF:
+    """Returns points as Qt has them, by one copy instead of an object for each."""
+    polygon = QPolygonF(len(x))
+    if len(x):
+        memory: Any = polygon.data().asarray(16 * len(x))
+        points = np.frombuffer(memory, np.float64).reshape(-1, 2)
+        points[:, 0], points[:, 1] = x, y
+    return polygon
