@@ -92,14 +92,12 @@ class TeleopTf:
 
     def _broadcast_once_a_stamp(self) -> None:
         """Broadcasts unless ROS time stands still: TF ignores a second transform with the same stamp, and warns."""
-        now = rospy.Time.now()
-        if now != self._broadcast_at:
-            self._broadcast_at = now
+        if rospy.Time.now() != self._broadcast_at:
             self._broadcast()
 
     def _broadcast(self) -> None:
         position, rpy = self._teleop.pose
-        self._topic.send(transform_message(position, rpy))
+        self._broadcast_at = self._topic.send(transform_message(position, rpy))
 
     def _reset(self, request: SetTransformRequest) -> SetTransformResponse:
         return SetTransformResponse(*self._put(request.transform))
