@@ -18,7 +18,7 @@ CLEARANCE_M = 0.035
 """Distance of the tip from the box on the way around it [m]."""
 ALIGNED_M, PASSED_M = 0.003, 0.015
 """Distance at which a leg ends: of the last one before a push, and of others [m]."""
-CLOSE_M, CLOSE_RAD = 0.015, math.radians(5.0)
+CLOSE_M, CLOSE_RAD = 0.02, math.radians(5.0)
 """Distance and angle of the box from its goal at which the person is content."""
 TURNED_RAD = math.radians(8.0)
 """Turn of the box during a push at which the person stops, to push another point [rad]."""
@@ -32,8 +32,8 @@ STILL_SPEED, STILL_S = 0.005, 0.2
 """Speed below which the tip stands still [m/s], and time for which it has to [s]."""
 HERE_M, MIN_PUSH_M = 0.02, 0.02
 """Length by which a push from the side where the tip is counts for more, and the least one for a turn [m]."""
-TOUCHING_M = 0.01
-"""Distance of the ball from the box below which it counts as touching [m]."""
+PUSHED_M, PRESS_SHARE = 0.006, 0.75
+"""Distance from the goal at which a push is over [m], and share of the way that is left for which a key is held."""
 MAX_PUSHES, MAX_PRESSES = 10, 8
 """Pushes after which the person gives up, and presses of a key for one leg of the way."""
 MAX_AIM_ERROR_M = 0.002
@@ -95,7 +95,7 @@ class Person:
         self._way: list[_Leg] = []
         self._push: Direction | None = None
         self._max_turn_rad = TURNED_RAD
-        self._pushing = Direction.UP
+        self._is_pushing = False
         self._pushes = self._presses = 0
         self._held: tuple[Direction, float] | None = None
         self._last: tuple[float, Place] = (-math.inf, (0.0, 0.0))
@@ -116,42 +116,44 @@ class Person:
         if max(map(abs, velocity)) > STILL_SPEED:
             self._moved_s = time_s
         if self._held is not None:
-            direction, until_s = self._held
-            if until_s < math.inf and time_s < until_s:
-                return direction
-            if until_s == math.inf and not self._is_pushed(tip, velocity, box):
-                return direction
-            self._held, self._moved_s = None, time_s
-        if time_s - self._moved_s >= STILL_S and not self.is_done:
+            is_pushed = self._is_pushing and self._is_pushed(tip, velocity, box)
+            if time_s >= self._held[1] or is_pushed:
+                self._held, self._moved_s = None, time_s
+        elif time_s - self._moved_s >= STILL_S and not self.is_done:
             self._held = self._next(time_s, tip, box)
         return None if self._held is None else self._held[0]
 
     def _next(self, time_s: float, tip: Place, box: PlanarPose) -> tuple[Direction, float] | None:
-        """Returns the key that is pressed next, and until when [s]; infinity is until the box is where it shall be."""
-        if not self._way and self._push is None:
+        """Returns the key that is pressed next, and until when [s]."""
+        self._presses += 1
+        self._is_pushing = False
+        if self._presses > MAX_PRESSES:
+            self.is_done = True
+            return None
+        if self._push is None:
             self._choose(tip, box)
         while self._way:
             axis, value, tolerance = self._way[0]
             left = value - tip[axis]
             if abs(left) > tolerance:
-                self._presses += 1
-                self.is_done = self._presses > MAX_PRESSES
                 return Direction.along(axis, left), time_s + abs(left) / self._speed
             self._way.pop(0)
             self._presses = 0
-        push, self._push = self._push, None
-        if push is None:
+        push = self._push
+        if push is None or self._is_pushed(tip, [0.0, 0.0], box):
+            self._push, self._presses = None, 0
             return None
-        self._pushing = push
-        return push, math.inf
+        self._is_pushing = True
+        way = push.sign * (self._goal[push.axis] - tip[push.axis]) - _half_width(box.yaw) - TIP_RADIUS_M
+        return push, time_s + max(PRESS_SHARE * way, PUSHED_M) / self._speed
 
     def _is_pushed(self, tip: Place, velocity: list[float], box: PlanarPose) -> bool:
-        """Returns whether it is time to let go."""
-        axis, sign = self._pushing.axis, self._pushing.sign
+        """Returns whether the present push is over: the box is where it shall be, it turns too far, or it was missed."""
+        assert self._push is not None
+        axis, sign = self._push.axis, self._push.sign
         left = sign * (self._goal[axis] - box[axis] - velocity[axis] * REACTION_S)
-        is_touching = sign * (box[axis] - tip[axis]) < _half_width(box.yaw) + TIP_RADIUS_M + TOUCHING_M
         is_past = sign * (tip[axis] - box[axis]) > 0.0
-        return is_past or (is_touching and (left <= 0.0 or abs(box.yaw - self._goal.yaw) > self._max_turn_rad))
+        return is_past or left <= PUSHED_M or abs(box.yaw - self._goal.yaw) > self._max_turn_rad
 
     def _choose(self, tip: Place, box: PlanarPose) -> None:
         """Chooses the next push, and the way to its start; is done if there is none."""

@@ -35,10 +35,9 @@ class BoxError(NamedTuple):
     angle_rad: float
 
     @classmethod
-    def of(cls, box: PlanarPose, goal: PlanarPose) -> BoxError:
-        """Returns those of a pose."""
-        angle = abs(math.remainder(box.yaw - goal.yaw, 2.0 * math.pi))
-        return cls(math.hypot(box.x - goal.x, box.y - goal.y), angle)
+    def of(cls, position: Array, quat_xyzw: Array) -> BoxError:
+        """Returns those of a box whose pose in the frame of the goal is given; a box that lies on its side is turned."""
+        return cls(float(np.linalg.norm(position)), 2.0 * math.acos(min(abs(float(quat_xyzw[3])), 1.0)))
 
     @property
     def is_at_goal(self) -> bool:

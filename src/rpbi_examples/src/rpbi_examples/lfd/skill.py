@@ -15,8 +15,10 @@ MOVED_M = 0.002
 """Distance from the first and the last place within which the tip counts as standing [m]."""
 GAP_M = 0.025
 """Distance of the tip from its first contact where the approach ends and the push begins [m]."""
-MIN_BASES, BASES_PER_S = 30, 10.0
-"""Basis functions of a primitive: at least, and for each second, since a push with its corners is long."""
+MIN_BASES, MAX_BASES, BASES_PER_S = 30, 1000, 20.0
+"""Number of basis functions of a primitive: limits, and for each second, since a push with its corners is long."""
+ALPHA_PER_S = 25.0
+"""Damping of a primitive for each second, so that it follows the demonstration as closely however long that is."""
 
 
 class Shown(NamedTuple):
@@ -109,4 +111,6 @@ class PushSkill:
 
 def _learned(times: Array, places: Array) -> Primitive:
     shown = Demonstration.of(times, places, names=NAMES)
-    return make_primitive("dmp", {"bases": max(MIN_BASES, round(BASES_PER_S * shown.duration_s))}).learn(shown)
+    bases = min(max(MIN_BASES, round(BASES_PER_S * shown.duration_s)), MAX_BASES)
+    options = {"bases": bases, "alpha": ALPHA_PER_S * max(shown.duration_s, 1.0)}
+    return make_primitive("dmp", options).learn(shown)

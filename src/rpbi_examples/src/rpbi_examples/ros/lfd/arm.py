@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import rospy
 from custom_srvs.srv import SetTransform
@@ -15,7 +17,7 @@ from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.services import call_service, get_srv_handler
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.ros.transform_messages import as_pose, transform_message
-from custom_ros_tools.transforms import Array, pose_of, rpy_of
+from custom_ros_tools.transforms import Array, pose_of
 from ik_ros.msg import IKProblem
 from ik_ros.srv import SolveIK, SolveIKResponse
 from ros_pybullet_interface.srv import ResetJointState
@@ -36,6 +38,8 @@ HOME_S, START_S = 2.0, 1.0
 SIGNAL_HZ = 50.0
 RETURN_RATE = 3.0
 """Speed towards the plan for each metre of the target beside it [1/s]."""
+BEYOND_M = 0.02
+"""Length by which a plan may leave the limits of teleoperation, where the target stops [m]."""
 END_S = 0.5
 """Time for which the last place is kept [s]."""
 
@@ -88,7 +92,7 @@ class Arm:
             InterfaceError: If it leaves the limits of teleoperation.
         """
         for axis, (lower, upper), column in zip("xy", self._limits, plan.places.T):
-            if column.min() < lower or column.max() > upper:
+            if column.min() < lower - BEYOND_M or column.max() > upper + BEYOND_M:
                 got = f"{column.min():.3f} to {column.max():.3f}"
                 raise InterfaceError(
                     f"the plan leaves the limits of teleoperation: {axis} from {lower:g} to {upper:g} m, got {got}"
@@ -140,4 +144,10 @@ class Arm:
 def planar(message: TransformStamped) -> PlanarPose:
     """Returns the pose of a transform on the floor."""
     place, quat = TfInterface.msg_to_pos_quat(message)
-    return PlanarPose(float(place[0]), float(place[1]), float(rpy_of(quat)[2]))
+    return PlanarPose(float(place[0]), float(place[1]), yaw_of(quat))
+
+
+def yaw_of(quat_xyzw: Array) -> float:
+    """Returns the direction of the x axis about the vertical [rad]."""
+    x, y, z, w = quat_xyzw
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

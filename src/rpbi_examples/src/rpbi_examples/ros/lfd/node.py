@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import rospy
 from cob_srvs.srv import SetString
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TransformStamped
 from matplotlib.figure import Figure
 from nav_msgs.msg import Path as PathMessage
 from sensor_msgs.msg import Joy
@@ -25,7 +25,7 @@ from custom_ros_tools.ros.lifecycle.run_node import run_node
 from custom_ros_tools.ros.services import call_service
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.ros.transform_messages import as_pose, transform_message
-from custom_ros_tools.transforms import Array, rpy_of
+from custom_ros_tools.transforms import Array
 from episodes import EpisodeFolder
 from episodes.folder import BAG
 from ros_pybullet_interface.msg import PybulletObject
@@ -36,13 +36,15 @@ from rpbi_examples.motions import PlanarPose
 from rpbi_examples.ros.human_interaction import interrupt_roslaunch
 from rpbi_utils import bag_to_dataframes, transforms_between
 
-from .arm import ORIGIN, TARGET, TIP, Arm, planar
+from .arm import ORIGIN, TARGET, TIP, Arm, planar, yaw_of
 
 BOX_FILE, BOX_NAME = "{rpbi_examples}/configs/lfd/box.yaml", "pushing_box"
 BOX, GOAL = f"rpbi/{BOX_NAME}", "rpbi/goal"
 CONTACTS, SIGNAL = f"/rpbi/{BOX_NAME}/contacts", "/operator_node/signal"
 ROBOT = "kuka_lwr"
 DEMONSTRATING = "demonstrating"
+AFTER_FAILURE = {DEMONSTRATING: "home", "demonstrated": "missed", "learned": "missed", "executed": "missed"}
+"""State after a step that failed, by the state before."""
 ORIGIN_PLACE = np.zeros(2)
 MAX_OFFSET_M = 0.1
 """Largest distance of a random start from the origin, along x and y [m]."""
@@ -104,7 +106,7 @@ class Lesson:
                 self._actions[name]()
             except (InterfaceError, OSError) as error:
                 rospy.logerr("%s: %s", name, error)
-                self._become("home" if before.startswith("demonstrat") else before)
+                self._become(AFTER_FAILURE.get(before, before))
         missed = [str(run.error) for run in self._executed if not run.error.is_at_goal]
         if missed and not rospy.is_shutdown():
             raise InterfaceError(f"the box was not at its goal: {'; '.join(missed)}")
@@ -186,7 +188,7 @@ class Lesson:
         if self._skill is not None:
             self._execute()
             return
-        if not self._shown or self._name not in ("demonstrated", "missed"):
+        if not self._shown or self._name == "home":
             raise InterfaceError("there is no demonstration yet: press 2 to start one")
         table = self._shown[-1].table
         touched = table.index[table["contact"] > 0.0]
@@ -215,13 +217,16 @@ class Lesson:
 
     # --- Box and arm
 
-    def _pose(self, frame: str, since: rospy.Time | None = None) -> PlanarPose:
-        """Returns where a frame is in the person's frame, by a transform that is not older than a time."""
-        message = self._tf.wait_for_tf_msg(ORIGIN, frame)
-        while since is not None and message.header.stamp < since:
+    def _pose(self, frame: str) -> PlanarPose:
+        """Returns where a frame is in the person's frame."""
+        return planar(self._tf.wait_for_tf_msg(ORIGIN, frame))
+
+    def _box_in(self, frame: str) -> TransformStamped:
+        """Returns the pose of the box from now on, in a frame."""
+        now = rospy.Time.now()
+        while (message := self._tf.wait_for_tf_msg(frame, BOX)).header.stamp < now:
             time.sleep(POLL_S)
-            message = self._tf.wait_for_tf_msg(ORIGIN, frame)
-        return planar(message)
+        return message
 
     def _prepare(self, start: Array) -> None:
         """Raises the arm, takes the box away and moves the tip to a start."""
@@ -236,7 +241,7 @@ class Lesson:
         box = PybulletObject(object_type=PybulletObject.DYNAMIC, filename=BOX_FILE)
         call_service("rpbi/add_pybullet_object", AddPybulletObject, box)
         self._has_box = True
-        last = self._pose(BOX, rospy.Time.now())
+        last = planar(self._box_in(ORIGIN))
         begin_s = still_s = rospy.get_time()
         while rospy.get_time() - still_s < REST_S:
             if rospy.get_time() - begin_s > MAX_DROP_S:
@@ -253,7 +258,7 @@ class Lesson:
 
     def _finish(self, plan: Plan | None) -> Run:
         """Ends an episode, and returns it as a table."""
-        error = BoxError.of(self._pose(BOX), self._goal)
+        error = BoxError.of(*TfInterface.msg_to_pos_quat(self._box_in(GOAL)))
         call_service("record/stop", Trigger)
         folder = EpisodeFolder(self._out / "episodes")
         episode = max(each.number for each in folder.all())
@@ -292,7 +297,7 @@ def read_episode(bag: Path) -> pd.DataFrame:
     tables = bag_to_dataframes(bag)
     tip, box = (transforms_between(tables, ORIGIN, frame) for frame in (TIP, BOX))
     table = tip[["translation/x", "translation/y"]].set_axis(["tip/x", "tip/y"], axis=1)
-    box_yaw = [rpy_of(quat)[2] for quat in box[[f"rotation/{each}" for each in "xyzw"]].to_numpy()]
+    box_yaw = [yaw_of(quat) for quat in box[[f"rotation/{each}" for each in "xyzw"]].to_numpy()]
     box_table = (
         box[["translation/x", "translation/y"]]
         .set_axis(["box/x", "box/y"], axis=1)
