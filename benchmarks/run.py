@@ -22,7 +22,7 @@ BENCHMARKS = (
     *("loop", "many", "load", "camera", "latency", "free_run", "reset", "tables"),
     *("ik", "ik_nodes", "device", "mvn", "grasp", "guard", "contacts", "physics"),
 )
-WHEN_NAMED = ("dressing", "guard_faults", "haptics", "passivity", "press", "soak", "streams", "teleop")
+WHEN_NAMED = ("dressing", "guard_faults", "haptics", "lfd", "passivity", "press", "soak", "streams", "teleop")
 """Those that take too long to run with the others."""
 FIND_RENDERER = """
 from rpbi.render.camera import Intrinsics

@@ -148,7 +148,7 @@ class Person:
         return push, time_s + max(PRESS_SHARE * way, PUSHED_M) / self._speed
 
     def _is_pushed(self, tip: Place, velocity: list[float], box: PlanarPose) -> bool:
-        """Returns whether the present push is over: the box is where it shall be, it turns too far, or it was missed."""
+        """Returns whether the push is over: the box is where it shall be, turns too far, or was missed."""
         assert self._push is not None
         axis, sign = self._push.axis, self._push.sign
         left = sign * (self._goal[axis] - box[axis] - velocity[axis] * REACTION_S)

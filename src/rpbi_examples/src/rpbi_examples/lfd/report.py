@@ -25,7 +25,9 @@ NEAR_M, NEAR_RAD = 0.03, math.radians(10.0)
 TIP, BOX, GOAL = "#1f5fb4", "#e67814", "#2ca02c"
 SHOWN_STYLE = {"color": TIP, "linestyle": "--", "linewidth": 1.5}
 KEYS = ("signal/x", "signal/y")
-SIZE, DPI = (15.0, 8.4), 110
+SIZE, DPI = (15.0, 8.4), 100
+BESIDE = 0.025
+"""Width of labels beside a plot, as a share of the figure."""
 
 
 class BoxError(NamedTuple):
@@ -36,7 +38,7 @@ class BoxError(NamedTuple):
 
     @classmethod
     def of(cls, position: Array, quat_xyzw: Array) -> BoxError:
-        """Returns those of a box whose pose in the frame of the goal is given; a box that lies on its side is turned."""
+        """Returns those of a pose in the frame of the goal; a box that lies on its side is turned."""
         return cls(float(np.linalg.norm(position)), 2.0 * math.acos(min(abs(float(quat_xyzw[3])), 1.0)))
 
     @property
@@ -128,6 +130,8 @@ def draw_pipeline(figure: Figure, goal: PlanarPose, shown: Run, executed: Run) -
         axes.grid(alpha=0.3)
     for axes in grid.flat:
         axes.legend(fontsize=7, loc="best")
+    figure.get_layout_engine().set(w_pad=0.25, h_pad=0.12)
+    figure.draw_without_rendering()
     for begin, end in ((signal, where), (where, states), (states, learned), (learned, planned), (planned, execution)):
         _arrow(figure, begin, end)
 
@@ -174,20 +178,16 @@ def _outline(box: PlanarPose) -> Array:
 
 
 def _arrow(figure: Figure, begin: Axes, end: Axes) -> None:
-    """Draws an arrow between two neighbours."""
-    figure.draw_without_rendering()  # so that the layout has placed them
+    """Draws an arrow between the middles of two neighbours, once the layout has placed them."""
     one, other = begin.get_position(), end.get_position()
-    if abs(one.y0 - other.y0) < 0.1:
-        y = one.y1 + 0.012
-        tail, head = (
-            ((one.x1 - 0.03, y), (other.x0 + 0.03, y))
-            if one.x0 < other.x0
-            else ((one.x0 + 0.03, y), (other.x1 - 0.03, y))
-        )
+    x, y = (one.x0 + 3.0 * one.x1) / 4.0, (one.y0 + one.y1) / 2.0
+    if abs(one.y0 - other.y0) > 0.1:
+        tail, head = (x, one.y0 - BESIDE), (x, other.y1 + BESIDE)
+    elif one.x0 < other.x0:
+        tail, head = (one.x1 + BESIDE / 4.0, y), (other.x0 - 2.0 * BESIDE, y)
     else:
-        x = one.x1 - 0.02
-        tail, head = (x, one.y0 - 0.01), (x, other.y1 + 0.03)
+        tail, head = (one.x0 - 2.0 * BESIDE, y), (other.x1 + BESIDE / 4.0, y)
     arrow = FancyArrowPatch(
-        tail, head, transform=figure.transFigure, arrowstyle="-|>", mutation_scale=18, color="#222222"
+        tail, head, transform=figure.transFigure, arrowstyle="simple", mutation_scale=22, color="0.3"
     )
     figure.add_artist(arrow)

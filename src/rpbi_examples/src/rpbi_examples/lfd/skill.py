@@ -86,8 +86,8 @@ class PushSkill:
     def __init__(self, shown: Shown) -> None:
         if shown.contact_s is None:
             raise InterfaceError("the box was not touched: there is nothing to learn")
-        shown = shown.moving()
-        contact = np.array([np.interp(shown.contact_s, shown.times, column) for column in shown.places.T])
+        contact_s, shown = shown.contact_s, shown.moving()
+        contact = np.array([np.interp(contact_s, shown.times, column) for column in shown.places.T])
         near = np.linalg.norm(shown.places - contact, axis=1) <= GAP_M
         split = int(np.argmax(near))
         if not near.any() or split == 0:

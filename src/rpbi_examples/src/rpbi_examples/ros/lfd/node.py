@@ -224,7 +224,7 @@ class Lesson:
     def _box_in(self, frame: str) -> TransformStamped:
         """Returns the pose of the box from now on, in a frame."""
         now = rospy.Time.now()
-        while (message := self._tf.wait_for_tf_msg(frame, BOX)).header.stamp < now:
+        while (message := self._tf.wait_for_tf_msg(frame, BOX)) is None or message.header.stamp < now:
             time.sleep(POLL_S)
         return message
 
@@ -272,7 +272,11 @@ class Lesson:
 
     def _report(self) -> None:
         """Writes summary.json and the pictures, and shows them if wanted."""
-        facts = {"operator": rospy.get_param("~operator", ""), "seed": self._seed, "goal": list(self._goal)}
+        facts = {
+            "operator": rospy.get_param("~operator", ""),
+            "seed": self._seed,
+            "goal": [round(each, 4) for each in self._goal],
+        }
         write_summary(self._out / "summary.json", facts, self._shown, self._executed)
         draw: dict[str, Callable[[Figure], None]] = {
             "paths": lambda figure: draw_paths(figure, self._goal, self._shown[-1], self._executed),

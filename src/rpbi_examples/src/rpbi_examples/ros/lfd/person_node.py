@@ -1,7 +1,8 @@
-"""`lfd_person.py`: a scripted person, who presses keys as the keyboard's node publishes them."""
+"""`lfd_person.py`: a scripted person, who presses keys as the keyboard's node publishes them, or those of a window."""
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Callable
 
 import numpy as np
@@ -18,21 +19,37 @@ from .arm import ORIGIN, TIP, planar
 
 BOX, GOAL = "rpbi/pushing_box", "rpbi/goal"
 LOOK_HZ = 50.0
-NEXT_KEY = {"ready": "1", "home": "2", "missed": "2", "demonstrated": "3", "learned": "3", "executed": "3"}
+NEXT_KEY = {
+    "ready": "1",
+    "home": "2",
+    "missed": "2",
+    "demonstrating": "2",
+    "demonstrated": "3",
+    "learned": "3",
+    "executed": "3",
+}
 """Key that is pressed in each state of the lesson."""
-DEMONSTRATING = "demonstrating"
-MAX_TRIES = 3
+DEMONSTRATING, DEMONSTRATE = "demonstrating", "2"
+MAX_TRIES = 4
 MAX_ANSWER_S = 5.0
 """Time after which a key that had no effect is pressed again [s]."""
 PRESS_S = 0.1
 """Time for which a key is pressed [s]."""
 
 
-class ScriptedPerson:
-    """Demonstrates when it is time, and presses the key that comes next."""
+Send = Callable[[bool, str], None]
+"""Called with whether a key goes down, and its name."""
 
-    def __init__(self) -> None:
-        self._keys = {name: rospy.Publisher(f"~{name}", Key, queue_size=100) for name in ("keydown", "keyup")}
+
+class ScriptedPerson:
+    """Demonstrates when it is time, and presses the key that comes next.
+
+    Args:
+        send: Presses keys and lets them go.
+    """
+
+    def __init__(self, send: Send) -> None:
+        self._send = send
         self._tf = TfInterface()
         self._random = np.random.default_rng([rospy.get_param("~seed", 0), 1])
         self._state = ""
@@ -45,18 +62,15 @@ class ScriptedPerson:
             InterfaceError: If the box was not at its goal after a few demonstrations.
         """
         goal, tries = planar(self._tf.wait_for_tf_msg(ORIGIN, GOAL)), 0
+        speed = rospy.get_param("operator_node/config/scale")
         while not rospy.is_shutdown():
             state = self._wait_for_state()
-            if state != DEMONSTRATING:
-                self._press(NEXT_KEY[state])
-            elif tries < MAX_TRIES:
-                tries += 1
-                demonstrate(
-                    self._tf, Person(goal, rospy.get_param("operator_node/config/scale"), self._random), self._hold
-                )
-                self._press("2")
-            else:
+            if state == DEMONSTRATING:
+                demonstrate(self._tf, Person(goal, speed, self._random), self._hold)
+            tries += NEXT_KEY[state] == DEMONSTRATE and state != DEMONSTRATING
+            if tries > MAX_TRIES:
                 raise InterfaceError(f"the demonstration did not succeed, {MAX_TRIES} times")
+            self._press(NEXT_KEY[state])
             self._wait_for_change(state)
 
     def _on_state(self, message: String) -> None:
@@ -65,7 +79,7 @@ class ScriptedPerson:
     def _wait_for_state(self) -> str:
         """Waits until a key is expected, and returns the state of the lesson."""
         rate = rospy.Rate(LOOK_HZ)
-        while (state := self._state) not in (*NEXT_KEY, DEMONSTRATING):
+        while (state := self._state) not in NEXT_KEY:
             rate.sleep()
         return state
 
@@ -76,19 +90,42 @@ class ScriptedPerson:
             rate.sleep()
 
     def _press(self, key: str) -> None:
-        self._send("keydown", key)
+        self._send(True, key)
         rospy.sleep(PRESS_S)
-        self._send("keyup", key)
+        self._send(False, key)
 
     def _hold(self, down: Direction | None, up: Direction | None) -> None:
         """Lets go of one key, and presses another."""
         if up is not None:
-            self._send("keyup", up.name)
+            self._send(False, up.name)
         if down is not None:
-            self._send("keydown", down.name)
+            self._send(True, down.name)
 
-    def _send(self, name: str, key: str) -> None:
-        self._keys[name].publish(Key(header=Header(stamp=rospy.Time.now()), code=getattr(Key, f"KEY_{key}")))
+
+def key_topics() -> Send:
+    """Returns the function that publishes keys as the keyboard's node does."""
+    topics = {
+        is_down: rospy.Publisher(f"~{name}", Key, queue_size=100)
+        for is_down, name in ((True, "keydown"), (False, "keyup"))
+    }
+
+    def send(is_down: bool, key: str) -> None:
+        topics[is_down].publish(Key(header=Header(stamp=rospy.Time.now()), code=getattr(Key, f"KEY_{key}")))
+
+    return send
+
+
+def window_keys() -> Send:
+    """Returns the function that presses keys of the keyboard's window, by xdotool."""
+
+    def xdotool(*arguments: str) -> None:
+        try:
+            subprocess.run(["xdotool", *arguments], check=True, capture_output=True, text=True)
+        except (OSError, subprocess.CalledProcessError) as error:
+            raise InterfaceError(f"xdotool {' '.join(arguments)}: {error}") from error
+
+    xdotool("search", "--sync", "--name", "keyboard", "windowfocus", "--sync")
+    return lambda is_down, key: xdotool("keydown" if is_down else "keyup", key.capitalize())
 
 
 def demonstrate(tf: TfInterface, person: Person, hold: Callable[[Direction | None, Direction | None], None]) -> None:
@@ -101,6 +138,7 @@ def demonstrate(tf: TfInterface, person: Person, hold: Callable[[Direction | Non
     rate = rospy.Rate(LOOK_HZ)
     while not person.is_done:
         tip, box = (tf.wait_for_tf_msg(ORIGIN, frame) for frame in (TIP, BOX))
+        assert tip is not None and box is not None
         at = planar(tip)
         key = person.key(tip.header.stamp.to_sec(), (at.x, at.y), planar(box))
         if key is not held:
@@ -110,5 +148,9 @@ def demonstrate(tf: TfInterface, person: Person, hold: Callable[[Direction | Non
 
 
 def main() -> None:
-    """Runs the node."""
-    run_node("keyboard", ScriptedPerson, ScriptedPerson.run)
+    """Runs the node; with `~window` it presses keys of the keyboard's window."""
+    run_node(
+        "lfd_person",
+        lambda: ScriptedPerson(window_keys() if rospy.get_param("~window", False) else key_topics()),
+        ScriptedPerson.run,
+    )
