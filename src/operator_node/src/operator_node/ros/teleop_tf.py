@@ -39,6 +39,7 @@ class TeleopTf:
                 self._config = private_config(TeleopConfig)
             with part():
                 parameters = private_parameters(TeleopParameters)
+        self._now = rospy.get_time if self._config.ros_time else time.monotonic
         self._teleop = Teleop(self._config, parameters.input_timeout_s)
         self._lock = threading.RLock()
         self._is_on = False
@@ -71,7 +72,7 @@ class TeleopTf:
             if not self._is_on:
                 return
             try:
-                is_slowed = self._teleop.command(message.data, time.monotonic())
+                is_slowed = self._teleop.command(message.data, self._now())
             except ValueError as error:
                 self._warn(self._input.topic, f"message refused, and the frame stands still: {error}")
                 return
@@ -87,7 +88,7 @@ class TeleopTf:
                 return
             if self._teleop.moves and self._input.has_ceased("the frame stands still"):
                 self._teleop.stop()
-            self._teleop.step(time.monotonic())
+            self._teleop.step(self._now())
             self._broadcast_once_a_stamp()
 
     def _broadcast_once_a_stamp(self) -> None:
