@@ -23,7 +23,7 @@ BENCHMARKS = (
     *("ik", "ik_nodes", "device", "mvn", "grasp", "guard", "contacts", "physics"),
 )
 WHEN_NAMED = (
-    *("datasets", "dressing", "guard_faults", "haptics", "live_plot", "passivity", "press", "soak", "streams"),
+    *("datasets", "dressing", "guard_faults", "haptics", "lfd", "live_plot", "passivity", "press", "soak", "streams"),
     "teleop",
 )
 """Those that take too long to run with the others."""

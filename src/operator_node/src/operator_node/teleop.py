@@ -25,6 +25,9 @@ class TeleopConfig(ConfigModel):
     target_frame_id: FrameId = Field(description="The frame that is moved.")
     parent_frame_id: FrameId = Field("world", description="Parent frame; the frame starts at its origin.")
     hz: Hz = Field(100.0, description="Rate at which it is moved and broadcast, in wall time.")
+    ros_time: Switch = Field(
+        False, description="Whether speeds count in ROS time, so that it is as slow as a simulation that is slow."
+    )
     xlim: Limits = Field((-math.inf, math.inf), description="Least and largest x; 0 lies between them.")
     ylim: Limits = Field((-math.inf, math.inf), description="Least and largest y.")
     zlim: Limits = Field((-math.inf, math.inf), description="Least and largest z.")

@@ -53,11 +53,12 @@ class TransformTopic:
         self._last: TransformStamped | None = None
         self._publisher = rospy.Publisher("/tf", TFMessage, latch=True, queue_size=10)
 
-    def send(self, transform: Transform) -> None:
-        """Sends the present pose of the child in the parent."""
+    def send(self, transform: Transform) -> rospy.Time:
+        """Sends the present pose of the child in the parent, and returns its stamp."""
         message = TransformStamped(child_frame_id=self._child, transform=transform)
         message.header.frame_id = self._parent
         message.header.stamp = rospy.Time.now()
         if message != self._last:
             self._last = message
             self._publisher.publish(TFMessage([message]))
+        return message.header.stamp

@@ -39,6 +39,7 @@ class TeleopTf:
                 self._config = private_config(TeleopConfig)
             with part():
                 parameters = private_parameters(TeleopParameters)
+        self._now = rospy.get_time if self._config.ros_time else time.monotonic
         self._teleop = Teleop(self._config, parameters.input_timeout_s)
         self._lock = threading.RLock()
         self._is_on = False
@@ -71,7 +72,7 @@ class TeleopTf:
             if not self._is_on:
                 return
             try:
-                is_slowed = self._teleop.command(message.data, time.monotonic())
+                is_slowed = self._teleop.command(message.data, self._now())
             except ValueError as error:
                 self._warn(self._input.topic, f"message refused, and the frame stands still: {error}")
                 return
@@ -87,19 +88,17 @@ class TeleopTf:
                 return
             if self._teleop.moves and self._input.has_ceased("the frame stands still"):
                 self._teleop.stop()
-            self._teleop.step(time.monotonic())
+            self._teleop.step(self._now())
             self._broadcast_once_a_stamp()
 
     def _broadcast_once_a_stamp(self) -> None:
         """Broadcasts unless ROS time stands still: TF ignores a second transform with the same stamp, and warns."""
-        now = rospy.Time.now()
-        if now != self._broadcast_at:
-            self._broadcast_at = now
+        if rospy.Time.now() != self._broadcast_at:
             self._broadcast()
 
     def _broadcast(self) -> None:
         position, rpy = self._teleop.pose
-        self._topic.send(transform_message(position, rpy))
+        self._broadcast_at = self._topic.send(transform_message(position, rpy))
 
     def _reset(self, request: SetTransformRequest) -> SetTransformResponse:
         return SetTransformResponse(*self._put(request.transform))

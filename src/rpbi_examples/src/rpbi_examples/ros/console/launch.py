@@ -1,14 +1,19 @@
 """The command `launch`."""
 
+from __future__ import annotations
+
 import argparse
 import re
 import sys
 from collections.abc import Iterable, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import roslaunch
 from roslaunch.arg_dump import get_args
+from roslaunch.parent import ROSLaunchParent
+from roslaunch.pmon import ProcessListener
 
 from custom_ros_tools.config import load_config
 from custom_ros_tools.console.argument import Argument
@@ -32,7 +37,8 @@ def launch(
 ) -> int:
     """Runs an example, a world of your own or a launch file, until Ctrl-C; without a name, it lists the examples.
 
-    An argument that the launch file lacks is refused, with those that it has.
+    An argument that the launch file lacks is refused, with those that it has. The exit code is 1 if a node that the
+    launch file calls required has ended with an error.
 
     ROS stops a running simulator when another one of the same name starts, so that is refused. Either give the second a
     master of its own, or give both a namespace. Only `world.launch`, by which worlds of your own run, has a prefix for
@@ -80,8 +86,28 @@ def launch(
     except (InterfaceError, roslaunch.RLException) as error:
         print(f"launch: {error}", file=sys.stderr)
         return 2
+    parents: list[_Parent] = []
+    roslaunch.parent.ROSLaunchParent = partial(_Parent, parents)  # roslaunch itself returns 0 whatever happened
     roslaunch.main(sys.argv)
-    return 0
+    return int(any(parent.has_failed for parent in parents))
+
+
+class _Parent(ROSLaunchParent, ProcessListener):
+    """A launch that remembers whether a required node has ended with an error.
+
+    Args:
+        parents: It is appended to them.
+    """
+
+    def __init__(self, parents: list[_Parent], *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, process_listeners=[self], **options)
+        self.has_failed = False
+        parents.append(self)
+
+    def process_died(self, process_name: str, exit_code: int | None) -> None:
+        """Notes the end of a process by itself; its name is that of the node, and a number."""
+        required = {f"{node.namespace}{node.name}".strip("/") for node in self.config.nodes if node.required}
+        self.has_failed |= bool(exit_code) and process_name.rpartition("-")[0] in required
 
 
 def _controls_of(world: str, given: Iterable[str]) -> list[str]:

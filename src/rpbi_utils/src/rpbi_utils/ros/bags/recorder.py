@@ -286,9 +286,10 @@ def _sent(uri: str, node: str) -> dict[str, int]:
     proxy: Any = ServerProxy(uri, TimedTransport(_ANSWER_S))
     try:
         connections = proxy.getBusInfo(_CALLER)[2]
-        publishers = proxy.getBusStats(_CALLER)[2][0]
+        answer = proxy.getBusStats(_CALLER)
     except MASTER_FAILURES:
         return {}
+    publishers = answer[2][0] if len(answer) > 2 and answer[2] else []  # nodes in C++ leave empty lists out
     chosen = {each[0] for each in connections if each[1] == node and each[2] == _OUTBOUND}
     counts = {topic: sum(each[2] for each in sent if each[0] in chosen) for topic, _, sent, *_ in publishers}
     return {topic: count for topic, count in counts.items() if count}

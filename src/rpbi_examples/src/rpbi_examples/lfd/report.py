@@ -1,0 +1,193 @@
+"""Results of a session: where the box was left, summary.json, and pictures of demonstration, plan and execution."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyArrowPatch
+
+from custom_ros_tools.transforms import Array
+from rpbi_examples.motions import PlanarPose
+
+from .person import HALF_SIDE_M
+from .skill import Plan
+
+NEAR_M, NEAR_RAD = 0.03, math.radians(10.0)
+"""Distance and angle up to which the box counts as at its goal [m, rad]."""
+TIP, BOX, GOAL = "#1f5fb4", "#e67814", "#2ca02c"
+SHOWN_STYLE = {"color": TIP, "linestyle": "--", "linewidth": 1.5}
+KEYS = ("signal/x", "signal/y")
+SIZE, DPI = (15.0, 8.4), 100
+BESIDE = 0.025
+"""Width of labels beside a plot, as a share of the figure."""
+
+
+class BoxError(NamedTuple):
+    """Distance [m] and angle [rad] of a box from its goal."""
+
+    distance_m: float
+    angle_rad: float
+
+    @classmethod
+    def of(cls, position: Array, quat_xyzw: Array) -> BoxError:
+        """Returns those of a pose in the frame of the goal; a box that lies on its side is turned."""
+        return cls(float(np.linalg.norm(position)), 2.0 * math.acos(min(abs(float(quat_xyzw[3])), 1.0)))
+
+    @property
+    def is_at_goal(self) -> bool:
+        """Whether the box counts as at its goal."""
+        return self.distance_m <= NEAR_M and self.angle_rad <= NEAR_RAD
+
+    def __str__(self) -> str:
+        return f"{1000.0 * self.distance_m:.1f} mm and {math.degrees(self.angle_rad):.1f} deg from its goal"
+
+
+class Run(NamedTuple):
+    """A demonstration or an execution, in the person's frame.
+
+    Attributes:
+        episode: Number of its episode.
+        table: Rows by time [s] with tip/x, tip/y, box/x, box/y [m], box/yaw [rad], signal/x, signal/y [m/s].
+        error: Where the box was left.
+        plan: The plan, None for a demonstration.
+    """
+
+    episode: int
+    table: pd.DataFrame
+    error: BoxError
+    plan: Plan | None = None
+
+    def summary(self) -> dict[str, Any]:
+        """Returns what summary.json has of it."""
+        return {
+            "episode": self.episode,
+            "seconds": round(float(self.table.index[-1] - self.table.index[0]), 2),
+            "start": [round(float(self.table[f"tip/{axis}"].iloc[0]), 4) for axis in "xy"],
+            "box_error_m": round(self.error.distance_m, 4),
+            "box_error_deg": round(math.degrees(self.error.angle_rad), 2),
+            "at_goal": self.error.is_at_goal,
+        }
+
+
+def write_summary(path: Path, facts: dict[str, Any], shown: Sequence[Run], executed: Sequence[Run]) -> None:
+    """Writes summary.json."""
+    text = {
+        **facts,
+        "demonstrations": [run.summary() for run in shown],
+        "executions": [run.summary() for run in executed],
+        "at_goal": bool(executed) and all(run.error.is_at_goal for run in executed),
+    }
+    beside = path.with_name(f".{path.name}.part")
+    beside.write_text(json.dumps(text, indent=2) + "\n")
+    beside.replace(path)
+
+
+def draw_paths(figure: Figure, goal: PlanarPose, shown: Run, executed: Sequence[Run]) -> None:
+    """Draws the last demonstration and some executions as seen from above."""
+    left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+    _draw_run(left, goal, shown, f"demonstration: box {shown.error}")
+    for run in executed[:-1]:
+        right.plot(run.table["tip/x"], run.table["tip/y"], color="0.75", linewidth=0.8)
+    right.plot(shown.table["tip/x"], shown.table["tip/y"], label="demonstration", **SHOWN_STYLE)
+    _draw_run(right, goal, executed[-1], f"execution {len(executed)}: box {executed[-1].error}")
+
+
+def draw_pipeline(figure: Figure, goal: PlanarPose, shown: Run, executed: Run) -> None:
+    """Draws the way from the operator's signal to the executed plan, step by step."""
+    assert executed.plan is not None
+    plan, seconds = executed.plan, shown.table.index - shown.table.index[0]
+    grid = figure.subplots(2, 3)
+    signal, where, states = grid[0]
+    execution, planned, learned = grid[1]
+    for key, colour in zip(KEYS, (TIP, GOAL)):
+        signal.plot(seconds, shown.table[key], color=colour, label=f"{key[-1]}", drawstyle="steps-post")
+    signal.set(title="1  operator: signal h", xlabel="time [s]", ylabel="velocity [m/s]")
+    _draw_run(where, goal, shown, "2  demonstration: tip u and box x")
+    for key, colour in (("tip/x", TIP), ("tip/y", GOAL), ("box/x", BOX), ("box/y", "#8c564b")):
+        states.plot(seconds, shown.table[key], color=colour, label=key)
+    states.set(title=f"3  rosbag to DataFrame: {len(shown.table)} rows", xlabel="time [s]", ylabel="[m]")
+    moved_s = plan.times - plan.push_s + _push_begins(shown, plan)
+    for axis, colour in zip("xy", (TIP, GOAL)):
+        learned.plot(
+            seconds, shown.table[f"tip/{axis}"], color=colour, alpha=0.35, linewidth=4.0, label=f"shown {axis}"
+        )
+        learned.plot(moved_s, plan.places[:, "xy".index(axis)], color=colour, label=f"DMP {axis}")
+    learned.axvline(moved_s[0] + plan.push_s, color="0.5", linewidth=1.0, linestyle=":")
+    learned.set(title="4  learned: approach | push", xlabel="time [s]", ylabel="[m]")
+    planned.plot(shown.table["tip/x"], shown.table["tip/y"], label="demonstration", **SHOWN_STYLE)
+    _draw_plan(planned, plan)
+    _map(planned, goal, "5  plan from a random start")
+    _draw_run(execution, goal, executed, f"6  executed: box {executed.error}", with_plan=False)
+    for axes in (signal, states, learned):
+        axes.grid(alpha=0.3)
+    for axes in grid.flat:
+        axes.legend(fontsize=7, loc="best")
+    figure.get_layout_engine().set(w_pad=0.25, h_pad=0.12)
+    figure.draw_without_rendering()
+    for begin, end in ((signal, where), (where, states), (states, learned), (learned, planned), (planned, execution)):
+        _arrow(figure, begin, end)
+
+
+def _push_begins(shown: Run, plan: Plan) -> float:
+    """Returns the time of the demonstration at which the tip first was where the plan's push begins [s]."""
+    place, _ = plan.at(plan.push_s)
+    tip = shown.table[["tip/x", "tip/y"]].to_numpy()
+    return float((shown.table.index - shown.table.index[0])[int(np.argmin(np.linalg.norm(tip - place, axis=1)))])
+
+
+def _draw_run(axes: Axes, goal: PlanarPose, run: Run, title: str, with_plan: bool = True) -> None:
+    table = run.table
+    boxes = [PlanarPose(*row) for row in table[["box/x", "box/y", "box/yaw"]].dropna().to_numpy()]
+    for pose, style in ((boxes[0], ":"), (boxes[-1], "-")):
+        axes.plot(*_outline(pose).T, color=BOX, linestyle=style, label="box at start" if style == ":" else "box at end")
+    axes.plot([box.x for box in boxes], [box.y for box in boxes], color=BOX, linewidth=0.8)
+    if run.plan is not None and with_plan:
+        _draw_plan(axes, run.plan)
+    axes.plot(table["tip/x"], table["tip/y"], color=TIP if run.plan is None else "#d62728", linewidth=1.2, label="tip")
+    axes.plot(table["tip/x"].iloc[:1], table["tip/y"].iloc[:1], "o", color="#222222", markersize=5, label="start")
+    _map(axes, goal, title)
+    axes.legend(fontsize=8, loc="lower left")
+
+
+def _draw_plan(axes: Axes, plan: Plan) -> None:
+    is_push = plan.times >= plan.push_s
+    axes.plot(*plan.places[~is_push].T, color="#9467bd", linewidth=2.5, alpha=0.6, label="planned approach")
+    axes.plot(*plan.places[is_push].T, color="0.4", linewidth=2.5, alpha=0.5, label="planned push")
+
+
+def _map(axes: Axes, goal: PlanarPose, title: str) -> None:
+    axes.fill(*_outline(goal).T, color=GOAL, alpha=0.2, label="goal")
+    axes.set(xlabel="x, to the right [m]", ylabel="y, away from the person [m]", aspect="equal")
+    axes.set_title(title, fontsize=10)
+    axes.grid(alpha=0.3)
+
+
+def _outline(box: PlanarPose) -> Array:
+    """Returns the corners of a box, shape (5, 2) [m]."""
+    corners = HALF_SIDE_M * np.array([(1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1)])
+    cos, sin = math.cos(box.yaw), math.sin(box.yaw)
+    return np.asarray(corners @ np.array([[cos, sin], [-sin, cos]]) + (box.x, box.y))
+
+
+def _arrow(figure: Figure, begin: Axes, end: Axes) -> None:
+    """Draws an arrow between the middles of two neighbours, once the layout has placed them."""
+    one, other = begin.get_position(), end.get_position()
+    x, y = (one.x0 + 3.0 * one.x1) / 4.0, (one.y0 + one.y1) / 2.0
+    if abs(one.y0 - other.y0) > 0.1:
+        tail, head = (x, one.y0 - BESIDE), (x, other.y1 + BESIDE)
+    elif one.x0 < other.x0:
+        tail, head = (one.x1 + BESIDE / 4.0, y), (other.x0 - 2.0 * BESIDE, y)
+    else:
+        tail, head = (one.x0 - 2.0 * BESIDE, y), (other.x1 + BESIDE / 4.0, y)
+    arrow = FancyArrowPatch(
+        tail, head, transform=figure.transFigure, arrowstyle="simple", mutation_scale=22, color="0.3"
+    )
+    figure.add_artist(arrow)

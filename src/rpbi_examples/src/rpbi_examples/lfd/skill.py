@@ -1,0 +1,116 @@
+"""The skill that is learned: to get behind a box from anywhere, and to push it as was shown."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.transforms import Array
+from motion_primitives import Demonstration, Primitive, Trajectory, make_primitive
+
+NAMES = ("x", "y")
+MOVED_M = 0.002
+"""Distance from the first and the last place within which the tip counts as standing [m]."""
+GAP_M = 0.025
+"""Distance of the tip from its first contact where the approach ends and the push begins [m]."""
+MIN_BASES, MAX_BASES, BASES_PER_S = 30, 1000, 20.0
+"""Number of basis functions of a primitive: limits, and for each second, since a push with its corners is long."""
+ALPHA_PER_S = 25.0
+"""Damping of a primitive for each second, so that it follows the demonstration as closely however long that is."""
+
+
+class Shown(NamedTuple):
+    """A demonstration as the tip's path, in the person's frame.
+
+    Attributes:
+        times: m times [s].
+        places: m places, shape (m, 2) [m].
+        contact_s: Time of the first contact with the box, None if there was none [s].
+    """
+
+    times: Array
+    places: Array
+    contact_s: float | None
+
+    def moving(self) -> Shown:
+        """Returns it without the time before the tip moves and after it has moved."""
+        off = [np.linalg.norm(self.places - self.places[index], axis=1) > MOVED_M for index in (0, -1)]
+        if not off[0].any():
+            raise InterfaceError("the tip has not moved: there is nothing to learn")
+        first, last = int(np.argmax(off[0])), len(self.times) - int(np.argmax(off[1][::-1]))
+        kept = slice(max(first - 1, 0), last + 1)
+        return Shown(self.times[kept], self.places[kept], self.contact_s)
+
+
+class Plan(NamedTuple):
+    """A planned motion from a start.
+
+    Attributes:
+        times: m times [s] from 0 on.
+        places: m places, shape (m, 2) [m].
+        velocities: m velocities, shape (m, 2) [m/s].
+        push_s: Time at which the push begins [s].
+    """
+
+    times: Array
+    places: Array
+    velocities: Array
+    push_s: float
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the last place [s]."""
+        return float(self.times[-1])
+
+    def at(self, time_s: float) -> tuple[Array, Array]:
+        """Returns place [m] and velocity [m/s] at a time [s]; after the end, it is there at rest."""
+        place, velocity = (
+            np.array([np.interp(time_s, self.times, column) for column in rows.T])
+            for rows in (self.places, self.velocities)
+        )
+        return place, velocity if 0.0 <= time_s < self.duration_s else np.zeros(2)
+
+
+class PushSkill:
+    """Two primitives, of the demonstration before the tip reaches the box and from there on.
+
+    A push only does the same again if it touches the box where it was shown. The approach therefore has any start, and
+    ends just before the demonstrated contact; the push begins there, whatever the start was.
+
+    Raises:
+        InterfaceError: If the demonstration does not suffice.
+    """
+
+    def __init__(self, shown: Shown) -> None:
+        if shown.contact_s is None:
+            raise InterfaceError("the box was not touched: there is nothing to learn")
+        contact_s, shown = shown.contact_s, shown.moving()
+        contact = np.array([np.interp(contact_s, shown.times, column) for column in shown.places.T])
+        near = np.linalg.norm(shown.places - contact, axis=1) <= GAP_M
+        split = int(np.argmax(near))
+        if not near.any() or split == 0:
+            raise InterfaceError(
+                f"the tip was at the box from the start: begin at least {GAP_M * 100:g} cm away from it"
+            )
+        self._approach = _learned(shown.times[: split + 1], shown.places[: split + 1])
+        self._push = _learned(shown.times[split:], shown.places[split:])
+
+    def plan(self, start: Array) -> Plan:
+        """Returns the motion from a start [m]: the approach, and the push as it was shown."""
+        approach, push = self._approach.plan(start=start), self._push.plan()
+        parts: tuple[Trajectory, Trajectory] = approach, push
+        times = np.concatenate([approach.times, approach.duration_s + push.times[1:]])
+        places, velocities = (
+            np.vstack([rows[0], rows[1][1:]])
+            for rows in ([each.positions for each in parts], [each.velocities for each in parts])
+        )
+        return Plan(times, places, velocities, approach.duration_s)
+
+
+def _learned(times: Array, places: Array) -> Primitive:
+    shown = Demonstration.of(times, places, names=NAMES)
+    bases = min(max(MIN_BASES, round(BASES_PER_S * shown.duration_s)), MAX_BASES)
+    options = {"bases": bases, "alpha": ALPHA_PER_S * max(shown.duration_s, 1.0)}
+    return make_primitive("dmp", options).learn(shown)

@@ -1,0 +1,1 @@
+"""Nodes of `lfd.launch`: the lesson, and the scripted person."""

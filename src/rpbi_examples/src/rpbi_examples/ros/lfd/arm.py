@@ -1,0 +1,153 @@
+"""The arm of the lesson: goes to places, follows the teleoperated frame, and follows plans."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import rospy
+from custom_srvs.srv import SetTransform
+from geometry_msgs.msg import Pose, TransformStamped
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import SetBool
+from teleop.srv import GetBoxLimits
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.services import call_service, get_srv_handler
+from custom_ros_tools.ros.tf_interface import TfInterface
+from custom_ros_tools.ros.transform_messages import as_pose, transform_message
+from custom_ros_tools.transforms import Array, pose_of
+from ik_ros.msg import IKProblem
+from ik_ros.srv import SolveIK, SolveIKResponse
+from ros_pybullet_interface.srv import ResetJointState
+from rpbi_examples.lfd.skill import Plan
+from rpbi_examples.motions import PlanarPose
+
+ORIGIN, TARGET, TARGET_TIP, TIP = (
+    "rpbi/teleop_origin",
+    "rpbi/teleop_target",
+    "rpbi/teleop_tip",
+    "rpbi/kuka_lwr/end_effector_ball",
+)
+BASE = "rpbi/kuka_lwr/lwr_arm_0_link"
+HOME = {"lwr_arm_1_joint": 0.2, "lwr_arm_3_joint": -1.6, "lwr_arm_5_joint": 1.35}
+"""Posture above the box [rad]; other joints at 0."""
+HOME_S, START_S = 2.0, 1.0
+"""Time to get there, and from there to a start [s]."""
+SIGNAL_HZ = 50.0
+RETURN_RATE = 3.0
+"""Speed towards the plan for each metre of the target beside it [1/s]."""
+BEYOND_M = 0.02
+"""Length by which a plan may leave the limits of teleoperation, where the target stops [m]."""
+END_S = 0.5
+"""Time for which the last place is kept [s]."""
+
+
+class Arm:
+    """The arm; places are x and y in the person's frame [m].
+
+    Args:
+        tf: TF.
+        solver: Name of the solver of `ik_ros`.
+    """
+
+    def __init__(self, tf: TfInterface, solver: str) -> None:
+        self._tf, self._solver = tf, solver
+        self._toggles = (f"ik/setup/{solver}/toggle", f"ik/solver/{solver}/toggle", "toggle_teleop_tf")
+        self._follows_person = False
+        self._signal = rospy.Publisher("operator_node/signal", Float64MultiArray, queue_size=10)
+        limits = get_srv_handler("teleop_box_limits", GetBoxLimits)()
+        self._limits = np.array([limits.xlim, limits.ylim])
+
+    def home(self) -> None:
+        """Raises the tip, so that it is nowhere near the box; the arm follows nothing afterwards."""
+        self._switch(False)
+        self._move(JointState(name=list(HOME), position=list(HOME.values())), HOME_S)
+
+    def go_to(self, place: Array) -> None:
+        """Moves the tip down to a place, from home, and follows the person from there.
+
+        Raises:
+            InterfaceError: If the place is out of reach.
+        """
+        self._move(self._solution(place).solution, START_S)
+        call_service("reset_teleop_transform", SetTransform, transform_message((*place, 0.0), (0.0, 0.0, 0.0)))
+        self._switch(True)
+
+    def require_reach(self, place: Array, subject: str) -> None:
+        """Checks that the tip reaches a place.
+
+        Raises:
+            InterfaceError: If it does not; the message begins with the subject.
+        """
+        answer = self._solution(place, required=False)
+        if not answer.success:
+            raise InterfaceError(f"{subject} is out of reach: {answer.message}")
+
+    def require_plan(self, plan: Plan) -> None:
+        """Checks that the target may move along a plan.
+
+        Raises:
+            InterfaceError: If it leaves the limits of teleoperation.
+        """
+        for axis, (lower, upper), column in zip("xy", self._limits, plan.places.T):
+            if column.min() < lower - BEYOND_M or column.max() > upper + BEYOND_M:
+                got = f"{column.min():.3f} to {column.max():.3f}"
+                raise InterfaceError(
+                    f"the plan leaves the limits of teleoperation: {axis} from {lower:g} to {upper:g} m, got {got}"
+                )
+
+    def follow(self, plan: Plan) -> None:
+        """Moves the target along a plan by velocities, as a person does, and returns at its end."""
+        call_service("operator_node/toggle", SetBool, False)  # the person does not steer meanwhile
+        try:
+            begin, rate = rospy.Time.now(), rospy.Rate(SIGNAL_HZ)
+            while (passed_s := (rospy.Time.now() - begin).to_sec()) < plan.duration_s + END_S:
+                velocity = plan.at(passed_s)[1]
+                message = self._tf.get_tf_msg(ORIGIN, TARGET)
+                if message is not None and message.header.stamp > begin:
+                    planned = plan.at((message.header.stamp - begin).to_sec())[0]
+                    there = message.transform.translation
+                    velocity = velocity + RETURN_RATE * (planned - (there.x, there.y))
+                self._signal.publish(Float64MultiArray(data=[*velocity.tolist(), 0.0]))
+                rate.sleep()
+            self._signal.publish(Float64MultiArray(data=[0.0, 0.0, 0.0]))
+        finally:
+            call_service("operator_node/toggle", SetBool, True)
+
+    def _switch(self, on: bool) -> None:
+        """Switches on or off that the arm follows the person."""
+        if on != self._follows_person:
+            for toggle in self._toggles:
+                call_service(toggle, SetBool, on)
+        self._follows_person = on
+
+    def _move(self, state: JointState, duration_s: float) -> None:
+        call_service("rpbi/kuka_lwr/move_to_joint_state", ResetJointState, state, duration_s)
+
+    def _solution(self, place: Array, required: bool = True) -> SolveIKResponse:
+        start = JointState(name=list(HOME), position=list(HOME.values()))
+        problem = IKProblem(has_target=True, target=self._tip_pose(place), start=start)
+        call = call_service if required else (lambda name, kind, ask: get_srv_handler(name, kind)(ask))
+        return call(f"ik/solver/{self._solver}/solve_ik", SolveIK, problem)
+
+    def _tip_pose(self, place: Array) -> Pose:
+        """Returns the pose of the tip at a place, in the arm's base."""
+        origin, tip = (
+            TfInterface.msg_to_matrix(self._tf.wait_for_tf_msg(*frames))
+            for frames in ((BASE, ORIGIN), (TARGET, TARGET_TIP))
+        )
+        return as_pose(TfInterface.pack_tf(*pose_of(origin @ TfInterface.pos_quat_to_matrix((*place, 0.0)) @ tip)))
+
+
+def planar(message: TransformStamped) -> PlanarPose:
+    """Returns the pose of a transform on the floor."""
+    place, quat = TfInterface.msg_to_pos_quat(message)
+    return PlanarPose(float(place[0]), float(place[1]), yaw_of(quat))
+
+
+def yaw_of(quat_xyzw: Array) -> float:
+    """Returns the direction of the x axis about the vertical [rad]."""
+    x, y, z, w = quat_xyzw
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
