@@ -162,7 +162,7 @@ def test_bad_episodes_are_named_and_the_others_exported(tmp_path, run):
     assert f"episode 0: {bag}: has no index" in text
     assert "episode 2: " in text and "no messages for 'action', which other episodes have" in text
     assert f"episode 3: {folder.folder_of(3) / 'episode.yaml'}: cannot be read" in text
-    assert "2 episodes are in " in text
+    assert "out has 2 episodes" in text
     with h5py.File(tmp_path / "out/dataset.hdf5") as file:
         assert list(file["data"]) == ["demo_0", "demo_1"]
     assert run("check_dataset", tmp_path / "out")[0] == 0
@@ -189,11 +189,15 @@ def test_a_full_disk_is_named_and_what_is_complete_is_kept(demos, tmp_path, run,
     folder = EpisodeFolder(tmp_path / "demos")
     for seconds in (0.6, 20.0, 0.6):
         write_episode(folder, seconds=seconds)
-    file_limit(120_000)
+    file_limit(350_000)
     code, text = run("export", folder.path, "--out", tmp_path / "out", "--option", "preset=ultrafast", "crf=0")
     assert code == 1
     assert "episode 1: " in text and "File too large" in text and "episodes 2 are not exported" in text
-    assert "1 episodes are in " in text
+    assert " has 1 episode\n" in text
+    file_limit(1_000_000)
+    code, text = run("export", folder.path, "--to", "robomimic", "--out", tmp_path / "small")
+    assert code == 1 and "episode 1: [Errno 27] File too large" in text and " has 1 episode\n" in text
+    shutil.rmtree(tmp_path / "small")
     file_limit(1_000)
     code, text = run("export", folder.path, "--to", "mcap", "--out", tmp_path / "none")
     assert code == 1 and "File too large" in text

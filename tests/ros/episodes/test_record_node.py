@@ -37,9 +37,10 @@ def _run(name: str, *words: str | Path) -> tuple[int, str]:
     return code, out.getvalue()
 
 
-def _recorder_pid() -> int:
-    found = subprocess.run(["pgrep", "-f", "rosbag/record.*episode.bag"], capture_output=True, text=True).stdout.split()
-    return int(found[0])
+def _recorder_pid(folder: EpisodeFolder) -> int:
+    """Returns the process that records into a folder; other runs of this test have recorders too."""
+    pattern = f"rosbag/record.*{folder.path}/.*episode.bag"
+    return int(subprocess.run(["pgrep", "-f", pattern], capture_output=True, text=True).stdout.split()[0])
 
 
 class _Session:
@@ -94,7 +95,7 @@ def test_episodes_are_recorded_listed_verified_and_a_changed_file_is_named(ros: 
     _answer(session.call("start"))
     session.move(0.5)
     wait_until(lambda: session.now()["messages"] > 100, "the counters have been read")
-    os.kill(_recorder_pid(), signal.SIGKILL)
+    os.kill(_recorder_pid(folder), signal.SIGKILL)
     wait_until(lambda: folder.numbers() == [0, 2], "what is left is repaired")
 
     first, third = folder.all()
@@ -153,7 +154,7 @@ def test_with_resets_by_a_button_and_a_changed_urdf(ros: Any, tmp_path: Path) ->
 def test_the_node_repairs_what_it_finds_and_a_full_disk_is_named(ros: Any, tmp_path: Path) -> None:
     session = _Session(ros, tmp_path)
     session.move(0.2)
-    recorder = _recorder_pid()
+    recorder = _recorder_pid(session.folder)
     session.node.kill()
     os.kill(recorder, signal.SIGKILL)
     session.node.wait()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -124,6 +126,12 @@ class ExportedEpisode(ABC):
         Args:
             image_stamps: Times of the images of each camera, shape (n,) [s].
         """
+
+
+def require_room(folder: Path, size: int) -> None:
+    """Raises an OSError if there is no room for so many bytes in a folder, by asking for it."""
+    with tempfile.TemporaryFile(dir=folder) as file:
+        os.posix_fallocate(file.fileno(), 0, size)
 
 
 class DatasetFormat(ABC):

@@ -29,7 +29,7 @@ COARSE = 8
 _BRIGHTNESS = (0.299, 0.587, 0.114)
 """Shares of red, green and blue, as codecs have them; compression keeps brightness better than colours."""
 _STRIDE = 2
-"""Of the pixels of an image, one in this many rows and columns counts for its coarse image."""
+"""Distance of the rows and columns of pixels that count for a coarse image."""
 
 
 def file_digest(path: Path) -> str:

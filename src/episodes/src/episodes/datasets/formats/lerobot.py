@@ -14,7 +14,7 @@ from pydantic import Field
 
 from custom_ros_tools.errors import MissingDependency
 from custom_ros_tools.schema import ConfigModel
-from episodes.datasets.format import Array, Camera, DatasetFormat, ExportedEpisode, Schema
+from episodes.datasets.format import Array, Camera, DatasetFormat, ExportedEpisode, Schema, require_room
 from episodes.datasets.layouts import lerobot as layout
 from episodes.datasets.provenance import checksums, coarse
 from episodes.datasets.statistics import ImageStatistics, pooled, statistics
@@ -27,6 +27,8 @@ except ImportError:
 
 MAX_DATA_BYTES = 100_000_000
 """Size of the rows in memory beyond which a data file is written [bytes]."""
+ROOM_BYTES = 200_000
+"""Room on the disk beside that of the rows, for metadata [bytes]."""
 PRESETS = {"h264": "veryfast", "av1": "12"}
 """Presets that encode two cameras of 640 x 480 faster than real time on one core."""
 CRF = {"h264": 23, "av1": 30}
@@ -123,6 +125,8 @@ class LeRobot(DatasetFormat):
                 undo.callback(path.unlink, missing_ok=True)
             films = {each.key: self._write_video(paths[each.key], each, episode) for each in self._schema.cameras}
             values = episode.values({key: film.stamps for key, film in films.items()})
+            rows = sum(each.nbytes for each in (*self._pending, *values.values()))
+            require_room(self._folder, 2 * rows + ROOM_BYTES)  # for the rows, which are written later
             undo.pop_all()
         return films, values
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -13,12 +14,24 @@ from PIL import Image
 from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel
-from episodes.datasets.format import ACTION, Array, Camera, DatasetError, DatasetFormat, ExportedEpisode, Schema
+from episodes.datasets.format import (
+    ACTION,
+    Array,
+    Camera,
+    DatasetError,
+    DatasetFormat,
+    ExportedEpisode,
+    Schema,
+    require_room,
+)
 from episodes.datasets.layouts.robomimic import ACTIONS, FILE, observation_key, scaled
 from episodes.datasets.provenance import checksums, frame_checksums
 
 SUCCESS = "success"
 """Label of episodes whose last row has the reward 1, and filter of them in `mask`."""
+
+ROOM_BYTES = 100_000
+"""Room on the disk beside that of the numbers of an episode [bytes]."""
 
 
 class RobomimicConfig(ConfigModel):
@@ -39,26 +52,44 @@ class Robomimic(DatasetFormat):
         assert schema is not None
         if all(each.key != ACTION for each in schema.features):
             raise DatasetError(folder, f"expected a feature '{ACTION}', found none")
-        self._schema = schema
+        self._folder, self._schema = folder, schema
         self._file = h5py.File(folder / FILE, "w")
         self._data = self._file.create_group("data")
         self._success: list[str] = []
         self._total = 0
 
     def add(self, index: int, episode: ExportedEpisode) -> dict[str, Any]:
-        """Writes an episode."""
+        """Writes an episode, after all of it has been read and there is room for it on the disk."""
+        stamps: dict[str, Array] = {}
+        observations: dict[str, Array] = {}
+        for camera in self._schema.cameras:
+            images, stamps[camera.key] = self._images(camera, episode)
+            observations[observation_key(camera.key)] = images
+        values = episode.values(stamps)
+        observations |= {observation_key(key): each for key, each in values.items() if key != ACTION}
+        size = 2 * sum(each.nbytes for each in observations.values())
+        require_room(self._folder, size + ROOM_BYTES)  # HDF5 itself crashes when the disk is full
         name = f"demo_{index}"
         demo = self._data.create_group(name)
         try:
-            facts = self._fill(demo, episode)
+            self._fill(demo, episode, values[ACTION], observations)
             self._file.flush()
+        except RuntimeError as error:
+            raise OSError(errno.EIO, f"{FILE} cannot be written: {' '.join(str(error).split())}") from error
         except BaseException:
             del self._data[name]
             raise
         self._total += len(episode.times)
         if episode.label == self.config.success:
             self._success.append(name)
-        return facts
+        columns = {
+            each.key: {"names": list(each.names), "checksums": checksums(values[each.key])}
+            for each in self._schema.features
+            if each.key != ACTION  # which is scaled by the values of all episodes
+        }
+        crcs = {key: frame_checksums(observations[observation_key(key)]) for key in stamps}
+        count = len(episode.times)
+        return {"frames": count, "fps": self._schema.fps, "columns": columns, "frame_checksums": crcs}
 
     def close(self) -> None:
         """Scales all actions, and writes the facts on the whole data set."""
@@ -81,30 +112,18 @@ class Robomimic(DatasetFormat):
             self._file["mask/success"] = np.array(self._success, dtype="S")
         self._file.close()
 
-    def _fill(self, demo: h5py.Group, episode: ExportedEpisode) -> dict[str, Any]:
-        count = len(episode.times)
-        stamps: dict[str, Array] = {}
-        for camera in self._schema.cameras:
-            images, stamps[camera.key] = self._images(camera, episode)
-            _put_observation(demo, observation_key(camera.key), images)
-        values = episode.values(stamps)
-        for feature in self._schema.features:
-            if feature.key == ACTION:
-                demo[ACTIONS] = values[ACTION]
-            else:
-                _put_observation(demo, observation_key(feature.key), values[feature.key])
+    def _fill(
+        self, demo: h5py.Group, episode: ExportedEpisode, actions: Array, observations: Mapping[str, Array]
+    ) -> None:
+        count = len(actions)
+        demo[ACTIONS] = actions
+        for key, values in observations.items():
+            _put_observation(demo, key, values)
         last = np.arange(count) == count - 1
         demo["rewards"] = (last & (episode.label == self.config.success)).astype(np.float32)
         demo["dones"] = last.astype(np.int64)
         demo.attrs["num_samples"] = count
         demo.attrs["task"], demo.attrs["label"] = episode.task, episode.label
-        columns = {
-            each.key: {"names": list(each.names), "checksums": checksums(values[each.key])}
-            for each in self._schema.features
-            if each.key != ACTION  # which is scaled by the values of all episodes
-        }
-        crcs = {each.key: frame_checksums(demo[f"obs/{observation_key(each.key)}"]) for each in self._schema.cameras}
-        return {"frames": count, "fps": self._schema.fps, "columns": columns, "frame_checksums": crcs}
 
     def _images(self, camera: Camera, episode: ExportedEpisode) -> tuple[Array, Array]:
         size = (self.config.image_width, self.config.image_height)

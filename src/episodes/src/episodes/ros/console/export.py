@@ -63,7 +63,8 @@ def export(
     result = export_folder(EpisodeFolder(folder), target, to, format_, wish, lambda line: print(line, flush=True))
     for fault in result.faults:
         print(fault)
-    print(f"{len(result.exported)} episodes are in {target}")
+    count = len(result.exported)
+    print(f"{target} has {count} episode{'s' * (count != 1)}")
     return 1 if result.faults else 0
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import shutil
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -17,6 +17,7 @@ from episodes.datasets.format import (
     STAMP_NAMES,
     STATE,
     TIME_ERROR,
+    Camera,
     DatasetError,
     DatasetFormat,
     Feature,
@@ -63,6 +64,20 @@ class Result:
     faults: list[str] = field(default_factory=list)
 
 
+class _Plan(NamedTuple):
+    """Episodes to export, and the content of their rows.
+
+    Attributes:
+        sources: The episodes.
+        signals: Features and their topics; empty for a format without rows.
+        schema: Content of the rows; None for a format without rows.
+    """
+
+    sources: list[SourceEpisode]
+    signals: tuple[Signal, ...] = ()
+    schema: Schema | None = None
+
+
 def export_folder(
     folder: EpisodeFolder, target: Path, name: str, format_: DatasetFormat, wish: Wish, report: Callable[[str], None]
 ) -> Result:
@@ -85,27 +100,25 @@ def export_folder(
     if target.exists():
         raise DatasetError(target, "exists already: name a folder that does not")
     result = Result()
-    sources, signals, schema = _plan(folder, format_, wish, result)
+    plan = _plan(folder, format_, wish, result)
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.parent / f".{target.name}.part"
     shutil.rmtree(part, ignore_errors=True)  # of an export that was killed
     part.mkdir()
     try:
-        format_.open(part, schema)
-        _add_all(part, format_, sources, signals, schema, wish, result, report)
+        format_.open(part, plan.schema)
+        _add_all(part, format_, plan, wish.disk_reserve_mb, result, report)
         if not result.exported:
             raise EpisodeError(folder.path, "\n".join(["no episode was exported", *result.faults]))
         format_.close()
-        write_export(part, _facts(folder, name, wish, schema, signals, result))
+        write_export(part, _facts(folder, name, wish, plan, result))
         part.rename(target)
     finally:
         shutil.rmtree(part, ignore_errors=True)
     return result
 
 
-def _plan(
-    folder: EpisodeFolder, format_: DatasetFormat, wish: Wish, result: Result
-) -> tuple[list[SourceEpisode], tuple[Signal, ...], Schema | None]:
+def _plan(folder: EpisodeFolder, format_: DatasetFormat, wish: Wish, result: Result) -> _Plan:
     """Returns the episodes to export, and the features that most of them have."""
     sources = []
     for number in folder.numbers():
@@ -125,18 +138,22 @@ def _plan(
         wanted = f" with the label {' or '.join(wish.labels)}" if wish.labels else ""
         raise EpisodeError(folder.path, "\n".join([f"no episode{wanted} can be exported", *result.faults]))
     if not format_.has_rows:
-        return sources, (), None
-    features = Counter((tuple(signal.feature for signal in each.signals), each.cameras) for each in sources)
-    (_, cameras), _ = features.most_common(1)[0]
-    best = features.most_common(1)[0][0]
-    signals = next(each.signals for each in sources if (tuple(s.feature for s in each.signals), each.cameras) == best)
-    keys = {signal.feature.key for signal in signals}
+        return _Plan(sources)
+    most, _ = Counter(map(_content, sources)).most_common(1)[0]
+    signals = next(each.signals for each in sources if _content(each) == most)
+    features, cameras = most
+    keys = {feature.key for feature in features}
     for key, option in ((STATE, "--state"), (ACTION, "--action")):
         if key not in keys:
             raise EpisodeError(folder.path, f"no topic for '{key}' in the recordings: name one by {option} TOPIC")
-    errors = (*(signal.feature.key for signal in signals), *(camera.key for camera in cameras))
+    errors = (*(feature.key for feature in features), *(camera.key for camera in cameras))
     own = (Feature(STAMP, STAMP_NAMES, "int64"), Feature(TIME_ERROR, errors))
-    return sources, signals, Schema(wish.fps, (*(signal.feature for signal in signals), *own), cameras)
+    return _Plan(sources, signals, Schema(wish.fps, (*features, *own), cameras))
+
+
+def _content(source: SourceEpisode) -> tuple[tuple[Feature, ...], tuple[Camera, ...]]:
+    """Returns the features and cameras of an episode."""
+    return tuple(signal.feature for signal in source.signals), source.cameras
 
 
 def _require_complete(folder: EpisodeFolder, episode: Episode) -> None:
@@ -150,31 +167,29 @@ def _require_complete(folder: EpisodeFolder, episode: Episode) -> None:
 def _add_all(
     part: Path,
     format_: DatasetFormat,
-    sources: Sequence[SourceEpisode],
-    signals: Sequence[Signal],
-    schema: Schema | None,
-    wish: Wish,
+    plan: _Plan,
+    disk_reserve_mb: float,
     result: Result,
     report: Callable[[str], None],
 ) -> None:
     """Adds episodes until the disk is full."""
     place = EpisodeFolder(part)
-    for position, source in enumerate(sources):
+    for position, source in enumerate(plan.sources):
         number, index = source.episode.number, len(result.exported)
-        if (free := place.free_mb()) < wish.disk_reserve_mb:
-            left = ", ".join(str(each.episode.number) for each in sources[position:])
-            full = f"{free:.0f} MB free on the disk, less than the reserve of {wish.disk_reserve_mb:.0f} MB"
+        if (free := place.free_mb()) < disk_reserve_mb:
+            left = ", ".join(str(each.episode.number) for each in plan.sources[position:])
+            full = f"{free:.0f} MB free on the disk, less than the reserve of {disk_reserve_mb:.0f} MB"
             result.faults.append(f"{full}: episodes {left} are not exported")
             return
         try:
-            if schema is not None:
-                source.use(schema, signals)
+            if plan.schema is not None:
+                source.use(plan.schema, plan.signals)
             facts = source.facts()
             facts |= format_.add(index, source)
         except (InterfaceError, OSError, ValueError) as error:
             result.faults.append(_fault(number, error))
             if getattr(error, "errno", None) in DISK_FULL:
-                left = ", ".join(str(each.episode.number) for each in sources[position + 1 :])
+                left = ", ".join(str(each.episode.number) for each in plan.sources[position + 1 :])
                 result.faults += [f"episodes {left} are not exported"] if left else []
                 return
             continue
@@ -202,19 +217,17 @@ def _fault(number: int, error: Exception) -> str:
     return f"episode {number}: {'; '.join(str(error).splitlines())}"
 
 
-def _facts(
-    folder: EpisodeFolder, name: str, wish: Wish, schema: Schema | None, signals: Sequence[Signal], result: Result
-) -> dict[str, object]:
-    sources = {each.feature.key: sorted({table for table, _ in each.columns}) for each in signals}
+def _facts(folder: EpisodeFolder, name: str, wish: Wish, plan: _Plan, result: Result) -> dict[str, object]:
+    schema = plan.schema or Schema(0, ())
     return {
         "format": name,
         "source": str(folder.path.absolute()),
         "episodes": result.exported,
         "left_out": result.faults,
         "task": wish.task,
-        "fps": schema.fps if schema else None,
-        "features": {each.key: list(each.names) for each in schema.features} if schema else {},
-        "cameras": {each.key: [each.height, each.width, 3] for each in schema.cameras} if schema else {},
-        "topics": sources,
-        "methods": {each.feature.key: each.method for each in signals},
+        "fps": schema.fps or None,
+        "features": {each.key: list(each.names) for each in schema.features},
+        "cameras": {each.key: [each.height, each.width, 3] for each in schema.cameras},
+        "topics": {each.feature.key: sorted({table for table, _ in each.columns}) for each in plan.signals},
+        "methods": {each.feature.key: each.method for each in plan.signals},
     }
