@@ -133,6 +133,18 @@ def test_a_topic_that_nobody_publishes_yet_is_recorded_from_its_first_message(ro
     assert list(bag_to_dataframes(tmp_path / "a.bag")["/late"]["data"]) == [7.0]
 
 
+def test_messages_of_a_node_in_cpp_are_counted(ros: Any, tmp_path: Path) -> None:
+    """As of robot_state_publisher beside the Panda; roscpp has another answer than rospy."""
+    links = '<link name="a"/><link name="b"/>'
+    joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>'
+    rospy.set_param("/two_links/robot_description", f'<robot name="two">{links}{joint}</robot>')
+    ros.start(
+        ["rosrun", "robot_state_publisher", "robot_state_publisher", "__ns:=two_links", "/tf_static:=/two_links/tf"]
+    )
+    with Recorder(tmp_path / "cpp.bag", ["/two_links/tf"]) as recorder:
+        wait_until(lambda: recorder.published() == {"/two_links/tf": 1}, "it is counted", 30.0)
+
+
 def test_the_bag_before_is_replaced_and_nothing_else_is_left(ros: Any, tmp_path: Path) -> None:
     path = tmp_path / "a.bag"
     for topic in ("/first", "/second"):

@@ -19,7 +19,7 @@ try:
 except ImportError as error:
     raise MissingDependency(error.name or "trimesh", "./rpbi setup html") from None
 
-MAX_TRIANGLES = 16_000
+MAX_TRIANGLES = 18_000
 """Number of triangles of all meshes of a page; with more, all are simplified."""
 MIN_TRIANGLES = 200
 """Number of triangles below which no mesh is simplified."""

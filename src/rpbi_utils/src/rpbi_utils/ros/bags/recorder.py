@@ -291,5 +291,9 @@ def _sent(uri: str, node: str) -> dict[str, int]:
         return {}
     publishers = answer[2][0] if len(answer) > 2 and answer[2] else []  # nodes in C++ leave empty lists out
     chosen = {each[0] for each in connections if each[1] == node and each[2] == _OUTBOUND}
-    counts = {topic: sum(each[2] for each in sent if each[0] in chosen) for topic, _, sent, *_ in publishers}
+    if isinstance(answer[0], list):  # roscpp: without code and message, and with the count behind two sizes
+        publishers = [(topic, {each[0]: each[3] for each in sent}) for topic, sent in answer[0]]
+    else:
+        publishers = [(topic, {each[0]: each[2] for each in sent}) for topic, _, sent, *_ in answer[2][0]]
+    counts = {topic: sum(sent[each] for each in chosen & sent.keys()) for topic, sent in publishers}
     return {topic: count for topic, count in counts.items() if count}

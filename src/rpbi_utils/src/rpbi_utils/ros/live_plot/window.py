@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from PyQt5.QtCore import QPointF, QRectF, Qt, QTimer
 from PyQt5.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap, QPolygonF, QResizeEvent
-from PyQt5.QtWidgets import QHBoxLayout, QLabel, QMainWindow, QPushButton, QVBoxLayout, QWidget
+from PyQt5.QtWidgets import QHBoxLayout, QLabel, QMainWindow, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from rpbi_utils.live_plot.plot import Line, LivePlot, thinned, ticks
 
@@ -167,7 +167,8 @@ class LivePlotWindow(QMainWindow):
         self.plot, self._folder = plot, folder
         self.canvas = Canvas(plot, seconds)
         self._status = _named(QLabel(), "status")
-        self._message = _named(QLabel("Space: pause; C: clear; P: picture; D: data; + and -: time"), "message")
+        self._message = _named(QLabel("keys: Space, C, P, D, + and -"), "message")
+        self._message.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         buttons = QHBoxLayout()
         self._pause = self._button(buttons, "Pause", "Space", self._on_pause)
         self._button(buttons, "Clear", "C", self._on_clear)
