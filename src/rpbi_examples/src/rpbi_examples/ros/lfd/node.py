@@ -20,7 +20,6 @@ from std_srvs.srv import Trigger, TriggerResponse
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from custom_ros_tools.ros.services import call_service
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.ros.transform_messages import as_pose, transform_message
 from custom_ros_tools.transforms import Array
@@ -32,7 +31,7 @@ from rpbi_examples.ros.human_interaction import interrupt_roslaunch
 
 from .arm import ORIGIN, TARGET, TIP, Arm, planar
 from .box import GOAL, PushedBox
-from .recording import finish_episode
+from .recording import begin_episode, discard_episode, finish_episode
 
 DEMONSTRATING = "demonstrating"
 AFTER_FAILURE = {DEMONSTRATING: "home", "demonstrated": "missed", "learned": "missed", "executed": "missed"}
@@ -143,7 +142,7 @@ class Lesson:
     def _home(self) -> None:
         """Raises the arm, takes the box away and goes to the origin; a demonstration is discarded."""
         if self._name == DEMONSTRATING:
-            rospy.loginfo("discarded: %s", call_service("record/discard", Trigger).message)
+            rospy.loginfo("discarded: %s", discard_episode())
         self._become("moving")
         self._prepare(ORIGIN_PLACE)
         self._become("home")
@@ -222,7 +221,7 @@ class Lesson:
 
     def _begin_episode(self) -> None:
         self._box.drop()
-        rospy.loginfo(call_service("record/start", Trigger).message)
+        rospy.loginfo(begin_episode())
 
     # --- Results
 

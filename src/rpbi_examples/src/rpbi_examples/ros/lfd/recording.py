@@ -23,6 +23,20 @@ CONTACTS, SIGNAL = f"/rpbi/{NAME}/contacts", "/operator_node/signal"
 ROBOT = "kuka_lwr"
 
 
+def begin_episode() -> str:
+    """Begins an episode, and returns a sentence about it.
+
+    Raises:
+        InterfaceError: If the recorder cannot begin, for instance on a full disk.
+    """
+    return str(call_service("record/start", Trigger).message)
+
+
+def discard_episode() -> str:
+    """Discards the episode that is recorded, and returns where it is."""
+    return str(call_service("record/discard", Trigger).message)
+
+
 def finish_episode(out: Path, error: BoxError, plan: Plan | None = None) -> Run:
     """Ends the episode that is recorded, labels it, and writes its table below a folder.
 
