@@ -112,7 +112,10 @@ class TeleopTf:
             roll, pitch, yaw = rpy_of(quat_in(transform)).tolist()
             with self._lock:
                 self._teleop.reset(TeleopPose((x, y, z), (roll, pitch, yaw)))
-                self._broadcast()
+                if self._is_on or self._config.broadcast_always:  # otherwise no other follows soon
+                    self._broadcast_once_a_stamp()
+                else:
+                    self._broadcast()
         except ValueError as error:
             return False, f"transform refused: {error}"
         return True, "transform set"

@@ -18,7 +18,7 @@ from custom_ros_tools.transforms import Array
 from rpbi_examples.motions import PlanarPose
 
 from .person import HALF_SIDE_M
-from .skill import Plan
+from .skill import Plan, Shown
 
 NEAR_M, NEAR_RAD = 0.03, math.radians(10.0)
 """Distance and angle up to which the box counts as at its goal [m, rad]."""
@@ -55,7 +55,8 @@ class Run(NamedTuple):
 
     Attributes:
         episode: Number of its episode.
-        table: Rows by time [s] with tip/x, tip/y, box/x, box/y [m], box/yaw [rad], signal/x, signal/y [m/s].
+        table: Rows by time [s] with tip/x, tip/y, box/x, box/y [m], box/yaw [rad], contact [N],
+            signal/x, signal/y [m/s].
         error: Where the box was left.
         plan: The plan, None for a demonstration.
     """
@@ -64,6 +65,12 @@ class Run(NamedTuple):
     table: pd.DataFrame
     error: BoxError
     plan: Plan | None = None
+
+    def path(self) -> Shown:
+        """Returns the tip's path, and when the box was first touched."""
+        touched = self.table.index[self.table["contact"] > 0.0]
+        contact_s = float(touched[0]) if len(touched) else None
+        return Shown(self.table.index.to_numpy(), self.table[["tip/x", "tip/y"]].to_numpy(), contact_s)
 
     def summary(self) -> dict[str, Any]:
         """Returns what summary.json has of it."""

@@ -16,8 +16,8 @@ from custom_ros_tools.ros.tf_interface import TfInterface
 from rpbi_examples.lfd.person import Direction, Person
 
 from .arm import ORIGIN, TIP, planar
+from .box import FRAME, GOAL
 
-BOX, GOAL = "rpbi/pushing_box", "rpbi/goal"
 LOOK_HZ = 50.0
 NEXT_KEY = {
     "ready": "1",
@@ -137,7 +137,7 @@ def demonstrate(tf: TfInterface, person: Person, hold: Callable[[Direction | Non
     held: Direction | None = None
     rate = rospy.Rate(LOOK_HZ)
     while not person.is_done:
-        tip, box = (tf.wait_for_tf_msg(ORIGIN, frame) for frame in (TIP, BOX))
+        tip, box = (tf.wait_for_tf_msg(ORIGIN, frame) for frame in (TIP, FRAME))
         assert tip is not None and box is not None
         at = planar(tip)
         key = person.key(tip.header.stamp.to_sec(), (at.x, at.y), planar(box))

@@ -1,0 +1,83 @@
+"""Demonstrations and executions as episodes, and episodes as tables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from cob_srvs.srv import SetString
+from std_srvs.srv import Trigger
+
+from custom_ros_tools.ros.services import call_service
+from episodes import EpisodeFolder
+from episodes.folder import BAG
+from rpbi_examples.lfd.report import BoxError, Run
+from rpbi_examples.lfd.skill import Plan
+from rpbi_utils import bag_to_dataframes, transforms_between
+
+from .arm import ORIGIN, TIP, yaw_of
+from .box import FRAME, NAME
+
+CONTACTS, SIGNAL = f"/rpbi/{NAME}/contacts", "/operator_node/signal"
+ROBOT = "kuka_lwr"
+
+
+def begin_episode() -> str:
+    """Begins an episode, and returns a sentence about it.
+
+    Raises:
+        InterfaceError: If the recorder cannot begin, for instance on a full disk.
+    """
+    return str(call_service("record/start", Trigger).message)
+
+
+def discard_episode() -> str:
+    """Discards the episode that is recorded, and returns where it is."""
+    return str(call_service("record/discard", Trigger).message)
+
+
+def finish_episode(out: Path, error: BoxError, plan: Plan | None = None) -> Run:
+    """Ends the episode that is recorded, labels it, and writes its table below a folder.
+
+    Raises:
+        InterfaceError: If it cannot be ended or read.
+    """
+    call_service("record/stop", Trigger)
+    call_service("record/label", SetString, "success" if error.is_at_goal else "failure")
+    folder = EpisodeFolder(out / "episodes")
+    number = max(each.number for each in folder.all())
+    table = read_episode(folder.folder_of(number) / BAG)
+    path = out / "tables" / f"episode_{number:06d}"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    table.to_parquet(path.with_suffix(".parquet"), engine="fastparquet")
+    table.to_csv(path.with_suffix(".csv"), float_format="%.6g")
+    return Run(number, table, error, plan)
+
+
+def read_episode(bag: str | Path) -> pd.DataFrame:
+    """Returns tip, box, contact force [N] and signal of an episode in one table, at the times of the tip; see `Run`.
+
+    Raises:
+        InterfaceError: If the bag cannot be read, or has no tip or no box.
+    """
+    tables = bag_to_dataframes(bag)
+    tip, box = (transforms_between(tables, ORIGIN, frame) for frame in (TIP, FRAME))
+    yaw = [yaw_of(quat) for quat in box[[f"rotation/{each}" for each in "xyzw"]].to_numpy()]
+    parts = [_named(box, "box").assign(**{"box/yaw": np.unwrap(yaw)})]
+    if CONTACTS in tables:
+        contacts = tables[CONTACTS]
+        force = contacts["normal_force"].where(contacts["other_body"] == ROBOT, 0.0).groupby(level=0).max()
+        parts.append(force.rename("contact").to_frame())
+    if SIGNAL in tables:
+        parts.append(tables[SIGNAL][["data/0", "data/1"]].set_axis(["signal/x", "signal/y"], axis=1))
+    table = _named(tip, "tip")
+    for part in parts:
+        table = pd.merge_asof(table, part, left_index=True, right_index=True, direction="nearest")
+    return table.reindex(columns=[*table.columns, *({"contact", "signal/x", "signal/y"} - {*table.columns})]).fillna(
+        0.0
+    )
+
+
+def _named(poses: pd.DataFrame, name: str) -> pd.DataFrame:
+    return poses[["translation/x", "translation/y"]].set_axis([f"{name}/x", f"{name}/y"], axis=1)
