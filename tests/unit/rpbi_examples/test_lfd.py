@@ -15,7 +15,7 @@ from PIL import Image
 from custom_ros_tools.errors import InterfaceError
 from rpbi_examples.lfd.person import HALF_SIDE_M, TIP_RADIUS_M, Person
 from rpbi_examples.lfd.report import BoxError, Run, draw_paths, draw_pipeline, write_summary
-from rpbi_examples.lfd.skill import PushSkill, Shown
+from rpbi_examples.lfd.skill import PushSkill, ShownPush
 from rpbi_examples.motions import PlanarPose
 
 GOAL, START = PlanarPose(-0.15, 0.4, 0.0), (0.0, 0.25)
@@ -46,9 +46,9 @@ def demonstrated(seed: int, is_stuck: bool = False) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=names).set_index("time")
 
 
-def shown(table: pd.DataFrame) -> Shown:
+def shown(table: pd.DataFrame) -> ShownPush:
     touched = table.index[table["contact"] > 0.0]
-    return Shown(table.index.to_numpy(), table[["tip/x", "tip/y"]].to_numpy(), touched[0] if len(touched) else None)
+    return ShownPush(table.index.to_numpy(), table[["tip/x", "tip/y"]].to_numpy(), touched[0] if len(touched) else None)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -53,7 +53,7 @@ class Feature(NamedTuple):
     dtype: str = "float32"
 
 
-class Camera(NamedTuple):
+class CameraFeature(NamedTuple):
     """Images of each row, of 8 bits in red, green and blue.
 
     Attributes:
@@ -78,10 +78,10 @@ class Schema(NamedTuple):
 
     fps: int
     features: tuple[Feature, ...]
-    cameras: tuple[Camera, ...] = ()
+    cameras: tuple[CameraFeature, ...] = ()
 
 
-class Frame(NamedTuple):
+class ImageFrame(NamedTuple):
     """An image of a row.
 
     Attributes:
@@ -112,7 +112,7 @@ class ExportedEpisode(ABC):
         """Times of the rows in the clock of the recording, shape (n,) [s]."""
 
     @abstractmethod
-    def frames(self, key: str) -> Iterator[Frame]:
+    def frames(self, key: str) -> Iterator[ImageFrame]:
         """Yields the n images of a camera, each the newest one at the time of its row.
 
         Raises:

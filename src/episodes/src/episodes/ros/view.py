@@ -17,7 +17,7 @@ from episodes.view.bodies import add_later_bodies, links_of
 from episodes.view.forces import contact_arrows, force_panels, wrench_arrows
 from episodes.view.frames import Frames
 from episodes.view.meshes import meshes_of
-from episodes.view.scene import MAX_HZ, MAX_POSES, Array, Link, Scene
+from episodes.view.scene import MAX_HZ, MAX_POSES, Array, PageScene, ShownLink
 from robot_model.geometry import Vector
 from rpbi.replay.session import Recording
 from rpbi.world import World
@@ -36,7 +36,7 @@ MIN_DISTANCE_M = 0.8
 """Smallest distance of the camera from the middle of the scene [m], where the world has no camera of its own."""
 
 
-def scene_of_episode(folder: EpisodeFolder, number: int, *, any_size: bool = False) -> Scene:
+def scene_of_episode(folder: EpisodeFolder, number: int, *, any_size: bool = False) -> PageScene:
     """Returns the scene of an episode, built with the files that are stored with it.
 
     Raises:
@@ -61,7 +61,7 @@ def scene_of_episode(folder: EpisodeFolder, number: int, *, any_size: bool = Fal
         return _scene(title, bag, episode.namespace, recording, any_size)
 
 
-def scene_of_bag(bag: Path, namespace: str = "/", *, any_size: bool = False) -> Scene:
+def scene_of_bag(bag: Path, namespace: str = "/", *, any_size: bool = False) -> PageScene:
     """Returns the scene of a bag with `rpbi/world_description`, built with the files that are on the disk.
 
     Raises:
@@ -71,7 +71,7 @@ def scene_of_bag(bag: Path, namespace: str = "/", *, any_size: bool = False) -> 
     return _scene(bag.name, bag, namespace, read_recording(bag, namespace, any_size, needs_states=False), any_size)
 
 
-def _scene(title: str, bag: Path, namespace: str, recording: Recording, any_size: bool) -> Scene:
+def _scene(title: str, bag: Path, namespace: str, recording: Recording, any_size: bool) -> PageScene:
     prefix = f"/{namespace.strip('/')}/rpbi/" if namespace.strip("/") else "/rpbi/"
     with BagReader(bag, any_size) as reader:
         types = {topic: {each.name for each in of_topic} for topic, of_topic in reader.types.items()}
@@ -91,7 +91,7 @@ def _scene(title: str, bag: Path, namespace: str, recording: Recording, any_size
         of_body = {topic.removeprefix(prefix).removesuffix("/joint_states"): tables[topic] for topic in joints}
         states = tables[state[0]] if state else None
         shown, more = links_of(world, at_start, recording.commands, states, frames, of_body)
-        scene = Scene(title, start_s, times, _camera(world, shown), shown, notes=[*notes, *more])
+        scene = PageScene(title, start_s, times, _camera(world, shown), shown, notes=[*notes, *more])
     finally:
         world.close()
     scene.meshes, of_meshes = meshes_of(shape for link in shown for shape in link.shapes)
@@ -122,7 +122,7 @@ def _times(bag: Path, tables: Mapping[str, pd.DataFrame], most: int) -> tuple[fl
     return start_s, np.linspace(0.0, seconds, count)
 
 
-def _camera(world: World, links: Sequence[Link]) -> tuple[Vector, Vector]:
+def _camera(world: World, links: Sequence[ShownLink]) -> tuple[Vector, Vector]:
     """Returns the position of the camera and the point that it looks at: the world's own, else so that links are seen.
 
     The world's own is that of PyBullet's window, `resetDebugVisualizerCamera`.

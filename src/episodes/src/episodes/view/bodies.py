@@ -15,7 +15,7 @@ from rpbi.world import World
 from rpbi_utils.bags.resampling import resample
 
 from .frames import Frames
-from .scene import Array, Link, Poses
+from .scene import Array, Poses, ShownLink
 
 Commands = Mapping[int, Mapping[int, RecordedCommand]]
 """Commands by number of resets and index, as `Recording` has them."""
@@ -44,7 +44,7 @@ def links_of(
     states: pd.DataFrame | None,
     frames: Frames,
     joints: Mapping[str, pd.DataFrame],
-) -> tuple[list[Link], list[str]]:
+) -> tuple[list[ShownLink], list[str]]:
     """Returns all links with visible shapes.
 
     Args:
@@ -58,7 +58,7 @@ def links_of(
     Returns:
         The links, and sentences on bodies that are not shown, or not where they were.
     """
-    links: list[Link] = []
+    links: list[ShownLink] = []
     notes: list[str] = []
     presence = _Presence(frozenset(at_start), commands, states, frames.times)
     teleported = {command.name for command in _in_order(commands) if command.what == "teleport"}
@@ -69,7 +69,7 @@ def links_of(
         shapes = _by_link(body_shapes(body))
         poses = _LinkPoses(world, body, frames, joints.get(name))
         links += [
-            Link(name, body.link_name(index), of_link, poses.of(index), presence.of(name))
+            ShownLink(name, body.link_name(index), of_link, poses.of(index), presence.of(name))
             for index, of_link in shapes.items()
         ]
         if poses.is_base_guessed and (name in teleported or _can_move(body)):

@@ -10,7 +10,7 @@ from custom_ros_tools.errors import MissingDependency
 from rpbi.bodies.visual_shapes import BodyShape, ShapeKind
 from rpbi.meshes.triangles import read_triangles
 
-from .scene import Array, Mesh
+from .scene import Array, TriangleMesh
 
 try:
     from fast_simplification import simplify
@@ -29,7 +29,7 @@ _SAME_M = 1e-6
 """Distance below which two corners of a mesh are one [m, in the units of the file]."""
 
 
-def meshes_of(shapes: Iterable[BodyShape]) -> tuple[dict[BodyShape, Mesh], list[str]]:
+def meshes_of(shapes: Iterable[BodyShape]) -> tuple[dict[BodyShape, TriangleMesh], list[str]]:
     """Returns the meshes of shapes, simplified together if they have too many triangles.
 
     Args:
@@ -58,8 +58,8 @@ def meshes_of(shapes: Iterable[BodyShape]) -> tuple[dict[BodyShape, Mesh], list[
     return {shape: _scaled(shown[_key(shape)], shape) for shape in wanted if _key(shape) in shown}, notes
 
 
-def _scaled(mesh: Trimesh, shape: BodyShape) -> Mesh:
-    return Mesh((mesh.vertices * shape.size).astype(np.float32), mesh.faces.astype(np.uint32))
+def _scaled(mesh: Trimesh, shape: BodyShape) -> TriangleMesh:
+    return TriangleMesh((mesh.vertices * shape.size).astype(np.float32), mesh.faces.astype(np.uint32))
 
 
 def _key(shape: BodyShape) -> object:

@@ -16,7 +16,7 @@ from custom_ros_tools.errors import MissingDependency
 from rpbi.bodies.visual_shapes import BodyShape, ShapeKind
 
 from .page_parts import BODY, HEAD
-from .scene import Array, Arrows, Link, Mesh, Scene
+from .scene import Array, Arrows, PageScene, ShownLink, TriangleMesh
 
 try:
     import viser
@@ -39,7 +39,7 @@ MAX_LINE_POINTS, MAX_POINTS = 1500, 30_000
 _WXYZ = [3, 0, 1, 2]
 
 
-def page_of(scene: Scene) -> str:
+def page_of(scene: PageScene) -> str:
     """Returns the text of the page."""
     metres_per_newton = _arrow_scale(scene.arrows)
     with contextlib.redirect_stdout(io.StringIO()):  # viser prints its address
@@ -53,7 +53,7 @@ def page_of(scene: Scene) -> str:
     return _with_plots(text, scene, metres_per_newton)
 
 
-def _record(server: Any, recording: Any, scene: Scene, metres_per_newton: float) -> None:
+def _record(server: Any, recording: Any, scene: PageScene, metres_per_newton: float) -> None:
     server.scene.set_up_direction("+z")
     server.initial_camera.position, server.initial_camera.look_at = scene.camera
     server.initial_camera.fov = FOV_RAD
@@ -68,7 +68,7 @@ def _record(server: Any, recording: Any, scene: Scene, metres_per_newton: float)
 class _LinkPlayer:
     """Shows a link at the times of the scene."""
 
-    def __init__(self, api: Any, link: Link, meshes: Mapping[BodyShape, Mesh]) -> None:
+    def __init__(self, api: Any, link: ShownLink, meshes: Mapping[BodyShape, TriangleMesh]) -> None:
         name = f"/{link.body}/{link.name}"
         self._position = _rounded(link.poses.position, POSE_STEP)
         self._wxyz = _rounded(link.poses.rotation.as_quat()[:, _WXYZ], POSE_STEP)
@@ -131,7 +131,7 @@ def _arrow_scale(arrows: list[Arrows]) -> float:
     return float(min((step * 10.0**power for step in (1, 2, 5, 10)), key=lambda each: abs(np.log10(each) - exponent)))
 
 
-def _add_shape(api: Any, name: str, shape: BodyShape, meshes: Mapping[BodyShape, Mesh]) -> None:
+def _add_shape(api: Any, name: str, shape: BodyShape, meshes: Mapping[BodyShape, TriangleMesh]) -> None:
     x, y, z, w = shape.pose_in_link.quat_xyzw
     size = shape.size
     *rgb, alpha = shape.rgba
@@ -155,7 +155,7 @@ def _rounded(values: Array, step: float) -> Array:
     return np.asarray(np.round(values / step) * step)
 
 
-def _with_plots(text: str, scene: Scene, metres_per_newton: float) -> str:
+def _with_plots(text: str, scene: PageScene, metres_per_newton: float) -> str:
     """Returns viser's page with plots below its view."""
     count = min(MAX_LINE_POINTS, MAX_POINTS // max(1, sum(map(len, scene.panels.values()))))
     data = {

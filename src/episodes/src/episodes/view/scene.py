@@ -48,7 +48,7 @@ class Poses(NamedTuple):
         return Poses(self.position + self.rotation.apply(other.position), self.rotation * other.rotation)
 
 
-class Mesh(NamedTuple):
+class TriangleMesh(NamedTuple):
     """A surface of triangles.
 
     Attributes:
@@ -61,7 +61,7 @@ class Mesh(NamedTuple):
 
 
 @dataclass
-class Link:
+class ShownLink:
     """A link with something to be seen.
 
     Attributes:
@@ -97,7 +97,7 @@ class Arrows:
 
 
 @dataclass
-class Scene:
+class PageScene:
     """All that a page shows.
 
     Attributes:
@@ -116,8 +116,8 @@ class Scene:
     start_s: float
     times: Array
     camera: tuple[Vector, Vector]
-    links: list[Link] = field(default_factory=list)
-    meshes: dict[BodyShape, Mesh] = field(default_factory=dict)
+    links: list[ShownLink] = field(default_factory=list)
+    meshes: dict[BodyShape, TriangleMesh] = field(default_factory=dict)
     arrows: list[Arrows] = field(default_factory=list)
     panels: dict[str, Mapping[str, pd.Series]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)

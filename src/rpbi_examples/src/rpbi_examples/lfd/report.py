@@ -18,7 +18,7 @@ from custom_ros_tools.transforms import Array
 from rpbi_examples.motions import PlanarPose
 
 from .person import HALF_SIDE_M
-from .skill import Plan, Shown
+from .skill import PushPlan, ShownPush
 
 NEAR_M, NEAR_RAD = 0.03, math.radians(10.0)
 """Distance and angle up to which the box counts as at its goal [m, rad]."""
@@ -64,13 +64,13 @@ class Run(NamedTuple):
     episode: int
     table: pd.DataFrame
     error: BoxError
-    plan: Plan | None = None
+    plan: PushPlan | None = None
 
-    def path(self) -> Shown:
+    def path(self) -> ShownPush:
         """Returns the tip's path, and when the box was first touched."""
         touched = self.table.index[self.table["contact"] > 0.0]
         contact_s = float(touched[0]) if len(touched) else None
-        return Shown(self.table.index.to_numpy(), self.table[["tip/x", "tip/y"]].to_numpy(), contact_s)
+        return ShownPush(self.table.index.to_numpy(), self.table[["tip/x", "tip/y"]].to_numpy(), contact_s)
 
     def summary(self) -> dict[str, Any]:
         """Returns what summary.json has of it."""
@@ -143,7 +143,7 @@ def draw_pipeline(figure: Figure, goal: PlanarPose, shown: Run, executed: Run) -
         _arrow(figure, begin, end)
 
 
-def _push_begins(shown: Run, plan: Plan) -> float:
+def _push_begins(shown: Run, plan: PushPlan) -> float:
     """Returns the time of the demonstration at which the tip first was where the plan's push begins [s]."""
     place, _ = plan.at(plan.push_s)
     tip = shown.table[["tip/x", "tip/y"]].to_numpy()
@@ -164,7 +164,7 @@ def _draw_run(axes: Axes, goal: PlanarPose, run: Run, title: str, with_plan: boo
     axes.legend(fontsize=8, loc="lower left")
 
 
-def _draw_plan(axes: Axes, plan: Plan) -> None:
+def _draw_plan(axes: Axes, plan: PushPlan) -> None:
     is_push = plan.times >= plan.push_s
     axes.plot(*plan.places[~is_push].T, color="#9467bd", linewidth=2.5, alpha=0.6, label="planned approach")
     axes.plot(*plan.places[is_push].T, color="0.4", linewidth=2.5, alpha=0.5, label="planned push")

@@ -8,7 +8,7 @@ import numpy as np
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.transforms import Array
-from motion_primitives import Demonstration, Primitive, Trajectory, make_primitive
+from motion_primitives import Demonstration, MotionPlan, Primitive, make_primitive
 
 NAMES = ("x", "y")
 MOVED_M = 0.002
@@ -21,7 +21,7 @@ ALPHA_PER_S = 25.0
 """Damping of a primitive for each second, so that it follows the demonstration as closely however long that is."""
 
 
-class Shown(NamedTuple):
+class ShownPush(NamedTuple):
     """A demonstration as the tip's path, in the person's frame.
 
     Attributes:
@@ -34,17 +34,17 @@ class Shown(NamedTuple):
     places: Array
     contact_s: float | None
 
-    def moving(self) -> Shown:
+    def moving(self) -> ShownPush:
         """Returns it without the time before the tip moves and after it has moved."""
         off = [np.linalg.norm(self.places - self.places[index], axis=1) > MOVED_M for index in (0, -1)]
         if not off[0].any():
             raise InterfaceError("the tip has not moved: there is nothing to learn")
         first, last = int(np.argmax(off[0])), len(self.times) - int(np.argmax(off[1][::-1]))
         kept = slice(max(first - 1, 0), last + 1)
-        return Shown(self.times[kept], self.places[kept], self.contact_s)
+        return ShownPush(self.times[kept], self.places[kept], self.contact_s)
 
 
-class Plan(NamedTuple):
+class PushPlan(NamedTuple):
     """A planned motion from a start.
 
     Attributes:
@@ -83,7 +83,7 @@ class PushSkill:
         InterfaceError: If the demonstration does not suffice.
     """
 
-    def __init__(self, shown: Shown) -> None:
+    def __init__(self, shown: ShownPush) -> None:
         if shown.contact_s is None:
             raise InterfaceError("the box was not touched: there is nothing to learn")
         contact_s, shown = shown.contact_s, shown.moving()
@@ -97,16 +97,16 @@ class PushSkill:
         self._approach = _learned(shown.times[: split + 1], shown.places[: split + 1])
         self._push = _learned(shown.times[split:], shown.places[split:])
 
-    def plan(self, start: Array) -> Plan:
+    def plan(self, start: Array) -> PushPlan:
         """Returns the motion from a start [m]: the approach, and the push as it was shown."""
         approach, push = self._approach.plan(start=start), self._push.plan()
-        parts: tuple[Trajectory, Trajectory] = approach, push
+        parts: tuple[MotionPlan, MotionPlan] = approach, push
         times = np.concatenate([approach.times, approach.duration_s + push.times[1:]])
         places, velocities = (
             np.vstack([rows[0], rows[1][1:]])
             for rows in ([each.positions for each in parts], [each.velocities for each in parts])
         )
-        return Plan(times, places, velocities, approach.duration_s)
+        return PushPlan(times, places, velocities, approach.duration_s)
 
 
 def _learned(times: Array, places: Array) -> Primitive:

@@ -14,7 +14,7 @@ from pydantic import Field
 
 from custom_ros_tools.errors import MissingDependency
 from custom_ros_tools.schema import ConfigModel
-from episodes.datasets.format import Array, Camera, DatasetFormat, ExportedEpisode, Schema, require_room
+from episodes.datasets.format import Array, CameraFeature, DatasetFormat, ExportedEpisode, Schema, require_room
 from episodes.datasets.layouts import lerobot as layout
 from episodes.datasets.provenance import checksums, coarse
 from episodes.datasets.statistics import ImageStatistics, pooled, statistics
@@ -145,7 +145,7 @@ class LeRobot(DatasetFormat):
             facts |= {f"stats/{key}/{name}": value for name, value in each.items()}
         return facts
 
-    def _write_video(self, path: Path, camera: Camera, episode: ExportedEpisode) -> _Film:
+    def _write_video(self, path: Path, camera: CameraFeature, episode: ExportedEpisode) -> _Film:
         from episodes.datasets.video import VideoWriter  # not needed without cameras
 
         codec = self.config.codec
@@ -184,7 +184,7 @@ class LeRobot(DatasetFormat):
             found[key] = statistics(np.concatenate(columns))
         return found | {key: pooled(parts) for key, parts in self._image_statistics.items()}
 
-    def _video_feature(self, camera: Camera) -> dict[str, Any]:
+    def _video_feature(self, camera: CameraFeature) -> dict[str, Any]:
         info = {
             "video.height": camera.height,
             "video.width": camera.width,

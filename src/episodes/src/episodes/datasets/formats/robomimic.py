@@ -17,7 +17,7 @@ from custom_ros_tools.schema import ConfigModel
 from episodes.datasets.format import (
     ACTION,
     Array,
-    Camera,
+    CameraFeature,
     DatasetError,
     DatasetFormat,
     ExportedEpisode,
@@ -125,7 +125,7 @@ class Robomimic(DatasetFormat):
         demo.attrs["num_samples"] = count
         demo.attrs["task"], demo.attrs["label"] = episode.task, episode.label
 
-    def _images(self, camera: Camera, episode: ExportedEpisode) -> tuple[Array, Array]:
+    def _images(self, camera: CameraFeature, episode: ExportedEpisode) -> tuple[Array, Array]:
         size = (self.config.image_width, self.config.image_height)
         images, stamps = [], []
         for pixels, stamp in episode.frames(camera.key):

@@ -17,7 +17,7 @@ from episodes.datasets.format import (
     STAMP_NAMES,
     STATE,
     TIME_ERROR,
-    Camera,
+    CameraFeature,
     DatasetError,
     DatasetFormat,
     Feature,
@@ -151,7 +151,7 @@ def _plan(folder: EpisodeFolder, format_: DatasetFormat, wish: Wish, result: Res
     return _Plan(sources, signals, Schema(wish.fps, (*features, *own), cameras))
 
 
-def _content(source: SourceEpisode) -> tuple[tuple[Feature, ...], tuple[Camera, ...]]:
+def _content(source: SourceEpisode) -> tuple[tuple[Feature, ...], tuple[CameraFeature, ...]]:
     """Returns the features and cameras of an episode."""
     return tuple(signal.feature for signal in source.signals), source.cameras
 

@@ -17,11 +17,11 @@ from episodes.datasets.format import (
     STAMP,
     TIME_ERROR,
     Array,
-    Camera,
+    CameraFeature,
     DatasetError,
     ExportedEpisode,
     Feature,
-    Frame,
+    ImageFrame,
     Schema,
     stamps_of,
 )
@@ -67,7 +67,7 @@ class SourceEpisode(ExportedEpisode):
         return tuple(derive(self._tables, self._types, self.episode.namespace, self._fixed_joints(), self._choice))
 
     @cached_property
-    def cameras(self) -> tuple[Camera, ...]:
+    def cameras(self) -> tuple[CameraFeature, ...]:
         """The cameras of 8 bits of its topics; those with another kind of pixels are left out unless they are named."""
         found = []
         for key, topic in self._image_topics.items():
@@ -80,7 +80,7 @@ class SourceEpisode(ExportedEpisode):
                 if self._choice.images is not None:
                     raise DatasetError(self.bag, f"{topic}: {error}") from error
                 continue
-            found.append(Camera(key, pixels.shape[0], pixels.shape[1]))
+            found.append(CameraFeature(key, pixels.shape[0], pixels.shape[1]))
         return tuple(found)
 
     def use(self, schema: Schema, signals: Sequence[Signal]) -> None:
@@ -126,13 +126,13 @@ class SourceEpisode(ExportedEpisode):
         whole = max(table.index[-1] for table in tables) - min(table.index[0] for table in tables)
         return float(whole - (self.times[-1] - self.times[0]))
 
-    def frames(self, key: str) -> Iterator[Frame]:
+    def frames(self, key: str) -> Iterator[ImageFrame]:
         """Yields the newest image of a camera at the time of each row."""
         (camera,) = (each for each in self._schema.cameras if each.key == key)
         topic = self._image_topics[key]
         images = self._images(topic)
         coming = next(images, None)
-        shown: Frame | None = None
+        shown: ImageFrame | None = None
         newest = coming
         for time_s in self.times:
             while coming is not None and coming[1] <= time_s:
@@ -146,7 +146,7 @@ class SourceEpisode(ExportedEpisode):
                 if pixels.shape[:2] != camera[1:]:
                     got, expected = (f"{width} x {height}" for height, width in (pixels.shape[:2], camera[1:]))
                     raise DatasetError(self.bag, f"{topic}: the image at {newest[1]} s: expected {expected}, got {got}")
-                shown = Frame(pixels, newest[1])
+                shown = ImageFrame(pixels, newest[1])
             yield shown
 
     def values(self, image_stamps: Mapping[str, Array]) -> dict[str, Array]:

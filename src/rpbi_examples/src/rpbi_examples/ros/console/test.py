@@ -15,7 +15,7 @@ PARALLEL = ("-n", "auto", "--max-worker-restart=0")
 def test(*words: Annotated[str, Argument("[--quick] [PATH | OPTION OF PYTEST ...]", files="*", is_raw=True)]) -> int:
     """Runs all tests, or those chosen as for pytest, in parallel workers.
 
-    All tests together install all extras first, 1.7 GB; chosen ones install nothing but what every command needs, and
+    All tests together install all extras first, 1.8 GB; chosen ones install nothing but what every command needs, and
     those that miss an extra are skipped with its name.
 
     A run ends with the time of each folder, of the slowest files and of the slowest tests.

@@ -21,7 +21,7 @@ from custom_ros_tools.transforms import Array, pose_of
 from ik_ros.msg import IKProblem
 from ik_ros.srv import SolveIK, SolveIKResponse
 from ros_pybullet_interface.srv import ResetJointState
-from rpbi_examples.lfd.skill import Plan
+from rpbi_examples.lfd.skill import PushPlan
 from rpbi_examples.motions import PlanarPose
 
 ORIGIN, TARGET, TARGET_TIP, TIP = (
@@ -85,7 +85,7 @@ class Arm:
         if not answer.success:
             raise InterfaceError(f"{subject} is out of reach: {answer.message}")
 
-    def require_plan(self, plan: Plan) -> None:
+    def require_plan(self, plan: PushPlan) -> None:
         """Checks that the target may move along a plan.
 
         Raises:
@@ -98,7 +98,7 @@ class Arm:
                     f"the plan leaves the limits of teleoperation: {axis} from {lower:g} to {upper:g} m, got {got}"
                 )
 
-    def follow(self, plan: Plan) -> None:
+    def follow(self, plan: PushPlan) -> None:
         """Moves the target along a plan by velocities, as a person does, and returns at its end."""
         call_service("operator_node/toggle", SetBool, False)  # the person does not steer meanwhile
         try:

@@ -13,7 +13,7 @@ from custom_ros_tools.ros.services import call_service
 from episodes import EpisodeFolder
 from episodes.folder import BAG
 from rpbi_examples.lfd.report import BoxError, Run
-from rpbi_examples.lfd.skill import Plan
+from rpbi_examples.lfd.skill import PushPlan
 from rpbi_utils import bag_to_dataframes, transforms_between
 
 from .arm import ORIGIN, TIP, yaw_of
@@ -37,7 +37,7 @@ def discard_episode() -> str:
     return str(call_service("record/discard", Trigger).message)
 
 
-def finish_episode(out: Path, error: BoxError, plan: Plan | None = None) -> Run:
+def finish_episode(out: Path, error: BoxError, plan: PushPlan | None = None) -> Run:
     """Ends the episode that is recorded, labels it, and writes its table below a folder.
 
     Raises:

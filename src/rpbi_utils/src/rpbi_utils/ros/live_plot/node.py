@@ -55,21 +55,21 @@ def _open(arguments: argparse.Namespace) -> tuple[Any, Any, Any]:
     from PyQt5.QtCore import QObject, pyqtSignal
     from PyQt5.QtWidgets import QApplication
 
-    from .source import Source
+    from .source import FieldSource
     from .window import LivePlotWindow
 
-    class Signals(QObject):
+    class PlotSignals(QObject):
         """Carries the end of the node into the thread of the window."""
 
         ended = pyqtSignal()
 
     application = QApplication([NAME])
-    signals = Signals()
+    signals = PlotSignals()
     signals.ended.connect(application.quit)
     rospy.on_shutdown(signals.ended.emit)
     plot = LivePlot()
     window = LivePlotWindow(plot, arguments.seconds, arguments.out.absolute())
-    return application, (signals, Source(arguments.fields, plot)), window
+    return application, (signals, FieldSource(arguments.fields, plot)), window
 
 
 def _show(opened: tuple[Any, Any, Any]) -> None:

@@ -21,7 +21,7 @@ PATIENCE_S = 3.0
 """Time after which a topic that is missing is logged [s]; two nodes that start together need some."""
 
 
-class Source:
+class FieldSource:
     """Subscribes to topics as raw bytes, and reads the fields by the definitions that their publishers send.
 
     Args:
