@@ -19,7 +19,7 @@ from worlds import BOX_FLOOR, box, iiwa, write_world
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs/commands.md").read_text()
-SECTIONS = dict(re.findall(r"^## ([a-z]+)\n\n(.*?)\n(?=^## )", PAGE, re.DOTALL | re.MULTILINE))
+SECTIONS = dict(re.findall(r"^## ([a-z_]+)\n\n(.*?)\n(?=^## )", PAGE, re.DOTALL | re.MULTILINE))
 WORLD = str(ROOT / "src/rpbi_examples/configs/grasp_example/config.yaml")
 
 
