@@ -118,7 +118,7 @@ def test_it_is_switched_and_reset_and_stays_within_its_box(ros):
 
 
 def test_in_ros_time_it_moves_as_slowly_as_the_world(ros):
-    """0.5 s of simulated time take more than 2.5 s."""
+    """0.5 s of simulated time take more than 2.5 s; the first step may be two periods long."""
     rospy.set_param("/use_sim_time", True)
     frame = start(ros, ros_time=True)
     with publishing("/clock", Clock) as clock, publishing("/operator_node/signal", Float64MultiArray) as signal:
@@ -127,4 +127,4 @@ def test_in_ros_time_it_moves_as_slowly_as_the_world(ros):
             clock.publish(Clock(rospy.Time.from_sec(10.0 + 0.001 * tick)))
             time.sleep(0.005)
         signal.publish(Float64MultiArray(data=[0.0, 0.0, 0.0]))
-    assert 0.1 < max(x for x, _, _ in frame.positions) <= 0.5 + 1e-6
+    assert 0.1 < max(x for x, _, _ in frame.positions) <= 0.5 + 0.02 + 1e-6
