@@ -68,8 +68,13 @@ class Session:
     def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self.close()
 
-    def start(self, command: list[str]) -> subprocess.Popen[bytes]:
-        """Starts a command in a process group of its own; what it prints goes to a file (see `output`)."""
+    def start(self, command: list[str], **environment: str) -> subprocess.Popen[bytes]:
+        """Starts a command in a process group of its own; what it prints goes to a file (see `output`).
+
+        Args:
+            command: The command.
+            environment: Variables of its environment, beside those of the session.
+        """
         with open(self.folder / f"{len(self._processes)}.log", "wb") as file:
             process = subprocess.Popen(
                 command,
@@ -77,7 +82,7 @@ class Session:
                 stdout=file,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
-                env=self._environment,
+                env={**self._environment, **environment},
             )
         self._processes.append(process)
         return process

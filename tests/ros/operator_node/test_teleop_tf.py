@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from typing import Any
 
 import pytest
@@ -11,6 +12,7 @@ from custom_srvs.srv import SetTransform
 from geometry_msgs.msg import Quaternion, Transform, Vector3
 from node_world import Rosout, count_taken, publishing
 from ros_system import wait_until
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import SetBool, Trigger
 from teleop.srv import GetBoxLimits
@@ -113,3 +115,16 @@ def test_it_is_switched_and_reset_and_stays_within_its_box(ros):
         assert not answer.success and told in answer.message
     assert ros.call("reset_teleop_transform_to_zero", Trigger).success
     wait_until(lambda: frame.positions[-1] == (0.0, 0.0, 0.0), "it is back")
+
+
+def test_in_ros_time_it_moves_as_slowly_as_the_world(ros):
+    """0.5 s of simulated time take more than 2.5 s; the first step may be two periods long."""
+    rospy.set_param("/use_sim_time", True)
+    frame = start(ros, ros_time=True)
+    with publishing("/clock", Clock) as clock, publishing("/operator_node/signal", Float64MultiArray) as signal:
+        for tick in range(501):
+            signal.publish(Float64MultiArray(data=[1.0, 0.0, 0.0]))
+            clock.publish(Clock(rospy.Time.from_sec(10.0 + 0.001 * tick)))
+            time.sleep(0.005)
+        signal.publish(Float64MultiArray(data=[0.0, 0.0, 0.0]))
+    assert 0.1 < max(x for x, _, _ in frame.positions) <= 0.5 + 0.02 + 1e-6

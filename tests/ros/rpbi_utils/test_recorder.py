@@ -320,3 +320,11 @@ def stopped(ros: Any) -> Callable[[str], str]:
         return node
 
     return stop
+
+
+def test_a_node_in_cpp_is_no_obstacle_to_counting(ros: Any, tmp_path: Path) -> None:
+    ros.start(["rosrun", "tf2_ros", "static_transform_publisher", *"0 0 1 0 0 0 rpbi/world there".split()])
+    wait_until(lambda: any("/tf_static" in topic for topic, _ in rospy.get_published_topics()), "it publishes")
+    with Recorder(tmp_path / "a.bag", ["/tf_static"]) as recorder:
+        assert set(recorder.published()) <= {"/tf_static"}
+    assert len(bag_to_dataframes(tmp_path / "a.bag")["/tf_static"]) == 1

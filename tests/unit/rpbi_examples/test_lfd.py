@@ -95,6 +95,7 @@ def test_what_cannot_be_learned_is_named(change, message):
 def test_a_box_on_its_side_is_not_at_its_goal():
     half = math.sqrt(0.5)
     assert BoxError.of(np.array([0.02, 0.0, 0.0]), np.array([0.0, 0.0, 0.05, 0.998])).is_at_goal
+    assert not BoxError.of(np.array([0.025, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 1.0])).is_good_to_learn
     assert not BoxError.of(np.array([0.02, 0.0, 0.03]), np.array([half, 0.0, 0.0, half])).is_at_goal
     assert not BoxError.of(np.array([0.031, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, -1.0])).is_at_goal
 

@@ -22,6 +22,8 @@ from .skill import PushPlan, ShownPush
 
 NEAR_M, NEAR_RAD = 0.03, math.radians(10.0)
 """Distance and angle up to which the box counts as at its goal [m, rad]."""
+SHOWN_SHARE = 2.0 / 3.0
+"""Share of them up to which a demonstration counts as good, since an execution adds some millimetres and degrees."""
 TIP, BOX, GOAL = "#1f5fb4", "#e67814", "#2ca02c"
 SHOWN_STYLE = {"color": TIP, "linestyle": "--", "linewidth": 1.5}
 KEYS = ("signal/x", "signal/y")
@@ -44,7 +46,15 @@ class BoxError(NamedTuple):
     @property
     def is_at_goal(self) -> bool:
         """Whether the box counts as at its goal."""
-        return self.distance_m <= NEAR_M and self.angle_rad <= NEAR_RAD
+        return self._is_within(1.0)
+
+    @property
+    def is_good_to_learn(self) -> bool:
+        """Whether a demonstration that left the box there is good enough to be repeated."""
+        return self._is_within(SHOWN_SHARE)
+
+    def _is_within(self, share: float) -> bool:
+        return self.distance_m <= share * NEAR_M and self.angle_rad <= share * NEAR_RAD
 
     def __str__(self) -> str:
         return f"{1000.0 * self.distance_m:.1f} mm and {math.degrees(self.angle_rad):.1f} deg from its goal"

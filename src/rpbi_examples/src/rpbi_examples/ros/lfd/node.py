@@ -178,9 +178,9 @@ class Lesson:
         print(run.table.describe().round(3).to_string(), flush=True)
         self._publish("demonstration", run.table[["tip/x", "tip/y"]].to_numpy())
         rospy.loginfo("demonstration %d: %d rows; the box is %s", run.episode, len(run.table), run.error)
-        if not run.error.is_at_goal:
-            rospy.logwarn("what is learned from it will not bring the box there: press 2 to demonstrate again")
-        self._become("demonstrated" if run.error.is_at_goal else "missed")
+        if not run.error.is_good_to_learn:
+            rospy.logwarn("what is learned from it may not bring the box there: press 2 to demonstrate again")
+        self._become("demonstrated" if run.error.is_good_to_learn else "missed")
 
     def _learn_or_execute(self) -> None:
         if self._skill is not None:
@@ -263,4 +263,4 @@ class Lesson:
 
 def main() -> None:
     """Runs the node."""
-    run_node("run_lfd", Lesson, Lesson.run)
+    run_node("run_lfd", lambda: Lesson().run())

@@ -149,8 +149,8 @@ def demonstrate(tf: TfInterface, person: Person, hold: Callable[[Direction | Non
 
 def main() -> None:
     """Runs the node; with `~window` it presses keys of the keyboard's window."""
-    run_node(
-        "lfd_person",
-        lambda: ScriptedPerson(window_keys() if rospy.get_param("~window", False) else key_topics()),
-        ScriptedPerson.run,
-    )
+    run_node("lfd_person", _act)
+
+
+def _act() -> None:
+    ScriptedPerson(window_keys() if rospy.get_param("~window", False) else key_topics()).run()
