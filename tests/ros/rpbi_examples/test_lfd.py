@@ -8,7 +8,7 @@ from pathlib import Path
 from ros_system import wait_until
 
 ROOT = Path(__file__).resolve().parents[3]
-SLOW_S = 300.0
+SLOW_S = 400.0
 
 
 def launched(ros, out: Path, *arguments: str) -> tuple[int, str]:
@@ -20,7 +20,7 @@ def launched(ros, out: Path, *arguments: str) -> tuple[int, str]:
 
 
 def test_it_shows_learns_and_executes(ros, tmp_path):
-    code, output = launched(ros, tmp_path / "new" / "folder", "seed:=6")
+    code, output = launched(ros, tmp_path / "new" / "folder", "seed:=6", "real_time_factor:=0.5")
     assert code == 0, output
     summary = json.loads((tmp_path / "new" / "folder" / "summary.json").read_text())
     assert summary["at_goal"] and len(summary["executions"]) == 1

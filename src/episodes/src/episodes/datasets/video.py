@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -17,11 +16,10 @@ try:
 except ImportError:
     raise MissingDependency("av", "./rpbi setup data") from None
 
-os.environ.setdefault("SVT_LOG", "1")  # the encoder of AV1 prints its settings otherwise
 Array = NDArray[Any]
 
-ENCODERS = {"h264": "libx264", "av1": "libsvtav1"}
-"""Encoder of each codec."""
+ENCODER = "libx264"
+"""Encoder of H.264. That of AV1, SVT-AV1, gives the calling thread of root the highest real-time priority."""
 PIXEL_FORMAT = "yuv420p"
 KEY_FRAME_EVERY = 2
 """Frames from one key frame to the next; a reader that jumps to a frame decodes at most so many."""
@@ -35,18 +33,17 @@ class VideoWriter:
         fps: Frames a second.
         height: Rows of pixels.
         width: Columns of pixels.
-        codec: A codec of `ENCODERS`.
-        preset: Preset of the encoder: a name of x264 such as `ultrafast`, or 0 (best) to 13 (fastest) for AV1.
+        preset: Preset of the encoder, such as `ultrafast`.
         crf: Quantisation; a lower number is a better picture and a larger file.
 
     Raises:
         OSError: If the file cannot be written, here and in all methods.
     """
 
-    def __init__(self, path: Path, fps: int, height: int, width: int, codec: str, preset: str, crf: int) -> None:
+    def __init__(self, path: Path, fps: int, height: int, width: int, preset: str, crf: int) -> None:
         self._container = av.open(str(path), "w", options={"movflags": "+faststart"})
         options = {"preset": preset, "crf": str(crf), "g": str(KEY_FRAME_EVERY)}
-        stream: Any = self._container.add_stream(ENCODERS[codec], rate=fps, options=options)
+        stream: Any = self._container.add_stream(ENCODER, rate=fps, options=options)
         stream.width, stream.height, stream.pix_fmt = width, height, PIXEL_FORMAT
         stream.codec_context.thread_count = 1
         stream.time_base = Fraction(1, fps)

@@ -29,25 +29,14 @@ MAX_DATA_BYTES = 100_000_000
 """Size of the rows in memory beyond which a data file is written [bytes]."""
 ROOM_BYTES = 200_000
 """Room on the disk beside that of the rows, for metadata [bytes]."""
-PRESETS = {"h264": "veryfast", "av1": "12"}
-"""Presets that encode two cameras of 640 x 480 faster than real time on one core."""
-CRF = {"h264": 23, "av1": 30}
+Preset = Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow"]
 
 
 class LeRobotConfig(ConfigModel):
     """Options of LeRobot data sets."""
 
-    codec: Literal["h264", "av1"] = Field(
-        "h264", description="Codec of videos; AV1 takes twice the time and makes smaller files."
-    )
-    preset: str = Field(
-        "",
-        description="Speed of the encoder: `ultrafast` to `veryslow` for H.264, 0 to 13 (fastest) for AV1; by default "
-        "`veryfast` or 12.",
-    )
-    crf: int | None = Field(
-        None, ge=0, le=63, description="Quantisation, less is better; by default 23 for H.264 and 30 for AV1."
-    )
+    preset: Preset = Field("veryfast", description="Speed of the encoder of videos.")
+    crf: int = Field(23, ge=0, le=51, description="Quantisation of videos; less is a better picture.")
     robot_type: str = Field("", description="Name of the robot, for readers.")
 
 
@@ -148,12 +137,10 @@ class LeRobot(DatasetFormat):
     def _write_video(self, path: Path, camera: CameraFeature, episode: ExportedEpisode) -> _Film:
         from episodes.datasets.video import VideoWriter  # not needed without cameras
 
-        codec = self.config.codec
         path.parent.mkdir(parents=True, exist_ok=True)
         film = _Film(len(episode.times))
-        preset, crf = self.config.preset or PRESETS[codec], self.config.crf
-        crf = CRF[codec] if crf is None else crf
-        with VideoWriter(path, self._schema.fps, camera.height, camera.width, codec, preset, crf) as video:
+        preset, crf = self.config.preset, self.config.crf
+        with VideoWriter(path, self._schema.fps, camera.height, camera.width, preset, crf) as video:
             for pixels, stamp in episode.frames(camera.key):
                 video.add(pixels)
                 film.add(pixels, stamp)
@@ -188,7 +175,7 @@ class LeRobot(DatasetFormat):
         info = {
             "video.height": camera.height,
             "video.width": camera.width,
-            "video.codec": self.config.codec,
+            "video.codec": "h264",
             "video.pix_fmt": "yuv420p",
             "video.is_depth_map": False,
             "video.fps": self._schema.fps,

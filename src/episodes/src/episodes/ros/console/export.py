@@ -49,7 +49,7 @@ def export(
         state: topics of observation.state; the positions of all joints without it
         action: topics of action; the targets of all joints without it
         images: topics of images; all cameras without it, none without a topic
-        option: options of the format, such as codec=av1
+        option: options of the format, such as preset=slow
         disk_reserve_mb: free space of the disk that is never used; 200 without it
     """
     if fps < 1:
