@@ -50,7 +50,7 @@ def test_bad_messages_are_refused_by_name_and_the_node_goes_on(ros):
 def test_a_person_is_dressed_from_datagrams_of_a_suit_to_the_outcome(ros, tmp_path):
     """Faster than people would like, so that the test is short; a slow simulator is a slow robot."""
     out = tmp_path / "outcome.json"
-    arguments = ["headless:=true", "speed:=0.5", f"out:={out}", f"port:={Port().number}"]
+    arguments = ["headless:=true", "speed:=0.35", f"out:={out}", f"port:={Port().number}"]
     process = ros.start(["roslaunch", "rpbi_examples", "telepresence.launch", *arguments])
     wait_until(lambda: "the sleeve is" in ros.output(process), "somebody is dressed", SLOW_S)
     wait_until(lambda: out.exists() and out.read_text().endswith("}\n"), "the outcome is written")
