@@ -85,7 +85,7 @@ def refilm(change: Callable[[list[np.ndarray]], list[np.ndarray]], fps: int = 30
         images = change([pixels for _, pixels in read_video(folder / VIDEO)])
         (folder / VIDEO).unlink()
         height, width, _ = images[0].shape
-        with VideoWriter(folder / VIDEO, fps, height, width, "h264", "veryfast", 20) as video:
+        with VideoWriter(folder / VIDEO, fps, height, width, "veryfast", 20) as video:
             for pixels in images:
                 video.add(pixels)
 
