@@ -22,6 +22,7 @@ from forked_node import close_server  # noqa: E402
 from ros_system import RosSystem, stop_group, wait_until  # noqa: E402
 from second_master import SecondMaster  # noqa: E402
 
+from custom_ros_tools import plugins  # noqa: E402
 from custom_ros_tools.ros.tf_interface import TfInterface  # noqa: E402
 
 pytest_plugins = ("work_plan", "run_report", "second_try")
@@ -45,6 +46,13 @@ def no_process_is_left() -> Iterator[None]:
         with contextlib.suppress(ProcessLookupError):
             os.kill(process_id, signal.SIGKILL)
     assert not left, f"tests left processes behind: {left}"
+
+
+@pytest.fixture(autouse=True)
+def any_package_is_trusted_again() -> Iterator[None]:
+    """Ends what a command that ran in this process allowed to be imported: the next test is another program."""
+    yield
+    plugins._trust = None
 
 
 @pytest.fixture(scope="module", autouse=True)

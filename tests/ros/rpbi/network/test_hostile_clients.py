@@ -193,16 +193,17 @@ class _Raw(rospy.AnyMsg):
         self._buff = data
 
 
-@pytest.mark.parametrize("seconds", [END_OF_TIME_S, 2_200_000_000, 2**32 - 1])
-def test_tf_after_the_end_of_time_does_not_end_the_node(ros, node, seconds):
+def test_tf_after_the_end_of_time_does_not_end_the_node(ros, node):
     transform = TransformStamped(child_frame_id="marker")
-    transform.header.frame_id, transform.header.stamp = "rpbi/world", rospy.Time(seconds)
+    transform.header.frame_id = "rpbi/world"
     transform.transform.rotation.w = 1.0
-    with publishing("/tf", TFMessage) as tf:
-        for _ in range(10):
-            tf.publish(TFMessage([transform]))
-            time.sleep(0.02)  # so that it is looked up in between
-    _is_well(ros, node)
+    with publishing("/tf", TFMessage) as tf:  # one: rospy may miss a publisher that ends and comes back at once
+        for seconds in (END_OF_TIME_S, 2_200_000_000, 2**32 - 1):
+            transform.header.stamp = rospy.Time(seconds)
+            for _ in range(10):
+                tf.publish(TFMessage([transform]))
+                time.sleep(0.02)  # so that it is looked up in between
+            _is_well(ros, node)
 
 
 @pytest.mark.parametrize("kind", ["urdf", "mesh", "yaml"])
