@@ -1,4 +1,4 @@
-"""How long the export of episodes with two cameras takes, beside their length."""
+"""Time that the export of an episode with two cameras takes, for each second of its length."""
 
 from __future__ import annotations
 

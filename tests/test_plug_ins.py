@@ -1,4 +1,4 @@
-"""What is written by hand to add a plug-in or a command; look-up, schemas, pages and completion follow from it.
+"""The files that are written by hand to add a plug-in or a command; look-up, schemas, pages and completion follow.
 
 One of each is added to a copy of the packages. This file stands for the test that each has too.
 """
@@ -157,7 +157,7 @@ FILES = {
     "device": {f"{OPERATOR}/devices/pedal.py": DEVICE_FILE, "docs/devices.md": "| `pedal` | its axis `down` |"},
     "command": {"src/rpbi_utils/src/rpbi_utils/ros/console/wave.py": COMMAND_FILE},
 }
-"""Of the body its class and an example, of the sensor its class and its topic, of the device its class and its page."""
+"""Files written by hand: a class each, and the example of the body, the topic of the sensor, the page of the device."""
 LINES = {
     "body": (f"{RPBI}/bodies/__init__.py", '        "dynamic": ', '        "marble": "rpbi.bodies.marble:Marble",\n'),
     "sensor": (

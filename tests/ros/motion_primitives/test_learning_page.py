@@ -1,4 +1,4 @@
-"""What docs/learning.md has people type works."""
+"""The code blocks of docs/learning.md run one after the other."""
 
 from __future__ import annotations
 

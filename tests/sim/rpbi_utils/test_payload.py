@@ -34,7 +34,7 @@ CARRIED = {
 }
 """Links below the sensor's joint, and how far their frames are along its z axis [m]; they are not turned."""
 MASS, CENTRE = 1.5, (0.04, -0.03, 0.08)
-"""Of the tool, in its own frame [kg, m]."""
+"""Mass [kg] and centre of mass [m] of the tool, in its own frame."""
 OFFSET = {"bias_force_n": [1.5, -2.5, 4.0], "bias_torque_nm": [0.2, -0.1, 0.3]}
 HOME = {"lwr_arm_1_joint": 0.52, "lwr_arm_3_joint": -1.57, "lwr_arm_5_joint": 1.05}
 TILTS = (

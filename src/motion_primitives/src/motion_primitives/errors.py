@@ -6,39 +6,32 @@ from custom_ros_tools.errors import InterfaceError
 
 
 @dataclass(eq=False)
-class DemonstrationError(InterfaceError):
+class _UnexpectedInput(InterfaceError):  # noqa: N818 (base of the two below)
+    """Input that does not fit.
+
+    Attributes:
+        subject: The part that is wrong.
+        expected: Description of what is needed.
+        got: Description of what was given.
+    """
+
+    subject: str
+    expected: str
+    got: str
+
+    def __str__(self) -> str:
+        return f"{self.subject}: expected {self.expected}, got {self.got}"
+
+
+class DemonstrationError(_UnexpectedInput):
     """A demonstration, or a set of them, cannot be learned from.
 
-    Attributes:
-        subject: What is wrong: `times`, `positions`, `orientations` or `demonstrations`.
-        expected: Description of what is needed.
-        got: Description of what was given.
+    The subject is `times`, `positions`, `orientations` or `demonstrations`.
     """
 
-    subject: str
-    expected: str
-    got: str
 
-    def __str__(self) -> str:
-        return f"{self.subject}: expected {self.expected}, got {self.got}"
-
-
-@dataclass(eq=False)
-class PlanError(InterfaceError):
-    """A motion cannot be planned as requested: an argument does not fit the primitive.
-
-    Attributes:
-        subject: The argument, such as `goal`.
-        expected: Description of what is needed.
-        got: Description of what was given.
-    """
-
-    subject: str
-    expected: str
-    got: str
-
-    def __str__(self) -> str:
-        return f"{self.subject}: expected {self.expected}, got {self.got}"
+class PlanError(_UnexpectedInput):
+    """A motion cannot be planned as requested: the subject is an argument that does not fit the primitive."""
 
 
 @dataclass(eq=False)

@@ -154,9 +154,7 @@ class RecordNode:
         self._simulator = _Simulator(self._parameters.namespace)
         for name, action in (("start", self.start), ("stop", self.stop), ("discard", self.discard)):
             rospy.Service(f"~{name}", Trigger, lambda _, action=action: TriggerResponse(*_answer(action)))
-        rospy.Service(
-            "~label", SetString, lambda request: SetStringResponse(*_answer(lambda: self.label(request.data)))
-        )
+        rospy.Service("~label", SetString, self._on_label)
         self._buttons: tuple[int, ...] = ()
         rospy.Subscriber("joy", Joy, self._on_joy, queue_size=10)
         self._keys = KeyDownSubscriber(self._actions_by_key())

@@ -85,7 +85,6 @@ class _Presence:
     def __init__(self, at_start: frozenset[str], commands: Commands, states: pd.DataFrame | None, times: Array) -> None:
         self._times = times
         self._changes: list[tuple[float, str, bool]] = []
-        self._at_start = at_start
         later = {command.name for command in _in_order(commands) if command.what == "add"} - at_start
         for resets, ticks in () if states is None else states.groupby("resets"):
             begin_s = -np.inf if not self._changes else ticks.index[0]

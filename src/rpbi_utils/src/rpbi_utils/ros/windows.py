@@ -1,4 +1,4 @@
-"""What windows need of the computer."""
+"""Requirements of Qt windows: PyQt5 and a display."""
 
 import ctypes
 import ctypes.util

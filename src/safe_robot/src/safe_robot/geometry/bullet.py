@@ -167,7 +167,9 @@ def _shapes_of_link(pb: Client, body: int, link: int) -> list[Solid]:
                 solids.append(Solid(0, few_balls(pb.getMeshData(body, link, collisionShapeIndex=i)[1])))
             else:
                 solids.append(Solid(0, balls_of(OF_PYBULLET.get(shape[2], ""), shape[3])).moved(0, place))
-    elif len(shapes_of_files) == len(shapes):  # PyBullet makes several shapes of each: they cannot be told apart
+    elif len(shapes_of_files) == len(
+        shapes
+    ):  # PyBullet makes several shapes of each, without a way to distinguish them
         solids.append(Solid(0, few_balls(pb.getMeshData(body, link)[1])))
     boxes = [box_of(*each.moved(0, np.linalg.inv(place)).extent).moved(0, place) for each, place in zip(solids, places)]
     lower, upper = pb.getAABB(body, link)

@@ -119,13 +119,6 @@ class SourceEpisode(ExportedEpisode):
             raise DatasetError(self.bag, f"its topics have no time in common; the last one to begin is {last}")
         return np.asarray(start + np.arange(count) / self._schema.fps)
 
-    @property
-    def left_out_s(self) -> float:
-        """Time of the recording of joint states and the like that is not in the rows [s]."""
-        tables = [self._tables[name] for name in self._continuous_tables()]
-        whole = max(table.index[-1] for table in tables) - min(table.index[0] for table in tables)
-        return float(whole - (self.times[-1] - self.times[0]))
-
     def frames(self, key: str) -> Iterator[ImageFrame]:
         """Yields the newest image of a camera at the time of each row."""
         (camera,) = (each for each in self._schema.cameras if each.key == key)
