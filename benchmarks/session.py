@@ -37,6 +37,10 @@ class Session:
 
     Args:
         use_sim_time: Whether ROS time is the simulator's.
+
+    Attributes:
+        folder: A temporary folder.
+        environment: Variables of everything that it starts.
     """
 
     def __init__(self, use_sim_time: bool = True) -> None:
@@ -46,7 +50,7 @@ class Session:
         self.folder = Path(self._folder.name)
         port = unused_port()
         uri = f"http://127.0.0.1:{port}"
-        self._environment = {
+        self.environment = {
             **{key: value for key, value in os.environ.items() if key not in ("ROS_HOSTNAME", "ROS_NAMESPACE")},
             "ROS_MASTER_URI": uri,
             "ROS_IP": "127.0.0.1",
@@ -82,7 +86,7 @@ class Session:
                 stdout=file,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
-                env={**self._environment, **environment},
+                env={**self.environment, **environment},
             )
         self._processes.append(process)
         return process

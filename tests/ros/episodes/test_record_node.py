@@ -39,7 +39,7 @@ def _run(name: str, *words: str | Path) -> tuple[int, str]:
 
 def _recorder_pid(folder: EpisodeFolder) -> int:
     """Returns the process that records into a folder; other runs of this test have recorders too."""
-    pattern = f"rosbag/record.*{folder.path}/.*episode.bag"
+    pattern = f"bag_writer.*{folder.path}/.*episode.bag"
     return int(subprocess.run(["pgrep", "-f", pattern], capture_output=True, text=True).stdout.split()[0])
 
 

@@ -13,9 +13,13 @@ from ros_system import wait_until
 from tf2_msgs.msg import TFMessage
 
 TIP, TARGET, FIGURE = "rpbi/kuka_lwr/end_effector_ball", "rpbi/figure_eight", "rpbi/figure_eight_base"
-SOLVERS = ("kdl", "trac_ik", "tasks", "trajectory")  # the last one plans the figure as a whole
+SOLVERS = ("kdl", "tasks", "trajectory")  # the last one plans the figure as a whole
 if os.environ.get("IK_EXAMPLE_SOLVERS") == "all":
-    SOLVERS += ("pybullet", "global")  # some 15 s each; they differ from kdl in nothing that the launch file does
+    SOLVERS += (
+        "trac_ik",
+        "pybullet",
+        "global",
+    )  # some 15 s each; they differ from kdl in nothing that the launch file does
 LEADING = "kdl"
 """The one with `real_robot:=true`."""
 SPAN_M = 0.35

@@ -28,6 +28,7 @@ PACKAGES = {
     "custom_ros_tools",
     "ik_ros",
     "keyboard",
+    "motion_primitives",
     "operator_node",
     "ros_pybullet_interface",
     "rpbi_examples",
@@ -40,13 +41,16 @@ PACKAGES = {
 PRELOADED = (
     "custom_ros_tools/nodes/attach_marker",
     "custom_ros_tools/nodes/remap_joint_state_to_joint_state",
+    "episodes/nodes/record_node.py",
     "ik_ros/nodes/ik_setup_node.py",
     "ik_ros/nodes/ik_solver_node.py",
     "operator_node/nodes/device_node.py",
+    "motion_primitives/nodes/primitives_node.py",
     "operator_node/nodes/mapping_node.py",
     "ros_pybullet_interface/nodes/ros_pybullet_interface_node.py",
     "rpbi_examples/nodes/figure_eight_node.py",
     "rpbi_examples/nodes/ik_example_node.py",
+    "rpbi_utils/nodes/interpolation_node.py",
     "rpbi_utils/nodes/stand_in_node.py",
     "safe_robot/nodes/safe_robot_node.py",
 )
@@ -114,7 +118,7 @@ def _program_server() -> _Server:
     """Starts this file as a program."""
     ours, theirs = _channel()
     command = [sys.executable, __file__, str(theirs.fileno())]
-    environment = {**os.environ, "PYTHONUNBUFFERED": "1", "OPENBLAS_NUM_THREADS": "1"}
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
     process = subprocess.Popen(
         command, pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL, env=environment, start_new_session=True
     )

@@ -46,7 +46,7 @@ def support_on_path(modules: str | None = None) -> dict[str, str]:
     return {"PYTHONPATH": os.pathsep.join((modules, *map(str, SUPPORT.iterdir())))}
 
 
-def wait_until(condition: Callable[[], Any], what: str, timeout_s: float = 120.0, every_s: float = 0.02) -> Any:
+def wait_until(condition: Callable[[], Any], what: str, timeout_s: float = 120.0, every_s: float = 0.05) -> Any:
     """Waits until a condition holds and returns its value.
 
     Errors of a master that is not up yet count as no, and so does asking for the last of no messages.

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import faulthandler
 import os
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 import pytest
+from shares import COMPUTING, is_in
 
 TESTS = Path(__file__).resolve().parents[2]
 FIRST = ("ros/ik_ros", "ros/rpbi_examples", "gui", "ros", "unit/safe_robot", "sim")
 """Folders whose files take long: they are begun first, so that no worker is left alone with one at the end."""
-
 
 QUICK_FOLDERS = ("unit", "sim")
 """Folders whose tests are quick, as those of the top are; elsewhere those with the mark."""
@@ -113,7 +114,18 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         matches = (number for number, folder in enumerate(FIRST) if item.path.is_relative_to(TESTS / folder))
         return next(matches, len(FIRST))
 
-    items.sort(key=rank)
+    files: dict[Path, list[pytest.Item]] = {}
+    for item in sorted(items, key=rank):
+        files.setdefault(item.path, []).append(item)
+    computing = [file for file in files if is_in(file, COMPUTING)]
+    others = [file for file in files if file not in set(computing)]
+    items[:] = [item for file in _in_turns(others, computing) for item in files[file]]
+
+
+def _in_turns(first: list[Path], second: list[Path]) -> Iterator[Path]:
+    """Yields files of two kinds in turns, so that workers have some of both at any time."""
+    for pair in zip_longest(first, second):
+        yield from filter(None, pair)
 
 
 def _is_quick(item: pytest.Item) -> bool:
@@ -128,12 +140,9 @@ def _is_all_quick(path: Path) -> bool:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """Returns how many workers `-n auto` means: one more than processors, since tests wait for some of their time.
-
-    With two more, the simulators of four tests in real time starved each other.
-    """
+    """Returns how many workers `-n auto` means: two more than processors, since tests wait for some of their time."""
     files = [argument.split("::")[0] for argument in getattr(config, "args", ())]
-    wanted = (os.cpu_count() or 1) + 1
+    wanted = (os.cpu_count() or 1) + 2
     if all(Path(file).is_file() for file in files):
         wanted = min(wanted, len(set(files)))
     return wanted if wanted > 1 else 0

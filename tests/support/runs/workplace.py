@@ -68,6 +68,7 @@ class Workplace:
             ROS_HOME=str(self.folder),
             HOME=str(home),
             XDG_RUNTIME_DIR=str(run),
+            OPENBLAS_NUM_THREADS="1",  # else each import of numpy has threads of the other processors spin for 0.1 s
         )
         if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):  # else each of a thousand nodes would compile its modules
             os.environ["PYTHONPYCACHEPREFIX"] = str(Path(__file__).resolve().parents[3] / ".rpbi/pycache")

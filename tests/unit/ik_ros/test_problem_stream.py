@@ -7,11 +7,12 @@ import pytest
 
 from custom_ros_tools.errors import UnknownNameError
 from ik_ros.problem import IKProblem, IKSolution
-from ik_ros.problem_stream import LONGEST_PERIOD_S, JointRateLimiter, JointRateLimiterConfig, ProblemStream
+from ik_ros.problem_stream import JointRateLimiter, JointRateLimiterConfig, ProblemStream
 from ik_ros.solver import Solver
 
 JOINTS = ("shoulder", "elbow")
 SPEED = 2.0
+MAX_PERIOD_S = 0.05
 
 
 class Asked(Solver):
@@ -39,7 +40,8 @@ def solver():
 
 @pytest.fixture
 def smooth(solver):
-    return ProblemStream(solver, JointRateLimiter(JointRateLimiterConfig(), JOINTS, solver.velocity_limits))
+    config = JointRateLimiterConfig(max_period_s=MAX_PERIOD_S)
+    return ProblemStream(solver, JointRateLimiter(config, JOINTS, solver.velocity_limits))
 
 
 def at(*positions, **start):
@@ -75,7 +77,7 @@ def test_continuity_begins_at_the_first_start_and_goes_no_faster_than_the_joints
     assert second.positions == pytest.approx((-0.5 + 0.01 * SPEED, 0.2 - 0.2 * 0.01 * SPEED))
     assert solver.starts[1] == {"shoulder": -0.5, "elbow": 0.2}, "where the last target was, whatever is measured"
     after_a_pause = smooth.solve(at(0.5, 0.0), 60.0)
-    assert after_a_pause.positions[0] - second.positions[0] == pytest.approx(LONGEST_PERIOD_S * SPEED)
+    assert after_a_pause.positions[0] - second.positions[0] == pytest.approx(MAX_PERIOD_S * SPEED)
 
 
 def test_continuity_begins_within_limits(smooth):

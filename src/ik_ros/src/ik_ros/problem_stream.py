@@ -12,9 +12,6 @@ from custom_ros_tools.schema import ConfigModel, Positive
 from .problem import IKProblem, IKSolution, JointPositions
 from .solver import Solver
 
-LONGEST_PERIOD_S = 0.1
-"""A target that comes after a longer pause goes on as if it had been this long."""
-
 
 class JointRateLimiterConfig(ConfigModel):
     """Timing of a stream of targets."""
@@ -24,6 +21,9 @@ class JointRateLimiterConfig(ConfigModel):
         description="Largest velocity of each joint, one for all or by joint [rad/s or m/s]; the URDF's if left out.",
     )
     velocity_scale: float = Field(1.0, gt=0.0, le=1.0, description="Share of these velocities that is used.")
+    max_period_s: Positive = Field(
+        0.1, description="A target that comes after a longer pause goes no further than after this one [s]."
+    )
     hold: bool = Field(
         False, description="Whether targets go on to the last solution, and stay there, while problems have none."
     )
@@ -43,6 +43,7 @@ class JointRateLimiter:
 
     Attributes:
         hold: Whether targets go on while problems have no solution.
+        max_period_s: Longest time since the last target that counts [s].
 
     Raises:
         ValueError: If the configuration names a joint that is not there, or a joint has no limit at all.
@@ -62,7 +63,7 @@ class JointRateLimiter:
             limits = dict.fromkeys(limits, given)
         if unlimited := ", ".join(name for name, limit in limits.items() if not 0.0 < limit < np.inf):
             raise ValueError(f"continuity.max_velocity: the URDF has no velocity for {unlimited}; give it one here")
-        self.hold = config.hold
+        self.hold, self.max_period_s = config.hold, config.max_period_s
         self._limits = config.velocity_scale * np.array(list(limits.values()))
         self._last: np.ndarray | None = None
 
@@ -86,7 +87,8 @@ class JointRateLimiter:
             return goal, 1.0
         way = goal - self._last
         needed_s = float(np.max(np.abs(way) / self._limits, initial=0.0))
-        share = 1.0 if needed_s <= period_s else max(period_s, 0.0) / needed_s
+        period_s = min(max(period_s, 0.0), self.max_period_s)
+        share = 1.0 if needed_s <= period_s else period_s / needed_s
         self._last = goal if share == 1.0 else self._last + share * way
         return self._last, share
 
@@ -174,4 +176,4 @@ class ProblemStream:
         now_s = stamp_s or time.monotonic()
         period_s = 0.0 if self._last_s is None else now_s - self._last_s
         self._last_s = now_s
-        return min(max(period_s, 0.0), LONGEST_PERIOD_S)
+        return period_s

@@ -44,8 +44,6 @@ MAX_HASH_WAIT_S = 1.5
 MAX_RESET_WAIT_S = 10.0
 """Longest time to wait for the state after a reset [s]."""
 POLL_S = 0.01
-CHUNK_KB = 8
-"""Data that a killed recorder may lose [kB]; those of a world with one arm at 50 Hz in 0.2 s."""
 KEPT_COMMANDS = 4_000
 """Number of commands in a world's life beyond which a late subscriber may miss the first ones; it gets 5,000."""
 
@@ -221,9 +219,7 @@ class RecordNode:
             files=files,
             note="; ".join(faults),
         )
-        recorder = Recorder(
-            self._part / BAG, topics, min_space=f"{parameters.disk_reserve_mb / 2:.0f}M", chunk_kb=CHUNK_KB
-        )
+        recorder = Recorder(self._part / BAG, topics, min_space_mb=parameters.disk_reserve_mb / 2.0)
         try:
             recorder.start()
             if fault := self._simulator.write_commands(self._part / EARLIER):

@@ -38,6 +38,13 @@ HOME_S, START_S = 2.0, 1.0
 SIGNAL_HZ = 50.0
 RETURN_RATE = 3.0
 """Speed towards the plan for each metre of the target beside it [1/s]."""
+LAG_M, SLACK_M = 0.02, 0.01
+"""Lag of the tip behind the plan that is normal, and further lag that halves the speed of the plan [m].
+
+The plan waits for the arm by phase stopping: Ijspeert et al., Dynamical Movement Primitives, Neural Computation 25(2).
+"""
+MIN_PACE = 0.1
+"""Least speed of the plan, so that it ends although the arm cannot follow."""
 BEYOND_M = 0.02
 """Length by which a plan may leave the limits of teleoperation, where the target stops [m]."""
 END_S = 0.5
@@ -102,12 +109,16 @@ class Arm:
         """Moves the target along a plan by velocities, as a person does, and returns at its end."""
         call_service("operator_node/toggle", SetBool, False)  # the person does not steer meanwhile
         try:
-            begin, rate = rospy.Time.now(), rospy.Rate(SIGNAL_HZ)
-            while (passed_s := (rospy.Time.now() - begin).to_sec()) < plan.duration_s + END_S:
-                velocity = plan.at(passed_s)[1]
+            now, rate = rospy.Time.now(), rospy.Rate(SIGNAL_HZ)
+            begin, phase_s = now, 0.0
+            while phase_s < plan.duration_s + END_S:
+                last, now = now, rospy.Time.now()
+                pace = self._pace(plan.at(phase_s)[0])
+                phase_s += pace * (now - last).to_sec()
+                velocity = pace * plan.at(phase_s)[1]
                 message = self._tf.get_tf_msg(ORIGIN, TARGET)
                 if message is not None and message.header.stamp > begin:
-                    planned = plan.at((message.header.stamp - begin).to_sec())[0]
+                    planned = plan.at(phase_s - pace * (now - message.header.stamp).to_sec())[0]
                     there = message.transform.translation
                     velocity = velocity + RETURN_RATE * (planned - (there.x, there.y))
                 self._signal.publish(Float64MultiArray(data=[*velocity.tolist(), 0.0]))
@@ -115,6 +126,15 @@ class Arm:
             self._signal.publish(Float64MultiArray(data=[0.0, 0.0, 0.0]))
         finally:
             call_service("operator_node/toggle", SetBool, True)
+
+    def _pace(self, planned: Array) -> float:
+        """Returns the speed of a plan's time, less than 1 while the tip is far from where it shall be."""
+        message = self._tf.get_tf_msg(ORIGIN, TIP)
+        if message is None:
+            return 1.0
+        there = message.transform.translation
+        lag = math.hypot(planned[0] - there.x, planned[1] - there.y)
+        return max(1.0 / (1.0 + (max(lag - LAG_M, 0.0) / SLACK_M) ** 2), MIN_PACE)
 
     def _switch(self, on: bool) -> None:
         """Switches on or off that the arm follows the person."""

@@ -1,4 +1,4 @@
-"""Starts and stops `rosbag record` without losing messages in between, and reports losses."""
+"""Records topics in a process of its own without losing messages, and reports losses."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import itertools
 import logging
 import os
 import re
-import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Collection, Sequence
@@ -17,14 +17,14 @@ from typing import Any
 from xmlrpc.client import ServerProxy
 
 import rosgraph
-import roslib.packages
 from rosgraph.names import get_ros_namespace, resolve_name
 
-from custom_ros_tools.errors import MissingDependency
 from custom_ros_tools.processes.child import start_child
 from custom_ros_tools.ros.lifecycle.timed_master import MASTER_FAILURES, TimedTransport
 from rpbi_utils.bags.errors import RecordingError
 
+NOT_RECORDING = "not recording: "
+"""Beginning of what the recording process prints before it ends with 1."""
 _CALLER = "/rpbi_utils"
 _ANSWER_S = 1.0
 _OUTBOUND = "o"
@@ -33,7 +33,6 @@ _QUIET_TURNS, _TURN_S, _MOST_GRACE_S = 20, 0.01, 10.0
 """Number, spacing [s] and duration [s] of checks that find the recorder idle at the end, to let the last messages
 arrive. Several checks, since a single time span might pass while the machine stands still.
 """
-_NOT_WRITING = ("Disabling recording", "Error writing", "Unknown exception")
 _DECORATION = re.compile(r"^(\x1b\[[\d;]*m)?\[ *[A-Z]+\] \[[\d., ]+\]: |\x1b\[[\d;]*m", re.MULTILINE)
 _numbers = itertools.count()
 
@@ -41,9 +40,10 @@ _log = logging.getLogger(__name__)
 
 
 class Recorder:
-    """A `rosbag record` of some topics, as a context: what is published inside it is in the bag, compressed by LZ4.
+    """Records some topics, as a context: what is published inside it is in the bag, compressed by LZ4.
 
-    When this process is killed, the recorder closes the bag and ends, too.
+    The bag is written by a process of its own. It keeps all messages until they are written, even if it gets no
+    processor time for a while. When this process is killed, it closes the bag and ends, too.
 
     On entry it waits until the recorder has subscribed to every topic and every publisher that is there sends to it; on
     exit it stops the recorder and waits until the bag is closed. It waits in wall time, never ROS time.
@@ -55,7 +55,7 @@ class Recorder:
         path: The bag to write, ending with `.bag`. Its folder is created, and a bag of that name is replaced.
         topics: Topics to record; relative names are resolved in the namespace of this process.
         timeout_s: Wall time to wait for the subscriptions, and for the bag to be closed [s].
-        min_space: Smallest free space on the disk (`"1G"`, `"200M"`); with less, `rosbag record` does not write.
+        min_space_mb: Free space of the disk below which the recording ends [MB].
     """
 
     def __init__(
@@ -64,8 +64,7 @@ class Recorder:
         topics: Sequence[str],
         *,
         timeout_s: float = 30.0,
-        min_space: str = "1G",
-        chunk_kb: int = 768,
+        min_space_mb: float = 1000.0,
     ) -> None:
         self.path = Path(path)
         if self.path.suffix != ".bag":
@@ -74,7 +73,7 @@ class Recorder:
             raise ValueError(f"a list of at least one topic is needed, got {topics!r}")
         self.topics = sorted({resolve_name(topic, get_ros_namespace()) for topic in topics})
         self._timeout_s = timeout_s
-        self._min_space, self._chunk_kb = min_space, chunk_kb
+        self._min_space_mb = min_space_mb
         self._node = f"/recorder_{os.getpid()}_{next(_numbers)}"
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -119,7 +118,6 @@ class Recorder:
         Raises:
             RecordingError: If there is no master or it ends, the bag cannot be written, or the recorder ends or
                 does not subscribe in time.
-            MissingDependency: If `rosbag record` is not installed.
         """
         if self.is_running:
             raise RecordingError(self.path, "is going on already")
@@ -132,7 +130,9 @@ class Recorder:
             raise RecordingError(self.path, f"cannot be written: {error}") from None
         self._output = tempfile.TemporaryFile()
         # SIGTERM has it close the bag; SIGINT is blocked in children of nodes
-        self._process = start_child(self._command(), signal.SIGTERM, stdout=self._output, stderr=subprocess.STDOUT)
+        environment = {key: value for key, value in os.environ.items() if key != "ROS_NAMESPACE"}
+        options: dict[str, Any] = {"stdout": self._output, "stderr": subprocess.STDOUT, "env": environment}
+        self._process = start_child(self._command(), signal.SIGTERM, **options)
         try:
             self._wait_until_connected()
         except BaseException:  # Ctrl-C included: leave no process behind
@@ -161,13 +161,8 @@ class Recorder:
         return self.path
 
     def _command(self) -> list[str]:
-        """Returns the command line of the recorder itself; the script `rosbag` would keep signals from it."""
-        found = roslib.packages.find_node("rosbag", "record")
-        if not found:
-            raise MissingDependency("rosbag record", "apt install python3-rosbag")
-        options = ["--output-name", str(self.path), "--min-space", self._min_space, "--lz4"]
-        options += ["--buffsize", "0", "--chunksize", str(self._chunk_kb)]
-        return [found[0], *options, *self.topics, f"__name:={self._node.removeprefix('/')}", "__ns:=/"]
+        words = (self._node.removeprefix("/"), str(self.path), str(self._min_space_mb), *self.topics)
+        return [sys.executable, "-m", "rpbi_utils.ros.bags.bag_writer", *words]
 
     def _wait_until_connected(self) -> None:
         deadline = time.monotonic() + self._timeout_s
@@ -211,9 +206,8 @@ class Recorder:
 
     def _raise_if_not_writing(self) -> None:
         for line in self._lines():
-            if any(words in line for words in _NOT_WRITING):
-                free = shutil.disk_usage(self.path.parent).free / 1e9
-                raise RecordingError(self.path, f"the recorder does not write ({free:.1f} GB free): {line}")
+            if line.startswith(NOT_RECORDING):
+                raise RecordingError(self.path, line)
 
     def _last_line(self) -> str:
         lines = self._lines()

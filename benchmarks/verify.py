@@ -1,0 +1,95 @@
+"""Whether recorded episodes of four examples simulate again to the same states, and whether a changed file is named."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+from typing import NamedTuple
+
+import numpy as np
+from result import Result, Target
+from session import Session
+
+from episodes import EpisodeFolder
+from episodes.ros.verification import verify_all
+
+
+class Scene(NamedTuple):
+    """An example whose episodes are recorded.
+
+    Attributes:
+        launch: Its launch file and arguments.
+        ready: Service that it offers when it is up.
+        program: One of `programs/` that takes the person's part, None without people.
+        longest_s: Length of the longest episode, in wall time [s].
+    """
+
+    launch: tuple[str, ...]
+    ready: str
+    program: str | None = None
+    longest_s: float = 3.0
+
+
+FAST = "real_time_factor:=0"
+SCENES = {
+    "pushing": Scene(("basic_example_kuka_lwr.launch", FAST), "/rpbi/reset"),
+    "grasping": Scene(("grasp_example.launch", FAST), "/rpbi/reset"),
+    "wiping": Scene(("wiping_example.launch", FAST), "/rpbi/reset"),
+    "a person's stick": Scene(("teleop.launch", "device:=joystick"), "/toggle_teleop_tf", "stick", 4.0),
+}
+EPISODES, QUICK_EPISODES = 250, 3
+SHORTEST_S = 1.2
+"""Length of the shortest episode, in wall time [s]."""
+CHANGED = 20
+"""Number of episodes of a scene that are verified with a changed file."""
+DIGIT = re.compile(r"(baseMass|lateralFriction|timeStep|gravZ|rollingFriction): *-?[\d.]*?([1-9])")
+
+
+def run(quick: bool) -> list[Result]:
+    """Records episodes of each scene, and verifies them in fresh processes, as `./rpbi verify` does."""
+    count = QUICK_EPISODES if quick else EPISODES
+    results = []
+    for name, scene in SCENES.items():
+        with Session() as ros:
+            folder = EpisodeFolder(ros.folder / "episodes")
+            _record(ros, scene, folder, count)
+            numbers = folder.numbers()
+            same = 0
+            for verdict in verify_all(folder, numbers, os.cpu_count() or 1, ()):
+                same += verdict.is_same
+                if not verdict.is_same:
+                    print(f"{name}: episode {verdict.number}: {verdict.text}", file=sys.stderr, flush=True)
+            results.append(Result("verify", f"{name}: the same, of {count}", same, "", None, Target(count, True)))
+            named, affected = _named_after_a_change(folder, numbers[:CHANGED])
+            figure = f"{name}: named after one digit of a file was changed, of {affected}"
+            results.append(Result("verify", figure, named, "", None, Target(affected, True)))
+    return results
+
+
+def _record(ros: Session, scene: Scene, folder: EpisodeFolder, count: int) -> None:
+    random = np.random.default_rng(len(scene.launch))
+    ros.node(["roslaunch", "rpbi_examples", *scene.launch, "headless:=true"], scene.ready)
+    if scene.program:
+        ros.program(scene.program)
+    ros.set_parameters("/record", {"folder": str(folder.path), "reset": True, "disk_reserve_mb": 100.0})
+    ros.node(["rosrun", "episodes", "record_node.py"], "/record/start")
+    lengths = random.uniform(SHORTEST_S, scene.longest_s, count).round(2).tolist()
+    ros.result_of(ros.program("record_episodes", json.dumps(lengths)), timeout_s=60.0 + 10.0 * sum(lengths))
+
+
+def _named_after_a_change(folder: EpisodeFolder, numbers: list[int]) -> tuple[int, int]:
+    """Changes one digit of the stored copy of a world file.
+
+    Returns:
+        The number of episodes that are named, and the number of those that have this file.
+    """
+    copy = next(path for path in sorted(folder.files.glob("*.yaml")) if DIGIT.search(path.read_text()))
+    found = DIGIT.search(text := copy.read_text())
+    assert found is not None
+    start, end = found.span(2)
+    copy.write_text(text[:start] + str(int(found[2]) % 9 + 1) + text[end:])
+    affected = [number for number in numbers if copy.stem in json.dumps(folder.read(number).files)]
+    verdicts = verify_all(folder, affected, os.cpu_count() or 1, ())
+    return sum(copy.stem in verdict.text and not verdict.is_same for verdict in verdicts), len(affected)

@@ -1,0 +1,134 @@
+"""Writes topics to a bag; `Recorder` starts it as a process of its own.
+
+All messages that arrive are kept until they are written. `rosbag record` keeps 100 of each topic, and loses messages
+when it gets no processor time for a while.
+"""
+
+from __future__ import annotations
+
+import argparse
+import queue
+import shutil
+import signal
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import genpy
+import rosbag
+import rospy
+
+from .recorder import NOT_RECORDING
+
+_POLL_S = 0.1
+_FLUSH_S = 0.5
+"""Time between two writes of the open chunk, which a recorder that is killed would lose [s]."""
+_HEADER = ("type", "md5sum", "message_definition", "callerid", "latching")
+
+
+class _Arrival(NamedTuple):
+    """A message as it came; its time is zero before the first /clock."""
+
+    topic: str
+    time: genpy.Time
+    message: rospy.AnyMsg
+
+
+class BagWriter:
+    """Writes topics to a bag until `end`, compressed by LZ4; the bag is `NAME.bag.active` until it is closed.
+
+    Args:
+        path: The bag.
+        min_space_mb: Free space of the disk below which it ends [MB].
+    """
+
+    def __init__(self, path: Path, min_space_mb: float) -> None:
+        self._path, self._min_space_mb = path, min_space_mb
+        self._arrivals: queue.SimpleQueue[_Arrival] = queue.SimpleQueue()
+        self._connections: dict[tuple[str, ...], Any] = {}
+        self._is_ended = threading.Event()
+
+    def end(self) -> None:
+        """Has `run` write what has arrived, close the bag, and return."""
+        self._is_ended.set()
+
+    def run(self, topics: Sequence[str]) -> None:
+        """Writes topics until `end`.
+
+        Raises:
+            OSError: If the bag cannot be written, or there is too little space.
+        """
+        self._require_space()
+        for topic in topics:
+            rospy.Subscriber(topic, rospy.AnyMsg, partial(self._on_message, topic), queue_size=None, tcp_nodelay=True)
+        while not (first := rospy.get_rostime()):
+            if self._is_ended.wait(_POLL_S):
+                return
+        active = self._path.with_name(f"{self._path.name}.active")
+        with rosbag.Bag(str(active), "w", compression="lz4") as bag:
+            self._write_all(bag, first)
+        active.rename(self._path)
+
+    def _write_all(self, bag: rosbag.Bag, first: genpy.Time) -> None:
+        flushed_s = time.monotonic()
+        while not (self._is_ended.is_set() and self._arrivals.empty()):
+            try:
+                self._write(bag, self._arrivals.get(timeout=_POLL_S), first)
+            except queue.Empty:
+                pass
+            if (now_s := time.monotonic()) - flushed_s > _FLUSH_S:
+                flushed_s = now_s
+                bag.flush()
+                self._require_space()
+
+    def _write(self, bag: rosbag.Bag, arrival: _Arrival, first: genpy.Time) -> None:
+        """Writes a message; each publisher and type of a topic is a connection of its own in the bag."""
+        header = arrival.message._connection_header
+        key = (arrival.topic, header["md5sum"], header.get("callerid", ""))
+        known = bag._topic_connections  # by itself, Bag.write has one connection a topic, whatever comes on it
+        known.pop(arrival.topic, None)
+        if key in self._connections:
+            known[arrival.topic] = self._connections[key]
+        described = {"topic": arrival.topic, **{each: header[each] for each in _HEADER if each in header}}
+        raw = (header["type"], arrival.message._buff, header["md5sum"], SimpleNamespace(_md5sum=header["md5sum"]))
+        bag.write(arrival.topic, raw, arrival.time or first, raw=True, connection_header=described)
+        self._connections[key] = known[arrival.topic]
+
+    def _on_message(self, topic: str, message: rospy.AnyMsg) -> None:
+        self._arrivals.put(_Arrival(topic, rospy.get_rostime(), message))
+
+    def _require_space(self) -> None:
+        free_mb = shutil.disk_usage(self._path.parent).free / 1e6
+        if free_mb < self._min_space_mb:
+            raise OSError(f"expected at least {self._min_space_mb:g} MB of free space, got {free_mb:.0f} MB")
+
+
+def main(words: Sequence[str]) -> int:
+    """Records until SIGTERM or SIGINT; returns the exit code, 1 if the bag cannot be written."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("node")
+    parser.add_argument("path", type=Path)
+    parser.add_argument("min_space_mb", type=float)
+    parser.add_argument("topics", nargs="+")
+    options = parser.parse_args(words)
+    writer = BagWriter(options.path, options.min_space_mb)
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: writer.end())
+    rospy.init_node(options.node, argv=[], disable_signals=True, disable_rosout=True)
+    try:
+        writer.run(options.topics)
+    except OSError as error:
+        print(f"{NOT_RECORDING}{error}", flush=True)
+        return 1
+    finally:
+        rospy.signal_shutdown("the recording has ended")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
