@@ -154,7 +154,8 @@ def test_with_resets_by_a_button_and_a_changed_urdf(ros: Any, tmp_path: Path) ->
 def test_the_node_repairs_what_it_finds_and_a_full_disk_is_named(ros: Any, tmp_path: Path) -> None:
     session = _Session(ros, tmp_path)
     session.move(0.2)
-    recorder = _recorder_pid(session.folder)
+    recorder, (part,) = _recorder_pid(session.folder), session.folder.partial()
+    wait_until(lambda: (part / "episode.bag.active").stat().st_size > 10_000, "messages are on the disk")
     session.node.kill()
     os.kill(recorder, signal.SIGKILL)
     session.node.wait()

@@ -189,7 +189,7 @@ def test_a_full_disk_is_an_error(ros: Any, tmp_path: Path) -> None:
 
 
 def test_a_folder_that_cannot_be_written_is_an_error(ros: Any) -> None:
-    with pytest.raises(RecordingError, match="not recording: .*Errno"):
+    with pytest.raises(RecordingError, match="not recording: "):
         with Recorder("/proc/a.bag", ["/a"]):
             pass
 

@@ -41,11 +41,9 @@ PACKAGES = {
 PRELOADED = (
     "custom_ros_tools/nodes/attach_marker",
     "custom_ros_tools/nodes/remap_joint_state_to_joint_state",
-    "episodes/nodes/record_node.py",
     "ik_ros/nodes/ik_setup_node.py",
     "ik_ros/nodes/ik_solver_node.py",
     "operator_node/nodes/device_node.py",
-    "motion_primitives/nodes/primitives_node.py",
     "operator_node/nodes/mapping_node.py",
     "ros_pybullet_interface/nodes/ros_pybullet_interface_node.py",
     "rpbi_examples/nodes/figure_eight_node.py",

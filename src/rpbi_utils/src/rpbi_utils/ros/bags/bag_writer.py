@@ -7,6 +7,7 @@ when it gets no processor time for a while.
 from __future__ import annotations
 
 import argparse
+import io
 import queue
 import shutil
 import signal
@@ -26,7 +27,7 @@ import rospy
 from .recorder import NOT_RECORDING
 
 _POLL_S = 0.1
-_FLUSH_S = 0.5
+_FLUSH_S = 0.2
 """Time between two writes of the open chunk, which a recorder that is killed would lose [s]."""
 _HEADER = ("type", "md5sum", "message_definition", "callerid", "latching")
 
@@ -36,7 +37,7 @@ class _Arrival(NamedTuple):
 
     topic: str
     time: genpy.Time
-    message: rospy.AnyMsg
+    message: genpy.Message
 
 
 class BagWriter:
@@ -95,17 +96,31 @@ class BagWriter:
         if key in self._connections:
             known[arrival.topic] = self._connections[key]
         described = {"topic": arrival.topic, **{each: header[each] for each in _HEADER if each in header}}
-        raw = (header["type"], arrival.message._buff, header["md5sum"], SimpleNamespace(_md5sum=header["md5sum"]))
+        raw = (
+            header["type"],
+            _serialized(arrival.message),
+            header["md5sum"],
+            SimpleNamespace(_md5sum=header["md5sum"]),
+        )
         bag.write(arrival.topic, raw, arrival.time or first, raw=True, connection_header=described)
         self._connections[key] = known[arrival.topic]
 
-    def _on_message(self, topic: str, message: rospy.AnyMsg) -> None:
+    def _on_message(self, topic: str, message: genpy.Message) -> None:
         self._arrivals.put(_Arrival(topic, rospy.get_rostime(), message))
 
     def _require_space(self) -> None:
         free_mb = shutil.disk_usage(self._path.parent).free / 1e6
         if free_mb < self._min_space_mb:
             raise OSError(f"expected at least {self._min_space_mb:g} MB of free space, got {free_mb:.0f} MB")
+
+
+def _serialized(message: genpy.Message) -> bytes:
+    """Returns a message as it was sent; rospy itself subscribes to /clock, which therefore comes as a message."""
+    if isinstance(message, rospy.AnyMsg):
+        return bytes(message._buff)
+    buffer = io.BytesIO()
+    message.serialize(buffer)
+    return buffer.getvalue()
 
 
 def main(words: Sequence[str]) -> int:
