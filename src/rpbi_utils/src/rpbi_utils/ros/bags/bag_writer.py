@@ -67,27 +67,35 @@ class BagWriter:
         self._require_space()
         for topic in topics:
             rospy.Subscriber(topic, rospy.AnyMsg, partial(self._on_message, topic), queue_size=None, tcp_nodelay=True)
-        while not (first := rospy.get_rostime()):
+        while not rospy.get_rostime():
             if self._is_ended.wait(_POLL_S):
                 return
         active = self._path.with_name(f"{self._path.name}.active")
         with rosbag.Bag(str(active), "w", compression="lz4") as bag:
-            self._write_all(bag, first)
+            self._write_all(bag)
         active.rename(self._path)
 
-    def _write_all(self, bag: rosbag.Bag, first: genpy.Time) -> None:
+    def _write_all(self, bag: rosbag.Bag) -> None:
         flushed_s = time.monotonic()
+        untimed: list[_Arrival] = []  # they came before the first /clock, and get the time of the next message
         while not (self._is_ended.is_set() and self._arrivals.empty()):
             try:
-                self._write(bag, self._arrivals.get(timeout=_POLL_S), first)
+                arrival = self._arrivals.get(timeout=_POLL_S)
+                untimed.append(arrival)
+                if arrival.time:
+                    for each in untimed:
+                        self._write(bag, each, arrival.time)
+                    untimed.clear()
             except queue.Empty:
                 pass
             if (now_s := time.monotonic()) - flushed_s > _FLUSH_S:
                 flushed_s = now_s
                 bag.flush()
                 self._require_space()
+        for each in untimed:
+            self._write(bag, each, rospy.get_rostime())
 
-    def _write(self, bag: rosbag.Bag, arrival: _Arrival, first: genpy.Time) -> None:
+    def _write(self, bag: rosbag.Bag, arrival: _Arrival, at: genpy.Time) -> None:
         """Writes a message; each publisher and type of a topic is a connection of its own in the bag."""
         header = arrival.message._connection_header
         key = (arrival.topic, header["md5sum"], header.get("callerid", ""))
@@ -102,7 +110,7 @@ class BagWriter:
             header["md5sum"],
             SimpleNamespace(_md5sum=header["md5sum"]),
         )
-        bag.write(arrival.topic, raw, arrival.time or first, raw=True, connection_header=described)
+        bag.write(arrival.topic, raw, at, raw=True, connection_header=described)
         self._connections[key] = known[arrival.topic]
 
     def _on_message(self, topic: str, message: genpy.Message) -> None:
