@@ -15,6 +15,8 @@ from rpbi_utils import bag_to_dataframes
 
 SLOW = "real_time_factor:=0.5"
 """Half as fast, since a person cannot push straight where other tests take the processor."""
+GOAL = "goal:=-0.73 0"
+"""Straight ahead, so that one push does it; `./rpbi bench lfd` has the goal round the corner."""
 SLOW_S = 400.0
 
 
@@ -24,7 +26,7 @@ def session(ros_master, screen, tmp_path_factory):
     system = RosSystem(tmp_path_factory.mktemp("lfd"))
     try:
         out = system.folder / "out"
-        arguments = ["operator:=keyboard", "seed:=5", "rounds:=1", "headless:=true", f"out:={out}", SLOW]
+        arguments = ["operator:=keyboard", "seed:=5", "rounds:=1", "headless:=true", f"out:={out}", SLOW, GOAL]
         launch = system.start(["roslaunch", "rpbi_examples", "lfd.launch", *arguments], **screen.environment)
         wait_until(lambda: "key 1: home" in system.output(launch), "it is ready", SLOW_S)
         assert system.call("/lfd/learn", Trigger).success  # nothing was shown yet
@@ -55,7 +57,7 @@ def test_demonstration_and_execution_are_episodes_and_tables(session):
     assert all(each.state == "complete" for each in episodes.values())
     first = min(episodes)
     joy = bag_to_dataframes(folder.folder_of(first) / "episode.bag", "/joy")["/joy"]
-    assert (joy["axes/1"] == 1.0).any() and (joy["axes/0"] == -1.0).any(), "keys were held"
+    assert (joy["axes/1"] == 1.0).any(), "a key was held"
     for number in episodes:
         table = pd.read_parquet(out / f"tables/episode_{number:06d}.parquet", engine="fastparquet")
         assert {"tip/x", "tip/y", "box/x", "box/y", "box/yaw", "contact", "signal/x", "signal/y"} == set(table.columns)

@@ -61,14 +61,30 @@ def publishing(topic: str, message_type: type) -> Iterator[rospy.Publisher]:
     if name in _published:
         wait_until(lambda: not _is_taken_for_connected(name), f"who listened to {name} has noticed that it ended")
     _published.add(name)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # without a queue, a message has gone when `publish` returns
-        publisher = rospy.Publisher(topic, message_type, queue_size=None)
-    wait_until(publisher.get_num_connections, f"somebody listens to {topic}")
+    publisher = _connected_publisher(topic, message_type)
     try:
         yield publisher
     finally:
         publisher.unregister()
+
+
+def _connected_publisher(topic: str, message_type: type) -> rospy.Publisher:
+    """Returns a publisher that somebody listens to.
+
+    A node in rospy overlooks one now and then that comes back soon after it ended; it is then offered once more.
+    """
+    for is_last in (False, False, True):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # without a queue, a message has gone when `publish` returns
+            publisher = rospy.Publisher(topic, message_type, queue_size=None)
+        try:
+            wait_until(publisher.get_num_connections, f"somebody listens to {topic}", 20.0)
+            break
+        except TimeoutError:
+            publisher.unregister()
+            if is_last:
+                raise
+    return publisher
 
 
 def count_taken(publisher: rospy.Publisher) -> int:

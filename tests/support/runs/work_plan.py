@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import faulthandler
 import os
-from collections.abc import Generator, Iterator
+from collections.abc import Generator
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 import pytest
-from shares import COMPUTING, is_in
+from shares import COMPUTING, EXAMPLES, is_in
 
 TESTS = Path(__file__).resolve().parents[2]
 FIRST = ("ros/ik_ros", "ros/rpbi_examples", "gui", "ros", "unit/safe_robot", "sim")
@@ -117,15 +117,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     files: dict[Path, list[pytest.Item]] = {}
     for item in sorted(items, key=rank):
         files.setdefault(item.path, []).append(item)
-    computing = [file for file in files if is_in(file, COMPUTING)]
-    others = [file for file in files if file not in set(computing)]
-    items[:] = [item for file in _in_turns(others, computing) for item in files[file]]
-
-
-def _in_turns(first: list[Path], second: list[Path]) -> Iterator[Path]:
-    """Yields files of two kinds in turns, so that workers have some of both at any time."""
-    for pair in zip_longest(first, second):
-        yield from filter(None, pair)
+    examples = [file for file in files if is_in(file, EXAMPLES)]
+    nodes = [file for file in files if not is_in(file, EXAMPLES + COMPUTING)]
+    others = [file for file in files if is_in(file, COMPUTING)]
+    in_turns = [file for pair in zip_longest(examples, nodes) for file in pair if file]  # few examples at once
+    items[:] = [item for file in in_turns + others for item in files[file]]
 
 
 def _is_quick(item: pytest.Item) -> bool:

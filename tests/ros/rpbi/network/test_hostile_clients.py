@@ -251,7 +251,7 @@ def test_a_node_that_was_out_of_file_handles_hears_again(ros, node):
     assert soft >= min(hard, MAX_FILES), "it may have many from its start"
     with ThreadPoolExecutor(1) as callers:
         try:
-            resource.prlimit(node.pid, resource.RLIMIT_NOFILE, (10, hard))
+            resource.prlimit(node.pid, resource.RLIMIT_NOFILE, (3, hard))  # the standard streams, which it has
             asked = callers.submit(objects, ros)
             with pytest.raises(TimeoutError):
                 asked.result(2.0)
