@@ -8,16 +8,17 @@ import select
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from multiprocessing.connection import Client, Connection
+from multiprocessing.connection import Connection
+from multiprocessing.reduction import recv_handle
 from typing import Any
 
 from custom_ros_tools.errors import InterfaceError
 from rpbi.world import World
 from rpbi.world.command_log import RecordedCommand
 from rpbi.world.saved.commands import apply_command
+from rpbi.world.saved.state import WorldState
 
 from .prediction import Candidate, Prediction, PredictionJob, predict
-from .shadow import Start
 
 PIPE_BYTES = 1 << 20
 
@@ -27,13 +28,13 @@ def main() -> None:
     connection = Connection(int(sys.argv[1]))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that it follows
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # so that forks are no zombies
-    start: Start = connection.recv()
+    state: WorldState = connection.recv()
     world: World | None = None
 
     def follow(commands: Sequence[RecordedCommand], tick: int, state_hash: str) -> None:
         nonlocal world
         if world is None:
-            world = World.from_state(start.state)
+            world = World.from_state(state)
         _advance(world, commands, tick)
         if (found := world.state_hash()) != state_hash:
             raise InterfaceError(
@@ -42,11 +43,13 @@ def main() -> None:
 
     def fork() -> None:
         assert world is not None
+        own = Connection(recv_handle(connection))
         if os.fork():
+            own.close()
             return
         try:
             connection.close()
-            _serve(Client(start.address, authkey=start.key), _requests_of(world))
+            _serve(own, _requests_of(world))
         finally:
             os._exit(0)
 

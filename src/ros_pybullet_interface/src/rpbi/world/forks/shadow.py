@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-import secrets
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from multiprocessing.connection import Connection, Listener, Pipe
-from typing import Any, NamedTuple
+from multiprocessing.connection import Connection, Pipe
+from multiprocessing.reduction import send_handle
+from typing import Any
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.processes.child import start_child
@@ -18,22 +18,6 @@ from rpbi.world.saved.state import WorldState
 
 from .prediction import Candidate, Prediction, PredictionJob
 
-KEY_BYTES = 32
-
-
-class Start(NamedTuple):
-    """What a shadow needs to begin.
-
-    Attributes:
-        state: State of the world.
-        address: Socket to which forks connect.
-        key: Secret by which they do.
-    """
-
-    state: WorldState
-    address: str
-    key: bytes
-
 
 class Remote:
     """The other end of a connection, which answers each request with its result or an error."""
@@ -41,14 +25,16 @@ class Remote:
     def __init__(self, connection: Connection, subject: str) -> None:
         self._connection, self._subject = connection, subject
 
-    def ask(self, name: str, *arguments: Any) -> Any:
-        """Returns the answer to a request.
+    def ask(self, name: str, *arguments: Any, handle: int | None = None) -> Any:
+        """Returns the answer to a request, which may come with a file handle.
 
         Raises:
             InterfaceError: If the other end refuses, or has ended.
         """
         try:
             self._connection.send((name, arguments))
+            if handle is not None:
+                send_handle(self._connection, handle, 0)
             is_good, answer = self._connection.recv()
         except (EOFError, OSError) as error:
             raise InterfaceError(f"{self._subject} has ended: {error or 'its memory may have run out'}") from None
@@ -102,9 +88,6 @@ class Shadow:
     """
 
     def __init__(self, state: WorldState) -> None:
-        key = secrets.token_bytes(KEY_BYTES)
-        # a name that begins with NUL is in the kernel, not in a folder: unix(7)
-        self._listener = Listener(f"\0rpbi-forks-{secrets.token_hex(KEY_BYTES)}", "AF_UNIX", authkey=key)
         ours, theirs = Pipe()
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
         self._process = start_child(
@@ -119,7 +102,7 @@ class Shadow:
         self.commands = len(state.commands)
         """Number of commands that it knows."""
         try:
-            ours.send(Start(state, str(self._listener.address), key))
+            ours.send(state)
             self._remote.ask("follow", (), state.tick, state.state_hash)
         except BaseException:
             self.close()
@@ -139,8 +122,10 @@ class Shadow:
         """Returns forks of it."""
         forks = []
         for index in range(count):
-            self._remote.ask("fork")
-            forks.append(Fork(self._listener.accept(), f"fork {index}"))
+            ours, theirs = Pipe()
+            with theirs:
+                self._remote.ask("fork", handle=theirs.fileno())
+            forks.append(Fork(ours, f"fork {index}"))
         return forks
 
     def predict(self, candidates: Sequence[Candidate], job: PredictionJob, jobs: int) -> list[Prediction]:
@@ -154,4 +139,3 @@ class Shadow:
         self._process.wait()
         assert self._process.stdin is not None
         self._process.stdin.close()
-        self._listener.close()
