@@ -36,7 +36,6 @@ from rpbi.world.actions import RecordedTrajectory, TimedGoal
 from rpbi.world.command_log import RecordedCommand
 from rpbi.world.loading import load_object
 from rpbi.world.saved.description import WorldDescription
-from rpbi.world.saved.values import to_text
 
 JOINTS = [f"lbr_iiwa_joint_{number}" for number in range(1, 8)]
 MODES = (pybullet.POSITION_CONTROL, pybullet.VELOCITY_CONTROL, pybullet.TORQUE_CONTROL, IMPEDANCE_CONTROL)

@@ -85,7 +85,9 @@ def test_what_pybullet_saves_by_itself_does_not_suffice(tmp_path):
 
 
 def test_what_is_predicted_is_what_happens(arm):
-    candidates = [[(20 * k, TARGET, {"lbr_iiwa_joint_1": 0.1 * turn + 0.01 * k}) for k in range(5)] for turn in range(3)]
+    candidates = [
+        [(20 * k, TARGET, {"lbr_iiwa_joint_1": 0.1 * turn + 0.01 * k}) for k in range(5)] for turn in range(3)
+    ]
     predictions = arm.predict(candidates, 150, watch=["iiwa", "box"], every=50, cost="costs:height")
     assert [each.fault for each in predictions] == [""] * 3
     assert len({each.state_hash for each in predictions}) == 3

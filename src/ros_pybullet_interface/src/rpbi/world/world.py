@@ -469,14 +469,24 @@ class World:
             InterfaceError: If the state is of another world, or the world does not come to the same state again; then
                 it is reset.
         """
-        if state.description != self.describe():
-            raise InterfaceError("the state is that of another world: build that one by World.from_state")
+        self.require_own(state)
         self.reset()
         try:
             state.run(self)
         except BaseException:
             self.reset()
             raise
+
+    def require_own(self, state: WorldState) -> None:
+        """Checks that a state is one of this world.
+
+        Raises:
+            InterfaceError: If it is of another world, or files have changed since.
+        """
+        if state.description != self.describe():
+            raise InterfaceError(
+                "the state is of another world, or one of its files has changed: build that world by World.from_state"
+            )
 
     def fork(self, count: int = 1) -> list[Fork]:
         """Returns worlds in processes of their own that go on from the present state, to the last bit.
