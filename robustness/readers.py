@@ -22,10 +22,10 @@ from robot_model.urdf.files import write_description
 from rpbi.engine.client import Client
 from rpbi.kinematics import Kinematics
 from rpbi.render.mirror import Mirror
-from rpbi.replay.world_description import WorldDescription, describe
 from rpbi.urdf.copies import description_for_ros
 from rpbi.world import World
 from rpbi.world.loading import load_world
+from rpbi.world.saved.description import WorldDescription
 from safe_robot.robot import GuardedRobot
 
 from .meshes import write_mesh
@@ -111,7 +111,7 @@ def _build_with(folder: Path, section: str, file: Path) -> None:
 def _run(main: str) -> None:
     """Builds a world, runs it for some ticks, and has the renderer's copy and a replay build the same."""
     with contextlib.closing(World(load_world(main), connection_mode=pybullet.DIRECT)) as world:
-        text = describe(world)
+        text = world.describe()
         for _ in range(TICKS):
             world.step()
         copy = Client(pybullet.DIRECT)
@@ -120,7 +120,7 @@ def _run(main: str) -> None:
             mirror.apply(entry)
         mirror.close()
         copy.disconnect()
-    WorldDescription(text).build().close()
+    World.from_description(WorldDescription(text)).close()
 
 
 def _urdf_readers(path: Path, folder: Path) -> Readers:
@@ -155,9 +155,9 @@ def _replay(path: Path, folder: Path) -> None:
     place = folder / "session"
     place.mkdir(exist_ok=True)
     with contextlib.closing(World(load_world(write_world(place, urdfs=(config,))))) as world:
-        described = json.loads(describe(world))
+        described = json.loads(world.describe())
     described["descriptions"] = {good: path.read_text(errors="replace")}
-    WorldDescription(json.dumps(described)).build().close()
+    World.from_description(WorldDescription(json.dumps(described))).close()
 
 
 REFUSALS = (InterfaceError, ValueError)

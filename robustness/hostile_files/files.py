@@ -34,12 +34,11 @@ from custom_ros_tools.console.modules import command_of
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from ros_pybullet_interface.msg import SimulationState, WorldCommand, WorldCommands
-from rpbi.replay.recorded_values import to_text
-from rpbi.replay.world_description import describe
 from rpbi.ros.console.check import check
 from rpbi.ros.node import SimulatorNode
 from rpbi.world import World
 from rpbi.world.loading import load_world
+from rpbi.world.saved.values import to_text
 from rpbi_utils import bag_to_dataframes, topic_report
 
 DATA = Path(pybullet_data.getDataPath())
@@ -393,7 +392,7 @@ def write_session(
             )
             bag.write("/rpbi/state", message, stamp)
 
-        bag.write("/rpbi/world_description", String(change(describe(world))), genpy.Time(1))
+        bag.write("/rpbi/world_description", String(change(world.describe())), genpy.Time(1))
         state()
         for _ in range(5):
             world.step()

@@ -30,7 +30,6 @@ from custom_ros_tools.console.modules import command_of
 from episodes import EpisodeFolder
 from episodes.folder import BAG
 from ros_pybullet_interface.msg import SimulationState
-from rpbi.replay.world_description import describe
 from rpbi.world import World
 from rpbi_utils import bag_to_dataframes, transforms_between
 
@@ -221,7 +220,7 @@ def test_forces_are_arrows_and_lines(page: _Page) -> None:
 def test_a_bag_by_itself_with_a_soft_body(tmp_path: Path) -> None:
     (tmp_path / "jelly.yaml").write_text("")
     world = World.from_file(write_world(tmp_path, collision=(FLOOR,), soft=(block(tmp_path),), **DEFORMABLE))
-    description = describe(world)
+    description = world.describe()
     world.close()
     path = tmp_path / "soft.bag"
     with rosbag.Bag(str(path), "w") as bag:

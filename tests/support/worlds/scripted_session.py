@@ -30,12 +30,12 @@ from rpbi.control.motors import MotorGains
 from rpbi.control.trajectories.request import TrajectoryPoint as Point
 from rpbi.control.trajectories.request import TrajectoryRequest
 from rpbi.geometry import Pose, Twist
-from rpbi.replay.recorded_values import to_text
-from rpbi.replay.session import Checkpoint, RecordedCommand, Recording, Replay
-from rpbi.replay.world_description import WorldDescription, describe
+from rpbi.replay.session import Checkpoint, Recording, Replay
 from rpbi.world import World
 from rpbi.world.actions import RecordedTrajectory, TimedGoal
+from rpbi.world.command_log import RecordedCommand
 from rpbi.world.loading import load_object
+from rpbi.world.saved.description import WorldDescription
 
 JOINTS = [f"lbr_iiwa_joint_{number}" for number in range(1, 8)]
 MODES = (pybullet.POSITION_CONTROL, pybullet.VELOCITY_CONTROL, pybullet.TORQUE_CONTROL, IMPEDANCE_CONTROL)
@@ -224,19 +224,15 @@ def run(world: World, seed: int, ticks: int, every: int = 500) -> list[Checkpoin
 
 def recorded(world: World) -> dict[int, RecordedCommand]:
     """Returns the commands of a world as a recording has them."""
-    return {
-        index: RecordedCommand(one.tick, one.name, one.what, to_text(one.value))
-        for index, one in enumerate(world.commands.since(0)[1])
-    }
+    return dict(enumerate(world.commands.records()))
 
 
 def record(seed: int, ticks: int, folder: Path | None = None) -> dict[str, Any]:
     """Runs a session in a world of its own and returns it as what JSON can hold."""
     world = build(folder)
-    description = describe(world)
+    description = world.describe()
     checkpoints = run(world, seed, ticks)
     commands = recorded(world)
-    assert len(commands) == world.commands.count, "more commands than a world keeps"
     world.close()
     return {"description": description, "commands": list(commands.items()), "checkpoints": checkpoints}
 

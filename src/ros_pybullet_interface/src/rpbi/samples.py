@@ -1,8 +1,10 @@
 """Samples of sensors: immutable values, all SI units, poses in `rpbi/world` unless noted otherwise."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from robot_model.geometry import Quaternion, Vector, plus, scaled
 
@@ -164,6 +166,10 @@ class ContactsSample:
     def __hash__(self) -> int:
         return hash((self.name, self.points))
 
+    def __reduce__(self) -> tuple[Callable[..., ContactsSample], tuple[Any, ...]]:
+        """Has it pickled with its points: what makes them stays where it is."""
+        return _contacts_of, (self.name, self.points)
+
     def __repr__(self) -> str:
         return f"ContactsSample(name={self.name!r}, points={self.points!r})"
 
@@ -175,6 +181,10 @@ class ContactsSample:
             if point.other_body != self.name:
                 total = plus(total, point.force)
         return total
+
+
+def _contacts_of(name: str, points: tuple[ContactPoint, ...]) -> ContactsSample:
+    return ContactsSample(name, lambda: points)
 
 
 class ContactArrowsSample(NamedTuple):

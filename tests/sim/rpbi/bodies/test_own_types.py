@@ -10,10 +10,10 @@ from worlds import FLOOR, box, write_world
 
 from custom_ros_tools.errors import ConfigError, PluginError
 from rpbi.bodies import BODY_TYPES
-from rpbi.replay.recorded_values import from_text, to_text
-from rpbi.replay.world_description import WorldDescription, describe
 from rpbi.world import World
 from rpbi.world.loading import load_object
+from rpbi.world.saved.description import WorldDescription
+from rpbi.world.saved.values import from_text, to_text
 
 TEMPLATES = Path(__file__).resolve().parents[4] / "templates"
 CONVEYOR, RANGE_FINDER = "my_robot_lab.conveyor:Conveyor", "my_robot_lab.range_finder:RangeFinder"
@@ -116,7 +116,7 @@ def test_a_reset_and_a_fresh_world_are_the_same_to_the_last_bit(world, tmp_path)
 
 
 def test_a_world_and_what_comes_into_it_can_be_recorded(world):
-    again = WorldDescription(describe(world)).build()
+    again = World.from_description(WorldDescription(world.describe()))
     config = load_object(CONVEYOR, {**BELT, "name": "second", "sensors": [EYE]}, "second.yaml")
     for each, given in ((world, config), (again, from_text(to_text(config)))):
         run(each, 300)

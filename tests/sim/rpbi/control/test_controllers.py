@@ -19,10 +19,11 @@ from rpbi.control.controllers.controller import SetPoints
 from rpbi.control.controllers.manager import ControllerSwitch, ControllerUpdate
 from rpbi.control.joint_command import JointCommand
 from rpbi.geometry import Pose
-from rpbi.replay.recorded_values import to_text
-from rpbi.replay.session import RecordedCommand, apply_command
 from rpbi.world import World
 from rpbi.world.actions import TimedGoal
+from rpbi.world.command_log import RecordedCommand
+from rpbi.world.saved.commands import apply_command
+from rpbi.world.saved.values import to_text
 
 ROOT = Path(__file__).resolve().parents[4]
 LWR = ROOT / "src" / "rpbi_examples" / "robots" / "kuka_lwr.urdf"

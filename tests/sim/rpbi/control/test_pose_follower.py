@@ -13,9 +13,9 @@ from robot_model.geometry import rotation_between
 from rpbi.control.pose_follower import PosePath
 from rpbi.geometry import Pose
 from rpbi.replay.session import Checkpoint, Recording, Replay
-from rpbi.replay.world_description import WorldDescription, describe
 from rpbi.samples import BaseStateSample
 from rpbi.world import World
+from rpbi.world.saved.description import WorldDescription
 
 TICKS_A_SECOND = 1000
 HZ = 30
@@ -223,7 +223,7 @@ def test_what_pybullet_gives_no_velocity_is_put_where_tf_says(build):
 
 def test_a_session_with_streams_of_poses_is_the_same_when_it_is_replayed(build):
     world = build(LOAD, ball(basePosition=[0.35, 0.0, 0.1]))
-    description = describe(world)
+    description = world.describe()
     states = []
     draw = random.Random(1)
     for _ in _follow(world, lambda t: Pose((_course(t) + draw.uniform(0.0, 0.01), 0.3 * math.sin(3.0 * t), 0.0)), 2.0):

@@ -106,3 +106,13 @@ def test_another_python_does_not_find_the_packages(tmp_path):
 def test_the_page_on_speed_times_a_tick(tmp_path):
     (block,) = BLOCK.findall((ROOT / "docs/slow.md").read_text())
     assert re.search(r"^\d+ us a tick of 1000 us$", run(block, tmp_path).stdout, re.MULTILINE)
+
+
+def test_the_page_on_many_worlds_shows_what_it_says(tmp_path):
+    blocks = BLOCK.findall((ROOT / "docs/many_worlds.md").read_text())
+    assert len(blocks) == 4
+    result = run("\n".join(blocks), tmp_path)
+    assert result.returncode == 0, result.stderr
+    lines = [line for line in result.stdout.splitlines() if re.match(r"500 |True|[0-9a-f]{32}$", line)]
+    assert lines[0] == "500 True" and lines[-1] == "True"
+    assert len({*lines[1:3]}) == 2, "the forks go different ways"

@@ -19,11 +19,11 @@ from custom_ros_tools.plugins import find
 from rpbi.config.pybullet_models import ChangeDynamics
 from rpbi.control.motors import ResolvedCommand
 from rpbi.geometry import Pose
-from rpbi.replay.recorded_values import FORMER_NAMES, from_text, to_text
 from rpbi.replay.session import Replay
-from rpbi.replay.world_description import WorldDescription
 from rpbi.world import World
 from rpbi.world.loading import load_world
+from rpbi.world.saved.description import WorldDescription
+from rpbi.world.saved.values import FORMER_NAMES, from_text, to_text
 
 TICKS = 3000
 EXAMPLES = Path(__file__).resolve().parents[4] / "src" / "rpbi_examples" / "configs"
@@ -119,7 +119,7 @@ def test_a_command_that_makes_no_sense_ends_the_replay_with_its_tick(session, se
 
 def test_a_reset_is_a_new_start_and_can_be_replayed_alone(folder):
     world = script.build(folder)
-    description = script.describe(world)
+    description = world.describe()
     script.run(world, 5, 200)
     world.reset()
     checkpoints = script.run(world, 6, 1000)
@@ -213,7 +213,7 @@ def test_an_object_file_that_has_changed_is_warned_of_however_it_is_named(how, t
     main = yaml.safe_load((folder / "world.yaml").read_text()) | {"dynamic_objects": [name]}
     (folder / "world.yaml").write_text(yaml.safe_dump(main))
     world = World.from_file(str(folder / "world.yaml"), connection_mode=pybullet.DIRECT)
-    text = script.describe(world)
+    text = world.describe()
     world.close()
     assert WorldDescription(text).warnings == []
     with open(folder / "box.yaml", "a") as file:

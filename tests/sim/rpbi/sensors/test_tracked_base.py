@@ -16,8 +16,8 @@ from robot_model.geometry import rotation_between
 from rpbi.bodies.visual_shapes import followed_frame
 from rpbi.geometry import Pose
 from rpbi.replay.session import Checkpoint, Recording, Replay
-from rpbi.replay.world_description import WorldDescription, describe
 from rpbi.world import World
+from rpbi.world.saved.description import WorldDescription
 
 DT_S = 0.001
 HZ = 50
@@ -114,7 +114,7 @@ def test_what_is_put_somewhere_is_left_to_physics_until_it_is_seen_again(build) 
 
 def test_a_session_that_tracks_and_loses_is_the_same_when_it_is_replayed(build) -> None:
     world = build(tracked_tf={"tf_id": "seen", "hz": HZ, "timeout_s": 0.05})
-    description = describe(world)
+    description = world.describe()
     states = set()
     for _ in range(3):
         for _ in follow(world, lambda t: Pose((0.2 + SPEED * t, 0.01 * math.sin(9.0 * t), 0.12)), 0.3):

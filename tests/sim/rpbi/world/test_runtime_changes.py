@@ -16,10 +16,10 @@ from rpbi.control.joint_command import JointCommand
 from rpbi.control.motors import MotorGains
 from rpbi.engine.client import Client
 from rpbi.render.mirror import Mirror
-from rpbi.replay.session import apply_command
 from rpbi.samples import JointStateSample, WrenchSample
 from rpbi.world import World
 from rpbi.world.load_log import replay
+from rpbi.world.saved.commands import apply_command
 
 MOON = SetGravity(gravZ=-1.62)
 JOINT = "lbr_iiwa_joint_2"

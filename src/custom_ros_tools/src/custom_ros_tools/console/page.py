@@ -7,8 +7,8 @@ from .command import PROGRAM, Command
 from .modules import commands
 
 FIRST = (
-    *("demo", "launch", "check", "list", "spawn", "remove", "move", "send", "attach", "detach", "gravity", "replay"),
-    *("test", "docs", "bench", "shell", "setup"),
+    *("demo", "launch", "check", "list", "spawn", "remove", "move", "send", "attach", "detach", "gravity"),
+    *("save", "restore", "replay", "test", "docs", "bench", "shell", "setup"),
 )
 """Commands at the beginning of the page, in this order; all others follow by name."""
 _HEAD = f"""\

@@ -80,7 +80,7 @@ def _scene(title: str, bag: Path, namespace: str, recording: Recording, any_size
     joints = [topic for topic in of_type[JOINTS] if topic.startswith(prefix) and topic.endswith("/joint_states")]
     forces = [*of_type[CONTACTS], *of_type[WRENCHES]]
     tables = bag_to_dataframes(bag, sorted({*of_type[TF], *state, *joints, *forces}), any_size=any_size)
-    world = recording.description.build()
+    world = World.from_description(recording.description)
     try:
         at_start = list(world.bodies)
         notes = [*recording.description.warnings, *add_later_bodies(world, recording.commands)]

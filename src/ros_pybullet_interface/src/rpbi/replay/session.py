@@ -6,18 +6,9 @@ from typing import Any, NamedTuple
 
 from custom_ros_tools.errors import InterfaceError
 from rpbi.world import World
-
-from .recorded_values import from_text
-from .world_description import WorldDescription
-
-
-class RecordedCommand(NamedTuple):
-    """A command as it was recorded: a WorldCommand with its value as text."""
-
-    tick: int
-    name: str
-    what: str
-    data: str
+from rpbi.world.command_log import RecordedCommand
+from rpbi.world.saved.commands import apply_command
+from rpbi.world.saved.description import WorldDescription
 
 
 class Checkpoint(NamedTuple):
@@ -97,7 +88,7 @@ class Replay:
 
     def __init__(self, recording: Recording, progress: Callable[[int], Any] = lambda _: None) -> None:
         self._recording, self._progress = recording, progress
-        self._world = recording.description.build()
+        self._world = World.from_description(recording.description)
         self._agreed = self._ticks = 0
         self._left_out: list[str] = []
 
@@ -157,37 +148,3 @@ class Replay:
         self._ticks += to.tick - start
         self._progress(to.tick - start)
         return done
-
-
-_CHANGES: dict[str, Callable[[World, str, Any], Any]] = {
-    "input": World.apply_input,
-    "add": lambda world, _, arguments: world.add(*arguments),
-    "remove": lambda world, name, _: world.remove(name),
-    "dynamics": World.change_dynamics,
-    "attach": lambda world, _, config: world.attach(config),
-    "detach": lambda world, name, _: world.detach(name),
-    "physics": lambda world, _, change: world.change_physics(change),
-    "sensor_rate": lambda world, name, rate: world.set_sensor_rate(name, *rate),
-    "halt": lambda world, _, reason: world.halt(reason),
-    "pause": lambda world, _, reason: world.pause(reason),
-}
-"""Commands to a world other than actions on its bodies."""
-
-
-def apply_command(world: World, command: RecordedCommand) -> None:
-    """Applies a recorded command to a world.
-
-    Raises:
-        InterfaceError: If the world refuses.
-        ValueError: If the command cannot be read, or is unknown.
-    """
-    name, what, value = command.name, command.what, from_text(command.data)
-    try:
-        if what in _CHANGES:
-            _CHANGES[what](world, name, value)
-        else:
-            world.act(name, what, value)
-    except InterfaceError:
-        raise
-    except Exception as error:  # the value fits neither the command nor the world, in whatever way
-        raise ValueError(f"'{what}' of '{name}' makes no sense in this world: {error!r}") from error

@@ -14,6 +14,7 @@ from rpbi.ros.publishers.commands import CommandPublisher
 from rpbi.ros.publishers.sample_publishers import SamplePublishers, TickPublisher
 from rpbi.ros.publishers.status import StatePublisher, StatusPublisher
 from rpbi.world import World
+from rpbi.world.saved.state import WorldState
 
 log = logging.getLogger(__name__)
 
@@ -143,20 +144,24 @@ class Simulation:
         self._status.publish(True)
         return request.done
 
-    def reset(self, refill: Callable[[], None] = lambda: None) -> None:
+    def reset(self, refill: Callable[[], None] = lambda: None, to: WorldState | None = None) -> None:
         """Resets the world to its state when built; it keeps running or standing still, and its time continues.
 
         Args:
             refill: Puts the inputs of the new start.
+            to: A saved state, to which it is restored instead.
 
         Raises:
-            InterfaceError: If something cannot be loaded any more; then it stands still.
+            InterfaceError: If something cannot be loaded any more, or the state is not reached; then it stands still.
         """
         if self._request is not None:
             request = self._end_request()
             request.fail(InterfaceError(f"the world was reset {request}"))
         try:
-            self.world.reset()
+            if to is None:
+                self.world.reset()
+            else:
+                self.world.restore(to)
         except InterfaceError as error:
             self._break_off(error)
             raise

@@ -1,10 +1,22 @@
 """Commands that entered a world after its start, by tick."""
 
+from __future__ import annotations
+
+import json
+import zlib
 from collections import deque
+from collections.abc import Iterator
+from itertools import islice
 from typing import Any, NamedTuple
 
+from custom_ros_tools.errors import InterfaceError
+
+from .saved.values import to_text
+
 MAX_KEPT = 5_000
-"""Commands that are kept, some megabytes at most."""
+"""Number of commands that are kept as they are, some megabytes at most; older ones are packed."""
+MAX_PACKED_BYTES = 1 << 28
+"""Largest size of the packed ones [bytes]: some millions."""
 
 
 class WorldCommand(NamedTuple):
@@ -25,8 +37,26 @@ class WorldCommand(NamedTuple):
     value: Any
 
 
+class RecordedCommand(NamedTuple):
+    """A command as it is recorded: a WorldCommand with its value as text."""
+
+    tick: int
+    name: str
+    what: str
+    data: str
+
+    @classmethod
+    def of(cls, command: WorldCommand) -> RecordedCommand:
+        """Returns the record of a command.
+
+        Raises:
+            TypeError: If its value cannot be recorded.
+        """
+        return cls(command.tick, command.name, command.what, to_text(command.value))
+
+
 class CommandLog:
-    """The newest commands since a world was built or reset, and their number.
+    """The commands since a world was built or reset, and their number.
 
     Attributes:
         count: Number of commands so far.
@@ -36,17 +66,51 @@ class CommandLog:
         self.clear()
 
     def note(self, command: WorldCommand) -> None:
-        """Appends one; the oldest is forgotten if there are too many."""
+        """Appends one; if there are many, the oldest is packed."""
+        if len(self._kept) == MAX_KEPT:
+            self._pack(self._kept.popleft())
         self._kept.append(command)
         self.count += 1
 
     def since(self, index: int, most: int = MAX_KEPT) -> tuple[int, tuple[WorldCommand, ...]]:
-        """Returns the commands from an index on, as far as they are kept, and the index of the first."""
+        """Returns the commands from an index on, as far as they are not packed, and the index of the first."""
         first = max(index, self.count - len(self._kept))
         end = min(first + most, self.count)
         return first, tuple(self._kept[each - self.count] for each in range(first, end))
 
+    def records(self, first: int = 0) -> Iterator[RecordedCommand]:
+        """Yields the records of all commands from an index on.
+
+        Raises:
+            InterfaceError: If one cannot be recorded, or the oldest had to be forgotten.
+        """
+        if self._fault:
+            raise InterfaceError(self._fault)
+        packed = self.count - len(self._kept)
+        if first < packed:
+            text = zlib.decompress(bytes(self._packed) + self._packing.copy().flush()).decode()
+            yield from (RecordedCommand(*json.loads(line)) for line in islice(text.splitlines(), first, None))
+        try:
+            yield from map(RecordedCommand.of, islice(self._kept, max(first - packed, 0), None))
+        except TypeError as error:
+            raise InterfaceError(f"a command cannot be recorded: {error}") from None
+
     def clear(self) -> None:
         """Begins afresh."""
-        self._kept: deque[WorldCommand] = deque(maxlen=MAX_KEPT)
+        self._kept: deque[WorldCommand] = deque()
+        self._packing, self._packed = zlib.compressobj(), bytearray()
+        self._fault = ""
         self.count = 0
+
+    def _pack(self, command: WorldCommand) -> None:
+        if self._fault:
+            return
+        try:
+            line = json.dumps(RecordedCommand.of(command))
+        except TypeError as error:
+            self._fault = f"command '{command.what}' of '{command.name}' cannot be recorded: {error}"
+            return
+        self._packed += self._packing.compress(line.encode() + b"\n")
+        if len(self._packed) > MAX_PACKED_BYTES:
+            self._fault = f"the first of {self.count} commands are forgotten; reset the world"
+            self._packed.clear()

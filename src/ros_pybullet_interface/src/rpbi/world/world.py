@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import logging
+import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import pybullet
 
-from custom_ros_tools.errors import UnknownNameError
+from custom_ros_tools.errors import InterfaceError, UnknownNameError
 from rpbi.bodies import Body, BodyConfig
 from rpbi.bodies.dynamics import LinkDynamics, read_dynamics
 from rpbi.config.attachments import AttachmentConfig
@@ -29,7 +31,11 @@ from rpbi.window import Window, check_recording
 from .actions import ACTIONS, MOVES_AT_ONCE
 from .command_log import CommandLog, WorldCommand
 from .contents import WorldContents, state_hash
+from .forks.prediction import Candidate, Cost, Prediction, PredictionJob
+from .forks.shadow import Fork, Shadow
 from .loading import LoadedWorld, load_object, load_world
+from .saved.description import WorldDescription, describe
+from .saved.state import WorldState
 
 log = logging.getLogger(__name__)
 
@@ -58,6 +64,7 @@ class World:
         """Commands since it was built or reset."""
         self.resets = 0
         """Number of resets."""
+        self._shadow: Shadow | None = None
         self.physics_s = 0.0
         """Wall time that PyBullet's steps took [s]."""
         self.loaded = loaded
@@ -85,6 +92,9 @@ class World:
         except BaseException:
             self.close()
             raise
+        self.start_hash = self.state_hash()
+        """Hash of the state when it was built, or was reset the last time."""
+        self._description = ""
 
     @classmethod
     def from_file(cls, path: str, **options: Any) -> World:
@@ -94,6 +104,39 @@ class World:
             ConfigError: If anything in the file, or in a file that it names, is wrong; it lists all problems.
         """
         return cls(load_world(path), **options)
+
+    @classmethod
+    def from_description(cls, description: WorldDescription) -> World:
+        """Builds the world that a recording describes, without a window.
+
+        Raises:
+            ConfigError: If it cannot be built here, for instance because a file is missing.
+        """
+        return cls(description.load(), connection_mode=pybullet.DIRECT)
+
+    @classmethod
+    def from_state(cls, state: WorldState | str | Path) -> World:
+        """Builds a world, without a window, and brings it to a saved state.
+
+        Args:
+            state: The state, or a file that `WorldState.write` wrote.
+
+        Raises:
+            ConfigError: If the file cannot be read, or the world cannot be built here.
+            InterfaceError: If the world does not come to the same state here, for instance with another PyBullet.
+        """
+        state = state if isinstance(state, WorldState) else WorldState.read(state)
+        try:
+            description = WorldDescription(state.description)
+        except ValueError as error:
+            raise InterfaceError(str(error)) from None
+        world = cls.from_description(description)
+        try:
+            state.run(world)
+        except BaseException:
+            world.close()
+            raise
+        return world
 
     def add(self, kind: str, config: BodyConfig | Mapping[str, Any], file: str | None = None) -> Body:
         """Adds a body; when it raises, the world is as it was.
@@ -378,6 +421,7 @@ class World:
             ConfigError: If something cannot be loaded any more, for instance because its file has gone; then the
                 world lacks it.
         """
+        self._end_shadow()
         self.halt("the world was reset")
         self._contents.clear()
         self._pushed.clear()
@@ -388,6 +432,125 @@ class World:
         finally:
             self.commands.clear()
             self.mailbox.drop()
+            self.start_hash, self._description = self.state_hash(), ""
+
+    def describe(self) -> str:
+        """Returns what it was built from, as JSON; see `WorldDescription`."""
+        if not self._description:
+            self._description = describe(self.loaded, self.start_hash)
+        return self._description
+
+    def save(self, file: str | Path | None = None) -> WorldState:
+        """Returns the present state, from which the same world goes on to the last bit.
+
+        It holds all commands since the world was built or reset. The time that `restore` takes is therefore that of
+        simulating again from there.
+
+        Args:
+            file: File that it is written to, too.
+
+        Raises:
+            InterfaceError: If the world has soft bodies, whose motion is not reproducible, or a command that cannot be
+                recorded.
+            OSError: If the file cannot be written.
+        """
+        if soft := [body.name for body in self.bodies.values() if body.is_soft]:
+            raise InterfaceError(f"expected no soft bodies, which never move the same way twice, got {', '.join(soft)}")
+
+        state = WorldState(self.describe(), tuple(self.commands.records()), self.clock.tick, self.state_hash())
+        if file is not None:
+            state.write(file)
+        return state
+
+    def restore(self, state: WorldState) -> None:
+        """Makes the world what it was when a state was saved; stamps go on.
+
+        Raises:
+            InterfaceError: If the state is of another world, or the world does not come to the same state again; then
+                it is reset.
+        """
+        self.require_own(state)
+        self.reset()
+        try:
+            state.run(self)
+        except BaseException:
+            self.reset()
+            raise
+
+    def require_own(self, state: WorldState) -> None:
+        """Checks that a state is one of this world.
+
+        Raises:
+            InterfaceError: If it is of another world, or files have changed since.
+        """
+        if state.description != self.describe():
+            raise InterfaceError(
+                "the state is of another world, or one of its files has changed: build that world by World.from_state"
+            )
+
+    def fork(self, count: int = 1) -> list[Fork]:
+        """Returns worlds in processes of their own that go on from the present state, to the last bit.
+
+        They are forked from a process that follows this world's commands, so the first call takes as long as simulating
+        again from the last reset; later ones follow from there.
+
+        Raises:
+            InterfaceError: If the state cannot be saved, or does not come to be the same there.
+        """
+        return self._followed().fork(count)
+
+    def predict(
+        self,
+        candidates: Sequence[Candidate],
+        ticks: int,
+        *,
+        watch: Sequence[str] | None = None,
+        every: int = 10,
+        cost: Cost | str | None = None,
+        jobs: int | None = None,
+    ) -> list[Prediction]:
+        """Returns what would happen from the present state with each of some sequences of inputs.
+
+        Args:
+            candidates: For each the inputs by tick from now on; those that are under way go on.
+            ticks: Number of ticks.
+            watch: Bodies whose motion is returned; all by default.
+            every: Number of ticks between two rows of it.
+            cost: Cost of a state, which is summed over all ticks: a function of a module that takes the `World`, a
+                class whose objects do, or `module:name` of either.
+            jobs: Number of processes at a time; the number of processors by default.
+
+        Raises:
+            InterfaceError: If the state cannot be saved, or does not come to be the same in another process.
+            UnknownNameError: If a watched body is unknown.
+            ValueError: If a number is not positive.
+        """
+        if min(ticks, every, 1 if jobs is None else jobs) < 1:
+            raise ValueError(f"ticks, every and jobs: expected at least 1, got {ticks}, {every} and {jobs}")
+        names = tuple(self.bodies if watch is None else watch)
+        for name in names:
+            self._contents.body(name)
+        job = PredictionJob(ticks, names, every, cost)
+        return self._followed().predict(candidates, job, jobs or os.cpu_count() or 1)
+
+    def _followed(self) -> Shadow:
+        """Returns the process that follows this world, at the present state."""
+        self.apply_inputs()
+        if self._shadow is None:
+            self._shadow = Shadow(self.save())
+            return self._shadow
+        try:
+            new = self.commands.records(self._shadow.commands)
+            self._shadow.follow(new, self.clock.tick, self.state_hash())
+        except InterfaceError:
+            self._end_shadow()
+            raise
+        return self._shadow
+
+    def _end_shadow(self) -> None:
+        if self._shadow is not None:
+            self._shadow.close()
+            self._shadow = None
 
     def changed_names(self) -> set[str]:
         """Returns the names of all objects that came or went since the world was built or reset."""
@@ -400,6 +563,7 @@ class World:
     def close(self) -> None:
         """Disconnects from PyBullet and fails the requests that wait."""
         self.mailbox.close()
+        self._end_shadow()
         try:
             self.halt("the simulation ended")
             self.pb.disconnect()

@@ -10,13 +10,12 @@ from std_msgs.msg import String
 
 from ros_pybullet_interface.msg import WorldCommand as WorldCommandMessage
 from ros_pybullet_interface.msg import WorldCommands
-from rpbi.replay.recorded_values import to_text
-from rpbi.replay.world_description import describe
 from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import to_ros_time
 from rpbi.ros.messages.topics import FastTopic
 from rpbi.world import World
 from rpbi.world.command_log import WorldCommand
+from rpbi.world.saved.values import to_text
 
 log = logging.getLogger(__name__)
 
@@ -55,7 +54,7 @@ class CommandPublisher:
         self._all = _Recipient(self._topic.publish)
         self._newcomers: list[_Recipient] = []
         self._description = rospy.Publisher(DESCRIPTION.name, String, queue_size=1, latch=True)
-        self._description.publish(describe(world))
+        self._description.publish(world.describe())
         self._resets = world.resets
 
     def spin(self) -> None:

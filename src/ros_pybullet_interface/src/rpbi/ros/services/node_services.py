@@ -5,6 +5,7 @@ A handler never touches PyBullet, it asks the simulation thread.
 
 import logging
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import genpy
@@ -57,6 +58,7 @@ from rpbi.ros.publishers.sample_topics import address
 from rpbi.ros.requests import Requests
 from rpbi.ros.simulation import Simulation
 from rpbi.world.loading import load_object, type_of
+from rpbi.world.saved.state import WorldState
 
 from .attachments import apply_wrench, attach, detach
 from .object_lifecycle import ObjectLifecycle
@@ -66,6 +68,7 @@ log = logging.getLogger(__name__)
 MAX_STEPS = 1_000_000
 """Ticks of one request, which is answered when they are done."""
 YAML_SUFFIXES = (".yaml", ".yml")
+STATE_SUFFIX = ".world"
 NO_FOLDER = "~config"
 """Stands for the path of a YAML that came without one."""
 OBJECT_TYPES = {
@@ -130,6 +133,31 @@ def _reset(node: NodeContext, _: Any) -> Answer:
     """Makes the world what it was at its start, to the last bit; stamps go on."""
     node.objects.reset()
     return Answer(True, "the world is as configured")
+
+
+def _save(node: NodeContext, request: SetStringRequest) -> Answer:
+    """Saves the state of the world in a file, from which it can be restored."""
+    path = _state_file(request.data)
+    state = node.ask(node.simulation.world.save)
+    try:
+        state.write(path)
+    except OSError as error:
+        raise InterfaceError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from None
+    return Answer(True, f"saved tick {state.tick} in {path}")
+
+
+def _restore(node: NodeContext, request: SetStringRequest) -> Answer:
+    """Restores the state of a file of this world, by simulating again from its start; stamps go on."""
+    state = WorldState.read(_state_file(request.data))
+    node.objects.reset(state)
+    return Answer(True, f"restored tick {state.tick}")
+
+
+def _state_file(name: str) -> Path:
+    path = Path(name)
+    if path.suffix != STATE_SUFFIX or not path.is_absolute():
+        raise InterfaceError(f"data: expected the full path of a {STATE_SUFFIX} file, got {shown(name)}")
+    return path
 
 
 def _state_hash(node: NodeContext, _: Any) -> tuple[bool, str, int, genpy.Time, int, str]:
@@ -304,6 +332,8 @@ NODE_SERVICES = (
     Service("rpbi/step", Trigger, _step),
     Service("rpbi/step_n", StepN, _step_n),
     Service("rpbi/reset", Trigger, _reset),
+    Service("rpbi/save", SetString, _save),
+    Service("rpbi/restore", SetString, _restore),
     Service("rpbi/add_pybullet_object", AddPybulletObject, _add_object),
     Service("rpbi/add_rgbd_sensor", SetString, _add_camera),
     Service("rpbi/remove_pybullet_object", SetString, _remove_object),

@@ -18,6 +18,7 @@ from rpbi.ros.requests import Requests
 from rpbi.ros.services.body_endpoints import BodyEndpoints
 from rpbi.ros.simulation import Simulation
 from rpbi.sensors.rgbd import RgbdSensor
+from rpbi.world.saved.state import WorldState
 
 
 class ObjectLifecycle:
@@ -79,16 +80,19 @@ class ObjectLifecycle:
             else:
                 raise UnknownNameError("object", name, [*self._world.bodies, *self._world.cameras])
 
-    def reset(self) -> None:
+    def reset(self, to: WorldState | None = None) -> None:
         """Makes the world what it was; what ROS has of bodies that were there all the time stays open.
 
+        Args:
+            to: A saved state; by default that of the start.
+
         Raises:
-            InterfaceError: If something cannot be loaded any more.
+            InterfaceError: If something cannot be loaded any more, or the state is of another world or not reached.
         """
         with self._lock:
             for name in self._ask(self._world.changed_names):
                 self._inputs.close(name)
-            closed, topics, error = self._ask(self._start_again)
+            closed, topics, error = self._ask(lambda: self._start_again(to))
             for topic in topics:
                 topic.close()
             for name in closed:
@@ -122,19 +126,24 @@ class ObjectLifecycle:
             self._world.remove(config.name)
             raise
 
-    def _start_again(self) -> tuple[set[str], list[FastTopic], InterfaceError | None]:
+    def _start_again(self, to: WorldState | None) -> tuple[set[str], list[FastTopic], InterfaceError | None]:
         """Does the simulation thread's part of a reset.
 
         Returns:
             The bodies that have gone or may be others now, their topics to close, and what went wrong.
         """
+        if to is not None:
+            self._world.require_own(to)
         changed = self._world.changed_names()
         for name in changed & self._world.bodies.keys():
             self._world.remove(name)
         topics = [topic for name in changed for topic in self._publishers.forget(name)]
         error = None
         try:
-            self._simulation.reset(self._inputs.repeat_poses)
+            if to is None:
+                self._simulation.reset(self._inputs.repeat_poses)
+            else:
+                self._simulation.reset(to=to)
         except InterfaceError as problem:
             error = problem
         lost = self._open_bodies - changed - self._world.bodies.keys()

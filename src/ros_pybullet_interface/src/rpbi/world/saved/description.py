@@ -7,8 +7,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import pybullet
-
 from custom_ros_tools.config import read_file
 from custom_ros_tools.errors import ConfigError, Problem, shortened
 from custom_ros_tools.plugins import full_name
@@ -17,21 +15,19 @@ from custom_ros_tools.schema.type_names import shown
 from robot_model.asset_files import LONGEST_PATH
 from robot_model.urdf.files import is_temporary, write_description
 from rpbi.bodies import BodyConfig
-from rpbi.world import World
 from rpbi.world.loading import LoadedWorld, ObjectConfig, WorldConfig
 
-from .recorded_values import from_text, to_text
+from .values import from_text, to_text
 
 FORMAT = 1
 """Version of the text's layout."""
 
 
-def describe(world: World) -> str:
-    """Returns what a world was built from, and the hash of its state now, at its start, as JSON.
+def describe(loaded: LoadedWorld, start_hash: str) -> str:
+    """Returns what a world was built from, and the hash of its state at its start, as JSON.
 
     Files are named with the hashes of their contents; robot descriptions that have no file of their own are in it.
     """
-    loaded = world.loaded
     named = _files([item.config.model_dump(mode="json") for item in loaded.objects])
     files = sorted({*named, *(item.path for item in loaded.objects if item.path)})
     return json.dumps(
@@ -43,7 +39,7 @@ def describe(world: World) -> str:
             "objects": [{"type": o.type, "file": o.file, "config": to_text(o.config)} for o in loaded.objects],
             "files": {path: _hash_of(path) for path in files},
             "descriptions": {path: Path(path).read_text(encoding="utf-8") for path in files if is_temporary(path)},
-            "start_hash": world.state_hash(),
+            "start_hash": start_hash,
         },
         indent=1,
     )
@@ -105,15 +101,15 @@ class WorldDescription:
         if written_by != version("pybullet"):
             self.warnings.append(f"recorded with PyBullet {written_by}, replayed with {version('pybullet')}")
 
-    def build(self) -> World:
-        """Builds the world, without a window.
+    def load(self) -> LoadedWorld:
+        """Returns the configuration of the world.
 
         Raises:
-            ConfigError: If it cannot be built here, for instance because a file is missing.
+            ConfigError: If it is not valid here, for instance because a file is missing.
         """
         config = self._read(self._config, self._file, WorldConfig)
         objects = [ObjectConfig(each.type, self._read(each.config, each.file), each.file) for each in self._objects]
-        return World(LoadedWorld(config, tuple(objects), self._file), connection_mode=pybullet.DIRECT)
+        return LoadedWorld(config, tuple(objects), self._file)
 
     def _read(self, text: str, file: str, kind: type[ConfigModel] = BodyConfig) -> Any:
         for path, description in self._descriptions.items():

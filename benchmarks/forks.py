@@ -1,0 +1,128 @@
+"""Whether saved, restored and forked worlds go on as the world itself, and how long a prediction takes."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from result import Result, Target
+
+SUPPORT = Path(__file__).resolve().parent.parent / "tests/support"
+sys.path += [str(SUPPORT / each) for each in ("worlds", "robots")]
+import scripted_session as script  # noqa: E402
+
+from rpbi.world import World  # noqa: E402
+
+SEEDS, QUICK_SEEDS = 200, 5
+FIRST_SEED = 5000
+"""Seeds from here on were not used before."""
+SHORTEST, LONGEST, AHEAD = 100, 900, 500
+"""Ticks before a state is saved, and after."""
+KUKA = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"
+ROBOT, TARGET = "kuka_lwr", "kuka_lwr/target"
+CANDIDATES, TICKS = 8, 200
+CHOSEN, QUICK_CHOSEN = 100, 5
+LARGEST_S = 0.2
+ELSEWHERE = (
+    "import sys; from rpbi.world import World; world = World.from_state(sys.argv[1])\n"
+    "for _ in range(int(sys.argv[2])): world.step()\n"
+    "print('hash:', world.state_hash())"
+)
+
+
+def run(quick: bool) -> list[Result]:
+    """Compares random sessions in contact by their hashes, and predicts for an arm that pushes a box."""
+    return [*_exact(QUICK_SEEDS if quick else SEEDS), *_predictions(QUICK_CHOSEN if quick else CHOSEN)]
+
+
+def _exact(seeds: int) -> list[Result]:
+    same = dict.fromkeys(("same process", "fork", "another process", "PyBullet's own saveState"), 0)
+    for seed in range(FIRST_SEED, FIRST_SEED + seeds):
+        for way, is_same in _session(seed).items():
+            same[way] += is_same
+    control = same.pop("PyBullet's own saveState")
+    return [
+        *(
+            Result("forks", f"{way}: equal {AHEAD} ticks on, of {seeds}", count, "", None, Target(seeds, at_least=True))
+            for way, count in same.items()
+        ),
+        Result("forks", f"control, PyBullet's own saveState: equal, of {seeds}", control, ""),
+    ]
+
+
+def _session(seed: int) -> dict[str, bool]:
+    """Returns by way whether a session goes on in the same way."""
+    with tempfile.TemporaryDirectory(prefix="rpbi-bench-") as folder:
+        world = script.build(Path(folder))
+        script.run(world, seed, int(np.random.default_rng(seed).integers(SHORTEST, LONGEST)))
+        file = Path(folder) / "here.world"
+        state = world.save(file)
+        with world.fork()[0] as fork:
+            fork.step(AHEAD)
+            hashes = {"fork": fork.state_hash()}
+        saved = world.pb.saveState()
+        expected = _hash_later(world)
+        command = [sys.executable, "-c", ELSEWHERE, str(file), str(AHEAD)]
+        printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        hashes["another process"] = printed.partition("hash: ")[2].split()[0]
+        world.pb.restoreState(saved)
+        world.clock.tick -= AHEAD
+        hashes["PyBullet's own saveState"] = _hash_later(world)
+        world.restore(state)
+        hashes["same process"] = _hash_later(world)
+        world.close()
+    return {way: found == expected for way, found in hashes.items()}
+
+
+def _hash_later(world: World) -> str:
+    for _ in range(AHEAD):
+        world.step()
+    return world.state_hash()
+
+
+def _predictions(chosen: int) -> list[Result]:
+    """Predicts candidates, takes one of them, and compares what happens with its prediction."""
+    random, durations, same = np.random.default_rng(FIRST_SEED), [], 0
+    world = World.from_file(KUKA)
+    for _ in range(300):
+        world.step()
+    begin_s = time.perf_counter()
+    world.predict([[]], 1)
+    cold_s = time.perf_counter() - begin_s
+    for _ in range(chosen):
+        candidates = [_candidate(random) for _ in range(CANDIDATES)]
+        begin_s = time.perf_counter()
+        predictions = world.predict(candidates, TICKS, watch=[ROBOT, "box"])
+        durations.append(time.perf_counter() - begin_s)
+        taken = int(random.integers(CANDIDATES))
+        _take(world, candidates[taken])
+        same += world.state_hash() == predictions[taken].state_hash
+    world.close()
+    what = f"{CANDIDATES} candidates x {TICKS} ticks of the KUKA"
+    return [
+        Result("forks", f"chosen candidate as predicted, of {chosen}", same, "", None, Target(chosen, at_least=True)),
+        Result("forks", f"{what}: median", float(np.median(durations)), "s", None, Target(LARGEST_S)),
+        Result("forks", f"{what}: longest", max(durations), "s"),
+        Result("forks", f"first prediction, {os.cpu_count()} processors", cold_s, "s"),
+    ]
+
+
+def _candidate(random: np.random.Generator) -> list[tuple[int, str, dict[str, float]]]:
+    joints = [f"lwr_arm_{index}_joint" for index in (0, 1, 3)]
+    goal = random.uniform((-0.5, 0.3, -1.8), (0.5, 0.9, -1.0))
+    return [(20 * turn, TARGET, dict(zip(joints, (goal + 0.01 * turn).tolist()))) for turn in range(10)]
+
+
+def _take(world: World, candidate: list[tuple[int, str, Any]]) -> None:
+    waiting = list(candidate)
+    for tick in range(TICKS):
+        while waiting and waiting[0][0] <= tick:
+            _, slot, value = waiting.pop(0)
+            world.put(slot, value)
+        world.step()

@@ -1,0 +1,196 @@
+"""Saved, restored and forked worlds go on as the world itself does, to the last bit; and what cannot be is named."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import costs
+import pybullet
+import pytest
+import scripted_session as script
+from worlds import FLOOR, box, iiwa, write_world
+
+from custom_ros_tools.errors import ConfigError, InterfaceError, UnknownNameError
+from rpbi.world import World
+from rpbi.world.command_log import MAX_KEPT
+from rpbi.world.saved.state import WorldState
+
+TARGET = "iiwa/target"
+AHEAD = 300
+"""Ticks for which worlds go on."""
+ELSEWHERE = """
+import sys
+from rpbi.world import World
+world = World.from_state(sys.argv[1])
+for _ in range(int(sys.argv[2])):
+    world.step()
+print("hash:", world.state_hash())
+"""
+
+
+def hash_later(world: World, ticks: int = AHEAD) -> str:
+    """Returns the hash of a world after some ticks."""
+    for _ in range(ticks):
+        world.step()
+    return world.state_hash()
+
+
+def hash_elsewhere(file: Path, ticks: int = AHEAD) -> str:
+    """Returns the hash of a saved world after some ticks in another process."""
+    done = subprocess.run([sys.executable, "-c", ELSEWHERE, str(file), str(ticks)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return next(line.partition(": ")[2] for line in done.stdout.splitlines() if line.startswith("hash: "))
+
+
+@pytest.fixture
+def arm(tmp_path, monkeypatch):
+    """An arm beside a box, under way to a target."""
+    path = write_world(tmp_path, collision=(FLOOR,), dynamic=(box("box"),), robots=(iiwa(),))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(Path(costs.__file__).parent), *sys.path)))
+    world = World.from_file(path, connection_mode=pybullet.DIRECT)
+    world.put(TARGET, {"lbr_iiwa_joint_2": 0.8})
+    hash_later(world, 50)
+    yield world
+    world.close()
+
+
+@pytest.mark.parametrize("seed", [301, 302, 303])
+def test_a_session_of_everything_goes_on_the_same_in_all_ways(tmp_path, seed):
+    world = script.build(tmp_path)
+    script.run(world, seed, 700)
+    state = world.save(tmp_path / "here.world")
+    with world.fork()[0] as fork:
+        fork.step(AHEAD)
+        forked = fork.state_hash()
+    expected = hash_later(world)
+    assert forked == expected
+    assert hash_elsewhere(tmp_path / "here.world") == expected
+    world.restore(state)
+    assert world.clock.tick == state.tick and hash_later(world) == expected
+    world.close()
+
+
+def test_what_pybullet_saves_by_itself_does_not_suffice(tmp_path):
+    world = script.build(tmp_path)
+    script.run(world, 301, 700)
+    saved = world.pb.saveState()
+    expected = hash_later(world)
+    world.pb.restoreState(saved)
+    world.clock.tick -= AHEAD
+    assert hash_later(world) != expected
+    world.close()
+
+
+def test_what_is_predicted_is_what_happens(arm):
+    candidates = [
+        [(20 * k, TARGET, {"lbr_iiwa_joint_1": 0.1 * turn + 0.01 * k}) for k in range(5)] for turn in range(3)
+    ]
+    predictions = arm.predict(candidates, 150, watch=["iiwa", "box"], every=50, cost="costs:height")
+    assert [each.fault for each in predictions] == [""] * 3
+    assert len({each.state_hash for each in predictions}) == 3
+    chosen = predictions[1]
+    assert list(chosen.ticks) == [50, 100, 150]
+    assert chosen.poses["box"].shape == (3, 7) and chosen.joints["iiwa"].shape == (3, 7)
+    assert chosen.contacts["box"].min() > 0.0, "it lies on the floor"
+    total = 0.0
+    for tick in range(150):
+        for planned in candidates[1]:
+            if planned[0] == tick:
+                arm.put(*planned[1:])
+        arm.step()
+        total += costs.height(arm)
+    assert arm.state_hash() == chosen.state_hash
+    assert total == chosen.cost
+    again = arm.predict([[]], 10)  # it has followed
+    assert hash_later(arm, 10) == again[0].state_hash
+
+
+@pytest.mark.parametrize(
+    "cost, fault",
+    [
+        ("costs:broken", "RuntimeError: no such thing"),
+        ("costs:endless", "cost: expected a finite number at tick 1, got nan"),
+        ("costs:dies", "its process ended early"),
+        ("nowhere:cost", "nowhere"),
+    ],
+)
+def test_a_cost_that_fails_is_named_and_the_world_goes_on(arm, cost, fault):
+    before = arm.state_hash()
+    (prediction,) = arm.predict([[]], 5, cost=cost)
+    assert fault in prediction.fault and prediction.cost == float("inf")
+    assert arm.state_hash() == before
+    assert arm.predict([[]], 5)[0].fault == ""
+
+
+def test_inputs_that_are_refused_are_named(arm):
+    predictions = arm.predict([[(0, "iiwa/aim", {})], [(0, TARGET, {"elbow": 1.0})], []], 5)
+    assert "unknown input 'iiwa/aim'" in predictions[0].fault and "elbow" in predictions[1].fault
+    assert predictions[2].fault == ""
+    with pytest.raises(UnknownNameError):
+        arm.predict([[]], 5, watch=["cup"])
+    with pytest.raises(ValueError, match="at least 1"):
+        arm.predict([[]], 0)
+
+
+def test_a_fork_answers_and_its_errors_come_back(arm):
+    first, second = arm.fork(2)
+    first.put(TARGET, {"lbr_iiwa_joint_1": 0.5})
+    samples = first.step(100)
+    assert {type(each).__name__ for each in samples} >= {"JointStateSample"}
+    second.step(100)
+    assert first.state_hash() != second.state_hash() == hash_later(arm, 100)
+    with pytest.raises(InterfaceError, match="fork 0: .*iiwa/aim"):
+        first.put("iiwa/aim", {})
+    first.act("box", "teleport", {"position": (1.0, 1.0, 1.0), "quat_xyzw": (0.0, 0.0, 0.0, 1.0)})
+    first.close()
+    with pytest.raises(InterfaceError, match="has ended"):
+        first.step()
+    second.close()
+
+
+def test_more_commands_than_are_kept_unpacked(arm):
+    for turn in range(MAX_KEPT + 50):
+        arm.put(TARGET, {"lbr_iiwa_joint_2": 0.8 + 0.0001 * (turn % 100)})
+        arm.apply_inputs()
+        if turn % 50 == 0:
+            arm.step()
+    state = arm.save()
+    assert len(state.commands) == arm.commands.count > MAX_KEPT
+    again = World.from_state(state)
+    assert hash_later(again, 50) == hash_later(arm, 50)
+    again.close()
+
+
+def test_files_that_are_none_are_named(arm, tmp_path):
+    good = tmp_path / "good.world"
+    arm.save(good)
+    cut = tmp_path / "cut.world"
+    cut.write_bytes(good.read_bytes()[:-20])
+    (tmp_path / "text.world").write_text("tick: 3")
+    for name, reason in (("cut", "truncated"), ("text", "expected a state"), ("gone", "no such file")):
+        with pytest.raises(ConfigError, match=rf"{name}\.world: .*{reason}"):
+            World.from_state(tmp_path / f"{name}.world")
+    assert WorldState.read(good) == arm.save()
+
+
+def test_states_of_other_worlds_and_versions_are_refused(arm, tmp_path):
+    state = arm.save()
+    with pytest.raises(InterfaceError, match="another world"):
+        arm.restore(state._replace(description=state.description.replace("box", "bin")))
+    with pytest.raises(InterfaceError, match="format 99, this version reads"):
+        World.from_state(state._replace(description=state.description.replace('"format": 1', '"format": 99')))
+    with pytest.raises(InterfaceError, match="not the saved one"):
+        World.from_state(state._replace(state_hash="0" * 32))
+    with pytest.raises(InterfaceError, match="not the saved one"):
+        arm.restore(state._replace(state_hash="0" * 32))
+    assert arm.clock.tick == 0, "it is reset"
+
+
+def test_something_that_is_not_recorded_is_noticed(arm):
+    arm.predict([[]], 1)
+    arm.bodies["box"].teleport(arm.bodies["box"].base_pose()._replace(position=(0.0, 1.0, 1.0)))
+    with pytest.raises(InterfaceError, match="something not recorded acts"):
+        arm.predict([[]], 1)
