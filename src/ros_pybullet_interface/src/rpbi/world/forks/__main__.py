@@ -53,7 +53,11 @@ def main() -> None:
         finally:
             os._exit(0)
 
-    _serve(connection, {"follow": follow, "fork": fork, "predict": lambda *a: list(_predict_all(world, *a))})
+    def predictions(candidates: Sequence[Candidate], job: PredictionJob, jobs: int) -> list[Prediction]:
+        assert world is not None
+        return list(_predict_all(world, candidates, job, jobs))
+
+    _serve(connection, {"follow": follow, "fork": fork, "predict": predictions})
 
 
 def _advance(world: World, commands: Sequence[RecordedCommand], tick: int) -> None:

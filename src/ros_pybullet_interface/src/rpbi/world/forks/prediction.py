@@ -123,7 +123,7 @@ class _Notes:
 
     def prediction(self, cost: float, state_hash: str) -> Prediction:
         """Returns the notes as arrays."""
-        parts = (
+        poses, joints, forces = (
             {name: np.array(rows) for name, rows in each.items()} for each in (self._poses, self._joints, self._forces)
         )
-        return Prediction(cost, state_hash, np.array(self._ticks, int), *parts)
+        return Prediction(cost, state_hash, np.array(self._ticks, int), poses, joints, forces)
