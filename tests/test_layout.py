@@ -47,7 +47,7 @@ FLOORS = {
         {"sensors"},
         {"bodies"},
         {"world"},
-        {"world_warnings", "render", "replay", "reference"},
+        {"world_warnings", "render", "replay", "reference", "follower"},
         {"images", "ros"},
         {"ros_node"},
     )

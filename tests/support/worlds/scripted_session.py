@@ -33,8 +33,8 @@ from rpbi.geometry import Pose, Twist
 from rpbi.replay.session import Checkpoint, Recording, Replay
 from rpbi.world import World
 from rpbi.world.actions import RecordedTrajectory, TimedGoal
-from rpbi.world.command_log import RecordedCommand
 from rpbi.world.loading import load_object
+from rpbi.world.saved.command_log import RecordedCommand
 from rpbi.world.saved.description import WorldDescription
 
 JOINTS = [f"lbr_iiwa_joint_{number}" for number in range(1, 8)]

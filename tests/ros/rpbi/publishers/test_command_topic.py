@@ -15,7 +15,7 @@ from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
 from ros_pybullet_interface.msg import WorldCommands
 from rpbi.ros.publishers.commands import CommandPublisher
 from rpbi.world import World
-from rpbi.world.command_log import WorldCommand
+from rpbi.world.saved.command_log import WorldCommand
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from rpbi.control.joint_command import JointCommand
 from rpbi.geometry import Pose
 from rpbi.world import World
 from rpbi.world.actions import TimedGoal
-from rpbi.world.command_log import RecordedCommand
+from rpbi.world.saved.command_log import RecordedCommand
 from rpbi.world.saved.commands import apply_command
 from rpbi.world.saved.values import to_text
 

@@ -15,7 +15,7 @@ from worlds import FLOOR, box, iiwa, write_world
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, UnknownNameError
 from rpbi.world import World
-from rpbi.world.command_log import MAX_KEPT
+from rpbi.world.saved.command_log import MAX_KEPT
 from rpbi.world.saved.state import WorldState
 
 TARGET = "iiwa/target"

@@ -1,6 +1,6 @@
 """What is kept of the commands that entered a world."""
 
-from rpbi.world.command_log import MAX_KEPT, CommandLog, WorldCommand
+from rpbi.world.saved.command_log import MAX_KEPT, CommandLog, WorldCommand
 
 
 def _log(count):

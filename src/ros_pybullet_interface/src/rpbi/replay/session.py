@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from custom_ros_tools.errors import InterfaceError
 from rpbi.world import World
-from rpbi.world.command_log import RecordedCommand
+from rpbi.world.saved.command_log import RecordedCommand
 from rpbi.world.saved.commands import apply_command
 from rpbi.world.saved.description import WorldDescription
 

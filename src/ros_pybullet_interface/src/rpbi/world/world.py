@@ -29,11 +29,11 @@ from rpbi.sensors.sensor import Sensor
 from rpbi.window import Window, check_recording
 
 from .actions import ACTIONS, MOVES_AT_ONCE
-from .command_log import CommandLog, WorldCommand
 from .contents import WorldContents, state_hash
 from .forks.prediction import Candidate, Cost, Prediction, PredictionJob
 from .forks.shadow import Fork, Shadow
 from .loading import LoadedWorld, load_object, load_world
+from .saved.command_log import CommandLog, WorldCommand
 from .saved.description import WorldDescription, describe
 from .saved.state import WorldState
 

@@ -14,7 +14,7 @@ from rpbi.ros.endpoints import Topic
 from rpbi.ros.headers import to_ros_time
 from rpbi.ros.messages.topics import FastTopic
 from rpbi.world import World
-from rpbi.world.command_log import WorldCommand
+from rpbi.world.saved.command_log import WorldCommand
 from rpbi.world.saved.values import to_text
 
 log = logging.getLogger(__name__)

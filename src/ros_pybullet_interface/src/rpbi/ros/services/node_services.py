@@ -13,7 +13,7 @@ from cob_srvs.srv import SetString, SetStringRequest
 from std_srvs.srv import Trigger
 
 from custom_ros_tools.config import load_config, load_configs
-from custom_ros_tools.errors import InterfaceError, UnknownNameError
+from custom_ros_tools.errors import InterfaceError, UnknownNameError, shortened
 from custom_ros_tools.schema.type_names import shown
 from robot_model.asset_files import find_file
 from ros_pybullet_interface.msg import ObjectDynamics, PybulletObject
@@ -156,7 +156,7 @@ def _restore(node: NodeContext, request: SetStringRequest) -> Answer:
 def _state_file(name: str) -> Path:
     path = Path(name)
     if path.suffix != STATE_SUFFIX or not path.is_absolute():
-        raise InterfaceError(f"data: expected the full path of a {STATE_SUFFIX} file, got {shown(name)}")
+        raise InterfaceError(f"data: expected the full path of a {STATE_SUFFIX} file, got {shortened(repr(name))}")
     return path
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.processes.child import start_child
-from rpbi.world.command_log import RecordedCommand
+from rpbi.world.saved.command_log import RecordedCommand
 from rpbi.world.saved.state import WorldState
 
 from .prediction import Candidate, Prediction, PredictionJob
@@ -35,6 +35,7 @@ class Remote:
             self._connection.send((name, arguments))
             if handle is not None:
                 send_handle(self._connection, handle, 0)
+                os.set_blocking(self._connection.fileno(), True)  # a default time-out of sockets has changed it
             is_good, answer = self._connection.recv()
         except (EOFError, OSError) as error:
             raise InterfaceError(f"{self._subject} has ended: {error or 'its memory may have run out'}") from None
@@ -91,7 +92,7 @@ class Shadow:
         ours, theirs = Pipe()
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
         self._process = start_child(
-            [sys.executable, "-P", "-m", __package__ or "", str(theirs.fileno())],
+            [sys.executable, "-P", "-m", "rpbi.follower", str(theirs.fileno())],
             signal.SIGKILL,
             pass_fds=[theirs.fileno()],
             env=environment,

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 from custom_ros_tools.errors import InterfaceError
-from rpbi.world.command_log import RecordedCommand
 
+from .command_log import RecordedCommand
 from .values import from_text
 
 _CHANGES: dict[str, Callable[[Any, str, Any], Any]] = {

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem, shortened
-from rpbi.world.command_log import RecordedCommand
 
+from .command_log import RecordedCommand
 from .commands import apply_command
 
 FORMAT = 1

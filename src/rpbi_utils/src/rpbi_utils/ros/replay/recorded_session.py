@@ -9,7 +9,7 @@ from std_msgs.msg import String
 
 from ros_pybullet_interface.msg import SimulationState, WorldCommands
 from rpbi.replay.session import Checkpoint, Recording
-from rpbi.world.command_log import RecordedCommand
+from rpbi.world.saved.command_log import RecordedCommand
 from rpbi.world.saved.description import WorldDescription
 from rpbi_utils.bags.errors import BagError
 from rpbi_utils.ros.bags.bag_reader import BagReader

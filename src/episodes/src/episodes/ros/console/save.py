@@ -6,8 +6,7 @@ from typing import Annotated
 from cob_srvs.srv import SetString
 
 from custom_ros_tools.console.argument import Argument
-
-from .running_simulator import Namespace, RunningSimulator
+from rpbi_utils.ros.console.running_simulator import Namespace, RunningSimulator
 
 
 def save(file: Annotated[Path, Argument("FILE.world", parse=Path, files="*")], *, ns: Namespace = None) -> str:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from custom_ros_tools.errors import InterfaceError
 
-from .saved.values import to_text
+from .values import to_text
 
 MAX_KEPT = 5_000
 """Number of commands that are kept as they are, some megabytes at most; older ones are packed."""

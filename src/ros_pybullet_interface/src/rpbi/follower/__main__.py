@@ -1,4 +1,4 @@
-"""Entry point of the process that follows a world and forks itself: `python -m rpbi.world.forks FD`."""
+"""Entry point of the process that follows a world and forks itself: `python -m rpbi.follower FD`."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ from typing import Any
 
 from custom_ros_tools.errors import InterfaceError
 from rpbi.world import World
-from rpbi.world.command_log import RecordedCommand
+from rpbi.world.forks.prediction import Candidate, Prediction, PredictionJob, predict
+from rpbi.world.saved.command_log import RecordedCommand
 from rpbi.world.saved.commands import apply_command
 from rpbi.world.saved.state import WorldState
-
-from .prediction import Candidate, Prediction, PredictionJob, predict
 
 PIPE_BYTES = 1 << 20
 
@@ -44,6 +43,7 @@ def main() -> None:
     def fork() -> None:
         assert world is not None
         own = Connection(recv_handle(connection))
+        os.set_blocking(connection.fileno(), True)  # a default time-out of sockets would have changed it
         if os.fork():
             own.close()
             return
