@@ -25,7 +25,7 @@ from second_master import SecondMaster  # noqa: E402
 from custom_ros_tools import plugins  # noqa: E402
 from custom_ros_tools.ros.tf_interface import TfInterface  # noqa: E402
 
-pytest_plugins = ("work_plan", "shares", "run_report", "second_try")
+pytest_plugins = ("work_plan", "run_report", "second_try")
 os.environ["PATH"] = path_with(WORKPLACE.folder / "bin")
 
 

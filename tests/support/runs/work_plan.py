@@ -5,12 +5,10 @@ from __future__ import annotations
 import faulthandler
 import os
 from collections.abc import Generator
-from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 import pytest
-from shares import COMPUTING, EXAMPLES, is_in
 
 TESTS = Path(__file__).resolve().parents[2]
 FIRST = ("ros/ik_ros", "ros/rpbi_examples", "gui", "ros", "unit/safe_robot", "sim")
@@ -114,14 +112,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         matches = (number for number, folder in enumerate(FIRST) if item.path.is_relative_to(TESTS / folder))
         return next(matches, len(FIRST))
 
-    files: dict[Path, list[pytest.Item]] = {}
-    for item in sorted(items, key=rank):
-        files.setdefault(item.path, []).append(item)
-    examples = [file for file in files if is_in(file, EXAMPLES)]
-    nodes = [file for file in files if not is_in(file, EXAMPLES + COMPUTING)]
-    others = [file for file in files if is_in(file, COMPUTING)]
-    in_turns = [file for pair in zip_longest(examples, nodes) for file in pair if file]  # few examples at once
-    items[:] = [item for file in in_turns + others for item in files[file]]
+    items.sort(key=rank)
 
 
 def _is_quick(item: pytest.Item) -> bool:
