@@ -67,8 +67,10 @@ def follows(example, position) -> Callable[[np.ndarray, Callable[[], object], Ca
 
     def run(direction: np.ndarray, move: Callable[[], object], let_go: Callable[[], object]) -> None:
         start = position(TIP)
-        wait_until(lambda: move() or (position(TIP) - start) @ direction > 0.04, "the arm follows", SLOW_S)
-        let_go()
+        try:
+            wait_until(lambda: move() or (position(TIP) - start) @ direction > 0.04, "the arm follows", SLOW_S)
+        finally:
+            let_go()  # else the next test would find a button held
         wait_until(lambda: signals.messages and not any(signals.messages[-1].data), "the signal is zero")
         seen = [start]  # it goes a little too far and comes back, since it cannot stop as suddenly as a key is let go
         wait_until(lambda: stands(seen), "the arm stands at its target", SLOW_S, every_s=0.3)
@@ -132,9 +134,8 @@ def test_the_logger_has_the_signals_of_the_last_second(example, screen):
 
 def test_mouse_moves_the_arm(example, screen, follows):
     with device(example, screen, "mouse"):
-        screen.run(
-            "xdotool", "search", "--sync", "--name", "mouse", "windowraise", "mousemove", "--window", "%1", "100", "200"
-        )
+        window = ("search", "--sync", "--onlyvisible", "--name", "^mouse$")  # before it is visible, it gets no mouse
+        screen.run("xdotool", *window, "windowraise", "mousemove", "--window", "%1", "100", "200")
         screen.run("xdotool", "mousedown", "1", "mousemove_relative", "--", "-80", "0")
         follows(-RIGHT, nothing, lambda: screen.run("xdotool", "mouseup", "1"))
 
@@ -162,8 +163,9 @@ def test_6d_mouse_moves_the_arm(example, screen, follows, tmp_path):
 
 def test_virtual_haptic_device_moves_the_arm(example, screen, follows):
     with device(example, screen, "virtual"):
-        screen.run("xdotool", "search", "--sync", "--name", "Virtual haptic device", "windowraise")
+        window = ("search", "--sync", "--onlyvisible", "--name", "Virtual haptic device")
+        screen.run("xdotool", *window, "windowraise")
         for button, right, down, direction in (("1", 60, 0, RIGHT), ("1", 0, 60, -AWAY), ("3", 0, -60, UP)):
-            middle = ("search", "--name", "Virtual haptic device", "mousemove", "--window", "%1", "210", "210")
-            screen.run("xdotool", *middle, "mousedown", button, "mousemove_relative", "--", str(right), str(down))
+            screen.run("xdotool", *window, "mousemove", "--window", "%1", "210", "210")
+            screen.run("xdotool", "mousedown", button, "mousemove_relative", "--", str(right), str(down))
             follows(direction, nothing, lambda: screen.run("xdotool", "mouseup", button))  # noqa: B023 (called here)

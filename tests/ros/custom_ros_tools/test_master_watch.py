@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import threading
@@ -10,6 +11,7 @@ from xmlrpc.server import SimpleXMLRPCServer
 import pytest
 import rosgraph
 import rospy
+import rospy.impl.registration
 from ros_system import wait_until
 from std_msgs.msg import Empty
 
@@ -56,34 +58,61 @@ def test_a_master_that_ends_while_a_node_starts_is_told_in_one_line(ros, second_
     assert said.count("has gone while the node was starting") == 1 and "Traceback" not in said, said
 
 
-def test_a_publisher_that_comes_while_its_subscriber_registers_is_connected(ros, monkeypatch):
-    """rospy would forget it if it is busy with another topic: the master's older answer comes last."""
+@contextlib.contextmanager
+def trial_publisher():
+    """A publisher's node as the master reports it; yields its URI and the topics that it was asked for."""
     asked = []
     server = SimpleXMLRPCServer(("127.0.0.1", 0), logRequests=False)
     server.register_function(
         lambda caller, topic, protocols: (asked.append(topic), (0, "it was a trial", []))[1], "requestTopic"
     )
     threading.Thread(target=server.serve_forever, daemon=True).start()
-    uri = f"http://127.0.0.1:{server.server_address[1]}/"
+    yield f"http://127.0.0.1:{server.server_address[1]}/", asked
+    server.shutdown()
+    server.server_close()
+
+
+def test_a_publisher_that_comes_while_its_subscriber_registers_is_connected(ros, monkeypatch):
+    """rospy would forget it if it is busy with another topic: the master's older answer comes last."""
     master, topic = rosgraph.Master("/late"), "/comes_meanwhile"
-    take = Registrations._on_answer
+    on_answer = Registrations._on_answer
+    with trial_publisher() as (uri, asked):
 
-    def take_late(self, kind, name, answer):
-        assert (kind, name, answer[2]) == ("sub", topic, [])
-        rospys = self._registry._rospys
-        rospys.publisher_update("/another", [])
-        wait_until(lambda: not rospys.updates, "rospy waits for the topics, which are locked now")
-        master.registerPublisher(topic, "std_msgs/Empty", uri)
-        wait_until(lambda: (topic, [uri]) in rospys.updates, "the master has told of the publisher")
-        take(self, kind, name, answer)
+        def answer_late(self, kind, name, answer):
+            assert (kind, name, answer[2]) == ("sub", topic, [])
+            master.registerPublisher(topic, "std_msgs/Empty", uri)
+            on_answer(self, kind, name, answer)
 
-    monkeypatch.setattr(Registrations, "_on_answer", take_late)
+        monkeypatch.setattr(Registrations, "_on_answer", answer_late)
+        subscriber = rospy.Subscriber(topic, Empty)
+        monkeypatch.undo()
+        try:
+            wait_until(lambda: topic in asked, "the publisher is asked for the topic")
+        finally:
+            master.unregisterPublisher(topic, uri)
+            subscriber.unregister()
+
+
+def test_reports_of_publishers_may_overtake_each_other(ros):
+    """rospy would connect to the publishers of the last report only."""
+    topic = "/reported_late"
+    manager = rospy.impl.registration.get_registration_listeners().listeners[0]._registry._rospys
     subscriber = rospy.Subscriber(topic, Empty)
-    monkeypatch.undo()
-    try:
-        wait_until(lambda: topic in asked, "the publisher is asked for the topic")
-    finally:
-        master.unregisterPublisher(topic, uri)
-        subscriber.unregister()
-        server.shutdown()
-        server.server_close()
+    with trial_publisher() as (new, asked_new), trial_publisher() as (old, asked_old):
+        with manager.cond:  # rospy's own thread gets to see both reports at once
+            manager.publisher_update(topic, [new])
+            manager.publisher_update(topic, [old])
+        wait_until(lambda: topic in asked_new and topic in asked_old, "both publishers are asked for the topic")
+    subscriber.unregister()
+
+
+def test_a_lost_connection_is_made_again(ros):
+    """rospy would take the ended connection for one that lives."""
+    publisher = ros.start(["rostopic", "pub", "-r", "50", "/goes_on", "std_msgs/Empty"])
+    received = ros.listen("/goes_on", Empty)
+    received.wait_for(1)
+    (connection,) = received._subscriber.impl.connections
+    connection.close()
+    count = len(received.messages)
+    received.wait_for(count + 10)
+    assert publisher.poll() is None

@@ -15,7 +15,7 @@ import rospy
 import yaml
 from cob_srvs.srv import SetString
 from diagnostic_msgs.msg import DiagnosticArray
-from ros_system import connections_of, wait_until
+from ros_system import wait_until
 from rosgraph_msgs.msg import Log
 from worlds import write_world
 
@@ -50,41 +50,17 @@ def objects(ros: Any, ns: str = "/") -> dict[str, str]:
     return dict(zip(answer.names, answer.types, strict=True))
 
 
-_published: set[str] = set()
-"""Topics that the tests' own process has published."""
-
-
 @contextmanager
 def publishing(topic: str, message_type: type) -> Iterator[rospy.Publisher]:
     """Publishes a topic that somebody listens to; none of the messages is lost when it ends."""
-    name = rospy.resolve_name(topic)
-    if name in _published:
-        wait_until(lambda: not _is_taken_for_connected(name), f"who listened to {name} has noticed that it ended")
-    _published.add(name)
-    publisher = _connected_publisher(topic, message_type)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # without a queue, a message has gone when `publish` returns
+        publisher = rospy.Publisher(topic, message_type, queue_size=None)
     try:
+        wait_until(publisher.get_num_connections, f"somebody listens to {topic}")
         yield publisher
     finally:
         publisher.unregister()
-
-
-def _connected_publisher(topic: str, message_type: type) -> rospy.Publisher:
-    """Returns a publisher that somebody listens to.
-
-    A node in rospy overlooks one now and then that comes back soon after it ended; it is then offered once more.
-    """
-    for is_last in (False, False, True):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # without a queue, a message has gone when `publish` returns
-            publisher = rospy.Publisher(topic, message_type, queue_size=None)
-        try:
-            wait_until(publisher.get_num_connections, f"somebody listens to {topic}", 20.0)
-            break
-        except TimeoutError:
-            publisher.unregister()
-            if is_last:
-                raise
-    return publisher
 
 
 def count_taken(publisher: rospy.Publisher) -> int:
@@ -95,18 +71,6 @@ def count_taken(publisher: rospy.Publisher) -> int:
         _, _, (_, subscriptions, *_) = ServerProxy(master.lookupNode(node)).getBusStats(rospy.get_name())
         counts += [read for name, connections in subscriptions if name == topic for _, _, read, *_ in connections]
     return min(counts, default=0)
-
-
-def _is_taken_for_connected(topic: str) -> bool:
-    """Whether a node has not noticed yet that we publish a topic no more; rospy would not connect it to us again."""
-    published, subscribed, _ = rosgraph.Master(rospy.get_name()).getSystemState()
-    if rospy.get_name() in dict(published).get(topic, []):
-        return False  # another publisher of ours goes on
-    return any(
-        (publisher, direction, name) == (rospy.get_node_uri(), "i", topic)
-        for connections in connections_of(topic, subscribed)
-        for _, publisher, direction, _, name, *_ in connections
-    )
 
 
 def registrations(node: str = "/ros_pybullet_interface") -> list[tuple[str, ...]]:

@@ -8,10 +8,12 @@ expected, what was found and what is lost, and the node continues without it.
 from __future__ import annotations
 
 import socket
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from functools import partial
 from importlib import import_module
+from itertools import count
 from typing import Any, TypeVar
 from weakref import WeakMethod
 
@@ -111,8 +113,70 @@ class DirectSending:
         return True
 
 
+class Subscriptions:
+    """Connects the subscriptions of this node to all publishers that the ROS master has reported.
+
+    rospy handles only the last report of each topic, although reports overtake each other. It also counts connections
+    that have ended, so that it overlooks a publisher that comes back, or that has lost one connection.
+
+    Args:
+        manager: The part of rospy that receives the reports; they come here instead.
+        topics: The topics of this node.
+    """
+
+    def __init__(self, manager: Any, topics: Any) -> None:
+        self._topics, self._connect_topic = topics, manager.handler._connect_topic
+        self._lock = threading.Lock()
+        self._reports = count()
+        self._reported: dict[tuple[str, str], int] = {}
+        """Number of the last report of each topic and publisher."""
+        self._connecting: set[tuple[str, str]] = set()
+        if not callable(manager.publisher_update):
+            raise TypeError("RegManager.publisher_update is no method")
+        manager.publisher_update = self.on_report
+
+    def on_report(self, topic: str, publishers: list[str]) -> None:
+        """Connects a subscription to publishers, given by their URIs; existing connections stay."""
+        with self._lock:
+            self._reported.update({(topic, uri): next(self._reports) for uri in publishers})
+        self.connect_missing()
+
+    def connect_missing(self) -> None:
+        """Connects to all reported publishers without a connection, without waiting for them."""
+        with self._lock:
+            missing = [pair for pair in self._reported if pair not in self._connecting and not self._has(*pair)]
+            self._connecting.update(missing)
+        for pair in missing:
+            threading.Thread(target=self._connect, args=pair, daemon=True).start()
+
+    def _has(self, topic: str, uri: str) -> bool:
+        subscription = self._topics.get_subscriber_impl(topic)
+        if subscription is None:
+            return False
+        for connection in getattr(subscription, "connections", ()):  # without this list, ended ones stay
+            if connection.done:
+                subscription.remove_connection(connection)
+        return bool(subscription.has_connection(uri))
+
+    def _connect(self, topic: str, uri: str) -> None:
+        """Connects to one publisher; one that refuses is forgotten until it is reported again."""
+        pair, code = (topic, uri), 0
+        report = self._reported.get(pair)
+        try:
+            code, *_ = self._connect_topic(topic, uri)
+        finally:
+            with self._lock:
+                self._connecting.discard(pair)
+                if code != 1 and self._reported.get(pair) == report:
+                    self._reported.pop(pair, None)
+
+
 class Registry:
-    """The topics and services of this node, from rospy."""
+    """The topics and services of this node, from rospy.
+
+    Attributes:
+        subscriptions: Connects the node to the publishers of what it subscribes to.
+    """
 
     def __init__(self) -> None:
         registration = import_module("rospy.impl.registration")
@@ -122,8 +186,9 @@ class Registry:
         kinds = registration.Registration
         if (kinds.SUB, kinds.PUB, kinds.SRV) != ("sub", "pub", "srv"):
             raise TypeError("other kinds of registrations")
-        with self.entries(), self._rospys.cond:
-            self._rospys.updates[:] = self._rospys.updates  # otherwise it would fail when it is needed
+        with self.entries():
+            pass  # otherwise it would fail when it is needed
+        self.subscriptions = Subscriptions(self._rospys, self._topics)
         rospy.core.add_shutdown_hook(lambda _: self._wake())  # rospy waits for its thread, up to 0.5 s
 
     @contextmanager
@@ -135,20 +200,6 @@ class Registry:
                 *(("pub", *each) for each in self._topics.get_publications()),
                 *(("srv", *each) for each in self._services.get_services()),
             ]
-
-    def connect(self, name: str, publishers: list[str]) -> None:
-        """Connects a subscription to the publishers that the master returned at its registration.
-
-        A publisher that registers right after it is reported by the master in another call, which may arrive earlier;
-        rospy would connect only to those of the last report. This runs before queued updates.
-
-        Args:
-            name: The topic.
-            publishers: Their URIs; existing connections stay.
-        """
-        with self._rospys.cond:
-            self._rospys.updates.insert(0, (name, publishers))
-            self._rospys.cond.notify_all()
 
     def _wake(self) -> None:
         with self._rospys.cond:

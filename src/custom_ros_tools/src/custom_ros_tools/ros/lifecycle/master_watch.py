@@ -84,12 +84,16 @@ class Registrations:
         served = sum(kind == "srv" for kind, _, _ in entries)
         return len(entries) - served, served
 
+    def connect_missing(self) -> None:
+        """Connects subscriptions again whose connections were lost."""
+        self._registry.subscriptions.connect_missing()
+
     def _on_answer(self, kind: str, name: str, answer: tuple[int, str, Any]) -> None:
         code, message, value = answer
         if code != 1:
             rospy.logfatal("the ROS master does not take %s: %s", name, message)
         elif kind == "sub":
-            self._registry.connect(name, value)
+            self._registry.subscriptions.on_report(name, value)
 
 
 class MasterWatch:
@@ -120,6 +124,8 @@ class MasterWatch:
         WallTimer(LOOK_HZ, self._look)
 
     def _look(self) -> None:
+        if self._registrations is not None:
+            self._registrations.connect_missing()
         try:
             with timed_master(self._uri) as master:
                 self._compare(master)
