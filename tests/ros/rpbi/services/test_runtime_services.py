@@ -162,8 +162,14 @@ def test_joint_states_that_are_off_have_no_topic(ros, simulator):
 @pytest.mark.parametrize(
     ("service", "service_type", "asked", "message"),
     [
-        ("set_real_time_factor", SetRealTimeFactor, [-1.0], "real_time_factor: must be finite and >= 0, got -1"),
-        ("set_real_time_factor", SetRealTimeFactor, [math.nan], "real_time_factor: must be finite"),
+        (
+            "set_real_time_factor",
+            SetRealTimeFactor,
+            [-1.0],
+            "real_time_factor: must be 0, which is as fast as it goes, or >= 0.001, got -1",
+        ),
+        ("set_real_time_factor", SetRealTimeFactor, [1e-300], "or >= 0.001, got 1e-300"),
+        ("set_real_time_factor", SetRealTimeFactor, [math.nan], "real_time_factor: must be 0"),
         ("set_gravity", SetGravity, [Vector3(0.0, math.inf, 0.0)], "gravity: gravY: "),
         ("set_physics_engine_parameter", SetString, ["{fixedTimeStep: 0.1}"], "fixedTimeStep: cannot change"),
         ("set_physics_engine_parameter", SetString, ["{erpp: 0.1}"], "unknown key 'erpp'; did you mean 'erp'?"),

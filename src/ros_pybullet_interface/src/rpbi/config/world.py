@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import Annotated, Any, Self
@@ -54,6 +55,19 @@ def _as_list(given: Any) -> Any:
 
 
 LONGEST_STEP_S = 10.0
+MIN_REAL_TIME_FACTOR = 1e-3
+"""Slowest pace: with less, motions last for hours, and services that wait for them seem not to answer."""
+
+
+def checked_real_time_factor(factor: float) -> float:
+    """Returns a factor of real time.
+
+    Raises:
+        ValueError: If it is neither 0 (as fast as possible) nor a finite number of at least MIN_REAL_TIME_FACTOR.
+    """
+    if factor == 0.0 or MIN_REAL_TIME_FACTOR <= factor < math.inf:
+        return factor
+    raise ValueError(f"must be 0, which is as fast as it goes, or >= {MIN_REAL_TIME_FACTOR:g}, got {factor:g}")
 
 
 def _whole_nanoseconds(seconds: float) -> float:
@@ -122,8 +136,8 @@ class WorldConfig(ConfigModel):
     setPhysicsEngineParameter: SetPhysicsEngineParameter = Field(
         SetPhysicsEngineParameter(), description="Solver of contacts and joints."
     )
-    real_time_factor: NonNegative = Field(
-        1.0, description="Simulated seconds in a second of wall time; 0 is as fast as it goes."
+    real_time_factor: Annotated[NonNegative, AfterValidator(checked_real_time_factor)] = Field(
+        1.0, description="Simulated seconds in a second of wall time, at least 0.001; 0 is as fast as it goes."
     )
     clock_hz: Hz | None = optional("Most /clock messages in a second of wall time.")
     tf_prefix: FrameId | None = optional("Prefix of all TF frames, so that two worlds can share one TF tree.")

@@ -1,7 +1,6 @@
 """The simulation loop: requests, ticks, samples out, in step with the wall clock."""
 
 import logging
-import math
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -9,6 +8,7 @@ from concurrent.futures import Future
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.buffered_socket import flush_buffered_sockets
+from rpbi.config.world import checked_real_time_factor
 from rpbi.engine.pacer import Pacer
 from rpbi.ros.publishers.commands import CommandPublisher
 from rpbi.ros.publishers.sample_publishers import SamplePublishers, TickPublisher
@@ -181,11 +181,12 @@ class Simulation:
         """Changes how fast the world is to run, from now on.
 
         Raises:
-            ValueError: If it is negative or not finite.
+            ValueError: If it is not valid, see `checked_real_time_factor`.
         """
-        if not 0.0 <= factor < math.inf:
-            raise ValueError(f"real_time_factor: must be finite and >= 0, got {factor:g}")
-        self._pacer.set_factor(factor)
+        try:
+            self._pacer.set_factor(checked_real_time_factor(factor))
+        except ValueError as error:
+            raise ValueError(f"real_time_factor: {error}") from None
         self._publishers.set_factor(factor)
 
     def run(self, is_over: Callable[[], bool]) -> None:
