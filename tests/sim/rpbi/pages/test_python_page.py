@@ -109,7 +109,8 @@ def test_the_page_on_speed_times_a_tick(tmp_path):
 
 
 def test_the_page_on_many_worlds_shows_what_it_says(tmp_path):
-    blocks = BLOCK.findall((ROOT / "docs/many_worlds.md").read_text())
+    found = BLOCK.findall((ROOT / "docs/many_worlds.md").read_text())
+    blocks = [block for block in found if "rospy" not in block]  # which test_predict_service.py runs
     assert len(blocks) == 4
     result = run("\n".join(blocks), tmp_path)
     assert result.returncode == 0, result.stderr

@@ -34,6 +34,7 @@ from .headers import use_own_frames, use_prefix
 from .initial_state import start_where_robots_are
 from .requests import Requests
 from .services.object_lifecycle import ObjectLifecycle
+from .services.prediction import Predictor
 from .simulation import Simulation
 
 
@@ -130,7 +131,7 @@ class SimulatorNode:
         ask = Requests(self._simulation)
         self._objects = ObjectLifecycle(self._simulation, ask, publishers)
         loading = {"search_paths": config.setAdditionalSearchPath, ROBOT_DESCRIPTION: description}
-        context = NodeContext(self._simulation, ask, self._objects, loading)
+        context = NodeContext(self._simulation, ask, self._objects, Predictor(self._simulation, ask), loading)
         window.serve(ask)
         for service in NODE_SERVICES:
             serve(service, context)

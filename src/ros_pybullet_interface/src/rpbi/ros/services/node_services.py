@@ -29,6 +29,7 @@ from ros_pybullet_interface.srv import (
     GetObjectDynamicsRequest,
     GetStateHash,
     ListObjects,
+    Predict,
     SetGravityRequest,
     SetRealTimeFactor,
     SetRealTimeFactorRequest,
@@ -62,6 +63,7 @@ from rpbi.world.saved.state import WorldState
 
 from .attachments import apply_wrench, attach, detach
 from .object_lifecycle import ObjectLifecycle
+from .prediction import Predictor, predict
 
 log = logging.getLogger(__name__)
 
@@ -89,12 +91,14 @@ class NodeContext(NamedTuple):
         simulation: The loop that runs the world.
         ask: Calls a function in the simulation thread.
         objects: Objects that are added and removed.
+        predictor: Predicts from the present state.
         loading: Context for the files of objects, see `load_object`.
     """
 
     simulation: Simulation
     ask: Requests
     objects: ObjectLifecycle
+    predictor: Predictor
     loading: Mapping[str, Any]
 
 
@@ -334,6 +338,7 @@ NODE_SERVICES = (
     Service("rpbi/reset", Trigger, _reset),
     Service("rpbi/save", SetString, _save),
     Service("rpbi/restore", SetString, _restore),
+    Service("rpbi/predict", Predict, predict),
     Service("rpbi/add_pybullet_object", AddPybulletObject, _add_object),
     Service("rpbi/add_rgbd_sensor", SetString, _add_camera),
     Service("rpbi/remove_pybullet_object", SetString, _remove_object),

@@ -83,16 +83,17 @@ class Shadow:
 
     Args:
         state: Present state of the world.
+        niceness: How much less of the processors it gets than this process, from 0 to 19.
 
     Raises:
         InterfaceError: If the world does not come to the same state there.
     """
 
-    def __init__(self, state: WorldState) -> None:
+    def __init__(self, state: WorldState, niceness: int = 0) -> None:
         ours, theirs = Pipe()
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
         self._process = start_child(
-            [sys.executable, "-P", "-m", "rpbi.follower", str(theirs.fileno())],
+            ["nice", "-n", str(niceness), sys.executable, "-P", "-m", "rpbi.follower", str(theirs.fileno())],
             signal.SIGKILL,
             pass_fds=[theirs.fileno()],
             env=environment,

@@ -1,0 +1,149 @@
+"""The service `rpbi/predict`: what would happen, while the world goes on."""
+
+from __future__ import annotations
+
+import os
+import threading
+from typing import Any
+
+import genpy
+from geometry_msgs.msg import Point, Pose, Quaternion
+
+from custom_ros_tools.errors import InterfaceError, UnknownNameError
+from custom_ros_tools.plugins import check_trusted
+from ros_pybullet_interface.msg import PlannedInput as PlannedInputMessage
+from ros_pybullet_interface.msg import PredictedBody
+from ros_pybullet_interface.msg import Prediction as PredictionMessage
+from ros_pybullet_interface.srv import PredictRequest
+from rpbi.bodies.robots.jointed import JointedBody
+from rpbi.ros.headers import to_ros_time
+from rpbi.ros.requests import Requests
+from rpbi.ros.simulation import Simulation
+from rpbi.world.forks.prediction import Candidate, PlannedInput, Prediction, PredictionJob
+from rpbi.world.forks.shadow import Shadow
+from rpbi.world.saved.command_log import RecordedCommand
+
+MAX_TICKS = 1_000_000
+"""Largest number of ticks of all candidates of a request; more are rejected."""
+MAX_ROWS = 100_000
+"""Largest number of rows of motion in an answer, of all bodies and candidates; more are rejected."""
+EVERY = 10
+"""Ticks between two rows of motion by default."""
+NICENESS = 5
+"""Niceness of the processes that predict, so that the running world is not late."""
+
+
+class Predictor:
+    """Predicts from the present state of a running world, in processes that follow it and end with this one.
+
+    The first prediction takes as long as simulating again from the last start or reset; later ones follow from there.
+
+    Args:
+        simulation: The loop that runs the world.
+        ask: Calls a function in the simulation thread.
+    """
+
+    def __init__(self, simulation: Simulation, ask: Requests) -> None:
+        self._simulation, self._ask = simulation, ask
+        self._lock = threading.Lock()
+        self._shadow: Shadow | None = None
+        self._resets = 0
+
+    def predict(self, candidates: list[Candidate], job: PredictionJob) -> tuple[int, int, list[Prediction]]:
+        """Returns the tick and stamp [ns] from which on is predicted, and what happens with each candidate.
+
+        Raises:
+            InterfaceError: If the world cannot be saved, or does not come to the same state in another process.
+        """
+        with self._lock:
+            try:
+                shadow, tick, stamp_ns = self._follow()
+                return tick, stamp_ns, shadow.predict(candidates, job, os.cpu_count() or 1)
+            except InterfaceError:
+                self._end()
+                raise
+
+    def _follow(self) -> tuple[Shadow, int, int]:
+        """Brings the process that follows to the present state; returns it with the tick and its stamp [ns]."""
+        world = self._simulation.world
+        if self._shadow is None or self._resets != world.resets:
+            self._end()
+            state, self._resets = self._ask(lambda: (world.save(), world.resets))
+            self._shadow = Shadow(state, NICENESS)
+        shadow = self._shadow
+
+        def news() -> tuple[int, list[RecordedCommand], int, str, int]:
+            world.apply_inputs()  # those that have arrived act before the next step
+            new = list(world.commands.records(shadow.commands)) if world.resets == self._resets else []
+            return world.resets, new, world.clock.tick, world.state_hash(), world.clock.stamp_ns
+
+        resets, new, tick, state_hash, stamp_ns = self._ask(news)
+        if resets != self._resets:
+            return self._follow()
+        shadow.follow(new, tick, state_hash)
+        return shadow, tick, stamp_ns
+
+    def _end(self) -> None:
+        if self._shadow is not None:
+            self._shadow.close()
+            self._shadow = None
+
+
+def predict(node: Any, request: PredictRequest) -> tuple[bool, str, int, genpy.Time, list[PredictionMessage]]:
+    """Predicts what would happen from the present state with each of some candidates; the world goes on."""
+    job = _job(node, request)
+    candidates = [[_planned(each) for each in candidate.inputs] for candidate in request.candidates]
+    tick, stamp_ns, predictions = node.predictor.predict(candidates, job)
+    joints = {name: _joint_names(node.simulation.world.bodies.get(name)) for name in job.watch}
+    messages = [_message(each, joints) for each in predictions]
+    good = sum(not each.fault for each in predictions)
+    return True, f"{good} of {len(messages)} predicted from tick {tick} on", tick, to_ros_time(stamp_ns), messages
+
+
+def _job(node: Any, request: PredictRequest) -> PredictionJob:
+    count, every = len(request.candidates), request.every or EVERY
+    if not request.ticks or not count:
+        raise InterfaceError(f"ticks and candidates: expected at least 1 of each, got {request.ticks} and {count}")
+    if request.ticks * count > MAX_TICKS:
+        raise InterfaceError(f"ticks: expected at most {MAX_TICKS} of all candidates, got {request.ticks * count}")
+    rows = request.ticks // every * count * len(request.watch)
+    if rows > MAX_ROWS:
+        raise InterfaceError(f"every: expected at most {MAX_ROWS} rows of motion, got {rows}; name a larger number")
+    if request.cost:
+        check_trusted(request.cost)
+    bodies = node.simulation.world.bodies
+    for name in request.watch:
+        if name not in bodies:
+            raise UnknownNameError("object", name, list(bodies))
+    return PredictionJob(request.ticks, tuple(request.watch), every, request.cost or None)
+
+
+def _planned(message: PlannedInputMessage) -> PlannedInput:
+    names, values = message.names, tuple(message.values)
+    if names and len(names) != len(values):
+        raise InterfaceError(f"{message.input}: expected a value for each of {len(names)} names, got {len(values)}")
+    return PlannedInput(message.tick, message.input, dict(zip(names, values, strict=True)) if names else values)
+
+
+def _joint_names(body: Any) -> list[str]:
+    return [joint.name for joint in body.model.moving] if isinstance(body, JointedBody) else []
+
+
+def _message(prediction: Prediction, joints: dict[str, list[str]]) -> PredictionMessage:
+    bodies = [
+        PredictedBody(
+            name=name,
+            poses=[Pose(Point(*row[:3]), Quaternion(*row[3:])) for row in poses.tolist()],
+            joint_names=joints.get(name, []),
+            joints=prediction.joints[name].ravel().tolist() if name in prediction.joints else [],
+            contacts=prediction.contacts[name].tolist(),
+        )
+        for name, poses in prediction.poses.items()
+    ]
+    return PredictionMessage(
+        cost=prediction.cost,
+        fault=prediction.fault,
+        state_hash=prediction.state_hash,
+        ticks=prediction.ticks.tolist(),
+        bodies=bodies,
+    )
