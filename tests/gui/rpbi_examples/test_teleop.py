@@ -111,7 +111,10 @@ def test_what_stands_in_for_a_real_robot_has_followed(example):
         there, here = (dict(zip(each.messages[-1].name, each.messages[-1].position)) for each in (real, arm))
         return all(abs(there[name] - here[name]) < 0.02 for name in there)
 
-    wait_until(follows, "it stands where the arm does", SLOW_S)
+    try:
+        wait_until(follows, "it stands where the arm does", SLOW_S)
+    except TimeoutError as error:  # the guard logs why it stands elsewhere
+        raise AssertionError(f"{error}:\n{example.output(example.processes[0])[-3000:]}") from error
     assert example.call("/stand_in/rpbi/stop", Trigger).success  # a computer has enough to do with the arm alone
     rosnode.kill_nodes([f"/{name}" for name in REAL_NODES])
 

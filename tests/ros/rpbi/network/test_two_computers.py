@@ -111,9 +111,9 @@ def test_a_guard_on_either_side_lets_a_swing_through(ros_of_module: RosSystem, b
         "policy": "limit",
         "period_s": 0.02,
         "shape": {"time_s": 0.06},
-        "silence_s": 0.2,
+        "silence_s": 2.0,  # a busy machine is no fault of the network
         "limits": {"acceleration": 10.0, "jerk": 1000.0},
-        "checks": {"staleness": {"timeout_s": 1.0}},
+        "checks": {"staleness": {"timeout_s": 4.0}},
     }
     given = [f"_{name}:={json.dumps(value)}" for name, value in parameters.items()]
     names = (f"joint_states/target:={targets}", f"joint_states/command:={TARGETS}", f"joint_states/measured:={STATES}")

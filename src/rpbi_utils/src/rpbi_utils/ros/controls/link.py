@@ -19,6 +19,8 @@ from rpbi_utils.ros.console.running_simulator import LIST, RunningSimulator
 
 LOOK_S = 1.0
 """Time between two looks at the ROS master [s]."""
+MAX_FAILED_LOOKS = 3
+"""Number of failed looks in a row after which nobody counts as offering anything: one may fail on a busy machine."""
 SILENCE_S = 2.5
 """Time without any message after which a simulator counts as gone [s]; /diagnostics comes once a second."""
 IMAGE = "/colour/image/compressed"
@@ -117,6 +119,7 @@ class SimulatorLink:
         self._names, self._topics = frozenset[str](), frozenset[str]()
         self._objects: Mapping[str, str] = MappingProxyType({})
         self._served: Any = None
+        self._failed_looks = 0
         self._wake = threading.Event()
         rospy.Subscriber("rpbi/status", Int64, self._on_status, queue_size=1, tcp_nodelay=True)
         rospy.Subscriber("rpbi/state", SimulationState, self._on_state, queue_size=1)
@@ -149,8 +152,11 @@ class SimulatorLink:
                 self.joints.follow()
                 self.image.follow()
                 self._look()
+                self._failed_looks = 0
             except MASTER_FAILURES:
-                self._names = frozenset()
+                self._failed_looks += 1
+                if self._failed_looks >= MAX_FAILED_LOOKS:
+                    self._names = frozenset()
             except rospy.ROSException:  # it is shutting down
                 return
             self._wake.wait(LOOK_S)
