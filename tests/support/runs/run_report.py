@@ -12,6 +12,7 @@ import pytest
 SLOWEST = 15
 Row = tuple[int, float, float]
 """Number of tests, wall time and processor time [s]."""
+WALL, PROCESSOR = 1, 2
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -52,8 +53,9 @@ class RunReport:
         folders = _summed(files, os.path.dirname)
         tables = {
             "time by folder": [*sorted(folders.items()), *_summed(folders, lambda _: "all").items()],
-            f"slowest {SLOWEST} files": _slowest(files),
-            f"slowest {SLOWEST} tests": _slowest(tests),
+            f"slowest {SLOWEST} files": _most(files, WALL),
+            f"{SLOWEST} files with the most processor time": _most(files, PROCESSOR),
+            f"slowest {SLOWEST} tests": _most(tests, WALL),
         }
         for title, rows in tables.items():
             terminalreporter.section(title)
@@ -71,9 +73,9 @@ def _summed(rows: Mapping[str, Row], group: Callable[[str], str]) -> dict[str, R
     return sums
 
 
-def _slowest(rows: Mapping[str, Row]) -> list[tuple[str, Row]]:
-    """Returns the rows with the most wall time, longest first."""
-    return sorted(rows.items(), key=lambda item: -item[1][1])[:SLOWEST]
+def _most(rows: Mapping[str, Row], column: int) -> list[tuple[str, Row]]:
+    """Returns the rows with the largest numbers in a column, largest first."""
+    return sorted(rows.items(), key=lambda item: -item[1][column])[:SLOWEST]
 
 
 def processor_s() -> float:
