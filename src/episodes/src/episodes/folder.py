@@ -38,7 +38,7 @@ class Episode:
         label: Word of the user for the outcome, such as `success`.
         note: Reason of a state other than `complete`, and whatever else a user should read.
         started: Wall time of the start, ISO 8601.
-        seconds: Length in wall time [s].
+        seconds: Length in wall time, or in the world's time if it comes from a farm [s].
         namespace: Namespace of the simulator.
         seeds: Seeds, as the node's parameter gives them.
         versions: Versions of this workspace, PyBullet, Python and numpy.
@@ -114,6 +114,11 @@ class EpisodeFolder:
             raise EpisodeError(self.path, "expected a folder of episodes, there is none")
         return sorted(_numbers(self.path, _COMPLETE))
 
+    def used(self) -> set[int]:
+        """Returns the numbers of all episodes, of those in temporary folders and of discarded ones too."""
+        discarded = _numbers(self.path / DISCARDED, _COMPLETE)
+        return {*_numbers(self.path, _COMPLETE), *_numbers(self.path, _PARTIAL), *discarded}
+
     def all(self) -> Iterator[Episode]:
         """Yields all finished episodes."""
         return map(self.read, self.numbers())
@@ -133,16 +138,24 @@ class EpisodeFolder:
         """Returns the folder of a finished episode."""
         return self.path / f"episode_{number:06d}"
 
-    def begin(self, **facts: Any) -> tuple[Episode, Path]:
+    def begin(self, number: int | None = None, **facts: Any) -> tuple[Episode, Path]:
         """Makes the temporary folder of a new episode.
 
+        Args:
+            number: Its number; by default the next one. Numbers of discarded episodes are not used again.
+            facts: Further attributes of the episode.
+
         Returns:
-            The episode and the folder. Numbers of discarded episodes are not used again.
+            The episode and the folder.
+
+        Raises:
+            EpisodeError: If the number is used.
         """
         self.path.mkdir(parents=True, exist_ok=True)
-        used = [-1, *_numbers(self.path, _COMPLETE), *_numbers(self.path, _PARTIAL)]
-        used += _numbers(self.path / DISCARDED, _COMPLETE)
-        episode = Episode(max(used) + 1, **facts)
+        used = self.used()
+        if number in used:
+            raise EpisodeError(self.path, f"expected a number that is not used, got {number}")
+        episode = Episode(max(used, default=-1) + 1 if number is None else number, **facts)
         part = self.path / f".{episode.name}.part"
         part.mkdir()
         write_facts(part, episode)
