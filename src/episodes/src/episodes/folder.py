@@ -114,10 +114,9 @@ class EpisodeFolder:
             raise EpisodeError(self.path, "expected a folder of episodes, there is none")
         return sorted(_numbers(self.path, _COMPLETE))
 
-    def used(self) -> set[int]:
-        """Returns the numbers of all episodes, of those in temporary folders and of discarded ones too."""
-        discarded = _numbers(self.path / DISCARDED, _COMPLETE)
-        return {*_numbers(self.path, _COMPLETE), *_numbers(self.path, _PARTIAL), *discarded}
+    def taken(self) -> set[int]:
+        """Returns the numbers of all finished episodes, of discarded ones too."""
+        return {*_numbers(self.path, _COMPLETE), *_numbers(self.path / DISCARDED, _COMPLETE)}
 
     def all(self) -> Iterator[Episode]:
         """Yields all finished episodes."""
@@ -138,6 +137,10 @@ class EpisodeFolder:
         """Returns the folder of a finished episode."""
         return self.path / f"episode_{number:06d}"
 
+    def part_of(self, number: int) -> Path:
+        """Returns the temporary folder of an episode."""
+        return self.path / f".episode_{number:06d}.part"
+
     def begin(self, number: int | None = None, **facts: Any) -> tuple[Episode, Path]:
         """Makes the temporary folder of a new episode.
 
@@ -152,11 +155,11 @@ class EpisodeFolder:
             EpisodeError: If the number is used.
         """
         self.path.mkdir(parents=True, exist_ok=True)
-        used = self.used()
+        used = self.taken() | set(_numbers(self.path, _PARTIAL))
         if number in used:
             raise EpisodeError(self.path, f"expected a number that is not used, got {number}")
         episode = Episode(max(used, default=-1) + 1 if number is None else number, **facts)
-        part = self.path / f".{episode.name}.part"
+        part = self.part_of(episode.number)
         part.mkdir()
         write_facts(part, episode)
         return episode, part
@@ -168,7 +171,7 @@ class EpisodeFolder:
 
     def partial(self) -> list[Path]:
         """Returns the temporary folders, of an episode that is being recorded or whose recorder was killed."""
-        return sorted(self.path / f".episode_{number:06d}.part" for number in _numbers(self.path, _PARTIAL))
+        return sorted(map(self.part_of, _numbers(self.path, _PARTIAL)))
 
     def discard(self, number: int) -> Path:
         """Moves an episode into `discarded` and returns its new folder; raises an EpisodeError if it does not exist."""

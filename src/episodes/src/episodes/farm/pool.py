@@ -1,0 +1,179 @@
+"""Processes that make episodes, and what happens when they die."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from multiprocessing.connection import Connection, Pipe, wait
+from pathlib import Path
+from typing import Any
+
+from custom_ros_tools.processes.child import start_child
+from episodes.errors import EpisodeError
+from episodes.folder import EpisodeFolder
+
+from .job import LOG, FarmJob, Outcome
+
+MAX_LOSSES = 3
+"""Number of processes that an episode may end before it is left out."""
+
+
+class Child:
+    """A process that makes episodes. It ends with this one.
+
+    Args:
+        module: Its program, which takes the number of a file handle and reads the job from there.
+        job: The job.
+        folder: Folder of the episodes.
+        slots: Largest number of episodes that it is asked for at a time.
+        arguments: Further arguments of the program.
+    """
+
+    def __init__(
+        self, module: str, job: FarmJob, folder: EpisodeFolder, slots: int = 1, arguments: Sequence[str] = ()
+    ) -> None:
+        self._slots = slots
+        self.numbers: set[int] = set()
+        """Episodes that it is asked for."""
+        self.connection, theirs = Pipe()
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+        with theirs, open(folder.path / LOG, "ab") as log:
+            self._process = start_child(
+                [sys.executable, "-P", "-m", module, str(theirs.fileno()), *arguments],
+                signal.SIGKILL,
+                pass_fds=[theirs.fileno()],
+                env=environment,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+            )
+        self._send((job, folder.path))
+
+    @property
+    def is_free(self) -> bool:
+        """Whether it can be asked for another episode."""
+        return len(self.numbers) < self._slots
+
+    def start(self, number: int) -> None:
+        """Asks it for an episode."""
+        self.numbers.add(number)
+        self._send(number)
+
+    def receive(self) -> Outcome | None:
+        """Returns what became of an episode; None if the process has ended."""
+        try:
+            outcome: Outcome = self.connection.recv()
+        except (EOFError, OSError):
+            return None
+        self.numbers.discard(outcome.number)
+        return outcome
+
+    def close(self) -> str:
+        """Ends it, and returns how it ended."""
+        self.connection.close()
+        has_ended = self._process.poll() is not None
+        self._process.kill()
+        code = self._process.wait()
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        if not has_ended:
+            return "was ended"
+        return signal.Signals(-code).name if code < 0 else f"exit code {code}"
+
+    def _send(self, message: Any) -> None:
+        with suppress(BrokenPipeError, ConnectionResetError):  # it has died, as `receive` finds
+            self.connection.send(message)
+
+
+class Pool:
+    """Processes that make the episodes of a job. A process that dies is replaced; its episode is made again.
+
+    Args:
+        folder: Folder of the episodes.
+        new_child: Starts a process.
+        size: Number of processes.
+        is_replaced: Whether a process that dies is replaced; without it, that is the end.
+    """
+
+    def __init__(
+        self, folder: EpisodeFolder, new_child: Callable[[], Child], size: int, *, is_replaced: bool = True
+    ) -> None:
+        self._folder, self._new_child, self._size, self._is_replaced = folder, new_child, size, is_replaced
+        self._children: list[Child] = []
+        self._losses: Counter[int] = Counter()
+
+    def run(self, numbers: Sequence[int]) -> Iterator[Outcome]:
+        """Makes episodes, and yields what became of each, in any order.
+
+        When it is left before its end, by an exception too, no process and no temporary folder stays.
+
+        Raises:
+            EpisodeError: If no further episode can be made; those that are complete stay.
+        """
+        self._waiting = deque(numbers)
+        for number in numbers:
+            self._drop_part(number)
+        try:
+            while self._waiting or any(child.numbers for child in self._children):
+                self._employ()
+                ready = wait([child.connection for child in self._children])
+                for child in [each for each in self._children if each.connection in ready]:
+                    yield from self._outcomes(child)
+        finally:
+            self._end()
+            for number in numbers:
+                self._drop_part(number)
+
+    def _employ(self) -> None:
+        """Gives work to all that can take some, and starts processes as long as there is work."""
+        while self._waiting:
+            free = next((child for child in self._children if child.is_free), None)
+            if free is None:
+                if len(self._children) == self._size:
+                    return
+                free = self._new_child()
+                self._children.append(free)
+            free.start(self._waiting.popleft())
+
+    def _outcomes(self, child: Child) -> Iterator[Outcome]:
+        outcome = child.receive()
+        if outcome is None:
+            self._children.remove(child)
+            reason = child.close()
+            if not self._is_replaced:
+                raise EpisodeError(self._folder.path, f"the process that makes the episodes ended: {reason}")
+            for number in sorted(child.numbers):
+                yield from self._again(Outcome(number, fault=f"its process ended ({reason})", is_lost=True))
+        elif outcome.stops:
+            subject = f"episode {outcome.number}: " if outcome.number >= 0 else ""
+            raise EpisodeError(self._folder.path, subject + outcome.fault)
+        elif outcome.is_lost:
+            yield from self._again(outcome)
+        else:
+            yield outcome
+
+    def _again(self, lost: Outcome) -> Iterator[Outcome]:
+        """Has a lost episode made again, unless it is there, or was lost too often."""
+        number = lost.number
+        self._drop_part(number)
+        if self._folder.folder_of(number).exists():  # the process ended just after it
+            yield Outcome(number, self._folder.read(number).label)
+            return
+        self._losses[number] += 1
+        if self._losses[number] < MAX_LOSSES:
+            self._waiting.append(number)
+        else:
+            yield Outcome(number, fault=f"left out: {MAX_LOSSES} times {lost.fault}")
+
+    def _drop_part(self, number: int) -> None:
+        part: Path = self._folder.part_of(number)
+        shutil.rmtree(part, ignore_errors=True)
+
+    def _end(self) -> None:
+        while self._children:
+            self._children.pop().close()
