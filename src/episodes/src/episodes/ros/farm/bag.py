@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -11,6 +12,7 @@ import rosbag
 from std_msgs.msg import String
 
 from custom_ros_tools.errors import InterfaceError
+from episodes.config import DEFAULT_TOPICS
 from rpbi.engine.clock import Schedule
 from rpbi.plugins import plugin_errors
 from rpbi.ros.endpoints import Topic
@@ -26,7 +28,7 @@ from rpbi.world import World
 
 
 class EpisodeBag:
-    """The bag of an episode, with the topics that the simulator node publishes, except images.
+    """The bag of an episode, with the topics that the recorder records by default.
 
     As a context it is closed at the end. Rates in wall time are rates in the world's time here.
 
@@ -45,6 +47,7 @@ class EpisodeBag:
         self._states = Schedule(config.state_hz, dt_ns) if config.state_hz else None
         self._clock = Schedule(config.clock_hz or FREE_RUNNING_CLOCK_HZ, dt_ns)
         self._routes: dict[SampleKey, Topic | None] = {}
+        """The topics of sensors that are recorded."""
         self._transforms = TransformCollector()
         self._commands = 0
         self._bag = rosbag.Bag(str(path), "w", compression="lz4")
@@ -126,7 +129,8 @@ class EpisodeBag:
             topic = self._topic(sample)
             if topic is not None and topic.handler is not None:
                 with plugin_errors(topic.handler, f"the message of '{sample.name}'"):
-                    yield topic.name.format(name=sample.name), topic.handler(sample, stamp_ns)
+                    message = topic.handler(sample, stamp_ns)
+                yield topic.name.format(name=sample.name), message
                 if topic.on_tf is not None:
                     self._transforms.collect(*topic.on_tf(sample, stamp_ns))
 
@@ -135,8 +139,18 @@ class EpisodeBag:
         key = type(sample), sample.name
         if key not in self._routes:
             sensors = (sensor for name in self._world.bodies for sensor in self._world.sensors_of(name))
-            self._routes |= {(each.sample_type, each.name): sample_topic(each) for each in sensors}
+            for sensor in sensors:
+                topic = sample_topic(sensor)
+                is_recorded = topic is not None and _RECORDED.fullmatch(_full(topic.name.format(name=sensor.name)))
+                self._routes[sensor.sample_type, sensor.name] = topic if is_recorded else None
         return self._routes.get(key)
 
     def _write(self, topic: str, message: Any) -> None:
-        self._bag.write(f"/{topic.lstrip('/')}", message, to_ros_time(self._world.clock.stamp_ns))
+        self._bag.write(_full(topic), message, to_ros_time(self._world.clock.stamp_ns))
+
+
+_RECORDED = re.compile(DEFAULT_TOPICS)
+
+
+def _full(topic: str) -> str:
+    return f"/{topic.lstrip('/')}"
