@@ -79,7 +79,7 @@ class FarmJob:
         return values or contents
 
 
-class Outcome(NamedTuple):
+class EpisodeOutcome(NamedTuple):
     """What became of an episode.
 
     Attributes:

@@ -10,7 +10,7 @@ import sys
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from multiprocessing.connection import Connection, Pipe, wait
+from multiprocessing.connection import Pipe, wait
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from custom_ros_tools.processes.child import start_child
 from episodes.errors import EpisodeError
 from episodes.folder import EpisodeFolder
 
-from .job import LOG, FarmJob, Outcome
+from .job import LOG, EpisodeOutcome, FarmJob
 
 MAX_LOSSES = 3
 """Number of processes that an episode may end before it is left out."""
@@ -64,10 +64,10 @@ class Child:
         self.numbers.add(number)
         self._send(number)
 
-    def receive(self) -> Outcome | None:
+    def receive(self) -> EpisodeOutcome | None:
         """Returns what became of an episode; None if the process has ended."""
         try:
-            outcome: Outcome = self.connection.recv()
+            outcome: EpisodeOutcome = self.connection.recv()
         except (EOFError, OSError):
             return None
         self.numbers.discard(outcome.number)
@@ -107,7 +107,7 @@ class Pool:
         self._children: list[Child] = []
         self._losses: Counter[int] = Counter()
 
-    def run(self, numbers: Sequence[int]) -> Iterator[Outcome]:
+    def run(self, numbers: Sequence[int]) -> Iterator[EpisodeOutcome]:
         """Makes episodes, and yields what became of each, in any order.
 
         When it is left before its end, by an exception too, no process and no temporary folder stays.
@@ -140,7 +140,7 @@ class Pool:
                 self._children.append(free)
             free.start(self._waiting.popleft())
 
-    def _outcomes(self, child: Child) -> Iterator[Outcome]:
+    def _outcomes(self, child: Child) -> Iterator[EpisodeOutcome]:
         outcome = child.receive()
         if outcome is None:
             self._children.remove(child)
@@ -148,7 +148,7 @@ class Pool:
             if not self._is_replaced:
                 raise EpisodeError(self._folder.path, f"the process that makes the episodes ended: {reason}")
             for number in sorted(child.numbers):
-                yield from self._again(Outcome(number, fault=f"its process ended ({reason})", is_lost=True))
+                yield from self._again(EpisodeOutcome(number, fault=f"its process ended ({reason})", is_lost=True))
         elif outcome.stops:
             subject = f"episode {outcome.number}: " if outcome.number >= 0 else ""
             raise EpisodeError(self._folder.path, subject + outcome.fault)
@@ -157,18 +157,18 @@ class Pool:
         else:
             yield outcome
 
-    def _again(self, lost: Outcome) -> Iterator[Outcome]:
+    def _again(self, lost: EpisodeOutcome) -> Iterator[EpisodeOutcome]:
         """Has a lost episode made again, unless it is there, or was lost too often."""
         number = lost.number
         self._drop_part(number)
         if self._folder.folder_of(number).exists():  # the process ended just after it
-            yield Outcome(number, self._folder.read(number).label)
+            yield EpisodeOutcome(number, self._folder.read(number).label)
             return
         self._losses[number] += 1
         if self._losses[number] < MAX_LOSSES:
             self._waiting.append(number)
         else:
-            yield Outcome(number, fault=f"left out: {MAX_LOSSES} times {lost.fault}")
+            yield EpisodeOutcome(number, fault=f"left out: {MAX_LOSSES} times {lost.fault}")
 
     def _drop_part(self, number: int) -> None:
         part: Path = self._folder.part_of(number)

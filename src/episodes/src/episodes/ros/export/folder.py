@@ -29,6 +29,7 @@ from episodes.folder import BAG, Episode, EpisodeFolder
 from .signals import Choice, Signal
 from .source import SourceEpisode
 
+
 class Wish(NamedTuple):
     """Content of a data set, as the user wants it.
 

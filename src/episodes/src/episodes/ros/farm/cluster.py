@@ -5,6 +5,7 @@ It is a process of its own because Ray ends the process that uses it when the he
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import signal
@@ -15,7 +16,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from custom_ros_tools.errors import InterfaceError
-from episodes.farm.job import FarmJob, Outcome
+from episodes.farm.job import EpisodeOutcome, FarmJob
 from episodes.folder import EpisodeFolder
 
 from .remote import make_remotely, store
@@ -45,7 +46,7 @@ class Cluster:
         if address != "auto":
             self._require_head()
         try:
-            ray.init(address, log_to_driver=False, logging_level="ERROR")
+            ray.init(address, log_to_driver=False, logging_level=logging.ERROR)
         except Exception as error:  # Ray has many kinds
             raise ClusterError(address, f"cannot be used: {' '.join(str(error).split())}") from error
         self._address = ray.get_runtime_context().gcs_address
@@ -57,7 +58,7 @@ class Cluster:
         """Asks for an episode."""
         self._numbers[self._task.remote(self._job, number)] = number
 
-    def outcomes(self) -> Iterator[Outcome]:
+    def outcomes(self) -> Iterator[EpisodeOutcome]:
         """Yields what became of episodes that are ready by now, or within POLL_S.
 
         Raises:
@@ -69,21 +70,21 @@ class Cluster:
         for reference in self._ray.wait(list(self._numbers), num_returns=1, timeout=POLL_S)[0]:
             yield self._outcome(reference, self._numbers.pop(reference))
 
-    def _outcome(self, reference: Any, number: int) -> Outcome:
+    def _outcome(self, reference: Any, number: int) -> EpisodeOutcome:
         try:
             outcome, files = self._ray.get(reference)
         except self._ray.exceptions.RayTaskError as error:  # raised by the task itself
-            return Outcome(number, fault=str(error).strip().splitlines()[-1])
+            return EpisodeOutcome(number, fault=str(error).strip().splitlines()[-1])
         except self._ray.exceptions.RayError as error:
             self._require_head()
-            return Outcome(number, fault=f"its process ended ({type(error).__name__})", is_lost=True)
+            return EpisodeOutcome(number, fault=f"its process ended ({type(error).__name__})", is_lost=True)
         if files:
             try:
                 store(self._folder, number, files)
             except OSError as error:
                 shutil.rmtree(self._folder.part_of(number), ignore_errors=True)
-                return Outcome(number, fault=f"cannot be written: {error}", stops=True)
-        result: Outcome = outcome
+                return EpisodeOutcome(number, fault=f"cannot be written: {error}", stops=True)
+        result: EpisodeOutcome = outcome
         return result
 
     def _require_head(self) -> None:
@@ -121,7 +122,7 @@ def main() -> None:
     except EOFError:
         return
     except ClusterError as error:
-        connection.send(Outcome(-1, fault=str(error), stops=True))
+        connection.send(EpisodeOutcome(-1, fault=str(error), stops=True))
         os._exit(1)  # Ray would wait for its head
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from custom_ros_tools.errors import MissingDependency
 from episodes.errors import EpisodeError
-from episodes.farm.job import FarmJob, Outcome, digest, policy_digest
+from episodes.farm.job import EpisodeOutcome, FarmJob, digest, policy_digest
 from episodes.farm.policy import POLICIES
 from episodes.farm.pool import Child, Pool
 from episodes.files import store_files
@@ -75,10 +75,8 @@ class Farm:
         except OSError as error:
             raise EpisodeError(folder.path, f"cannot be written: {error}") from error
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _lock(handle, folder)
             yield
-        except BlockingIOError:
-            raise EpisodeError(folder.path, "another farm is at work in it") from None
         finally:
             os.close(handle)
 
@@ -89,7 +87,7 @@ class Farm:
         jobs: int,
         address: str | None = None,
         disk_reserve_mb: float = 200.0,
-    ) -> Iterator[Outcome]:
+    ) -> Iterator[EpisodeOutcome]:
         """Makes episodes, and yields what became of each, in any order.
 
         Args:
@@ -122,6 +120,13 @@ class Farm:
         except OSError as error:
             raise EpisodeError(folder.path, f"cannot be written: {error}") from error
         return {"versions": versions(), "git": git_state(), "files": files, "note": "; ".join(faults)}
+
+
+def _lock(handle: int, folder: EpisodeFolder) -> None:
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise EpisodeError(folder.path, "another farm is at work in it") from None
 
 
 def _require_space(folder: EpisodeFolder, reserve_mb: float) -> None:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import logging
 import shutil
+import socket
 import sys
 from datetime import datetime
-from pathlib import Path
 
 import pybullet
 
 from custom_ros_tools.errors import InterfaceError
-from episodes.errors import DISK_FULL, EpisodeError
-from episodes.farm.job import FarmJob, Outcome, digest, policy_digest
+from episodes.errors import DISK_FULL
+from episodes.farm.job import EpisodeOutcome, FarmJob, digest, policy_digest
 from episodes.farm.policy import POLICIES
 from episodes.farm.run import EpisodeRun
 from episodes.folder import BAG, EpisodeFolder
@@ -50,21 +50,21 @@ class EpisodeMaker:
         self._loaded = load_world(job.world)
         self._policy = POLICIES.configured(job.policy, "--policy")
         if policy_digest(self._policy) != job.policy_sha256:
-            raise EpisodeError(Path(job.world), f"the file of {job.policy} is another one here than where the farm began")
+            raise _AnotherError(f"the file of the policy {job.policy}")
 
-    def make(self, folder: EpisodeFolder, number: int) -> Outcome:
+    def make(self, folder: EpisodeFolder, number: int) -> EpisodeOutcome:
         """Makes an episode in a folder; it is there as a whole or not at all."""
         try:
-            return Outcome(number, self._make(folder, number))
+            return EpisodeOutcome(number, self._make(folder, number))
         except OSError as error:
             is_full = error.errno in DISK_FULL
-            return Outcome(number, fault=f"cannot be written: {error}", stops=is_full)
-        except _AnotherWorldError as error:
-            return Outcome(number, fault=str(error), stops=True)
+            return EpisodeOutcome(number, fault=f"cannot be written: {error}", stops=is_full)
+        except _AnotherError as error:
+            return EpisodeOutcome(number, fault=str(error), stops=True)
         except Exception as error:
             _log.exception("episode %d", number)
-            text = "; ".join(str(error).splitlines())
-            return Outcome(number, fault=text if isinstance(error, InterfaceError) else f"{type(error).__name__}: {text}")
+            kind = "" if isinstance(error, InterfaceError) else f"{type(error).__name__}: "
+            return EpisodeOutcome(number, fault=kind + "; ".join(str(error).splitlines()))
 
     def _make(self, folder: EpisodeFolder, number: int) -> str:
         job = self._job
@@ -89,15 +89,13 @@ class EpisodeMaker:
     def _check(self, world: World) -> None:
         """Checks, for the first world, that it is the one of the job."""
         if not self._is_checked and digest(world.describe()) != self._job.world_sha256:
-            raise _AnotherWorldError(self._job.world)
+            raise _AnotherError(f"the world of {self._job.world}")
         self._is_checked = True
 
 
-class _AnotherWorldError(InterfaceError):
-    """The world is not the same here."""
+class _AnotherError(InterfaceError):
+    """World or policy are not those of the job; its argument says which."""
 
     def __str__(self) -> str:
-        return (
-            f"{self.args[0]}: another world comes of it here than where the farm began; expected the same files, "
-            "version of this workspace, and PyBullet"
-        )
+        where = f"another one on {socket.gethostname()} than where the farm was started"
+        return f"{self.args[0]} is {where}: expected the same files, version of this workspace, and PyBullet"

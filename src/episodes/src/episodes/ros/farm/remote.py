@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 from functools import lru_cache
-from pathlib import Path
 
 from custom_ros_tools.errors import InterfaceError
-from episodes.farm.job import FarmJob, Outcome
+from episodes.farm.job import EpisodeOutcome, FarmJob
 from episodes.folder import BAG, FACTS, EpisodeFolder
 
 from .maker import EpisodeMaker
@@ -16,12 +16,12 @@ Files = dict[str, bytes]
 """Contents of the files of an episode by name."""
 
 
-def make_remotely(job: FarmJob, number: int) -> tuple[Outcome, Files]:
+def make_remotely(job: FarmJob, number: int) -> tuple[EpisodeOutcome, Files]:
     """Makes an episode in a temporary folder of this node, and returns its files; none if it has failed."""
     try:
         maker = _maker(job)
     except InterfaceError as error:
-        return Outcome(number, fault=str(error), stops=True), {}
+        return EpisodeOutcome(number, fault=str(error), stops=True), {}
     with tempfile.TemporaryDirectory(prefix="rpbi-farm-") as path:
         folder = EpisodeFolder(path)
         outcome = maker.make(folder, number)
@@ -37,15 +37,14 @@ def store(folder: EpisodeFolder, number: int, files: Files) -> None:
         OSError: If it cannot be written.
     """
     part = folder.part_of(number)
+    shutil.rmtree(part, ignore_errors=True)
     part.mkdir()
     for name, content in files.items():
-        Path(part / name).write_bytes(content)
+        (part / name).write_bytes(content)
     part.rename(folder.folder_of(number))
 
 
-_makers = lru_cache(maxsize=1)(EpisodeMaker)
-
-
+@lru_cache(maxsize=1)
 def _maker(job: FarmJob) -> EpisodeMaker:
     """Returns the maker of a job; the process of a node goes on with the same job most of the time."""
-    return _makers(job)
+    return EpisodeMaker(job)

@@ -5,7 +5,7 @@ import sys
 from multiprocessing.connection import Connection
 
 from custom_ros_tools.errors import InterfaceError
-from episodes.farm.job import Outcome
+from episodes.farm.job import EpisodeOutcome
 from episodes.folder import EpisodeFolder
 
 from .maker import EpisodeMaker
@@ -20,7 +20,7 @@ def main() -> None:
     try:
         maker = EpisodeMaker(job)
     except InterfaceError as error:
-        connection.send(Outcome(-1, fault=str(error), stops=True))
+        connection.send(EpisodeOutcome(-1, fault=str(error), stops=True))
         return
     while True:
         try:
