@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import time
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from episodes.farm import Policy
 
 FAULTY = 2
 """Number of the first episodes in which a policy fails."""
+DELAY_S = "FARM_DELAY_S"
+"""Variable with the time that 50 ticks take longer [s], so that somebody may disturb them."""
 
 
 class Slide(Policy):
@@ -23,6 +26,7 @@ class Slide(Policy):
 
     def act(self):
         if self.world.clock.tick % 50 == 0:
+            time.sleep(float(os.environ.get(DELAY_S, 0.0)))
             force = {"force": tuple(self.rng.uniform(-30.0, 30.0, 3)), "torque": (0.0, 0.0, 0.0), "duration_s": 0.03}
             self.world.put("box/external_wrench", force)
         return "success" if self.world.bodies["box"].base_pose().position[0] > 0.25 else None

@@ -22,6 +22,8 @@ from .job import LOG, EpisodeOutcome, FarmJob
 
 MAX_LOSSES = 3
 """Number of processes that an episode may end before it is left out."""
+END_S = 5.0
+"""Time from the end of the connection to a process until it is killed [s]."""
 
 
 class Child:
@@ -73,16 +75,22 @@ class Child:
         self.numbers.discard(outcome.number)
         return outcome
 
-    def close(self) -> str:
-        """Ends it, and returns how it ended."""
+    def close(self, grace_s: float = 0.0) -> str:
+        """Ends it.
+
+        Args:
+            grace_s: Time that it has to end by itself [s].
+
+        Returns:
+            How it ended: a signal, or its exit code.
+        """
         self.connection.close()
-        has_ended = self._process.poll() is not None
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(grace_s)
         self._process.kill()
         code = self._process.wait()
         assert self._process.stdin is not None
         self._process.stdin.close()
-        if not has_ended:
-            return "was ended"
         return signal.Signals(-code).name if code < 0 else f"exit code {code}"
 
     def _send(self, message: Any) -> None:
@@ -144,7 +152,7 @@ class Pool:
         outcome = child.receive()
         if outcome is None:
             self._children.remove(child)
-            reason = child.close()
+            reason = child.close(END_S)
             if not self._is_replaced:
                 raise EpisodeError(self._folder.path, f"the process that makes the episodes ended: {reason}")
             for number in sorted(child.numbers):
