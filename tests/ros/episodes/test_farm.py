@@ -5,15 +5,20 @@ from __future__ import annotations
 import hashlib
 import os
 import random
+import re
 import resource
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
+import numpy as np
 import pytest
 from farm_policies import DELAY_S
 from ros_system import support_on_path, wait_until
@@ -23,6 +28,7 @@ from episodes.farm.job import LOG
 from episodes.folder import BAG, EpisodeFolder
 from episodes.ros.farm.farm import Farm
 from episodes.ros.farm.maker import EpisodeMaker
+from episodes.ros.farm.remote import make_remotely
 
 ROOT = Path(__file__).resolve().parents[3]
 CONSOLE = (sys.executable, str(ROOT / "src/custom_ros_tools/nodes/console"))
@@ -232,6 +238,29 @@ def test_a_full_disk_is_named_and_nothing_is_lost(world, alone, run, tmp_path, f
     assert code == 1 and "cannot be written: [Errno 27] File too large" in text, text
     assert "1 of 8 episodes are in" in text
     assert digests(tmp_path) == {0: digests(alone)[0]} and EpisodeFolder(tmp_path).partial() == []
+
+
+def test_a_node_that_has_something_else_is_named(world):
+    job = Farm(world, "farm_policies:Slide", ticks=50).job
+    for change, thing in (({"world_sha256": "0"}, "the world of "), ({"policy_sha256": "0"}, "the file of the policy")):
+        outcome, files = make_remotely(replace(job, **change), 0)
+        assert outcome.stops and outcome.fault.startswith(f"{socket.gethostname()}: {thing}") and not files, outcome
+
+
+def test_the_policy_of_the_page_makes_a_data_set(run, tmp_path):
+    block = re.search(r"```python\n(.*?)```", (ROOT / "docs/farm.md").read_text(), re.DOTALL)
+    assert block is not None
+    (tmp_path / "push.py").write_text(block[1])
+    kuka = "{rpbi_examples}/configs/basic_example_kuka_lwr/config.yaml"
+    command = ["farm", kuka, "--policy", "push:Push", "--episodes", "4", "--seconds", "2", "--out", "pushes"]
+    text, _ = (farm := start(command, tmp_path)).communicate(timeout=120.0)
+    assert farm.returncode == 0, text
+    assert {episode.label for episode in EpisodeFolder(tmp_path / "pushes").all()} == {"success", "timeout"}, text
+    code, text = run("export", tmp_path / "pushes", "--to", "robomimic", "--out", tmp_path / "out")
+    assert code == 0, text
+    with h5py.File(tmp_path / "out/dataset.hdf5") as file:
+        actions = [file[f"data/demo_{number}/actions"][:] for number in range(4)]
+    assert all(np.ptp(each, axis=0).max() > 0.1 for each in actions), "targets of the policy are actions"
 
 
 def test_without_ray_the_extra_is_named(world, run, tmp_path, monkeypatch):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import shutil
-import socket
 import sys
 from datetime import datetime
 
@@ -97,5 +96,5 @@ class _AnotherError(InterfaceError):
     """World or policy are not those of the job; its argument says which."""
 
     def __str__(self) -> str:
-        where = f"another one on {socket.gethostname()} than where the farm was started"
+        where = "another one here than where the farm was started"
         return f"{self.args[0]} is {where}: expected the same files, version of this workspace, and PyBullet"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import socket
 import tempfile
 from functools import lru_cache
 
@@ -17,17 +18,21 @@ Files = dict[str, bytes]
 
 
 def make_remotely(job: FarmJob, number: int) -> tuple[EpisodeOutcome, Files]:
-    """Makes an episode in a temporary folder of this node, and returns its files; none if it has failed."""
+    """Makes an episode in a temporary folder of this node, and returns its files; none if it has failed.
+
+    A fault that stops the farm names the node.
+    """
+    node = socket.gethostname()
     try:
         maker = _maker(job)
     except InterfaceError as error:
-        return EpisodeOutcome(number, fault=str(error), stops=True), {}
+        return EpisodeOutcome(number, fault=f"{node}: {error}", stops=True), {}
     with tempfile.TemporaryDirectory(prefix="rpbi-farm-") as path:
         folder = EpisodeFolder(path)
         outcome = maker.make(folder, number)
         place = folder.folder_of(number)
         files = {name: (place / name).read_bytes() for name in (BAG, FACTS)} if outcome.label else {}
-    return outcome, files
+    return (outcome._replace(fault=f"{node}: {outcome.fault}") if outcome.stops else outcome), files
 
 
 def store(folder: EpisodeFolder, number: int, files: Files) -> None:
