@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
+from custom_ros_tools.plugins import own_folders
 from custom_ros_tools.plugins.table import PluginTable
 from rpbi.world import World
+
+own_folders.append(str(Path(__file__).parent))
 
 
 class Policy:

@@ -44,7 +44,7 @@ class Child:
         self.numbers: set[int] = set()
         """Episodes that it is asked for."""
         self.connection, theirs = Pipe()
-        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
         with theirs, open(folder.path / LOG, "ab") as log:
             self._process = start_child(
                 [sys.executable, "-P", "-m", module, str(theirs.fileno()), *arguments],
@@ -113,6 +113,7 @@ class Pool:
     ) -> None:
         self._folder, self._new_child, self._size, self._is_replaced = folder, new_child, size, is_replaced
         self._children: list[Child] = []
+        self._waiting: deque[int] = deque()
         self._losses: Counter[int] = Counter()
 
     def run(self, numbers: Sequence[int]) -> Iterator[EpisodeOutcome]:
@@ -123,7 +124,7 @@ class Pool:
         Raises:
             EpisodeError: If no further episode can be made; those that are complete stay.
         """
-        self._waiting = deque(numbers)
+        self._waiting.extend(numbers)
         for number in numbers:
             self._drop_part(number)
         try:
