@@ -1,4 +1,4 @@
-"""The job of a farm: what determines its episodes, and how a folder keeps it."""
+"""The job of a farm, which determines its episodes, and the outcome of each."""
 
 from __future__ import annotations
 
@@ -80,12 +80,12 @@ class FarmJob:
 
 
 class EpisodeOutcome(NamedTuple):
-    """What became of an episode.
+    """Outcome of an episode.
 
     Attributes:
         number: Its number; -1 if it concerns none.
         label: Its label, if it is there.
-        fault: Why it is not there.
+        fault: Reason why it is not there.
         is_lost: Whether its process has ended meanwhile, so that it is worth another try.
         stops: Whether no other episode can be made, either.
     """

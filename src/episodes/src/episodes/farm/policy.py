@@ -1,4 +1,4 @@
-"""Policies: what acts in the world of an episode, and when the episode ends."""
+"""Policies, which act in the world of an episode and end it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Processes that make episodes, and what happens when they die."""
+"""Processes that make episodes, and their replacement when they die."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Child:
         self._send(number)
 
     def receive(self) -> EpisodeOutcome | None:
-        """Returns what became of an episode; None if the process has ended."""
+        """Returns the outcome of an episode; None if the process has ended."""
         try:
             outcome: EpisodeOutcome = self.connection.recv()
         except (EOFError, OSError):
@@ -117,7 +117,7 @@ class Pool:
         self._losses: Counter[int] = Counter()
 
     def run(self, numbers: Sequence[int]) -> Iterator[EpisodeOutcome]:
-        """Makes episodes, and yields what became of each, in any order.
+        """Makes episodes, and yields their outcomes, in any order.
 
         When it is left before its end, by an exception too, no process and no temporary folder stays.
 

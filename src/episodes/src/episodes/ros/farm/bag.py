@@ -63,7 +63,7 @@ class EpisodeBag:
                 raise
 
     def start(self) -> None:
-        """Writes what was before the first tick: description, static frames, state and samples."""
+        """Writes the world before its first tick: description, static frames, state and samples."""
         self._write(DESCRIPTION.name, String(self._world.describe()))
         if self._world.config.poses:
             self._write(TF_STATIC.name, static_frames_message(self._world.config.poses))
@@ -102,7 +102,7 @@ class EpisodeBag:
             self._write_state(with_hash)
 
     def end(self) -> None:
-        """Writes what is left of the last tick, with the hash of its state."""
+        """Writes the rest of the last tick, with the hash of its state."""
         self.before_step()
         self._write_clock()
         self._write_samples(self._world.read_rest())

@@ -59,7 +59,7 @@ class Cluster:
         self._numbers[self._task.remote(self._job, number)] = number
 
     def outcomes(self) -> Iterator[EpisodeOutcome]:
-        """Yields what became of episodes that are ready by now, or within POLL_S.
+        """Yields the outcomes of episodes that are ready by now, or within POLL_S.
 
         Raises:
             ClusterError: If the head does not answer.

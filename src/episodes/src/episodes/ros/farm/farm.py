@@ -88,7 +88,7 @@ class Farm:
         address: str | None = None,
         disk_reserve_mb: float = 200.0,
     ) -> Iterator[EpisodeOutcome]:
-        """Makes episodes, and yields what became of each, in any order.
+        """Makes episodes, and yields their outcomes, in any order.
 
         Args:
             folder: The folder, which is claimed.
