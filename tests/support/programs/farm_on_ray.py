@@ -6,7 +6,7 @@ Its arguments are a folder and the words of the first farm, whose episodes go to
 
 from __future__ import annotations
 
-import contextlib
+import ctypes
 import os
 import signal
 import subprocess
@@ -17,11 +17,14 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
 CONSOLE = (sys.executable, str(ROOT / "src/custom_ros_tools/nodes/console"))
+PR_SET_CHILD_SUBREAPER = 36
+"""Has processes whose parent has ended become children of this one, see prctl(2)."""
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 
 
 def main() -> None:
     """Runs both."""
+    ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1)
     folder, words = Path(sys.argv[1]), sys.argv[2:]
     with tempfile.TemporaryDirectory(prefix="rpbi-ray-") as place:
         os.environ["RAY_TMPDIR"] = place
@@ -44,16 +47,15 @@ def main() -> None:
                     sys.exit(f"expected the exit code 1 without the head of the cluster, got {farm.returncode}")
         finally:
             cluster.shutdown()
-            _end_rest(place)
+            _end_rest()
 
 
-def _end_rest(place: str) -> None:
+def _end_rest() -> None:
     """Ends the agents of nodes that were killed, which would notice that only later."""
-    mark = f"RAY_TMPDIR={place}\0".encode()
-    for process in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(OSError):  # it has ended, or is somebody else's
-            if mark in (process / "environ").read_bytes():
-                os.kill(int(process.name), signal.SIGKILL)
+    while orphans := Path(f"/proc/self/task/{os.getpid()}/children").read_text().split():
+        for orphan in map(int, orphans):
+            os.kill(orphan, signal.SIGKILL)
+            os.waitpid(orphan, 0)
 
 
 def _started(command: list[str], folder: Path, count: int, out: object) -> subprocess.Popen[bytes]:
