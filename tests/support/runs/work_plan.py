@@ -34,6 +34,7 @@ EXTRA_OF = {
     "av": "data",
     "pyarrow": "data",
     "rosbags": "data",
+    "ray": "farm",
 }
 """Extra that has a module."""
 

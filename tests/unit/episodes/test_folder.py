@@ -34,6 +34,20 @@ def test_an_episode_gets_its_name_when_it_is_complete(tmp_path: Path) -> None:
     assert folder.read(0) == episode
 
 
+def test_an_episode_may_have_a_fixed_number_that_is_free(tmp_path: Path) -> None:
+    folder = EpisodeFolder(tmp_path)
+    episode, part = folder.begin(7)
+    assert (episode.number, part) == (7, folder.part_of(7))
+    with pytest.raises(EpisodeError, match="expected a number that is not used, got 7"):
+        folder.begin(7)
+    folder.complete(part, episode)
+    folder.discard(7)
+    assert folder.taken() == {7} and folder.numbers() == []
+    with pytest.raises(EpisodeError, match="got 7"):
+        folder.begin(7)
+    assert folder.begin()[0].number == 8
+
+
 def test_numbers_of_discarded_episodes_are_not_used_again(tmp_path: Path) -> None:
     folder = EpisodeFolder(tmp_path)
     assert [_record(folder) for _ in range(3)] == [0, 1, 2]

@@ -1,9 +1,13 @@
 """Errors of episodes."""
 
+import errno
 from dataclasses import dataclass
 from pathlib import Path
 
 from custom_ros_tools.errors import InterfaceError
+
+DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Numbers of the errors of a disk that takes no more."""
 
 
 @dataclass(eq=False)

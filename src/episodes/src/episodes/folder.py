@@ -38,7 +38,7 @@ class Episode:
         label: Word of the user for the outcome, such as `success`.
         note: Reason of a state other than `complete`, and whatever else a user should read.
         started: Wall time of the start, ISO 8601.
-        seconds: Length in wall time [s].
+        seconds: Length in wall time, or in the world's time if it comes from a farm [s].
         namespace: Namespace of the simulator.
         seeds: Seeds, as the node's parameter gives them.
         versions: Versions of this workspace, PyBullet, Python and numpy.
@@ -114,6 +114,10 @@ class EpisodeFolder:
             raise EpisodeError(self.path, "expected a folder of episodes, there is none")
         return sorted(_numbers(self.path, _COMPLETE))
 
+    def taken(self) -> set[int]:
+        """Returns the numbers of all finished episodes, of discarded ones too."""
+        return {*_numbers(self.path, _COMPLETE), *_numbers(self.path / DISCARDED, _COMPLETE)}
+
     def all(self) -> Iterator[Episode]:
         """Yields all finished episodes."""
         return map(self.read, self.numbers())
@@ -133,17 +137,29 @@ class EpisodeFolder:
         """Returns the folder of a finished episode."""
         return self.path / f"episode_{number:06d}"
 
-    def begin(self, **facts: Any) -> tuple[Episode, Path]:
+    def part_of(self, number: int) -> Path:
+        """Returns the temporary folder of an episode."""
+        return self.path / f".episode_{number:06d}.part"
+
+    def begin(self, number: int | None = None, **facts: Any) -> tuple[Episode, Path]:
         """Makes the temporary folder of a new episode.
 
+        Args:
+            number: Its number; by default the next one. Numbers of discarded episodes are not used again.
+            facts: Further attributes of the episode.
+
         Returns:
-            The episode and the folder. Numbers of discarded episodes are not used again.
+            The episode and the folder.
+
+        Raises:
+            EpisodeError: If the number is used.
         """
         self.path.mkdir(parents=True, exist_ok=True)
-        used = [-1, *_numbers(self.path, _COMPLETE), *_numbers(self.path, _PARTIAL)]
-        used += _numbers(self.path / DISCARDED, _COMPLETE)
-        episode = Episode(max(used) + 1, **facts)
-        part = self.path / f".{episode.name}.part"
+        used = self.taken() | set(_numbers(self.path, _PARTIAL))
+        if number in used:
+            raise EpisodeError(self.path, f"expected a number that is not used, got {number}")
+        episode = Episode(max(used, default=-1) + 1 if number is None else number, **facts)
+        part = self.part_of(episode.number)
         part.mkdir()
         write_facts(part, episode)
         return episode, part
@@ -155,7 +171,7 @@ class EpisodeFolder:
 
     def partial(self) -> list[Path]:
         """Returns the temporary folders, of an episode that is being recorded or whose recorder was killed."""
-        return sorted(self.path / f".episode_{number:06d}.part" for number in _numbers(self.path, _PARTIAL))
+        return sorted(map(self.part_of, _numbers(self.path, _PARTIAL)))
 
     def discard(self, number: int) -> Path:
         """Moves an episode into `discarded` and returns its new folder; raises an EpisodeError if it does not exist."""

@@ -1,11 +1,11 @@
 """Inputs of the world from ROS: subscriptions and TF, by way of the mailbox."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import geometry_msgs.msg
 import rospy
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import Vector3, WrenchStamped
 from sensor_msgs.msg import JointState
 
 from custom_ros_tools.errors import ConfigError, Problem
@@ -14,12 +14,14 @@ from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from custom_ros_tools.ros.rospy_internals import close_poller_with
 from rpbi.control.external_wrenches import TIMEOUT_S, ExternalWrench
 from rpbi.control.joint_command import JointCommand, WrongQuantityError
+from rpbi.control.motors import QUANTITIES, ResolvedCommand
+from rpbi.control.planar_base import PlanarVelocity
 from rpbi.engine.inputs import Input, PoseInput
 from rpbi.geometry import Twist
 from rpbi.world import World
 
 from .endpoints import Topic, find_topic
-from .headers import prefixed
+from .headers import prefixed, to_ros_time
 from .tf_follower import TfFollower, refusal
 
 
@@ -84,6 +86,31 @@ def topic_input(key: str, taken: Input) -> Topic:
         message = f"missing, expected 'module:NAME' of the Topic for its input '{key}'"
         raise ConfigError([Problem(full_name(taken.apply), "ros_topic", message)])
     return TOPIC_INPUTS[key]
+
+
+def input_messages(world: World, slot: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Yields topics and messages by which a value of an input would have come; none for inputs of other kinds.
+
+    Args:
+        world: The world; its present stamp is that of the messages.
+        slot: `NAME/INPUT`.
+        value: The value, as it was applied.
+    """
+    name, _, key = slot.rpartition("/")
+    if key == "target" and isinstance(value, tuple):
+        for command in (each for each in value if isinstance(each, ResolvedCommand)):
+            yield TOPIC_INPUTS[key].name.format(name=name), _target_message(world, world.bodies[name], command)
+    elif key == "cmd_vel" and isinstance(value, PlanarVelocity):
+        linear, angular = Vector3(value.x, value.y, 0.0), Vector3(0.0, 0.0, value.yaw)
+        yield TOPIC_INPUTS[key].name.format(name=name), geometry_msgs.msg.Twist(linear, angular)
+
+
+def _target_message(world: World, robot: Any, command: ResolvedCommand) -> JointState:
+    message = JointState(name=[robot.model.joints[index].name for index in command.values])
+    message.header.stamp = to_ros_time(world.clock.stamp_ns)
+    message.velocity = [command.velocities[index] for index in command.values if index in command.velocities]
+    setattr(message, QUANTITIES[command.mode], list(command.values.values()))
+    return message
 
 
 class Inputs:

@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Annotated
 
 from custom_ros_tools.console.argument import Argument, UsageError
+from episodes.errors import EpisodeError
+from episodes.farm.job import FARM
 from episodes.folder import EpisodeFolder
 from episodes.listing import details_of, table_of
 from episodes.ros.bags import repair as repair_bag
@@ -38,6 +40,10 @@ def episodes(
         episode = given.relabel(int(relabel[0]), relabel[1])
         return f"episode {episode.number}: {episode.label}"
     if repair:
+        if (folder / FARM).exists():
+            raise EpisodeError(
+                folder, "expected episodes of a recorder, these are of a farm: it makes them again itself"
+            )
         repaired = [repair_bag(given, part) for part in given.partial()]
         return (
             "\n".join(f"episode {each.number}: {each.state}: {each.note}" for each in repaired) or "nothing to repair"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import shutil
 from collections import Counter
 from collections.abc import Callable
@@ -24,13 +23,11 @@ from episodes.datasets.format import (
     Schema,
 )
 from episodes.datasets.provenance import write_episode, write_export
-from episodes.errors import EpisodeError
+from episodes.errors import DISK_FULL, EpisodeError
 from episodes.folder import BAG, Episode, EpisodeFolder
 
 from .signals import Choice, Signal
 from .source import SourceEpisode
-
-DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class Wish(NamedTuple):

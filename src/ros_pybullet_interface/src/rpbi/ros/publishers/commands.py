@@ -77,11 +77,17 @@ class CommandPublisher:
         self._newcomers = [reader for reader in self._newcomers if reader.next < commands.count]
 
     def _send(self, reader: _Recipient) -> None:
-        first, commands = self._world.commands.since(reader.next, MAX_COMMANDS_PER_MESSAGE)
-        message = WorldCommands(resets=self._resets, first=first, commands=[_message(each) for each in commands])
-        message.header.stamp = to_ros_time(self._world.clock.stamp_ns)
-        reader.next = first + len(commands)
+        message = commands_message(self._world, reader.next)
+        reader.next = message.first + len(message.commands)
         reader.send(message)
+
+
+def commands_message(world: World, first: int) -> WorldCommands:
+    """Returns the commands of a world from an index on, at most MAX_COMMANDS_PER_MESSAGE."""
+    first, commands = world.commands.since(first, MAX_COMMANDS_PER_MESSAGE)
+    message = WorldCommands(resets=world.resets, first=first, commands=[_message(each) for each in commands])
+    message.header.stamp = to_ros_time(world.clock.stamp_ns)
+    return message
 
 
 def _message(command: WorldCommand) -> WorldCommandMessage:

@@ -19,7 +19,12 @@ class StaticFrames:
     def __init__(self, poses: Sequence[StaticFrame]) -> None:
         if poses:
             self._publisher = rospy.Publisher(TF_STATIC.name, TF_STATIC.message_type, queue_size=1, latch=True)
-            self._publisher.publish(TFMessage([_transform(each) for each in poses]))
+            self._publisher.publish(static_frames_message(poses))
+
+
+def static_frames_message(poses: Sequence[StaticFrame]) -> TFMessage:
+    """Returns frames with their poses as transforms."""
+    return TFMessage([_transform(each) for each in poses])
 
 
 def _transform(frame: StaticFrame) -> TransformStamped:

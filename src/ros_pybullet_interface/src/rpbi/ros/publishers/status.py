@@ -3,6 +3,7 @@
 import logging
 import time
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import rosgraph
 import rospy
@@ -57,6 +58,31 @@ def _warn_of_rivals() -> None:
         log.warning("/clock is published by %s too: two worlds cannot both be the clock", ", ".join(rivals))
 
 
+def clock_message(stamp_ns: int) -> ClockMessage:
+    """Returns the message of a world's time [ns]."""
+    return ClockMessage(to_ros_time(stamp_ns))
+
+
+def state_message(world: World, with_hash: bool, **pace: Any) -> SimulationState:
+    """Returns the state of a world.
+
+    Args:
+        world: The world.
+        with_hash: Whether the hash of the state is in it.
+        pace: The fields of the message that the world does not know: whether it runs, and how fast.
+    """
+    message = SimulationState(
+        tick=world.clock.tick,
+        simulated_time=world.clock.time_s,
+        resets=world.resets,
+        commands=world.commands.count,
+        state_hash=world.state_hash() if with_hash else "",
+        **pace,
+    )
+    message.header.stamp = to_ros_time(world.clock.stamp_ns)
+    return message
+
+
 class ClockPublisher:
     """Simulated time on /clock, of which the simulator is the only source."""
 
@@ -93,7 +119,7 @@ class ClockPublisher:
 
     def _send(self) -> None:
         self._sent_ns = self._clock.stamp_ns
-        self._publisher.publish(ClockMessage(to_ros_time(self._sent_ns)))
+        self._publisher.publish(clock_message(self._sent_ns))
 
 
 class StatusPublisher:
@@ -231,19 +257,14 @@ class StatePublisher:
     def _publish(self, with_hash: bool = False) -> None:
         if not self._topic.has_subscribers:
             return
-        clock = self._world.clock
-        message = SimulationState(
+        message = state_message(
+            self._world,
+            with_hash,
             running=self._moves and not self.is_stepping,
             stepping=self.is_stepping,
-            tick=clock.tick,
-            simulated_time=clock.time_s,
             real_time_factor_asked=self._pacer.real_time_factor,
             real_time_factor=self._factor,
             overruns=self._pacer.overruns,
             lost_time=self._pacer.lost_s,
-            resets=self._world.resets,
-            commands=self._world.commands.count,
-            state_hash=self._world.state_hash() if with_hash else "",
         )
-        message.header.stamp = to_ros_time(clock.stamp_ns)
         self._topic.publish(message)

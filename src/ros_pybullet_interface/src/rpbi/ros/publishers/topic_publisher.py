@@ -72,15 +72,14 @@ class TopicPublisher:
         return topic
 
 
-class TransformPublisher:
-    """Link poses on TF, all that a tick has in one message."""
+class TransformCollector:
+    """Link poses as transforms, all that a tick has in one message."""
 
     def __init__(self) -> None:
-        self._topic = FastTopic(TF.name, TF.message_type)
         self._last: dict[str, list[TransformStamped]] = {}
         self._collected: list[TransformStamped] = []
 
-    def publish(self, sample: LinkPoseSample, stamp_ns: int) -> None:
+    def collect(self, sample: LinkPoseSample, stamp_ns: int) -> None:
         """Collects the transforms of a body."""
         transforms = self._last.get(sample.name)
         if transforms is None or len(transforms) != len(sample.frames):
@@ -93,16 +92,14 @@ class TransformPublisher:
             rotation.x, rotation.y, rotation.z, rotation.w = quat
         self._collected += transforms
 
-    def flush(self) -> None:
-        """Sends what was collected."""
-        if self._collected:
-            if self._topic.has_subscribers:
-                self._topic.publish(PackedTransforms(self._collected))
-            self._collected = []
+    def drain(self) -> PackedTransforms | None:
+        """Returns what was collected, valid until the next sample; None if that is nothing."""
+        collected, self._collected = self._collected, []
+        return PackedTransforms(collected) if collected else None
 
-    def serve_late(self) -> None:
-        """Sends all last poses to new subscribers."""
-        self._topic.serve_late(lambda: TFMessage([one for body in self._last.values() for one in body]))
+    def last(self) -> TFMessage:
+        """Returns the last poses of all bodies."""
+        return TFMessage([one for body in self._last.values() for one in body])
 
     def restart(self) -> None:
         """Drops all poses."""
@@ -111,6 +108,28 @@ class TransformPublisher:
     def forget(self, name: str) -> None:
         """Drops the poses of a body."""
         self._last.pop(name, None)
+
+
+class TransformPublisher(TransformCollector):
+    """Link poses on TF."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._topic = FastTopic(TF.name, TF.message_type)
+
+    def publish(self, sample: LinkPoseSample, stamp_ns: int) -> None:
+        """Collects the transforms of a body for the next `flush`."""
+        self.collect(sample, stamp_ns)
+
+    def flush(self) -> None:
+        """Sends what was collected."""
+        message = self.drain()
+        if message is not None and self._topic.has_subscribers:
+            self._topic.publish(message)
+
+    def serve_late(self) -> None:
+        """Sends all last poses to new subscribers."""
+        self._topic.serve_late(self.last)
 
 
 def _transform(frame: str) -> TransformStamped:

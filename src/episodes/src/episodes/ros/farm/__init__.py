@@ -1,0 +1,1 @@
+"""Episodes of a farm as bags, and the processes that write them."""

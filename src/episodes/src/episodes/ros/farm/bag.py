@@ -1,0 +1,156 @@
+"""The bag of an episode, written from its world without a ROS master."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import rosbag
+from std_msgs.msg import String
+
+from custom_ros_tools.errors import InterfaceError
+from episodes.config import DEFAULT_TOPICS
+from rpbi.engine.clock import Schedule
+from rpbi.plugins import plugin_errors
+from rpbi.ros.endpoints import Topic
+from rpbi.ros.headers import to_ros_time
+from rpbi.ros.inputs import input_messages
+from rpbi.ros.publishers.commands import COMMANDS, DESCRIPTION, commands_message
+from rpbi.ros.publishers.sample_topics import sample_topic
+from rpbi.ros.publishers.static_frames import TF_STATIC, static_frames_message
+from rpbi.ros.publishers.status import CLOCK, FREE_RUNNING_CLOCK_HZ, STATE, clock_message, state_message
+from rpbi.ros.publishers.topic_publisher import TF, SampleKey, TransformCollector
+from rpbi.samples import LinkPoseSample, SceneSample
+from rpbi.world import World
+
+
+class EpisodeBag:
+    """The bag of an episode, with the topics that the recorder records by default.
+
+    As a context it is closed at the end. Rates in wall time are rates in the world's time here.
+
+    Args:
+        path: The bag.
+        world: The world, at tick 0.
+
+    Raises:
+        OSError: If it cannot be written, as from all methods.
+    """
+
+    def __init__(self, path: Path, world: World) -> None:
+        self._world = world
+        config, dt_ns = world.config, world.clock.dt_ns
+        self._hashes = Schedule(config.state_hash_hz, dt_ns) if config.state_hash_hz else None
+        self._states = Schedule(config.state_hz, dt_ns) if config.state_hz else None
+        self._clock = Schedule(config.clock_hz or FREE_RUNNING_CLOCK_HZ, dt_ns)
+        self._routes: dict[SampleKey, Topic | None] = {}
+        """The topics of sensors that are recorded."""
+        self._transforms = TransformCollector()
+        self._commands = 0
+        self._bag = rosbag.Bag(str(path), "w", compression="lz4")
+
+    def __enter__(self) -> EpisodeBag:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        try:
+            self._bag.close()
+        except Exception:
+            if error is None:  # else this one follows from that
+                raise
+
+    def start(self) -> None:
+        """Writes the world before its first tick: description, static frames, state and samples."""
+        self._write(DESCRIPTION.name, String(self._world.describe()))
+        if self._world.config.poses:
+            self._write(TF_STATIC.name, static_frames_message(self._world.config.poses))
+        self._write_clock()
+        self.before_step()
+        self._write_state(with_hash=True)
+        self._write_samples(self._world.read_rest())
+
+    def before_step(self) -> None:
+        """Writes the commands that came since the last time, and targets on the topics on which they would have come.
+
+        Raises:
+            InterfaceError: If one cannot be recorded.
+        """
+        world = self._world
+        while self._commands < world.commands.count:
+            first, commands = world.commands.since(self._commands)
+            message = commands_message(world, first)
+            if unrecorded := next((each for each in message.commands if not each.data), None):
+                raise InterfaceError(f"command '{unrecorded.what}' of '{unrecorded.name}' cannot be recorded")
+            self._commands = first + len(message.commands)
+            self._write(COMMANDS.name, message)
+            for command in commands[: len(message.commands)]:
+                if command.what == "input":
+                    for topic, target in input_messages(world, command.name, command.value):
+                        self._write(topic, target)
+
+    def after_step(self, samples: list[Any]) -> None:
+        """Writes a tick: its time and samples, and its state if that is due."""
+        tick = self._world.clock.tick
+        if self._clock.is_due(tick):
+            self._write_clock()
+        self._write_samples(samples)
+        with_hash = self._hashes is not None and self._hashes.is_due(tick)
+        if with_hash or (self._states is not None and self._states.is_due(tick)):
+            self._write_state(with_hash)
+
+    def end(self) -> None:
+        """Writes the rest of the last tick, with the hash of its state."""
+        self.before_step()
+        self._write_clock()
+        self._write_samples(self._world.read_rest())
+        self._write_state(with_hash=True)
+
+    def _write_clock(self) -> None:
+        self._write(CLOCK.name, clock_message(self._world.clock.stamp_ns))
+
+    def _write_state(self, with_hash: bool) -> None:
+        self._write(STATE.name, state_message(self._world, with_hash, running=True))
+
+    def _write_samples(self, samples: list[Any]) -> None:
+        for sample in samples:
+            for topic, message in self._messages(sample):
+                self._write(topic, message)
+        if (transforms := self._transforms.drain()) is not None:
+            self._write(TF.name, transforms)
+
+    def _messages(self, sample: Any) -> Iterator[tuple[str, Any]]:
+        stamp_ns = self._world.clock.stamp_ns
+        if isinstance(sample, LinkPoseSample):
+            self._transforms.collect(sample, stamp_ns)
+        elif not isinstance(sample, SceneSample):
+            topic = self._topic(sample)
+            if topic is not None and topic.handler is not None:
+                with plugin_errors(topic.handler, f"the message of '{sample.name}'"):
+                    message = topic.handler(sample, stamp_ns)
+                yield topic.name.format(name=sample.name), message
+                if topic.on_tf is not None:
+                    self._transforms.collect(*topic.on_tf(sample, stamp_ns))
+
+    def _topic(self, sample: Any) -> Topic | None:
+        """Returns the topic of the sensor that a sample comes from; None if there is none."""
+        key = type(sample), sample.name
+        if key not in self._routes:
+            sensors = (sensor for name in self._world.bodies for sensor in self._world.sensors_of(name))
+            for sensor in sensors:
+                topic = sample_topic(sensor)
+                is_recorded = topic is not None and _RECORDED.fullmatch(_full(topic.name.format(name=sensor.name)))
+                self._routes[sensor.sample_type, sensor.name] = topic if is_recorded else None
+        return self._routes.get(key)
+
+    def _write(self, topic: str, message: Any) -> None:
+        self._bag.write(_full(topic), message, to_ros_time(self._world.clock.stamp_ns))
+
+
+_RECORDED = re.compile(DEFAULT_TOPICS)
+
+
+def _full(topic: str) -> str:
+    return f"/{topic.lstrip('/')}"
