@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 from result import Result, Target
+from session import JOINT_STATES, Session
+from worlds import arm_world
 
 SUPPORT = Path(__file__).resolve().parent.parent / "tests/support"
 sys.path += [str(SUPPORT / each) for each in ("worlds", "robots")]
@@ -29,6 +31,8 @@ ROBOT, TARGET = "kuka_lwr", "kuka_lwr/target"
 CANDIDATES, TICKS = 8, 200
 CHOSEN, QUICK_CHOSEN = 100, 5
 LARGEST_S = 0.2
+BESIDE_S, QUICK_BESIDE_S = 20.0, 5.0
+HZ, LEAST_HZ = 1000.0, 998.0
 ELSEWHERE = (
     "import sys; from rpbi.world import World; world = World.from_state(sys.argv[1])\n"
     "for _ in range(int(sys.argv[2])): world.step()\n"
@@ -38,7 +42,11 @@ ELSEWHERE = (
 
 def run(quick: bool) -> list[Result]:
     """Compares random sessions in contact by their hashes, and predicts for an arm that pushes a box."""
-    return [*_exact(QUICK_SEEDS if quick else SEEDS), *_predictions(QUICK_CHOSEN if quick else CHOSEN)]
+    return [
+        *_exact(QUICK_SEEDS if quick else SEEDS),
+        *_predictions(QUICK_CHOSEN if quick else CHOSEN),
+        *_beside_a_node(QUICK_BESIDE_S if quick else BESIDE_S),
+    ]
 
 
 def _exact(seeds: int) -> list[Result]:
@@ -110,6 +118,22 @@ def _predictions(chosen: int) -> list[Result]:
         Result("forks", f"{what}: median", float(np.median(durations)), "s", None, Target(LARGEST_S)),
         Result("forks", f"{what}: longest", max(durations), "s"),
         Result("forks", f"first prediction, {os.cpu_count()} processors", cold_s, "s"),
+    ]
+
+
+def _beside_a_node(seconds: float) -> list[Result]:
+    """Counts the joint states of a running simulator while it is asked for predictions all the time."""
+    with Session() as ros:
+        ros.simulator(arm_world(ros.folder, HZ))
+        asking = ros.program("predict_often", CANDIDATES, TICKS, 2.0 + seconds)
+        ros.wait_for_output(asking, "ready")
+        states = ros.watch(JOINT_STATES, seconds=seconds, stock=False).arrivals()[JOINT_STATES]
+        durations = ros.result_of(asking)
+    what = f"beside a node at {HZ:g} Hz, {CANDIDATES} candidates x {TICKS} ticks"
+    return [
+        Result("forks", f"{what}: joint states", states.rate_hz, "Hz", None, Target(LEAST_HZ, at_least=True)),
+        Result("forks", f"{what}: median", float(np.median(durations)), "s"),
+        Result("forks", f"{what}: longest", max(durations), "s"),
     ]
 
 
