@@ -13,7 +13,7 @@ from rpbi.control.joint_command import JointCommand
 from rpbi.geometry import Pose
 from rpbi.world import World
 
-from .parts import link_index
+from .parts import link_index, robot_of
 
 Values = npt.NDArray[np.float64]
 
@@ -48,8 +48,8 @@ class JointAction:
 
     def __init__(self, world: World, robot: str, joints: Sequence[str], speed: float, period_s: float) -> None:
         self._world, self._robot, self._slot = world, robot, f"{robot}/target"
-        driven = world.bodies[robot].model.driven
-        chosen = [world.bodies[robot].model[name] for name in joints] or driven
+        driven = robot_of(world, robot).model.driven
+        chosen = [robot_of(world, robot).model[name] for name in joints] or driven
         self._names = [joint.name for joint in chosen]
         self._indices = [joint.index for joint in chosen]
         self._lower, self._upper = np.array([(joint.lower, joint.upper) for joint in chosen]).T
@@ -59,7 +59,7 @@ class JointAction:
 
     def reset(self) -> None:
         """Begins at the present positions."""
-        positions = self._world.bodies[self._robot].joint_positions()
+        positions = robot_of(self._world, self._robot).joint_positions()
         self._targets = np.array([positions[index] for index in self._indices])
 
     def apply(self, values: Values) -> None:
@@ -90,12 +90,12 @@ class HandAction:
         step: float,
     ) -> None:
         self._world, self._robot, self._slot = world, robot, f"{robot}/target"
-        self._link = link_index(world.bodies[robot], link)
+        self._link = link_index(robot_of(world, robot), link)
         self._axes = ["xyz".index(axis) for axis in axes]
         self._low, self._high, self._step = np.array(low), np.array(high), step
         self._start = Pose()
         self._moves = self._columns()
-        driven = world.bodies[robot].model.driven
+        driven = robot_of(world, robot).model.driven
         self._names = [joint.name for joint, moves in zip(driven, self._moves) if moves]
         self._lower, self._upper = np.array([(joint.lower, joint.upper) for joint in driven]).T
         self.goal = np.zeros(3)
@@ -104,14 +104,14 @@ class HandAction:
 
     def reset(self) -> None:
         """Begins at the present pose."""
-        self._start = self._world.bodies[self._robot].link_pose(self._link)
+        self._start = robot_of(self._world, self._robot).link_pose(self._link)
         self.goal = np.array(self._start.position)
 
     def apply(self, values: Values) -> None:
         """Moves the goal, and the joints towards it by the damped inverse of the Jacobian."""
         self.goal[self._axes] += self._step * values
         self.goal = np.minimum(np.maximum(self.goal, self._low), self._high)
-        robot = self._world.bodies[self._robot]
+        robot = robot_of(self._world, self._robot)
         pose = robot.link_pose(self._link)
         turn = rotation_between(pose.quat_xyzw, self._start.quat_xyzw)
         error = np.array([*(self.goal - pose.position), *turn])
@@ -123,7 +123,7 @@ class HandAction:
 
     def _columns(self) -> npt.NDArray[np.bool_]:
         """Returns which driven joints move the link."""
-        robot = self._world.bodies[self._robot]
+        robot = robot_of(self._world, self._robot)
         positions = [state[0] for state in robot.drive.measured().values()]
         moves: npt.NDArray[np.bool_] = robot.robot_model.jacobian(robot.base_pose(), positions, self._link).any(axis=0)
         return moves
@@ -142,13 +142,13 @@ class GripperAction:
     def __init__(self, world: World, robot: str, joints: Sequence[str], step: float) -> None:
         self._world, self._robot, self._slot = world, robot, f"{robot}/target"
         self._names, self._step = tuple(joints), step
-        joint = world.bodies[robot].model[joints[0]]
+        joint = robot_of(world, robot).model[joints[0]]
         self._index, self._lower, self._upper = joint.index, joint.lower, joint.upper
         self._target = 0.0
 
     def reset(self) -> None:
         """Begins at the present opening."""
-        self._target = self._world.bodies[self._robot].joint_positions()[self._index]
+        self._target = robot_of(self._world, self._robot).joint_positions()[self._index]
 
     def apply(self, values: Values) -> None:
         """Moves the target, which stays within the limits."""

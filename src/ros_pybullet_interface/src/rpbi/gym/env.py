@@ -13,7 +13,7 @@ from gymnasium import spaces
 from custom_ros_tools.config import load_config
 from custom_ros_tools.errors import ConfigError, InterfaceError, Problem, UnknownNameError
 from custom_ros_tools.schema.type_names import shown
-from rpbi.plugins import is_foreign, plugin_errors
+from rpbi.plugins import plugin_errors
 from rpbi.world import World
 
 from .checks import CheckedTask
@@ -62,9 +62,7 @@ class WorldEnv(gymnasium.Env[Any, Any]):
             raise ValueError(f"render_mode: expected None or one of {', '.join(MODES)}, got '{render_mode}'")
         varied = Randomization.read(randomization)
         self.render_mode = render_mode
-        self.world = World.from_file(
-            world, connection_mode=pybullet.GUI if render_mode == "human" else pybullet.DIRECT
-        )
+        self.world = World.from_file(world, connection_mode=pybullet.GUI if render_mode == "human" else pybullet.DIRECT)
         try:
             self._task = CheckedTask(make_task(self.world, task))
             self.task = self._task.task
@@ -104,7 +102,7 @@ class WorldEnv(gymnasium.Env[Any, Any]):
         """Acts for some ticks.
 
         Returns:
-            Observation, reward, whether the episode is over, whether it was truncated since its actions are used up, and
+            Observation, reward, whether the episode is over, whether it was truncated since all its actions are used, and
             `is_success`.
         """
         self._task.count += 1

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from custom_ros_tools.errors import MissingDependency, PhysicsError
+from custom_ros_tools.errors import MissingDependency, PhysicsError, UnknownNameError
 from rpbi.bodies import Body
+from rpbi.bodies.robots.robot import Robot
 from rpbi.sensors.link_pose import index_of_link
 from rpbi.world import World
 
@@ -76,7 +78,7 @@ class Parts:
 
 def joint_part(world: World, robot: str) -> Part:
     """Returns positions [rad or m], then velocities [rad/s or m/s] of a robot's driven joints, within their limits."""
-    joints = world.bodies[robot].model.driven
+    joints = robot_of(world, robot).model.driven
     indices = [joint.index for joint in joints]
     speeds = [min(joint.max_velocity, FARTHEST) for joint in joints]
 
@@ -95,11 +97,11 @@ def sensor_parts(world: World, robot: str) -> Iterator[Part]:
     high = (LARGEST_FORCE_N,) * 3 + (LARGEST_TORQUE_NM,) * 3
 
     def read(number: int) -> Sequence[float]:
-        sample = world.bodies[robot].force_torque_sensors[number].read(world.clock.tick)
+        sample = robot_of(world, robot).force_torque_sensors[number].read(world.clock.tick)
         return (0.0,) * 6 if sample is None else (*sample.force, *sample.torque)
 
-    for number, sensor in enumerate(getattr(world.bodies[robot], "force_torque_sensors", ())):
-        yield Part(f"{sensor.name}/wrench", [-each for each in high], high, lambda number=number: read(number))
+    for number, sensor in enumerate(robot_of(world, robot).force_torque_sensors):
+        yield Part(f"{sensor.name}/wrench", [-each for each in high], high, partial(read, number))
 
 
 def pose_part(world: World, name: str, low: Sequence[float], high: Sequence[float]) -> Part:
@@ -110,6 +112,19 @@ def pose_part(world: World, name: str, low: Sequence[float], high: Sequence[floa
         return (*position, *quat)
 
     return Part(f"{name}/pose", (*low, *(-1.0,) * 4), (*high, *(1.0,) * 4), read)
+
+
+def robot_of(world: World, name: str) -> Robot:
+    """Returns a robot with motors.
+
+    Raises:
+        UnknownNameError: If the world has none of that name.
+    """
+    found = world.bodies.get(name)
+    if not isinstance(found, Robot):
+        known = [each for each, body in world.bodies.items() if isinstance(body, Robot)]
+        raise UnknownNameError("robot", name, known)
+    return found
 
 
 def link_index(body: Body, link: str) -> int:

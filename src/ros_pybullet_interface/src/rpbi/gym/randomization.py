@@ -15,6 +15,8 @@ from custom_ros_tools.schema import ConfigModel, ListOf, Name, NonNegative, Text
 from rpbi.geometry import Pose
 from rpbi.world import World
 
+from .parts import robot_of
+
 
 def _ordered(value: tuple[float, float]) -> tuple[float, float]:
     if value[0] > value[1]:
@@ -76,7 +78,7 @@ class JointVariation(ConfigModel):
 
     def apply(self, world: World, random: np.random.Generator) -> None:
         """Puts the joints elsewhere."""
-        body = world.bodies[self.robot]
+        body = robot_of(world, self.robot)
         starts = body.joint_positions()
         chosen = [body.model[name] for name in self.joints] or body.model.driven
         offsets = random.uniform(-self.offset, self.offset, len(chosen)).tolist()
@@ -191,5 +193,5 @@ class Randomizer:
         for index, camera in enumerate(self._config.cameras):
             known = [name for name, each in self._world.cameras.items() if each.pose is not None]
             if camera.camera not in known:
-                message = f"expected a camera with a pose, which are {', '.join(known) or 'none'}; got '{camera.camera}'"
+                message = f"expected one of {', '.join(known) or 'none with a pose'}; got '{camera.camera}'"
                 yield Problem(file, f"cameras[{index}].camera", message)

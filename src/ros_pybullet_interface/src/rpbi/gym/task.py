@@ -12,6 +12,7 @@ from gymnasium import spaces
 from pydantic import Field
 
 from custom_ros_tools.schema import ConfigModel
+from rpbi.bodies.robots.robot import Robot
 from rpbi.world import World
 
 from .actions import ActionPart
@@ -60,7 +61,7 @@ class Task(ABC):
     def parts(self) -> Iterator[Part]:
         """Yields the parts of an observation: joints and force-torque sensors of all robots, and what others add."""
         for name, body in self.world.bodies.items():
-            if hasattr(body, "motors"):
+            if isinstance(body, Robot):
                 yield joint_part(self.world, name)
                 yield from sensor_parts(self.world, name)
 
@@ -101,8 +102,8 @@ class Task(ABC):
             part.apply(values[begin : begin + part.size])
             begin += part.size
 
-    def after_tick(self) -> None:
-        """Notes what happened in a tick; most tasks need nothing."""
+    def after_tick(self) -> None:  # noqa: B027 (most tasks need nothing)
+        """Notes what happened in a tick."""
 
     def observation(self) -> Any:
         """Returns the present observation."""

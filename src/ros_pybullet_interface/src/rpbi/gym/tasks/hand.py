@@ -9,7 +9,7 @@ from pydantic import Field
 from custom_ros_tools.schema import Name, Position, PositiveMetres, Text
 from robot_model.geometry import Vector
 from rpbi.gym.actions import HandAction
-from rpbi.gym.parts import Part, link_index
+from rpbi.gym.parts import Part, link_index, robot_of
 from rpbi.gym.task import Task, TaskConfig
 from rpbi.world import World
 
@@ -29,7 +29,7 @@ class HandTask(Task):
 
     def __init__(self, world: World, config: HandConfig) -> None:
         super().__init__(world, config)
-        self._link = link_index(world.bodies[config.robot], config.link)
+        self._link = link_index(robot_of(world, config.robot), config.link)
 
     def hand_action(self, axes: str = "xyz") -> HandAction:
         """Returns ways of the hand along some axes."""

@@ -32,6 +32,7 @@ class Lift(HandTask):
 
     def __init__(self, world: World, config: LiftConfig) -> None:
         super().__init__(world, config)
+        world.dynamics(config.object)  # which has to be there
         self._start_height = 0.0
 
     def actions(self) -> Sequence[ActionPart]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from pydantic import Field
 
-from custom_ros_tools.schema import ListOf, Name, NonNegativeMetres, PositiveMetres, Position
+from custom_ros_tools.schema import ListOf, Name, NonNegativeMetres, Position, PositiveMetres
 from robot_model.geometry import Vector, minus, plus
 from rpbi.geometry import Pose
 from rpbi.gym.actions import ActionPart
@@ -36,7 +36,7 @@ class Peg(HandTask):
     def __init__(self, world: World, config: PegConfig) -> None:
         super().__init__(world, config)
         for name in config.walls:
-            world.dynamics(name)
+            world.dynamics(name)  # which has to be there
         self.hole: Vector = config.hole
         """Middle of the hole's opening [m]."""
 

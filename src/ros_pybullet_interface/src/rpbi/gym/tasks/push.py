@@ -32,6 +32,7 @@ class Push(HandTask):
 
     def __init__(self, world: World, config: PushConfig) -> None:
         super().__init__(world, config)
+        world.dynamics(config.object)  # which has to be there
         self.goal: tuple[float, float] = (0.0, 0.0)
         """The goal of the body in the plane [m]."""
 

@@ -12,7 +12,7 @@ from pydantic import Field
 from custom_ros_tools.schema import Fraction, ListOf, Name, Position, PositiveMetres, Text, Unit
 from robot_model.geometry import Vector, minus
 from rpbi.gym.actions import ActionPart, JointAction
-from rpbi.gym.parts import Part, link_index
+from rpbi.gym.parts import Part, link_index, robot_of
 from rpbi.gym.task import Task, TaskConfig
 from rpbi.world import World
 
@@ -36,7 +36,7 @@ class Reach(Task):
 
     def __init__(self, world: World, config: ReachConfig) -> None:
         super().__init__(world, config)
-        self._link = link_index(world.bodies[config.robot], config.link)
+        self._link = link_index(robot_of(world, config.robot), config.link)
         self.goal: Vector = (0.0, 0.0, 0.0)
         """The goal in the world [m]."""
 

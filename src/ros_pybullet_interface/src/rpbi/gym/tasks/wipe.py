@@ -15,7 +15,6 @@ from rpbi.world import World
 
 from .hand import HandConfig, HandTask
 
-
 TICKS = 5
 """Ticks between two looks at the contacts; the hand moves by a fraction of a cell meanwhile."""
 
@@ -38,6 +37,7 @@ class Wipe(HandTask):
 
     def __init__(self, world: World, config: WipeConfig) -> None:
         super().__init__(world, config)
+        world.dynamics(config.surface)  # which has to be there
         low, high = np.array(config.spot_low[:2]), np.array(config.spot_high[:2])
         steps = (np.arange(config.cells) + 0.5) / config.cells
         x, y = np.meshgrid(*(low + np.outer(steps, high - low)).T)

@@ -105,7 +105,7 @@ def main() -> None:
             elif name == "share":
                 file = recv_handle(connection)
                 os.set_blocking(connection.fileno(), True)  # a default time-out of sockets would have changed it
-                answer = worker and worker.share(SharedArrays(*arguments, file))
+                answer = getattr(worker, name)(SharedArrays(*arguments, file=file))
             else:
                 answer = getattr(worker, name)(*arguments)
             text = pickle.dumps((True, answer), pickle.HIGHEST_PROTOCOL)
