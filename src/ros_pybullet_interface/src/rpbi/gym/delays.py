@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from copy import deepcopy
 from typing import Any
 
 
@@ -24,7 +25,7 @@ class DelayLine:
         self._ticks, self._action_ticks = ticks, action_ticks
         self._observed_at = (-observation_ticks) % ticks or ticks
         """Tick of each action, counted from 1, after which an observation is made."""
-        self._observations = deque([first] * -(-observation_ticks // ticks))
+        self._observations = deque(deepcopy(first) for _ in range(observation_ticks // ticks))
         self._actions: deque[tuple[int, Any]] = deque()
         self._tick = 0
 

@@ -102,8 +102,7 @@ class WorldEnv(gymnasium.Env[Any, Any]):
         """Acts for some ticks.
 
         Returns:
-            Observation, reward, whether the episode is over, whether it was truncated since all its actions are used, and
-            `is_success`.
+            Observation, reward, whether the episode is over, whether all of its actions are used, and `is_success`.
         """
         self._task.count += 1
         observation = self._line.run(action, self._task.act, self._step, self._observe)

@@ -26,7 +26,7 @@ def _ordered(value: tuple[float, float]) -> tuple[float, float]:
 
 Range = Annotated[tuple[float, float], Field(strict=False), AfterValidator(_ordered)]
 PositiveRange = Annotated[
-    tuple[NonNegative, NonNegative], Field(strict=False), AfterValidator(_ordered), Unit("[lowest, highest]")
+    tuple[NonNegative, NonNegative], Field(strict=False), AfterValidator(_ordered), Unit("lowest, highest")
 ]
 
 

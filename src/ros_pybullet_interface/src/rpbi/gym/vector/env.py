@@ -24,6 +24,8 @@ from rpbi.gym.env import WorldEnv
 
 from .arrays import SharedArrays
 
+ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+"""Variables of workers, so that their libraries start no threads, which would contend for the processors."""
 Info = dict[str, Any]
 Result = tuple[Any, npt.NDArray[np.float64], npt.NDArray[np.bool_], npt.NDArray[np.bool_], Info]
 
@@ -197,7 +199,7 @@ class _Process:
                 [sys.executable, "-P", "-m", "rpbi.gym.vector.worker", str(theirs.fileno())],
                 signal.SIGKILL,
                 pass_fds=[theirs.fileno()],
-                env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
+                env={**os.environ, **ENVIRONMENT, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
             )
         self._connection: Connection = ours
 

@@ -96,16 +96,17 @@ def main() -> None:
     worker: Worker | None = None
     while True:
         try:
-            name, arguments = cloudpickle.loads(connection.recv_bytes())
+            request = connection.recv_bytes()
         except (EOFError, OSError):
             break
         try:
+            name, arguments = cloudpickle.loads(request)
             if name == "make":
                 worker, answer = Worker(*arguments), None
             elif name == "share":
                 file = recv_handle(connection)
                 os.set_blocking(connection.fileno(), True)  # a default time-out of sockets would have changed it
-                answer = getattr(worker, name)(SharedArrays(*arguments, file=file))
+                answer = getattr(worker, name)(SharedArrays(arguments[0], arguments[1], file))
             else:
                 answer = getattr(worker, name)(*arguments)
             text = pickle.dumps((True, answer), pickle.HIGHEST_PROTOCOL)

@@ -1,0 +1,97 @@
+"""The cross-entropy method, and policies that it can find: linear ones, for environments in a vector."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium.vector import VectorEnv
+
+Array = npt.NDArray[np.float64]
+
+
+class CrossEntropy:
+    """Draws parameters from a normal distribution, and moves it to the best of them.
+
+    Args:
+        size: Number of parameters.
+        deviation: Standard deviation of each at the start.
+        elite: Share of those drawn that count as the best.
+        floor: Smallest standard deviation.
+        random: Source of the parameters.
+    """
+
+    def __init__(self, size: int, deviation: float, elite: float, floor: float, random: np.random.Generator) -> None:
+        self.mean, self.deviation = np.zeros(size), np.full(size, deviation)
+        self._elite, self._floor, self._random = elite, floor, random
+
+    def draw(self, count: int) -> Array:
+        """Returns parameters, shape (count, size)."""
+        return self.mean + self.deviation * self._random.normal(size=(count, len(self.mean)))
+
+    def update(self, parameters: Array, scores: Array) -> None:
+        """Moves the distribution to the parameters with the highest scores, shape (count,)."""
+        best = parameters[np.argsort(scores)[-max(2, round(self._elite * len(scores))) :]]
+        self.mean = best.mean(axis=0)
+        self.deviation = np.maximum(best.std(axis=0), self._floor)
+
+
+class LinearPolicies:
+    """A linear policy for each of n environments: action = tanh(W features + b).
+
+    Args:
+        parameters: Shape (n, size), see `size`.
+        scale: Unit of each feature.
+    """
+
+    def __init__(self, parameters: Array, scale: Array, actions: int) -> None:
+        self._weights = parameters.reshape(len(parameters), actions, len(scale) + 1)
+        self._scale = scale
+
+    @staticmethod
+    def size(features: int, actions: int) -> int:
+        """Returns the number of parameters of a policy."""
+        return actions * (features + 1)
+
+    def __call__(self, features: Array) -> Array:
+        """Returns actions, shape (n, actions), for features, shape (n, features)."""
+        inputs = np.hstack([features / self._scale, np.ones((len(features), 1))])
+        return np.tanh(np.einsum("naf,nf->na", self._weights, inputs))
+
+
+class Episodes(NamedTuple):
+    """Results of an episode in each of n environments.
+
+    Attributes:
+        returns: Sums of rewards, shape (n,).
+        successes: Whether each succeeded, shape (n,).
+        actions: Number of actions of all.
+    """
+
+    returns: Array
+    successes: npt.NDArray[np.bool_]
+    actions: int
+
+
+def run_episodes(envs: VectorEnv[Any, Any, Any], policies: Any, features: Any, seeds: Sequence[int]) -> Episodes:
+    """Runs an episode in each environment, with a policy for each.
+
+    Args:
+        envs: The environments, n of them.
+        policies: Returns actions of all for features of all.
+        features: Returns features, shape (n, features), of observations of all.
+        seeds: A seed for each.
+    """
+    observations, infos = envs.reset(seed=list(seeds))
+    returns, successes = np.zeros(envs.num_envs), np.zeros(envs.num_envs, bool)
+    runs, count = np.ones(envs.num_envs, bool), 0
+    while runs.any():
+        actions = policies(features(observations)).astype(np.float32)
+        observations, rewards, ends, truncations, infos = envs.step(actions)
+        returns += np.where(runs, rewards, 0.0)
+        successes |= runs & infos["is_success"]
+        count += int(runs.sum())
+        runs &= ~(ends | truncations)
+    return Episodes(returns, successes, count)
