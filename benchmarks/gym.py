@@ -134,7 +134,9 @@ def _resets(name: str) -> Iterator[Result]:
         env.world.reset(rebuild)
         durations.append(_duration(lambda rebuild=rebuild: [env.world.reset(rebuild) for _ in range(RESETS)]) / RESETS)
     env.close()
-    yield Result("gym", f"{name}: reset, beside one that loads everything", 1e3 * durations[0], "ms", 1e3 * durations[1])
+    yield Result(
+        "gym", f"{name}: reset, beside one that loads everything", 1e3 * durations[0], "ms", 1e3 * durations[1]
+    )
 
 
 def _workers(name: str, steps: int, rounds: int) -> Iterator[Result]:

@@ -33,8 +33,8 @@ CAMERA = {
 }
 
 
-def write(folder: Path, **robot: Any) -> str:
-    """Writes the world, and returns its main file."""
+def write(folder: Path, connect: dict[str, Any] | None = None, **robot: Any) -> str:
+    """Writes the world, with further keys of the robot, and returns its main file."""
     (folder / "arm.urdf").write_text(ARM)
     arm = {
         "name": "arm",
@@ -46,9 +46,8 @@ def write(folder: Path, **robot: Any) -> str:
     }
     place = {"tf_id": "rpbi/eye", "position": [0.4, 0.0, 1.5], "rpy": [3.14159, 0.0, 0.0]}
     thing = box(half_extents_m=(0.05, 0.05, 0.05), basePosition=[0.35, 0.15, 0.05])
-    return write_world(
-        folder, collision=(BOX_FLOOR,), dynamic=(thing,), robots=(arm,), rgbd_sensor=CAMERA, poses=[place]
-    )
+    main = {"rgbd_sensor": CAMERA, "poses": [place], "connect": connect or {"connection_mode": "DIRECT"}}
+    return write_world(folder, collision=(BOX_FLOOR,), dynamic=(thing,), robots=(arm,), **main)
 
 
 class SwingConfig(TaskConfig):

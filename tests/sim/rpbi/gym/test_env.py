@@ -43,6 +43,7 @@ def test_gymnasium_finds_nothing_to_complain_about(tmp_path, options):
         env = gymnasium.make("test/Swing-v0")
         check_env(env.unwrapped, skip_render_check=True)  # which opens a window, see tests/gui
     assert env.unwrapped.world.bodies.keys() == {"floor", "box", "arm"}
+    env.reset()
     image = env.render() if options else np.zeros((16, 24, 3), np.uint8)
     assert (image.shape, image.dtype) == ((16, 24, 3), np.uint8) and (image.max() > 0) == bool(options)
     env.close()
@@ -119,7 +120,12 @@ def test_a_task_that_fails_is_named(tmp_path, fault, method, message):
     ("task", "randomization", "error", "message"),
     [
         ("lifft", None, UnknownNameError, "unknown task 'lifft'.*did you mean 'lift'"),
-        ({"type": "gym_world:Swinge"}, None, ConfigError, "task: type: 'gym_world' has no 'Swinge'; did you mean 'Swing'"),
+        (
+            {"type": "gym_world:Swinge"},
+            None,
+            ConfigError,
+            "task: type: 'gym_world' has no 'Swinge'; did you mean 'Swing'",
+        ),
         ({"type": "gym_world:Swing", "ticks": 1}, None, ConfigError, "task: ticks: unknown key"),
         (
             {"type": "reach", "robot": "arn", "link": "bar", "goal_low": [0, 0, 0], "goal_high": [1, 1, 1]},
@@ -128,7 +134,12 @@ def test_a_task_that_fails_is_named(tmp_path, fault, method, message):
             "unknown robot 'arn'",
         ),
         (Swing, {"dynamics": [{"object": "bax", "mass": [1, 2]}]}, ConfigError, r"dynamics\[0\]: unknown object 'bax'"),
-        (Swing, {"dynamics": [{"object": "floor", "mass": [1, 2]}]}, ConfigError, r"dynamics\[0\]: mass: 'floor' is static"),
+        (
+            Swing,
+            {"dynamics": [{"object": "floor", "mass": [1, 2]}]},
+            ConfigError,
+            r"dynamics\[0\]: mass: 'floor' is static",
+        ),
         (Swing, {"cameras": [{"camera": "ear"}]}, ConfigError, r"cameras\[0\].camera: expected one of eye; got 'ear'"),
     ],
 )

@@ -18,7 +18,10 @@ from rpbi.gym.randomization import Randomization
     [
         ("dynamic: []", "dynamic: unknown key 'dynamic'; did you mean 'dynamics'?"),
         ("dynamics: [{object: box, masss: [1, 2]}]", "dynamics[0].masss: unknown key 'masss'; did you mean 'mass'?"),
-        ("dynamics: [{object: box, mass: 1}]", "dynamics[0].mass: expected a list of 2 numbers [lowest, highest], got 1"),
+        (
+            "dynamics: [{object: box, mass: 1}]",
+            "dynamics[0].mass: expected a list of 2 numbers [lowest, highest], got 1",
+        ),
         ("dynamics: [{object: box, mass: [2, 1]}]", "dynamics[0].mass: expected [lowest, highest], got [2.0, 1.0]"),
         ("delays: {action_s: [-1, 0]}", "delays.action_s[0]: must be >= 0"),
     ],

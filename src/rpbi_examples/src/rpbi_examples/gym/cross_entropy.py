@@ -39,26 +39,19 @@ class CrossEntropy:
 
 
 class LinearPolicies:
-    """A linear policy for each of n environments: action = tanh(W features + b).
+    """A linear policy for each of n environments: action = tanh(W features), without an offset.
 
     Args:
-        parameters: Shape (n, size), see `size`.
-        scale: Unit of each feature.
+        parameters: The weights W of each, shape (n, features x actions).
+        features: Number of features.
     """
 
-    def __init__(self, parameters: Array, scale: Array, actions: int) -> None:
-        self._weights = parameters.reshape(len(parameters), actions, len(scale) + 1)
-        self._scale = scale
-
-    @staticmethod
-    def size(features: int, actions: int) -> int:
-        """Returns the number of parameters of a policy."""
-        return actions * (features + 1)
+    def __init__(self, parameters: Array, features: int) -> None:
+        self._weights = parameters.reshape(len(parameters), -1, features)
 
     def __call__(self, features: Array) -> Array:
         """Returns actions, shape (n, actions), for features, shape (n, features)."""
-        inputs = np.hstack([features / self._scale, np.ones((len(features), 1))])
-        return np.tanh(np.einsum("naf,nf->na", self._weights, inputs))
+        return np.tanh(np.einsum("naf,nf->na", self._weights, features))
 
 
 class Episodes(NamedTuple):

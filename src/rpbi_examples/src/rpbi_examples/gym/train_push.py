@@ -1,0 +1,117 @@
+"""Learns to push a box to random goals, from nothing, and draws the learning curve.
+
+    .venv/bin/python -m rpbi_examples.gym.train_push
+
+It takes some minutes on two processors.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gymnasium
+import matplotlib
+import numpy as np
+import numpy.typing as npt
+
+import rpbi_examples.gym  # registers the environments
+
+from .cross_entropy import Array, CrossEntropy, LinearPolicies, run_episodes
+
+ENVIRONMENT = next(name for name in rpbi_examples.gym.ENVIRONMENTS if "Push" in name)
+VARIATION = f"{rpbi_examples.gym.FOLDER}/push/random.yaml"
+FEATURES, ACTIONS = 6, 2
+UNIT_M = 0.1
+"""Distance that is a feature of 1."""
+FIRST_TEST_SEED = 1_000_000
+"""Seeds of episodes from which nothing is learned."""
+
+
+class Progress(NamedTuple):
+    """Result of a generation.
+
+    Attributes:
+        actions: Actions so far.
+        score: Mean return of the mean policy in test episodes.
+        success: Share of test episodes in which the mean policy succeeded.
+        seconds: Time so far [s].
+    """
+
+    actions: int
+    score: float
+    success: float
+    seconds: float
+
+
+def features(observations: dict[str, npt.NDArray[np.float32]]) -> Array:
+    """Returns ways from hand to box and from box to goal in the plane, turn of the box, and 1; shape (n, 6)."""
+    box, hand, goal = observations["box/pose"], observations["hand"][:, :2], observations["goal"]
+    ways = np.hstack([box[:, :2] - hand, goal - box[:, :2]]) / UNIT_M
+    return np.hstack([ways, 2.0 * box[:, 5:6], np.ones((len(box), 1))]).astype(np.float64)
+
+
+def train(envs: Any, generations: int, tries: int, seed: int) -> list[Progress]:
+    """Learns, and returns the progress before the first generation and after each.
+
+    Args:
+        envs: Environments, one for each policy of a generation.
+        generations: Their number.
+        tries: Episodes of each policy in a generation.
+        seed: Seed of everything.
+    """
+    count, begin_s, actions = envs.num_envs, time.monotonic(), 0
+    method = CrossEntropy(FEATURES * ACTIONS, 1.0, 0.2, 0.05, np.random.default_rng(seed))
+    found: list[Progress] = []
+    for generation in range(generations + 1):
+        mean = LinearPolicies(np.tile(method.mean, (count, 1)), FEATURES)
+        test = run_episodes(envs, mean, features, range(FIRST_TEST_SEED, FIRST_TEST_SEED + count))
+        found.append(Progress(actions, test.returns.mean(), test.successes.mean(), time.monotonic() - begin_s))
+        print("%3d: %7d actions, %4.0f s, return %7.2f, success %3.0f %%"
+              % (generation, actions, found[-1].seconds, found[-1].score, 100 * found[-1].success), flush=True)  # fmt: skip
+        drawn, scores = method.draw(count), np.zeros(count)
+        for each in range(tries):
+            same = [seed + tries * generation + each] * count
+            episodes = run_episodes(envs, LinearPolicies(drawn, FEATURES), features, same)
+            scores += episodes.returns / tries
+            actions += episodes.actions
+        method.update(drawn, scores)
+    return found
+
+
+def draw(progress: list[Progress], file: Path) -> None:
+    """Draws returns and successes over the number of actions."""
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, (score, success) = pyplot.subplots(2, 1, sharex=True, figsize=(7.0, 4.5), layout="constrained")
+    actions = [each.actions / 1000 for each in progress]
+    score.plot(actions, [each.score for each in progress], "o-", ms=3, color="tab:blue")
+    score.set(ylabel="return", title=f"{ENVIRONMENT} with random mass, friction, poses and delays: test episodes")
+    success.plot(actions, [100 * each.success for each in progress], "o-", ms=3, color="tab:green")
+    success.set(xlabel="actions that were learned from [thousands]", ylabel="success [%]", ylim=(-3, 103))
+    for axes in (score, success):
+        axes.grid(alpha=0.3)
+    figure.savefig(file, dpi=110)
+
+
+def main() -> None:
+    """Learns, and draws the curve."""
+    parser = argparse.ArgumentParser(description="Learns to push a box to random goals.")
+    parser.add_argument("--generations", type=int, default=16)
+    parser.add_argument("--policies", type=int, default=24, help="policies of a generation")
+    parser.add_argument("--tries", type=int, default=3, help="episodes of each policy in a generation")
+    parser.add_argument("--workers", type=int, default=2, help="processes")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--out", type=Path, default=Path("gym_curve.png"), help="picture of the learning curve")
+    chosen = parser.parse_args()
+    envs = gymnasium.make_vec(ENVIRONMENT, num_envs=chosen.policies, workers=chosen.workers, randomization=VARIATION)
+    progress = train(envs, chosen.generations, chosen.tries, chosen.seed)
+    envs.close()
+    draw(progress, chosen.out)
+
+
+if __name__ == "__main__":
+    main()
