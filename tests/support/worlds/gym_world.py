@@ -17,7 +17,8 @@ from rpbi.gym.task import Task, TaskConfig
 ARM = """<robot name="arm">
   <link name="base"/>
   <link name="bar">
-    <inertial><origin xyz="0.25 0 0"/><mass value="1"/><inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/>
+    <inertial><origin xyz="0.25 0 0"/><mass value="1"/>
+      <inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/>
     </inertial>
     <visual><origin xyz="0.25 0 0"/><geometry><box size="0.5 0.05 0.05"/></geometry></visual>
     <collision><origin xyz="0.25 0 0"/><geometry><box size="0.5 0.05 0.05"/></geometry></collision>

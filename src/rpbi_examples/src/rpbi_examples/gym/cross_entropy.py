@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from gymnasium.vector import VectorEnv
 
 Array = npt.NDArray[np.float64]
 
@@ -68,11 +67,11 @@ class Episodes(NamedTuple):
     actions: int
 
 
-def run_episodes(envs: VectorEnv[Any, Any, Any], policies: Any, features: Any, seeds: Sequence[int]) -> Episodes:
+def run_episodes(envs: Any, policies: Any, features: Any, seeds: Sequence[int]) -> Episodes:
     """Runs an episode in each environment, with a policy for each.
 
     Args:
-        envs: The environments, n of them.
+        envs: A vector of n environments.
         policies: Returns actions of all for features of all.
         features: Returns features, shape (n, features), of observations of all.
         seeds: A seed for each.

@@ -69,8 +69,7 @@ def train(envs: Any, generations: int, tries: int, seed: int) -> list[Progress]:
         mean = LinearPolicies(np.tile(method.mean, (count, 1)), FEATURES)
         test = run_episodes(envs, mean, features, range(FIRST_TEST_SEED, FIRST_TEST_SEED + count))
         found.append(Progress(actions, test.returns.mean(), test.successes.mean(), time.monotonic() - begin_s))
-        print("%3d: %7d actions, %4.0f s, return %7.2f, success %3.0f %%"
-              % (generation, actions, found[-1].seconds, found[-1].score, 100 * found[-1].success), flush=True)  # fmt: skip
+        print(f"{generation:3d}: {_line(found[-1])}", flush=True)
         drawn, scores = method.draw(count), np.zeros(count)
         for each in range(tries):
             same = [seed + tries * generation + each] * count
@@ -79,6 +78,11 @@ def train(envs: Any, generations: int, tries: int, seed: int) -> list[Progress]:
             actions += episodes.actions
         method.update(drawn, scores)
     return found
+
+
+def _line(progress: Progress) -> str:
+    actions, score, success, seconds = progress
+    return f"{actions:7d} actions, {seconds:4.0f} s, return {score:6.2f}, success {100 * success:3.0f} %"
 
 
 def draw(progress: list[Progress], file: Path) -> None:
