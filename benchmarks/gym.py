@@ -123,7 +123,7 @@ def _draw(env: WorldEnv) -> None:
     camera = next(iter(env.world.cameras.values()))
     intrinsics = Camera.of(camera.config).intrinsics
     for _ in range(ACTIONS):
-        images._renderer.draw(intrinsics, camera.pose)
+        images.renderer.draw(intrinsics, camera.pose)
 
 
 def _resets(name: str) -> Iterator[Result]:

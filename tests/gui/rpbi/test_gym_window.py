@@ -13,7 +13,7 @@ from pathlib import Path
 import gym_world
 import gymnasium
 from gymnasium.utils.env_checker import check_env
-from rpbi.gym.registration import register
+from rpbi.gym.env import register
 
 world = gym_world.write(Path(sys.argv[1]), connect={"connection_mode": "DIRECT", "options": "--width=160 --height=120"})
 register("test/Swing-v0", world, "gym_world:Swing")

@@ -11,8 +11,8 @@ from worlds import BOX_FLOOR, box, write_world
 
 from rpbi.gym.actions import ActionPart, JointAction
 from rpbi.gym.env import WorldEnv
-from rpbi.gym.parts import Part, pose_part
-from rpbi.gym.task import Task, TaskConfig
+from rpbi.gym.parts import ObservationPart, pose_part
+from rpbi.gym.task import WorldTask, WorldTaskConfig
 
 ARM = """<robot name="arm">
   <link name="base"/>
@@ -35,7 +35,9 @@ CAMERA = {
 
 
 def write(folder: Path, connect: dict[str, Any] | None = None, **robot: Any) -> str:
-    """Writes the world, with further keys of the robot, and returns its main file."""
+    """Writes the world, with further keys of the robot, if it is not there yet; returns its main file."""
+    if (folder / "world.yaml").exists():
+        return str(folder / "world.yaml")
     (folder / "arm.urdf").write_text(ARM)
     arm = {
         "name": "arm",
@@ -51,14 +53,14 @@ def write(folder: Path, connect: dict[str, Any] | None = None, **robot: Any) -> 
     return write_world(folder, collision=(BOX_FLOOR,), dynamic=(thing,), robots=(arm,), **main)
 
 
-class SwingConfig(TaskConfig):
+class SwingConfig(WorldTaskConfig):
     """Options of the task."""
 
     fault: str = ""
     """What it does wrong."""
 
 
-class Swing(Task):
+class Swing(WorldTask):
     """Knocks the box away."""
 
     Config = SwingConfig
@@ -67,7 +69,7 @@ class Swing(Task):
         """Returns the joint."""
         return [JointAction(self.world, "arm", (), 1.0, self.period_s)]
 
-    def parts(self) -> Iterator[Part]:
+    def parts(self) -> Iterator[ObservationPart]:
         """Adds the box."""
         yield from super().parts()
         yield pose_part(self.world, "box", (-2.0,) * 3, (2.0,) * 3)

@@ -9,7 +9,7 @@ from rpbi.render.camera import looking_at
 from rpbi.render.frame import Camera, Frame
 from rpbi.render.messages import Scene
 from rpbi.render.mirror import Mirror
-from rpbi.render.renderers import open_renderer
+from rpbi.render.renderers import Renderer, open_renderer
 
 from .world.load_log import LoadLogReader
 
@@ -35,6 +35,11 @@ class CameraImages:
         self._unread = LoadLogReader(world.log)
         self._renderer = open_renderer([Camera.of(sensor.config) for sensor in world.cameras.values()], use_egl)
         self._mirror = Mirror(self._renderer.pb)
+
+    @property
+    def renderer(self) -> Renderer:
+        """The renderer, whose client has a copy of the world."""
+        return self._renderer
 
     def frame(self, camera: str = "") -> Frame:
         """Returns what a camera sees now, which need not be a tick at which it is due.

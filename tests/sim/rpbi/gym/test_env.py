@@ -11,8 +11,7 @@ from gym_world import Swing, made, write
 from gymnasium.utils.env_checker import check_env, data_equivalence
 
 from custom_ros_tools.errors import ConfigError, PluginError, UnknownNameError
-from rpbi.gym.env import WorldEnv
-from rpbi.gym.registration import register
+from rpbi.gym.env import WorldEnv, register
 
 VARIED = {
     "dynamics": [{"object": "box", "mass_factor": [0.5, 2.0], "lateralFriction": [0.2, 0.8]}],

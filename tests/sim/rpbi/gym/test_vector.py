@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from gym_world import made
+from gym_world import made, write
 from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
@@ -17,6 +17,12 @@ from rpbi.gym.vector.env import WorldVectorEnv
 
 VARIED = {"poses": [{"object": "box", "position": [0.02, 0.02, 0.0]}]}
 COUNT = 3
+
+
+@pytest.fixture(autouse=True)
+def world_file(tmp_path):
+    """Has the world written before several processes read it."""
+    write(tmp_path)
 
 
 @pytest.mark.parametrize("mode", AutoresetMode, ids=lambda mode: mode.name)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rpbi.gym.delays import DelayLine
+from rpbi.gym.env import DelayLine
 
 
 def run(observation_ticks: int, action_ticks: int, actions: int = 4, ticks: int = 10) -> tuple[list, list]:

@@ -12,7 +12,7 @@ from gymnasium import spaces
 
 from rpbi.plugins import is_foreign, raise_plugin_error
 
-from .task import Task
+from .task import WorldTask
 
 
 class CheckedTask:
@@ -25,11 +25,11 @@ class CheckedTask:
         PluginError: By all methods.
     """
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: WorldTask) -> None:
         self.task = task
         self.count = 0
         """Number of actions in the episode."""
-        self._checks_space = is_foreign(task) or type(task).observation is not Task.observation
+        self._checks_space = is_foreign(task) or type(task).observation is not WorldTask.observation
         self.action_space = self._call("action_space", lambda: _space(task.action_space))
         self.observation_space = self._call("observation_space", lambda: _space(task.observation_space))
 
@@ -45,7 +45,7 @@ class CheckedTask:
     @property
     def watches(self) -> bool:
         """Whether the task looks at every tick."""
-        return type(self.task).after_tick is not Task.after_tick
+        return type(self.task).after_tick is not WorldTask.after_tick
 
     def after_tick(self) -> None:
         """Has the task note what happened in a tick."""

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from typing import Any
 
 import gymnasium
 import pybullet
 from gymnasium import spaces
 
-from custom_ros_tools.config import load_config
-from custom_ros_tools.errors import ConfigError, InterfaceError, Problem, UnknownNameError
-from custom_ros_tools.schema.type_names import shown
-from rpbi.plugins import plugin_errors
+from custom_ros_tools.errors import InterfaceError
 from rpbi.world import World
 
 from .checks import CheckedTask
-from .delays import DelayLine
 from .randomization import Randomization, Randomizer
-from .task import Task
-from .tasks import TASKS
+from .task import WorldTask, make_task
 from .views import Image, Views
 
 MODES = ("human", "rgb_array")
@@ -52,7 +48,7 @@ class WorldEnv(gymnasium.Env[Any, Any]):
     def __init__(
         self,
         world: str,
-        task: str | Mapping[str, Any] | type[Task],
+        task: str | Mapping[str, Any] | type[WorldTask],
         *,
         randomization: str | Mapping[str, Any] | None = None,
         cameras: Sequence[str] = (),
@@ -66,8 +62,7 @@ class WorldEnv(gymnasium.Env[Any, Any]):
         try:
             self._task = CheckedTask(make_task(self.world, task))
             self.task = self._task.task
-            self._views = Views(self.world, cameras)
-            self._check_camera(world)
+            self._views = Views(self.world, cameras, render_mode, self.task.period_s)
             file = randomization if isinstance(randomization, str) else "randomization"
             self._randomizer = Randomizer(self.world, varied, file)
         except BaseException:
@@ -77,7 +72,6 @@ class WorldEnv(gymnasium.Env[Any, Any]):
         self.action_space = self._task.action_space
         self.observation_space = self._with_images(self._task.observation_space)
         self._line = DelayLine(1, 0, 0, None)
-        self._drawn_s = 0.0
         self._step = self._watched_step if self._task.watches else self.world.step
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
@@ -116,12 +110,7 @@ class WorldEnv(gymnasium.Env[Any, Any]):
 
         With PyBullet's window it waits until the time of an action has passed since the last call, and returns nothing.
         """
-        if self.render_mode == "rgb_array":
-            return self._views.frame()
-        if self.render_mode == "human":
-            time.sleep(max(0.0, self._drawn_s + self.task.period_s - time.monotonic()))
-            self._drawn_s = time.monotonic()
-        return None
+        return self._views.render()
 
     def close(self) -> None:
         """Ends the world."""
@@ -146,33 +135,61 @@ class WorldEnv(gymnasium.Env[Any, Any]):
     def _info(self) -> dict[str, Any]:
         return {"is_success": self._task.has_succeeded()}
 
-    def _check_camera(self, file: str) -> None:
-        if self.render_mode == "rgb_array" and not any(camera.pose for camera in self.world.cameras.values()):
-            message = "render_mode rgb_array: expected a camera with a pose in `poses`, got none"
-            raise ConfigError([Problem(file, "rgbd_sensor", message)])
 
+class DelayLine:
+    """Runs the ticks of an action, in which older actions begin to act and observations are made that are due later.
 
-def make_task(world: World, given: str | Mapping[str, Any] | type[Task]) -> Task:
-    """Makes a task for a world, see `WorldEnv`.
+    An observation that is d ticks old at the end of an action was made d ticks before that; those from before the
+    episode are the one of its start.
 
-    Raises:
-        ConfigError: If its options are wrong or do not fit the world.
-        UnknownNameError: If there is no such task.
-        PluginError: If its class is of another package and fails.
+    Args:
+        ticks: Ticks of an action.
+        observation_ticks: Age of observations.
+        action_ticks: Time until an action begins to act.
+        first: The observation of the start.
     """
-    file = given if isinstance(given, str) and given.endswith((".yaml", ".yml")) else "task"
-    if isinstance(given, type):
-        kind, options = given, {}
-    else:
-        entry = load_config(given) if file == given else {"type": given} if isinstance(given, str) else given
-        options = dict(entry) if isinstance(entry, Mapping) else {}
-        name = options.pop("type", None)
-        if not isinstance(name, str):
-            raise ConfigError([Problem(file, "type", f"expected a name of a task, got {shown(name)}")])
-        kind = TASKS.configured(name, file, "type")
-    config = kind.Config.parse(options, file)
-    with plugin_errors(kind, "making the task"):
-        try:
-            return kind(world, config)
-        except (ValueError, UnknownNameError) as error:
-            raise ConfigError([Problem(file, "", str(error))]) from None
+
+    def __init__(self, ticks: int, observation_ticks: int, action_ticks: int, first: Any) -> None:
+        self._ticks, self._action_ticks = ticks, action_ticks
+        self._observed_at = (-observation_ticks) % ticks or ticks
+        """Tick of each action, counted from 1, after which an observation is made."""
+        self._observations = deque(deepcopy(first) for _ in range(observation_ticks // ticks))
+        self._actions: deque[tuple[int, Any]] = deque()
+        self._tick = 0
+
+    def run(self, action: Any, act: Callable[[Any], None], step: Callable[[], Any], observe: Callable[[], Any]) -> Any:
+        """Runs one action, and returns the observation that is due at its end.
+
+        Args:
+            action: The action.
+            act: Has an action begin to act.
+            step: Advances by a tick.
+            observe: Returns the present observation.
+        """
+        actions = self._actions
+        actions.append((self._tick + self._action_ticks, action))
+        for tick in range(1, self._ticks + 1):
+            if actions and actions[0][0] <= self._tick:
+                act(actions.popleft()[1])
+            step()
+            self._tick += 1
+            if tick == self._observed_at:
+                self._observations.append(observe())
+        return self._observations.popleft()
+
+
+def register(name: str, world: str, task: Any, **options: Any) -> None:
+    """Registers an environment, so that `gymnasium.make` and `gymnasium.make_vec` make it.
+
+    Args:
+        name: Its id, such as `rpbi/Reach-v0`.
+        world: Main YAML file of the world.
+        task: The task, see `WorldEnv`.
+        options: Further options of `WorldEnv`; those of `gymnasium.make` override them.
+    """
+    gymnasium.register(
+        name,
+        entry_point="rpbi.gym.env:WorldEnv",
+        vector_entry_point="rpbi.gym.vector.env:make_vector",
+        kwargs={"world": world, "task": task, **options},
+    )

@@ -29,7 +29,7 @@ LARGEST_FORCE_N, LARGEST_TORQUE_NM = 1e3, 1e2
 """Bounds of measured forces and torques; larger ones are clipped."""
 
 
-class Part(NamedTuple):
+class ObservationPart(NamedTuple):
     """An entry of an observation.
 
     Attributes:
@@ -52,7 +52,7 @@ class Parts:
         space: A dictionary of boxes, float32.
     """
 
-    def __init__(self, parts: Sequence[Part]) -> None:
+    def __init__(self, parts: Sequence[ObservationPart]) -> None:
         self._parts = tuple(parts)
         self._low = np.array([each for part in parts for each in part.low], np.float32)
         self._high = np.array([each for part in parts for each in part.high], np.float32)
@@ -76,7 +76,7 @@ class Parts:
         return {name: clipped[each] for name, each in self._slices.items()}
 
 
-def joint_part(world: World, robot: str) -> Part:
+def joint_part(world: World, robot: str) -> ObservationPart:
     """Returns positions [rad or m], then velocities [rad/s or m/s] of a robot's driven joints, within their limits."""
     joints = robot_of(world, robot).model.driven
     indices = [joint.index for joint in joints]
@@ -89,10 +89,10 @@ def joint_part(world: World, robot: str) -> Part:
 
     lower = [max(joint.lower, -FARTHEST) for joint in joints]
     upper = [min(joint.upper, FARTHEST) for joint in joints]
-    return Part(f"{robot}/joints", [*lower, *(-speed for speed in speeds)], [*upper, *speeds], read)
+    return ObservationPart(f"{robot}/joints", [*lower, *(-speed for speed in speeds)], [*upper, *speeds], read)
 
 
-def sensor_parts(world: World, robot: str) -> Iterator[Part]:
+def sensor_parts(world: World, robot: str) -> Iterator[ObservationPart]:
     """Yields force [N] and torque [N m] of each force-torque sensor of a robot; 0 before its first measurement."""
     high = (LARGEST_FORCE_N,) * 3 + (LARGEST_TORQUE_NM,) * 3
 
@@ -101,17 +101,17 @@ def sensor_parts(world: World, robot: str) -> Iterator[Part]:
         return (0.0,) * 6 if sample is None else (*sample.force, *sample.torque)
 
     for number, sensor in enumerate(robot_of(world, robot).force_torque_sensors):
-        yield Part(f"{sensor.name}/wrench", [-each for each in high], high, partial(read, number))
+        yield ObservationPart(f"{sensor.name}/wrench", [-each for each in high], high, partial(read, number))
 
 
-def pose_part(world: World, name: str, low: Sequence[float], high: Sequence[float]) -> Part:
+def pose_part(world: World, name: str, low: Sequence[float], high: Sequence[float]) -> ObservationPart:
     """Returns the pose of a body's base in the world: position [m] within bounds, then quaternion x, y, z, w."""
 
     def read() -> Sequence[float]:
         position, quat = world.bodies[name].base_pose()
         return (*position, *quat)
 
-    return Part(f"{name}/pose", (*low, *(-1.0,) * 4), (*high, *(1.0,) * 4), read)
+    return ObservationPart(f"{name}/pose", (*low, *(-1.0,) * 4), (*high, *(1.0,) * 4), read)
 
 
 def robot_of(world: World, name: str) -> Robot:

@@ -1,6 +1,6 @@
 """Environments of Gymnasium with the robots of the examples; importing this registers their names."""
 
-from rpbi.gym.registration import register
+from rpbi.gym.env import register
 
 FOLDER = "{rpbi_examples}/configs/gym"
 ENVIRONMENTS = {f"rpbi/{name.capitalize()}-v0": name for name in ("reach", "push", "lift", "wipe", "peg")}

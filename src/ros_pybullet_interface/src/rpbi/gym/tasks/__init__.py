@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 from custom_ros_tools.plugins.table import PluginTable
 
 if TYPE_CHECKING:
-    from rpbi.gym.task import Task
+    from rpbi.gym.task import WorldTask
 
-TASKS: PluginTable[Task] = PluginTable(
+TASKS: PluginTable[WorldTask] = PluginTable(
     "task",
-    "rpbi.gym.task:Task",
+    "rpbi.gym.task:WorldTask",
     {
-        "reach": "rpbi.gym.tasks.reach:Reach",
-        "push": "rpbi.gym.tasks.push:Push",
-        "lift": "rpbi.gym.tasks.lift:Lift",
-        "wipe": "rpbi.gym.tasks.wipe:Wipe",
-        "peg": "rpbi.gym.tasks.peg:Peg",
+        "reach": "rpbi.gym.tasks.reach:ReachTask",
+        "push": "rpbi.gym.tasks.push:PushTask",
+        "lift": "rpbi.gym.tasks.lift:LiftTask",
+        "wipe": "rpbi.gym.tasks.wipe:WipeTask",
+        "peg": "rpbi.gym.tasks.peg:PegTask",
     },
 )
 """All tasks; each is imported when it is looked up, since they need Gymnasium."""

@@ -9,12 +9,12 @@ from pydantic import Field
 from custom_ros_tools.schema import Name, Position, PositiveMetres, Text
 from robot_model.geometry import Vector
 from rpbi.gym.actions import HandAction
-from rpbi.gym.parts import Part, link_index, robot_of
-from rpbi.gym.task import Task, TaskConfig
+from rpbi.gym.parts import ObservationPart, link_index, robot_of
+from rpbi.gym.task import WorldTask, WorldTaskConfig
 from rpbi.world import World
 
 
-class HandConfig(TaskConfig):
+class HandConfig(WorldTaskConfig):
     """Options of tasks in which a hand moves in a box."""
 
     robot: Name = Field(description="The robot.")
@@ -24,7 +24,7 @@ class HandConfig(TaskConfig):
     step: PositiveMetres = Field(0.01, description="Largest way of an action along each axis.")
 
 
-class HandTask(Task):
+class HandTask(WorldTask):
     """A task in which the hand of a robot moves in the axes of the world, and keeps its orientation."""
 
     def __init__(self, world: World, config: HandConfig) -> None:
@@ -36,10 +36,10 @@ class HandTask(Task):
         config = self.config
         return HandAction(self.world, config.robot, config.link, axes, config.low, config.high, config.step)
 
-    def parts(self) -> Iterator[Part]:
+    def parts(self) -> Iterator[ObservationPart]:
         """Adds the position of the hand [m]."""
         yield from super().parts()
-        yield Part("hand", self.config.low, self.config.high, self.hand)
+        yield ObservationPart("hand", self.config.low, self.config.high, self.hand)
 
     def hand(self) -> Vector:
         """Returns where the hand is in the world [m]."""

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from custom_ros_tools.schema import ListOf, Name, PositiveMetres, Text
 from rpbi.gym.actions import ActionPart, GripperAction
-from rpbi.gym.parts import Part, pose_part
+from rpbi.gym.parts import ObservationPart, pose_part
 from rpbi.world import World
 
 from .hand import HandConfig, HandTask
@@ -25,7 +25,7 @@ class LiftConfig(HandConfig):
     height: PositiveMetres = Field(0.1, description="Height above its start at which the body counts as lifted.")
 
 
-class Lift(HandTask):
+class LiftTask(HandTask):
     """Grasps a body and lifts it."""
 
     Config = LiftConfig
@@ -40,7 +40,7 @@ class Lift(HandTask):
         config = self.config
         return [self.hand_action(), GripperAction(self.world, config.robot, config.fingers, config.finger_step)]
 
-    def parts(self) -> Iterator[Part]:
+    def parts(self) -> Iterator[ObservationPart]:
         """Adds the pose of the body."""
         yield from super().parts()
         yield pose_part(self.world, self.config.object, self.config.low, self.config.high)

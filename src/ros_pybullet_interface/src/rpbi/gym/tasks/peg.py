@@ -12,7 +12,7 @@ from custom_ros_tools.schema import ListOf, Name, NonNegativeMetres, Position, P
 from robot_model.geometry import Vector, minus, plus
 from rpbi.geometry import Pose
 from rpbi.gym.actions import ActionPart
-from rpbi.gym.parts import Part
+from rpbi.gym.parts import ObservationPart
 from rpbi.world import World
 
 from .hand import HandConfig, HandTask
@@ -28,7 +28,7 @@ class PegConfig(HandConfig):
     depth: PositiveMetres = Field(0.03, description="Depth of the peg's tip in the hole that counts as inserted.")
 
 
-class Peg(HandTask):
+class PegTask(HandTask):
     """Inserts a peg, the tip of which is the hand, into a hole."""
 
     Config = PegConfig
@@ -44,10 +44,10 @@ class Peg(HandTask):
         """Returns ways of the hand."""
         return [self.hand_action()]
 
-    def parts(self) -> Iterator[Part]:
+    def parts(self) -> Iterator[ObservationPart]:
         """Adds the way from the tip to the hole's opening [m]."""
         yield from super().parts()
-        yield Part("way", (-2.0,) * 3, (2.0,) * 3, lambda: minus(self.hole, self.hand()))
+        yield ObservationPart("way", (-2.0,) * 3, (2.0,) * 3, lambda: minus(self.hole, self.hand()))
 
     def reset(self, random: np.random.Generator) -> None:
         """Moves the hole."""

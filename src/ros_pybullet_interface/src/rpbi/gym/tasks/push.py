@@ -10,7 +10,7 @@ from pydantic import Field
 
 from custom_ros_tools.schema import Name, Position, PositiveMetres
 from rpbi.gym.actions import ActionPart
-from rpbi.gym.parts import Part, pose_part
+from rpbi.gym.parts import ObservationPart, pose_part
 from rpbi.world import World
 
 from .hand import HandConfig, HandTask
@@ -25,7 +25,7 @@ class PushConfig(HandConfig):
     tolerance: PositiveMetres = Field(0.03, description="Distance of the body from the goal that counts as reached.")
 
 
-class Push(HandTask):
+class PushTask(HandTask):
     """Pushes a body over the ground to a random goal."""
 
     Config = PushConfig
@@ -40,11 +40,11 @@ class Push(HandTask):
         """Returns ways of the hand in the plane; its height stays as it is."""
         return [self.hand_action("xy")]
 
-    def parts(self) -> Iterator[Part]:
+    def parts(self) -> Iterator[ObservationPart]:
         """Adds the pose of the body, and the goal [m]."""
         yield from super().parts()
         yield pose_part(self.world, self.config.object, self.config.low, self.config.high)
-        yield Part("goal", self.config.goal_low[:2], self.config.goal_high[:2], lambda: self.goal)
+        yield ObservationPart("goal", self.config.goal_low[:2], self.config.goal_high[:2], lambda: self.goal)
 
     def reset(self, random: np.random.Generator) -> None:
         """Draws a goal."""

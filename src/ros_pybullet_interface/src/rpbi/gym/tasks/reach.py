@@ -12,12 +12,12 @@ from pydantic import Field
 from custom_ros_tools.schema import Fraction, ListOf, Name, Position, PositiveMetres, Text, Unit
 from robot_model.geometry import Vector, minus
 from rpbi.gym.actions import ActionPart, JointAction
-from rpbi.gym.parts import Part, link_index, robot_of
-from rpbi.gym.task import Task, TaskConfig
+from rpbi.gym.parts import ObservationPart, link_index, robot_of
+from rpbi.gym.task import WorldTask, WorldTaskConfig
 from rpbi.world import World
 
 
-class ReachConfig(TaskConfig):
+class ReachConfig(WorldTaskConfig):
     """Options of the task `reach`."""
 
     robot: Name = Field(description="The robot.")
@@ -29,7 +29,7 @@ class ReachConfig(TaskConfig):
     tolerance: PositiveMetres = Field(0.03, description="Distance that counts as reached.")
 
 
-class Reach(Task):
+class ReachTask(WorldTask):
     """Moves joints until a link is at a random goal."""
 
     Config = ReachConfig
@@ -45,10 +45,10 @@ class Reach(Task):
         config = self.config
         return [JointAction(self.world, config.robot, config.joints, config.speed, self.period_s)]
 
-    def parts(self) -> Iterator[Part]:
+    def parts(self) -> Iterator[ObservationPart]:
         """Adds the way from the link to the goal [m]."""
         yield from super().parts()
-        yield Part("way", (-2.0,) * 3, (2.0,) * 3, lambda: minus(self.goal, self.position()))
+        yield ObservationPart("way", (-2.0,) * 3, (2.0,) * 3, lambda: minus(self.goal, self.position()))
 
     def reset(self, random: np.random.Generator) -> None:
         """Draws a goal."""

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from custom_ros_tools.schema import Name, NonNegative, Position, PositiveMetres, Unit
 from rpbi.gym.actions import ActionPart
-from rpbi.gym.parts import LARGEST_FORCE_N, Part
+from rpbi.gym.parts import LARGEST_FORCE_N, ObservationPart
 from rpbi.world import World
 
 from .hand import HandConfig, HandTask
@@ -30,7 +30,7 @@ class WipeConfig(HandConfig):
     force: Annotated[NonNegative, Unit("N")] = Field(1.0, description="Least normal force that wipes.")
 
 
-class Wipe(HandTask):
+class WipeTask(HandTask):
     """Wipes a rectangle of a surface: presses on it, and passes over all of its cells."""
 
     Config = WipeConfig
@@ -51,12 +51,12 @@ class Wipe(HandTask):
         """Returns ways of the hand."""
         return [self.hand_action()]
 
-    def parts(self) -> Iterator[Part]:
+    def parts(self) -> Iterator[ObservationPart]:
         """Adds the force on the surface [N], and 1 for each cell that was wiped."""
         yield from super().parts()
-        yield Part("force", (0.0,), (LARGEST_FORCE_N,), lambda: (self.force(),))
+        yield ObservationPart("force", (0.0,), (LARGEST_FORCE_N,), lambda: (self.force(),))
         count = len(self.cells)
-        yield Part("wiped", (0.0,) * count, (1.0,) * count, lambda: self.is_wiped.astype(float).tolist())
+        yield ObservationPart("wiped", (0.0,) * count, (1.0,) * count, lambda: self.is_wiped.astype(float).tolist())
 
     def reset(self, random: np.random.Generator) -> None:
         """Has all cells dirty."""
