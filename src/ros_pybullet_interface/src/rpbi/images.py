@@ -24,6 +24,8 @@ STREAMS = ("colour", "depth", "segmentation")
 class CameraImages:
     """Draws what the cameras of a world see, in the thread that asks, which is always the same one.
 
+    The renderer is opened when it is made, and draws the scene of the present tick, also while the world stands still.
+
     Args:
         world: The world, with one camera or more.
         use_egl: Whether to draw by EGL, which is faster where there is a graphics card. A driver that fails may end the
@@ -71,3 +73,10 @@ class CameraImages:
         """Disconnects from PyBullet and deletes the files that it made."""
         self._mirror.close()
         self._renderer.pb.disconnect()
+
+    def __enter__(self) -> CameraImages:
+        """Closes itself at the end of a `with` block."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

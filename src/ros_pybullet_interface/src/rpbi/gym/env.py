@@ -11,12 +11,16 @@ import gymnasium
 import pybullet
 from gymnasium import spaces
 
-from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.config import load_config
+from custom_ros_tools.errors import ConfigError, InterfaceError, Problem, UnknownNameError
+from custom_ros_tools.schema.type_names import shown
+from rpbi.plugins import plugin_errors
 from rpbi.world import World
 
 from .checks import CheckedTask
 from .randomization import Randomization, Randomizer
-from .task import WorldTask, make_task
+from .task import WorldTask
+from .tasks import TASKS
 from .views import Image, Views
 
 MODES = ("human", "rgb_array")
@@ -134,6 +138,32 @@ class WorldEnv(gymnasium.Env[Any, Any]):
 
     def _info(self) -> dict[str, Any]:
         return {"is_success": self._task.has_succeeded()}
+
+
+def make_task(world: World, given: str | Mapping[str, Any] | type[WorldTask]) -> WorldTask:
+    """Makes a task for a world, see `WorldEnv`.
+
+    Raises:
+        ConfigError: If its options are wrong or do not fit the world.
+        UnknownNameError: If there is no such task.
+        PluginError: If its class is of another package and fails.
+    """
+    file = given if isinstance(given, str) and given.endswith((".yaml", ".yml")) else "task"
+    if isinstance(given, type):
+        kind, options = given, {}
+    else:
+        entry = load_config(given) if file == given else {"type": given} if isinstance(given, str) else given
+        options = dict(entry) if isinstance(entry, Mapping) else {}
+        name = options.pop("type", None)
+        if not isinstance(name, str):
+            raise ConfigError([Problem(file, "type", f"expected a name of a task, got {shown(name)}")])
+        kind = TASKS.configured(name, file, "type")
+    config = kind.Config.parse(options, file)
+    with plugin_errors(kind, "making the task"):
+        try:
+            return kind(world, config)
+        except (ValueError, UnknownNameError) as error:
+            raise ConfigError([Problem(file, "", str(error))]) from None
 
 
 class DelayLine:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
@@ -11,17 +11,12 @@ import numpy as np
 from gymnasium import spaces
 from pydantic import Field
 
-from custom_ros_tools.config import load_config
-from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
 from custom_ros_tools.schema import ConfigModel
-from custom_ros_tools.schema.type_names import shown
 from rpbi.bodies.robots.robot import Robot
-from rpbi.plugins import plugin_errors
 from rpbi.world import World
 
 from .actions import ActionPart
 from .parts import ObservationPart, Parts, joint_part, sensor_parts
-from .tasks import TASKS
 
 
 class WorldTaskConfig(ConfigModel):
@@ -125,29 +120,3 @@ class WorldTask(ABC):
     def has_ended(self) -> bool:
         """Returns whether the episode is over: by default when the task is done."""
         return self.has_succeeded()
-
-
-def make_task(world: World, given: str | Mapping[str, Any] | type[WorldTask]) -> WorldTask:
-    """Makes a task for a world, see `WorldEnv`.
-
-    Raises:
-        ConfigError: If its options are wrong or do not fit the world.
-        UnknownNameError: If there is no such task.
-        PluginError: If its class is of another package and fails.
-    """
-    file = given if isinstance(given, str) and given.endswith((".yaml", ".yml")) else "task"
-    if isinstance(given, type):
-        kind, options = given, {}
-    else:
-        entry = load_config(given) if file == given else {"type": given} if isinstance(given, str) else given
-        options = dict(entry) if isinstance(entry, Mapping) else {}
-        name = options.pop("type", None)
-        if not isinstance(name, str):
-            raise ConfigError([Problem(file, "type", f"expected a name of a task, got {shown(name)}")])
-        kind = TASKS.configured(name, file, "type")
-    config = kind.Config.parse(options, file)
-    with plugin_errors(kind, "making the task"):
-        try:
-            return kind(world, config)
-        except (ValueError, UnknownNameError) as error:
-            raise ConfigError([Problem(file, "", str(error))]) from None
