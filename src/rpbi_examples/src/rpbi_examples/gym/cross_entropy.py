@@ -20,11 +20,20 @@ class CrossEntropy:
         elite: Share of those drawn that count as the best.
         floor: Smallest standard deviation.
         random: Source of the parameters.
+        rate: Share of the way to the best that mean and deviation are moved.
     """
 
-    def __init__(self, size: int, deviation: float, elite: float, floor: float, random: np.random.Generator) -> None:
+    def __init__(
+        self,
+        size: int,
+        deviation: float,
+        elite: float,
+        floor: float,
+        random: np.random.Generator,
+        rate: float = 0.7,
+    ) -> None:
         self.mean, self.deviation = np.zeros(size), np.full(size, deviation)
-        self._elite, self._floor, self._random = elite, floor, random
+        self._elite, self._floor, self._random, self._rate = elite, floor, random, rate
 
     def draw(self, count: int) -> Array:
         """Returns parameters, shape (count, size)."""
@@ -33,8 +42,9 @@ class CrossEntropy:
     def update(self, parameters: Array, scores: Array) -> None:
         """Moves the distribution to the parameters with the highest scores, shape (count,)."""
         best = parameters[np.argsort(scores)[-max(2, round(self._elite * len(scores))) :]]
-        self.mean = best.mean(axis=0)
-        self.deviation = np.maximum(best.std(axis=0), self._floor)
+        self.mean += self._rate * (best.mean(axis=0) - self.mean)
+        deviation = self.deviation + self._rate * (best.std(axis=0) - self.deviation)
+        self.deviation = np.maximum(deviation, self._floor)
 
 
 class LinearPolicies:
