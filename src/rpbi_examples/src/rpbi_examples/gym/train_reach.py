@@ -1,8 +1,8 @@
-"""Learns to push a box to random goals, from nothing, and draws the learning curve.
+"""Learns to reach random goals by seven joints, from nothing, and draws the learning curve.
 
-    .venv/bin/python -m rpbi_examples.gym.train_push
+    .venv/bin/python -m rpbi_examples.gym.train_reach
 
-It takes some minutes on two processors.
+It takes about a minute on two processors.
 """
 
 from __future__ import annotations
@@ -21,10 +21,12 @@ import rpbi_examples.gym  # registers the environments
 
 from .cross_entropy import Array, CrossEntropy, LinearPolicies, run_episodes
 
-ENVIRONMENT = next(name for name in rpbi_examples.gym.ENVIRONMENTS if "Push" in name)
-FEATURES, ACTIONS = 6, 2
+ENVIRONMENT = next(name for name in rpbi_examples.gym.ENVIRONMENTS if "Reach" in name)
+FEATURES, ACTIONS = 3, 7
 UNIT_M = 0.1
 """Distance that is a feature of 1."""
+TESTS = 32
+"""Number of test episodes, a multiple of the number of environments."""
 FIRST_TEST_SEED = 1_000_000
 """Seeds of episodes from which nothing is learned."""
 
@@ -46,10 +48,8 @@ class Progress(NamedTuple):
 
 
 def features(observations: dict[str, npt.NDArray[np.float32]]) -> Array:
-    """Returns ways from hand to box and from box to goal in the plane, turn of the box, and 1; shape (n, 6)."""
-    box, hand, goal = observations["box/pose"], observations["hand"][:, :2], observations["goal"]
-    ways = np.hstack([box[:, :2] - hand, goal - box[:, :2]]) / UNIT_M
-    return np.hstack([ways, 2.0 * box[:, 5:6], np.ones((len(box), 1))]).astype(np.float64)
+    """Returns the ways from the tool to the goals, shape (n, 3)."""
+    return observations["way"].astype(np.float64) / UNIT_M
 
 
 def train(envs: Any, generations: int, tries: int, seed: int) -> list[Progress]:
@@ -65,9 +65,8 @@ def train(envs: Any, generations: int, tries: int, seed: int) -> list[Progress]:
     method = CrossEntropy(FEATURES * ACTIONS, 1.0, 0.25, 0.05, np.random.default_rng(seed))
     found: list[Progress] = []
     for generation in range(generations + 1):
-        mean = LinearPolicies(np.tile(method.mean, (count, 1)), FEATURES)
-        test = run_episodes(envs, mean, features, range(FIRST_TEST_SEED, FIRST_TEST_SEED + count))
-        found.append(Progress(actions, test.returns.mean(), test.successes.mean(), time.monotonic() - begin_s))
+        test = _test(envs, method.mean)
+        found.append(Progress(actions, *test, time.monotonic() - begin_s))
         print(f"{generation:3d}: {_line(found[-1])}", flush=True)
         drawn, scores = method.draw(count), np.zeros(count)
         for each in range(tries):
@@ -77,6 +76,14 @@ def train(envs: Any, generations: int, tries: int, seed: int) -> list[Progress]:
             actions += episodes.actions
         method.update(drawn, scores)
     return found
+
+
+def _test(envs: Any, parameters: Array) -> tuple[float, float]:
+    """Returns mean return and success of a policy in test episodes."""
+    policies = LinearPolicies(np.tile(parameters, (envs.num_envs, 1)), FEATURES)
+    seeds = np.arange(FIRST_TEST_SEED, FIRST_TEST_SEED + TESTS).reshape(-1, envs.num_envs).tolist()
+    found = [run_episodes(envs, policies, features, each) for each in seeds]
+    return float(np.mean([each.returns for each in found])), float(np.mean([each.successes for each in found]))
 
 
 def _line(progress: Progress) -> str:
@@ -102,10 +109,10 @@ def draw(progress: list[Progress], file: Path) -> None:
 
 def main() -> None:
     """Learns, and draws the curve."""
-    parser = argparse.ArgumentParser(description="Learns to push a box to random goals.")
-    parser.add_argument("--generations", type=int, default=10)
-    parser.add_argument("--policies", type=int, default=32, help="policies of a generation")
-    parser.add_argument("--tries", type=int, default=4, help="episodes of each policy in a generation")
+    parser = argparse.ArgumentParser(description="Learns to reach random goals.")
+    parser.add_argument("--generations", type=int, default=25)
+    parser.add_argument("--policies", type=int, default=8, help="policies of a generation")
+    parser.add_argument("--tries", type=int, default=1, help="episodes of each policy in a generation")
     parser.add_argument("--workers", type=int, default=2, help="processes")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("gym_curve.png"), help="picture of the learning curve")
