@@ -15,7 +15,7 @@ from rpbi.world import World
 
 from .hand import HandConfig, HandTask
 
-TICKS = 5
+TICKS = 20
 """Ticks between two looks at the contacts; the hand moves by a fraction of a cell meanwhile."""
 
 
