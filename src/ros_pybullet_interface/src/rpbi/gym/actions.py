@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import sub
 from typing import Protocol
 
 import numpy as np
@@ -92,29 +93,29 @@ class HandAction:
         self._world, self._robot, self._slot = world, robot, f"{robot}/target"
         self._link = link_index(robot_of(world, robot), link)
         self._axes = ["xyz".index(axis) for axis in axes]
-        self._low, self._high, self._step = np.array(low), np.array(high), step
+        self._low, self._high, self._step = tuple(low), tuple(high), step
         self._start = Pose()
         self._moves = self._columns()
         driven = robot_of(world, robot).model.driven
         self._names = [joint.name for joint, moves in zip(driven, self._moves) if moves]
         self._lower, self._upper = np.array([(joint.lower, joint.upper) for joint in driven]).T
-        self.goal = np.zeros(3)
+        self.goal = [0.0, 0.0, 0.0]
         """Where the link is to be [m]."""
         self.size = len(axes)
 
     def reset(self) -> None:
         """Begins at the present pose."""
         self._start = robot_of(self._world, self._robot).link_pose(self._link)
-        self.goal = np.array(self._start.position)
+        self.goal = list(self._start.position)
 
     def apply(self, values: Values) -> None:
         """Moves the goal, and the joints towards it by the damped inverse of the Jacobian."""
-        self.goal[self._axes] += self._step * values
-        self.goal = np.minimum(np.maximum(self.goal, self._low), self._high)
+        for axis, value in zip(self._axes, values.tolist()):
+            self.goal[axis] = min(max(self.goal[axis] + self._step * value, self._low[axis]), self._high[axis])
         robot = robot_of(self._world, self._robot)
         pose = robot.link_pose(self._link)
         turn = rotation_between(pose.quat_xyzw, self._start.quat_xyzw)
-        error = np.array([*(self.goal - pose.position), *turn])
+        error = np.array([*map(sub, self.goal, pose.position), *turn])
         positions = [state[0] for state in robot.drive.measured().values()]
         jacobian = robot.robot_model.jacobian(robot.base_pose(), positions, self._link)
         change = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + DAMPING, error)

@@ -47,6 +47,11 @@ class CheckedTask:
         """Whether the task looks at every tick."""
         return type(self.task).after_tick is not WorldTask.after_tick
 
+    @property
+    def ends_otherwise(self) -> bool:
+        """Whether episodes end in other ways than with success."""
+        return type(self.task).has_ended is not WorldTask.has_ended
+
     def after_tick(self) -> None:
         """Has the task note what happened in a tick."""
         self._call("after_tick", self.task.after_tick)

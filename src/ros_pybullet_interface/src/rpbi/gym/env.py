@@ -94,7 +94,7 @@ class WorldEnv(gymnasium.Env[Any, Any]):
         self._task.reset(self.np_random)
         first = self._observe()
         self._line = DelayLine(self.task.config.action_ticks, observation_ticks, action_ticks, first)
-        return first, self._info()
+        return first, {"is_success": self._task.has_succeeded()}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Acts for some ticks.
@@ -104,10 +104,12 @@ class WorldEnv(gymnasium.Env[Any, Any]):
         """
         self._task.count += 1
         observation = self._line.run(action, self._task.act, self._step, self._observe)
-        reward, has_ended = self._task.reward(), self._task.has_ended()
+        reward, has_succeeded = self._task.reward(), self._task.has_succeeded()
+        has_ended = self._task.has_ended() if self._task.ends_otherwise else has_succeeded
+        is_last = self._task.count >= self.task.config.max_actions
         if self.render_mode == "human":
             self.render()
-        return observation, reward, has_ended, self._task.count >= self.task.config.max_actions, self._info()
+        return observation, reward, has_ended, is_last, {"is_success": has_succeeded}
 
     def render(self) -> Image | None:
         """Returns what the world's first camera sees, uint8, shape (height, width, 3).
@@ -135,9 +137,6 @@ class WorldEnv(gymnasium.Env[Any, Any]):
         if not isinstance(space, spaces.Dict):
             raise InterfaceError(f"images need observations that are dictionaries, got {space}")
         return spaces.Dict({**space.spaces, **self._views.spaces})
-
-    def _info(self) -> dict[str, Any]:
-        return {"is_success": self._task.has_succeeded()}
 
 
 def make_task(world: World, given: str | Mapping[str, Any] | type[WorldTask]) -> WorldTask:
@@ -181,6 +180,7 @@ class DelayLine:
 
     def __init__(self, ticks: int, observation_ticks: int, action_ticks: int, first: Any) -> None:
         self._ticks, self._action_ticks = ticks, action_ticks
+        self._has_delay = bool(observation_ticks or action_ticks)
         self._observed_at = (-observation_ticks) % ticks or ticks
         """Tick of each action, counted from 1, after which an observation is made."""
         self._observations = deque(deepcopy(first) for _ in range(observation_ticks // ticks))
@@ -196,6 +196,11 @@ class DelayLine:
             step: Advances by a tick.
             observe: Returns the present observation.
         """
+        if not self._has_delay:
+            act(action)
+            for _ in range(self._ticks):
+                step()
+            return observe()
         actions = self._actions
         actions.append((self._tick + self._action_ticks, action))
         for tick in range(1, self._ticks + 1):
