@@ -9,7 +9,7 @@ from rpbi_examples.gym.cross_entropy import CrossEntropy, LinearPolicies
 
 
 def test_it_finds_the_best():
-    best, method = np.array([0.5, -1.0, 2.0]), CrossEntropy(3, 1.0, 0.2, 1e-3, np.random.default_rng(0))
+    best, method = np.array([0.5, -1.0, 2.0]), CrossEntropy(3, 2.0, 0.2, 1e-3, np.random.default_rng(0))
     for _ in range(30):
         drawn = method.draw(40)
         method.update(drawn, -((drawn - best) ** 2).sum(axis=1))

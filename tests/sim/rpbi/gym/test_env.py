@@ -36,10 +36,11 @@ def episode(env: WorldEnv, seed: int | None) -> list:
     ids=["plain", "varied, with images"],
 )
 def test_gymnasium_finds_nothing_to_complain_about(tmp_path, options):
-    register("test/Swing-v0", write(tmp_path), "gym_world:Swing", **options)
+    name = f"test/Swing{len(options)}-v0"
+    register(name, write(tmp_path), "gym_world:Swing", **options)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        env = gymnasium.make("test/Swing-v0")
+        env = gymnasium.make(name)
         check_env(env.unwrapped, skip_render_check=True)  # which opens a window, see tests/gui
     assert env.unwrapped.world.bodies.keys() == {"floor", "box", "arm"}
     env.reset()
