@@ -22,6 +22,7 @@ SMALL_LINES = 80
 TABLES = (
     "rpbi.bodies",
     "rpbi.sensors",
+    "rpbi.gym.tasks",
     "ik_ros.solvers",
     "ik_ros.tasks",
     "operator_node.devices",
@@ -48,7 +49,7 @@ FLOORS = {
         {"bodies"},
         {"world"},
         {"world_warnings", "render", "replay", "reference", "follower"},
-        {"images", "ros"},
+        {"images", "gym", "ros"},
         {"ros_node"},
     )
 }

@@ -29,6 +29,7 @@ EXTRA_OF = {
     "fast_simplification": "html",
     "msgspec": "html",
     "zstandard": "html",
+    "gymnasium": "gym",
     "nbclient": "notebook",
     "nbformat": "notebook",
     "av": "data",

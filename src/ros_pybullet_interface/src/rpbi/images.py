@@ -9,7 +9,7 @@ from rpbi.render.camera import looking_at
 from rpbi.render.frame import Camera, Frame
 from rpbi.render.messages import Scene
 from rpbi.render.mirror import Mirror
-from rpbi.render.renderers import open_renderer
+from rpbi.render.renderers import Renderer, open_renderer
 
 from .world.load_log import LoadLogReader
 
@@ -24,6 +24,8 @@ STREAMS = ("colour", "depth", "segmentation")
 class CameraImages:
     """Draws what the cameras of a world see, in the thread that asks, which is always the same one.
 
+    The renderer is opened when it is made, and draws the scene of the present tick, also while the world stands still.
+
     Args:
         world: The world, with one camera or more.
         use_egl: Whether to draw by EGL, which is faster where there is a graphics card. A driver that fails may end the
@@ -35,6 +37,11 @@ class CameraImages:
         self._unread = LoadLogReader(world.log)
         self._renderer = open_renderer([Camera.of(sensor.config) for sensor in world.cameras.values()], use_egl)
         self._mirror = Mirror(self._renderer.pb)
+
+    @property
+    def renderer(self) -> Renderer:
+        """The renderer, whose client has a copy of the world."""
+        return self._renderer
 
     def frame(self, camera: str = "") -> Frame:
         """Returns what a camera sees now, which need not be a tick at which it is due.
@@ -66,3 +73,10 @@ class CameraImages:
         """Disconnects from PyBullet and deletes the files that it made."""
         self._mirror.close()
         self._renderer.pb.disconnect()
+
+    def __enter__(self) -> CameraImages:
+        """Closes itself at the end of a `with` block."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

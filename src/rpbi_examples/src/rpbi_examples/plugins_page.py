@@ -13,6 +13,7 @@ from operator_node.haptics.devices import HAPTIC_DEVICES
 from operator_node.mappings import MAPPINGS
 from rpbi.bodies import BODY_TYPES
 from rpbi.control.controllers import CONTROLLERS
+from rpbi.gym.tasks import TASKS as GYM_TASKS
 from rpbi.reference.markdown import WRITTEN_BY, code, page, table
 from rpbi.sensors import SENSOR_TYPES
 from safe_robot.checks import CHECKS
@@ -23,6 +24,7 @@ TABLES: tuple[tuple[str, PluginTable, str], ...] = (
     ("Controllers", CONTROLLERS, "[controllers](controllers.md)"),
     ("Solvers", SOLVERS, "[solvers](ik_solvers.md)"),
     ("Tasks", TASKS, "[tasks](ik_tasks.md)"),
+    ("Tasks of environments", GYM_TASKS, "[environments](gym.md)"),
     ("Devices", DEVICES, "[devices](devices.md)"),
     ("Haptic devices", HAPTIC_DEVICES, "[haptics](haptics.md)"),
     ("Mappings", MAPPINGS, "[teleoperation](teleoperation.md)"),

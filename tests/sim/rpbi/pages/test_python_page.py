@@ -7,9 +7,11 @@ import subprocess
 from pathlib import Path
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).resolve().parents[4]
 PYTHON = ROOT / ".venv/bin/python"
+VARIATION = ROOT / "src/rpbi_examples/configs/gym/push/random.yaml"
 BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
 
 
@@ -117,3 +119,21 @@ def test_the_page_on_many_worlds_shows_what_it_says(tmp_path):
     lines = [line for line in result.stdout.splitlines() if re.match(r"500 |True|[0-9a-f]{32}$", line)]
     assert lines[0] == "500 True" and lines[-1] == "True"
     assert len({*lines[1:3]}) == 2, "the forks go different ways"
+
+
+def test_the_page_on_environments_shows_what_it_says(tmp_path):
+    blocks = BLOCK.findall((ROOT / "docs/gym.md").read_text())
+    assert len(blocks) == 6
+    result = run("\nprint('-----')\n".join(blocks), tmp_path)
+    assert result.returncode == 0, result.stderr
+    first, _, own, varied, vector, mode = result.stdout.split("-----\n")
+    assert first.startswith("['box/pose', 'goal', 'hand', 'kuka_lwr/joints'] False\n(")
+    assert own.startswith("Box(-1.0, 1.0, (7,), float32) Box(0.0, 2.0, (1,), float32) [0.15")
+    masses = numbers(varied)
+    assert len({*masses, 0.8}) == 3 and all(0.7 * 0.8 <= mass <= 1.3 * 0.8 for mass in masses)
+    assert (vector, mode) == ("(4, 3) (4,)\n", "AutoresetMode.SAME_STEP\n")
+
+
+def test_the_random_variation_of_the_page_is_that_of_the_example():
+    (block,) = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs/gym.md").read_text(), re.DOTALL)
+    assert yaml.safe_load(block) == yaml.safe_load(VARIATION.read_text())

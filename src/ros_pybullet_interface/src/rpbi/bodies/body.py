@@ -98,6 +98,11 @@ class Body:
             raise ValueError(f"'{self.name}' is {'soft' if self.is_soft else 'only shown'}: no wrench acts on it")
         self.external_wrenches.set(self.external_wrenches.check(wrench))
 
+    @property
+    def links(self) -> tuple[str, ...]:
+        """Names of its links; empty for the root, none if it is soft."""
+        return () if self.is_soft else ("", *map(self.link_name, self.link_indices))
+
     def link_name(self, index: int) -> str:
         """Returns the name of a link by PyBullet's index, -1 for the base."""
         return self._link_names[index]
@@ -167,6 +172,14 @@ class Body:
 
     def halt(self, reason: str) -> None:
         """Breaks off what it was about to do over the coming ticks, since they may not come; most bodies do nothing."""
+
+    def restart(self) -> bool:
+        """Becomes what it was when it was made, after PyBullet has gone back to that state of motion.
+
+        Returns:
+            Whether that is possible; bodies of most types are made anew instead.
+        """
+        return False
 
     def pause(self, reason: str) -> None:
         """Breaks off what cannot wait until a world that is stopped runs again; as a rule that is all."""

@@ -6,6 +6,7 @@ from pydantic import BeforeValidator, Field
 
 from custom_ros_tools.schema import AlsoTakes, Expects, Fraction, Switch
 from rpbi.config.pybullet_models import CreateCollisionShape, CreateVisualShape, PybulletModel
+from rpbi.control.pose_follower import TrackedBase
 from rpbi.engine.client import Client
 from rpbi.meshes.decomposition import convex_parts
 
@@ -75,3 +76,7 @@ class ShapeObject(Body):
             multi_body["baseCollisionShapeIndex"] = pb.createCollisionShape(**arguments)
         super().__init__(pb, name, pb.createMultiBody(**multi_body))
         self.visual = visual
+
+    def restart(self) -> bool:
+        """Has nothing to do, unless it is tracked: no other state changes without a command."""
+        return not isinstance(self.pose_follower, TrackedBase)

@@ -17,6 +17,7 @@ class BaseStateSensor(Sensor):
     """
 
     sample_type = BaseStateSample
+    keeps_state = False
     ros_topic = "rpbi.ros.publishers.sample_topics:BASE_STATE"
 
     def __init__(self, body: SensedBody, hz: float, frame: str | None = None) -> None:

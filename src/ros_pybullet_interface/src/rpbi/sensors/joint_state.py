@@ -13,6 +13,7 @@ class JointStateSensor(Sensor):
     """Positions, velocities and motor efforts of all joints of a robot."""
 
     sample_type = JointStateSample
+    keeps_state = False
     ros_topic = "rpbi.ros.publishers.sample_topics:JOINT_STATES"
 
     def __init__(self, robot: SensedRobot, hz: float) -> None:

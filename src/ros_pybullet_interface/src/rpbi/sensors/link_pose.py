@@ -27,6 +27,7 @@ class LinkPoseSensor(Sensor):
     """
 
     sample_type = LinkPoseSample
+    keeps_state = False
     ros_topic = None
 
     def __init__(self, body: SensedBody, hz: float, links: bool = True, root_frame: str | None = None) -> None:

@@ -22,6 +22,7 @@ class RgbdSensor(Sensor):
 
     Config = RgbdSensorConfig
     sample_type = SceneSample
+    keeps_state = False
     ros_topic = None
 
     def __init__(

@@ -24,6 +24,8 @@ class Sensor(ABC):
     wanted: bool = True
     sample_type: ClassVar[type]
     """Type of its samples."""
+    keeps_state: ClassVar[bool] = True
+    """Whether its samples depend on more than the present state of the world, such as earlier ticks."""
     ros_topic: ClassVar[str | None] = ""
     """Place of its `Topic`, as `module:NAME`.
 

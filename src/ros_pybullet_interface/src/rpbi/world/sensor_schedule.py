@@ -93,6 +93,18 @@ class SensorSchedule:
         del self._scheduled[name]
         self._rebuild()
 
+    @property
+    def keep_state(self) -> bool:
+        """Whether one of the sensors keeps a state of its own."""
+        return any(each.sensor.keeps_state for each in self._all())
+
+    def restart(self) -> None:
+        """Has all due as in the beginning, at tick 0."""
+        for each in self._all():
+            each.read_tick = -1
+            each.schedule_from(self._clock.tick, self._clock.dt_ns)
+        self._rebuild()
+
     def clear(self) -> None:
         """Forgets all."""
         self._scheduled.clear()

@@ -39,6 +39,10 @@ class MobileRobot(Robot):
         """Returns `cmd_vel`, a Twist in the base frame, beside the inputs of every robot."""
         return {**super().inputs(), "cmd_vel": Input(PlanarVelocity.checked, self.planar_base.follow)}
 
+    def restart(self) -> bool:
+        """Is made anew, since its base follows velocities."""
+        return False
+
     def before_step(self, tick: int) -> None:
         """Drives the base, beside what every robot does."""
         super().before_step(tick)

@@ -173,6 +173,16 @@ class Robot(JointedBody):
         if self.drive.motion is not None and not self.drive.motion.can_wait:
             self.halt(reason)
 
+    def restart(self) -> bool:
+        """Holds its start position as in the beginning, unless it has controllers, a follower or filtered sensors."""
+        if self.controllers.names or self.follower is not None or self.force_torque_sensors:
+            return False
+        self.halt("the world was reset")
+        self.drive.drop_targets()
+        self.motors.switch(self.motors.mode)
+        self._springs.restart()
+        return True
+
     def switch_mode(self, mode: int) -> None:
         """Changes PyBullet's control mode, if it is another one; a motion that runs is ended."""
         if mode != self.motors.mode:

@@ -103,6 +103,7 @@ class ContactsSensor(Sensor):
     """All contact points of a body in the last tick."""
 
     sample_type = ContactsSample
+    keeps_state = False
     ros_topic = "rpbi.ros.publishers.sample_topics:CONTACTS"
 
     def __init__(self, body: SensedBody, hz: float) -> None:

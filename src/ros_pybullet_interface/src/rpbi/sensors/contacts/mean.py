@@ -14,6 +14,8 @@ from .contacts import ContactsSensor
 class MeanContactsSensor(ContactsSensor):
     """Contacts of a body as means over all ticks since the last sample, one for each two links that touched."""
 
+    keeps_state = True
+
     def __init__(self, body: SensedBody, hz: float) -> None:
         super().__init__(body, hz)
         self._ticks: list[ContactsSample] = []

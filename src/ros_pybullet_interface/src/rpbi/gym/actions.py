@@ -1,0 +1,157 @@
+"""Parts of actions: numbers in [-1, 1] that move joints or a hand within their limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from operator import sub
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from robot_model.geometry import rotation_between
+from rpbi.control.joint_command import JointCommand
+from rpbi.geometry import Pose
+from rpbi.world import World
+
+from .parts import link_index, robot_of
+
+Values = npt.NDArray[np.float64]
+
+DAMPING = 1e-4 * np.eye(6)
+"""Damping of the inverse of the Jacobian [m^2]: near singular configurations the hand is slower than asked."""
+
+
+class ActionPart(Protocol):
+    """Some of the numbers of an action.
+
+    Attributes:
+        size: Their count.
+    """
+
+    size: int
+
+    def reset(self) -> None:
+        """Begins where the world is, which was just reset."""
+
+    def apply(self, values: Values) -> None:
+        """Acts by numbers in [-1, 1]."""
+
+
+class JointAction:
+    """Moves joints of a robot: -1 to 1 is the share of their largest change in the time of an action.
+
+    Args:
+        joints: Their names; all that have motors by default.
+        speed: Largest speed, as a share of the velocity limits of the URDF.
+        period_s: Time of an action [s].
+    """
+
+    def __init__(self, world: World, robot: str, joints: Sequence[str], speed: float, period_s: float) -> None:
+        self._world, self._robot, self._slot = world, robot, f"{robot}/target"
+        driven = robot_of(world, robot).model.driven
+        chosen = [robot_of(world, robot).model[name] for name in joints] or driven
+        self._names = [joint.name for joint in chosen]
+        self._indices = [joint.index for joint in chosen]
+        self._lower, self._upper = np.array([(joint.lower, joint.upper) for joint in chosen]).T
+        self._steps = np.array([min(speed * joint.max_velocity, 1e3) * period_s for joint in chosen])
+        self._targets = np.zeros(len(chosen))
+        self.size = len(chosen)
+
+    def reset(self) -> None:
+        """Begins at the present positions."""
+        positions = robot_of(self._world, self._robot).joint_positions()
+        self._targets = np.array([positions[index] for index in self._indices])
+
+    def apply(self, values: Values) -> None:
+        """Moves the targets, which stay within the limits."""
+        self._targets = np.minimum(np.maximum(self._targets + values * self._steps, self._lower), self._upper)
+        self._world.put(self._slot, JointCommand(self._names, position=self._targets.tolist()))
+
+
+class HandAction:
+    """Moves a link of a robot in the axes of the world, and keeps its orientation.
+
+    Args:
+        link: The link; its URDF frame moves.
+        axes: Axes along which it is moved, such as `xy`; along the others it stays where it began.
+        low: Lower corner of the box that it stays in [m].
+        high: Upper corner [m].
+        step: Largest way of an action along each axis [m].
+    """
+
+    def __init__(
+        self,
+        world: World,
+        robot: str,
+        link: str,
+        axes: str,
+        low: Sequence[float],
+        high: Sequence[float],
+        step: float,
+    ) -> None:
+        self._world, self._robot, self._slot = world, robot, f"{robot}/target"
+        self._link = link_index(robot_of(world, robot), link)
+        self._axes = ["xyz".index(axis) for axis in axes]
+        self._low, self._high, self._step = tuple(low), tuple(high), step
+        self._start = Pose()
+        self._moves = self._columns()
+        driven = robot_of(world, robot).model.driven
+        self._names = [joint.name for joint, moves in zip(driven, self._moves) if moves]
+        self._lower, self._upper = np.array([(joint.lower, joint.upper) for joint in driven]).T
+        self.goal = [0.0, 0.0, 0.0]
+        """Where the link is to be [m]."""
+        self.size = len(axes)
+
+    def reset(self) -> None:
+        """Begins at the present pose."""
+        self._start = robot_of(self._world, self._robot).link_pose(self._link)
+        self.goal = list(self._start.position)
+
+    def apply(self, values: Values) -> None:
+        """Moves the goal, and the joints towards it by the damped inverse of the Jacobian."""
+        for axis, value in zip(self._axes, values.tolist()):
+            self.goal[axis] = min(max(self.goal[axis] + self._step * value, self._low[axis]), self._high[axis])
+        robot = robot_of(self._world, self._robot)
+        pose = robot.link_pose(self._link)
+        turn = rotation_between(pose.quat_xyzw, self._start.quat_xyzw)
+        error = np.array([*map(sub, self.goal, pose.position), *turn])
+        positions = [state[0] for state in robot.drive.measured().values()]
+        jacobian = robot.robot_model.jacobian(robot.base_pose(), positions, self._link)
+        change = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + DAMPING, error)
+        targets = np.minimum(np.maximum(positions + change, self._lower), self._upper)[self._moves]
+        self._world.put(self._slot, JointCommand(self._names, position=targets.tolist()))
+
+    def _columns(self) -> npt.NDArray[np.bool_]:
+        """Returns which driven joints move the link."""
+        robot = robot_of(self._world, self._robot)
+        positions = [state[0] for state in robot.drive.measured().values()]
+        moves: npt.NDArray[np.bool_] = robot.robot_model.jacobian(robot.base_pose(), positions, self._link).any(axis=0)
+        return moves
+
+
+class GripperAction:
+    """Opens (1) and closes (-1) fingers: a number is the velocity of all of them, as a share of their largest change.
+
+    Args:
+        joints: Joints of the fingers, whose targets are the same.
+        step: Largest change of an action [m or rad].
+    """
+
+    size = 1
+
+    def __init__(self, world: World, robot: str, joints: Sequence[str], step: float) -> None:
+        self._world, self._robot, self._slot = world, robot, f"{robot}/target"
+        self._names, self._step = tuple(joints), step
+        joint = robot_of(world, robot).model[joints[0]]
+        self._index, self._lower, self._upper = joint.index, joint.lower, joint.upper
+        self._target = 0.0
+
+    def reset(self) -> None:
+        """Begins at the present opening."""
+        self._target = robot_of(self._world, self._robot).joint_positions()[self._index]
+
+    def apply(self, values: Values) -> None:
+        """Moves the target, which stays within the limits."""
+        self._target = min(max(self._target + self._step * float(values[0]), self._lower), self._upper)
+        self._world.put(self._slot, JointCommand(self._names, position=(self._target,) * len(self._names)))

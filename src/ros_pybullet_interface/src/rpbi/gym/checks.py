@@ -1,0 +1,140 @@
+"""Calls of tasks, whose results are checked: a task of somebody else may fail, or return nonsense."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from rpbi.plugins import is_foreign, raise_plugin_error
+
+from .task import WorldTask
+
+
+class CheckedTask:
+    """A task; an error of one from another package becomes a PluginError that names class, method and action.
+
+    Args:
+        task: The task.
+
+    Raises:
+        PluginError: By all methods.
+    """
+
+    def __init__(self, task: WorldTask) -> None:
+        self.task = task
+        self.count = 0
+        """Number of actions in the episode."""
+        self._checks_space = is_foreign(task) or type(task).observation is not WorldTask.observation
+        self.action_space = self._call("action_space", lambda: _space(task.action_space))
+        self.observation_space = self._call("observation_space", lambda: _space(task.observation_space))
+
+    def reset(self, random: np.random.Generator) -> None:
+        """Prepares an episode."""
+        self.count = 0
+        self._call("reset", self.task.reset, random)
+
+    def act(self, action: Any) -> None:
+        """Acts in the world."""
+        self._call("act", self.task.act, action)
+
+    @property
+    def watches(self) -> bool:
+        """Whether the task looks at every tick."""
+        return type(self.task).after_tick is not WorldTask.after_tick
+
+    @property
+    def ends_otherwise(self) -> bool:
+        """Whether episodes end in other ways than with success."""
+        return type(self.task).has_ended is not WorldTask.has_ended
+
+    def after_tick(self) -> None:
+        """Has the task note what happened in a tick."""
+        self._call("after_tick", self.task.after_tick)
+
+    def observation(self) -> Any:
+        """Returns the present observation, which is in its space."""
+        return self._call("observation", self._observation)
+
+    def reward(self) -> float:
+        """Returns the reward, a finite number."""
+        return float(self._call("reward", self._reward))
+
+    def has_succeeded(self) -> bool:
+        """Returns whether the task is done."""
+        return bool(self._call("has_succeeded", self._truth, self.task.has_succeeded))
+
+    def has_ended(self) -> bool:
+        """Returns whether the episode is over."""
+        return bool(self._call("has_ended", self._truth, self.task.has_ended))
+
+    def _call(self, method: str, call: Callable[..., Any], *arguments: Any) -> Any:
+        try:
+            return call(*arguments)
+        except Exception as error:
+            raise_plugin_error(self.task, f"{method} at action {self.count}", error)
+            raise
+
+    def _reward(self) -> float:
+        value = self.task.reward()
+        if type(value) is not float:
+            value = _number(value)
+        if not math.isfinite(value):
+            raise ValueError(f"expected a finite number, got {value!r}")
+        return value
+
+    def _truth(self, ask: Callable[[], Any]) -> bool:
+        value = ask()
+        if not isinstance(value, (bool, np.bool_)):
+            raise TypeError(f"expected True or False, got {value!r}")
+        return bool(value)
+
+    def _observation(self) -> Any:
+        found = self.task.observation()
+        if self._checks_space:
+            for problem in problems(self.observation_space, found):
+                raise ValueError(problem)
+        return found
+
+
+def problems(space: spaces.Space[Any], value: Any, key: str = "observation") -> list[str]:
+    """Returns where a value is not in a space: key, expected and got."""
+    if isinstance(space, spaces.Dict):
+        if not isinstance(value, dict) or value.keys() != space.spaces.keys():
+            got = sorted(value) if isinstance(value, dict) else type(value).__name__
+            return [f"{key}: expected a dict of {sorted(space.spaces)}, got {got}"]
+        return [each for name, one in space.spaces.items() for each in problems(one, value[name], f"{key}['{name}']")]
+    if isinstance(space, spaces.Box):
+        return _box_problems(space, value, key)
+    return [] if space.contains(value) else [f"{key}: expected one of {space}, got {value!r}"]
+
+
+def _box_problems(space: spaces.Box, value: Any, key: str) -> list[str]:
+    if not isinstance(value, np.ndarray):
+        return [f"{key}: expected an array of shape {space.shape}, got {type(value).__name__}"]
+    if value.shape != space.shape:
+        return [f"{key}: expected the shape {space.shape}, got {value.shape}"]
+    if value.dtype != space.dtype:
+        return [f"{key}: expected {space.dtype}, got {value.dtype}"]
+    if not np.isfinite(value).all():
+        return [f"{key}: expected finite numbers, got {value}"]
+    if (value < space.low).any() or (value > space.high).any():
+        return [f"{key}: expected numbers within {space.low} and {space.high}, got {value}"]
+    return []
+
+
+def _space(space: Any) -> spaces.Space[Any]:
+    if not isinstance(space, spaces.Space):
+        raise TypeError(f"expected a space of gymnasium, got {space!r}")
+    return space
+
+
+def _number(value: Any) -> float:
+    is_scalar = isinstance(value, (numbers.Real, np.generic)) or (isinstance(value, np.ndarray) and not value.shape)
+    if not is_scalar:
+        raise TypeError(f"expected a number, got {value!r}")
+    return float(value)

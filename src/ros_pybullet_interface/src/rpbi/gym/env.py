@@ -1,0 +1,230 @@
+"""A world and a task as an environment of Gymnasium."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
+from typing import Any
+
+import gymnasium
+import pybullet
+from gymnasium import spaces
+
+from custom_ros_tools.config import load_config
+from custom_ros_tools.errors import ConfigError, InterfaceError, Problem, UnknownNameError
+from custom_ros_tools.schema.type_names import shown
+from rpbi.plugins import plugin_errors
+from rpbi.world import World
+
+from .checks import CheckedTask
+from .randomization import Randomization, Randomizer
+from .task import WorldTask
+from .tasks import TASKS
+from .views import Image, Views
+
+MODES = ("human", "rgb_array")
+
+
+class WorldEnv(gymnasium.Env[Any, Any]):
+    """A world in which a task is to be done.
+
+    Args:
+        world: Main YAML file of the world.
+        task: The task: a YAML file or a mapping with its `type` and options, a name of `TASKS`, `module:Class`, or a
+            class.
+        randomization: YAML file, or mapping, of what varies from episode to episode; nothing by default.
+        cameras: Cameras of the world whose images are in observations.
+        render_mode: `rgb_array` for images of the world's first camera, `human` for PyBullet's window.
+
+    Attributes:
+        world: The world; nothing of it is hidden.
+        task: The task.
+
+    Raises:
+        ConfigError: If a file is wrong; it lists all problems.
+        PluginError: If a task of another package fails.
+        UnknownNameError: If there is no such task or camera.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": list(MODES)}
+
+    def __init__(
+        self,
+        world: str,
+        task: str | Mapping[str, Any] | type[WorldTask],
+        *,
+        randomization: str | Mapping[str, Any] | None = None,
+        cameras: Sequence[str] = (),
+        render_mode: str | None = None,
+    ) -> None:
+        if render_mode not in (None, *MODES):
+            raise ValueError(f"render_mode: expected None or one of {', '.join(MODES)}, got '{render_mode}'")
+        varied = Randomization.read(randomization)
+        self.render_mode = render_mode
+        self.world = World.from_file(world, connection_mode=pybullet.GUI if render_mode == "human" else pybullet.DIRECT)
+        try:
+            self._task = CheckedTask(make_task(self.world, task))
+            self.task = self._task.task
+            self._views = Views(self.world, cameras, render_mode, self.task.period_s)
+            file = randomization if isinstance(randomization, str) else "randomization"
+            self._randomizer = Randomizer(self.world, varied, file)
+        except BaseException:
+            self.world.close()
+            raise
+        self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / self.task.period_s))}
+        self.action_space = self._task.action_space
+        self.observation_space = self._with_images(self._task.observation_space)
+        self._line = DelayLine(1, 0, 0, None)
+        self._step = self._watched_step if self._task.watches else self.world.step
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Starts an episode; the same seed and actions lead to the same observations, to the last bit.
+
+        Args:
+            seed: Seed of all that is random from now on; without one, what was random before goes on.
+            options: None are known.
+
+        Returns:
+            The observation, and `is_success`.
+        """
+        super().reset(seed=seed)
+        self.world.reset(rebuild=False)
+        observation_ticks, action_ticks = self._randomizer.apply(self.np_random)
+        self._task.reset(self.np_random)
+        first = self._observe()
+        self._line = DelayLine(self.task.config.action_ticks, observation_ticks, action_ticks, first)
+        return first, {"is_success": self._task.has_succeeded()}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Acts for some ticks.
+
+        Returns:
+            Observation, reward, whether the episode is over, whether all of its actions are used, and `is_success`.
+        """
+        self._task.count += 1
+        observation = self._line.run(action, self._task.act, self._step, self._observe)
+        reward, has_succeeded = self._task.reward(), self._task.has_succeeded()
+        has_ended = self._task.has_ended() if self._task.ends_otherwise else has_succeeded
+        is_last = self._task.count >= self.task.config.max_actions
+        if self.render_mode == "human":
+            self.render()
+        return observation, reward, has_ended, is_last, {"is_success": has_succeeded}
+
+    def render(self) -> Image | None:
+        """Returns what the world's first camera sees, uint8, shape (height, width, 3).
+
+        With PyBullet's window it waits until the time of an action has passed since the last call, and returns nothing.
+        """
+        return self._views.render()
+
+    def close(self) -> None:
+        """Ends the world."""
+        self._views.close()
+        self.world.close()
+
+    def _watched_step(self) -> None:
+        self.world.step()
+        self._task.after_tick()
+
+    def _observe(self) -> Any:
+        observation = self._task.observation()
+        return {**observation, **self._views.read()} if self._views.spaces else observation
+
+    def _with_images(self, space: spaces.Space[Any]) -> spaces.Space[Any]:
+        if not self._views.spaces:
+            return space
+        if not isinstance(space, spaces.Dict):
+            raise InterfaceError(f"images need observations that are dictionaries, got {space}")
+        return spaces.Dict({**space.spaces, **self._views.spaces})
+
+
+def make_task(world: World, given: str | Mapping[str, Any] | type[WorldTask]) -> WorldTask:
+    """Makes a task for a world, see `WorldEnv`.
+
+    Raises:
+        ConfigError: If its options are wrong or do not fit the world.
+        UnknownNameError: If there is no such task.
+        PluginError: If its class is of another package and fails.
+    """
+    file = given if isinstance(given, str) and given.endswith((".yaml", ".yml")) else "task"
+    if isinstance(given, type):
+        kind, options = given, {}
+    else:
+        entry = load_config(given) if file == given else {"type": given} if isinstance(given, str) else given
+        options = dict(entry) if isinstance(entry, Mapping) else {}
+        name = options.pop("type", None)
+        if not isinstance(name, str):
+            raise ConfigError([Problem(file, "type", f"expected a name of a task, got {shown(name)}")])
+        kind = TASKS.configured(name, file, "type")
+    config = kind.Config.parse(options, file)
+    with plugin_errors(kind, "making the task"):
+        try:
+            return kind(world, config)
+        except (ValueError, UnknownNameError) as error:
+            raise ConfigError([Problem(file, "", str(error))]) from None
+
+
+class DelayLine:
+    """Runs the ticks of an action, in which older actions begin to act and observations are made that are due later.
+
+    An observation that is d ticks old at the end of an action was made d ticks before that; those from before the
+    episode are the one of its start.
+
+    Args:
+        ticks: Ticks of an action.
+        observation_ticks: Age of observations.
+        action_ticks: Time until an action begins to act.
+        first: The observation of the start.
+    """
+
+    def __init__(self, ticks: int, observation_ticks: int, action_ticks: int, first: Any) -> None:
+        self._ticks, self._action_ticks = ticks, action_ticks
+        self._has_delay = bool(observation_ticks or action_ticks)
+        self._observed_at = (-observation_ticks) % ticks or ticks
+        """Tick of each action, counted from 1, after which an observation is made."""
+        self._observations = deque(deepcopy(first) for _ in range(observation_ticks // ticks))
+        self._actions: deque[tuple[int, Any]] = deque()
+        self._tick = 0
+
+    def run(self, action: Any, act: Callable[[Any], None], step: Callable[[], Any], observe: Callable[[], Any]) -> Any:
+        """Runs one action, and returns the observation that is due at its end.
+
+        Args:
+            action: The action.
+            act: Has an action begin to act.
+            step: Advances by a tick.
+            observe: Returns the present observation.
+        """
+        if not self._has_delay:
+            act(action)
+            for _ in range(self._ticks):
+                step()
+            return observe()
+        actions = self._actions
+        actions.append((self._tick + self._action_ticks, action))
+        for tick in range(1, self._ticks + 1):
+            if actions and actions[0][0] <= self._tick:
+                act(actions.popleft()[1])
+            step()
+            self._tick += 1
+            if tick == self._observed_at:
+                self._observations.append(observe())
+        return self._observations.popleft()
+
+
+def register(name: str, world: str, task: Any, **options: Any) -> None:
+    """Registers an environment, so that `gymnasium.make` and `gymnasium.make_vec` make it.
+
+    Args:
+        name: Its id, such as `rpbi/Reach-v0`.
+        world: Main YAML file of the world.
+        task: The task, see `WorldEnv`.
+        options: Further options of `WorldEnv`; those of `gymnasium.make` override them.
+    """
+    gymnasium.register(
+        name,
+        entry_point="rpbi.gym.env:WorldEnv",
+        vector_entry_point="rpbi.gym.vector.env:make_vector",
+        kwargs={"world": world, "task": task, **options},
+    )

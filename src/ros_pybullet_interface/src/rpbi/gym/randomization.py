@@ -1,0 +1,197 @@
+"""Random variation of a world from episode to episode, by YAML."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import AfterValidator, Field
+
+from custom_ros_tools.config import load_config
+from custom_ros_tools.errors import ConfigError, InterfaceError, Problem
+from custom_ros_tools.schema import ConfigModel, ListOf, Name, NonNegative, Text, Unit, Vec3
+from rpbi.geometry import Pose
+from rpbi.world import World
+
+from .parts import robot_of
+
+
+def _ordered(value: tuple[float, float]) -> tuple[float, float]:
+    if value[0] > value[1]:
+        raise ValueError(f"expected [lowest, highest], got {list(value)}")
+    return value
+
+
+Range = Annotated[tuple[float, float], Field(strict=False), AfterValidator(_ordered)]
+PositiveRange = Annotated[
+    tuple[NonNegative, NonNegative], Field(strict=False), AfterValidator(_ordered), Unit("lowest, highest")
+]
+
+
+class DynamicsVariation(ConfigModel):
+    """Dynamics of a body or a link; each number is uniform in its range, with the same value for an episode."""
+
+    object: Text = Field(description="`NAME`, or `NAME/LINK` for one of its links.")
+    mass: PositiveRange | None = Field(None, description="Mass [kg].")
+    mass_factor: PositiveRange | None = Field(None, description="Factor on the mass that it has at the start.")
+    lateralFriction: PositiveRange | None = Field(None, description="Coulomb friction coefficient.")
+    spinningFriction: PositiveRange | None = Field(None, description="Friction about the contact normal.")
+    rollingFriction: PositiveRange | None = Field(None, description="Friction against rolling.")
+    restitution: PositiveRange | None = Field(None, description="Bounciness.")
+    linearDamping: PositiveRange | None = Field(None, description="Share of linear velocity lost.")
+    angularDamping: PositiveRange | None = Field(None, description="Share of angular velocity lost.")
+    jointDamping: PositiveRange | None = Field(None, description="Damping of the joint.")
+
+    def apply(self, world: World, random: np.random.Generator) -> None:
+        """Changes the dynamics."""
+        ranges = {key: each for key in type(self).model_fields if key != "object" and (each := getattr(self, key))}
+        values = {key: float(random.uniform(*each)) for key, each in ranges.items()}
+        if "mass_factor" in values:
+            values["mass"] = values.pop("mass_factor") * world.dynamics(self.object).mass
+        world.change_dynamics(self.object, values)
+
+
+class PoseVariation(ConfigModel):
+    """Start pose of a body, by offsets from the configured one."""
+
+    object: Name = Field(description="The body.")
+    position: Annotated[Vec3, Unit("m")] = Field((0.0, 0.0, 0.0), description="Largest offsets along x, y, z.")
+    yaw: Annotated[NonNegative, Unit("rad")] = Field(0.0, description="Largest turn about the vertical, either way.")
+
+    def apply(self, world: World, random: np.random.Generator) -> None:
+        """Puts the body elsewhere."""
+        pose = world.bodies[self.object].base_pose()
+        offset, yaw = random.uniform(-1.0, 1.0, 3) * self.position, random.uniform(-self.yaw, self.yaw)
+        turn = Pose((0.0, 0.0, 0.0), (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)))
+        position = tuple((np.array(pose.position) + offset).tolist())
+        world.act(self.object, "teleport", Pose(position, (turn @ pose).quat_xyzw))
+
+
+class JointVariation(ConfigModel):
+    """Start positions of a robot's driven joints, by offsets from the configured ones, within their limits."""
+
+    robot: Name = Field(description="The robot.")
+    offset: Annotated[NonNegative, Unit("rad or m")] = Field(description="Largest offset, either way.")
+    joints: ListOf[Text] = Field((), description="The joints; all that have motors by default.")
+
+    def apply(self, world: World, random: np.random.Generator) -> None:
+        """Puts the joints elsewhere."""
+        body = robot_of(world, self.robot)
+        starts = body.joint_positions()
+        chosen = [body.model[name] for name in self.joints] or body.model.driven
+        offsets = random.uniform(-self.offset, self.offset, len(chosen)).tolist()
+        positions = {each.name: each.nearest_allowed(starts[each.index] + by) for each, by in zip(chosen, offsets)}
+        world.act(self.robot, "set_joint_state", positions)
+
+
+class CameraVariation(ConfigModel):
+    """Pose of a camera, by offsets from the one that it had at first."""
+
+    camera: Name = Field(description="The camera.")
+    position: Annotated[Vec3, Unit("m")] = Field((0.0, 0.0, 0.0), description="Largest offsets along x, y, z.")
+    rotation: Annotated[NonNegative, Unit("rad")] = Field(0.0, description="Largest turn, about a random axis.")
+
+    def drawn(self, pose: Pose, random: np.random.Generator) -> Pose:
+        """Returns a pose near another one."""
+        offset, angle = random.uniform(-1.0, 1.0, 3) * self.position, random.uniform(-self.rotation, self.rotation)
+        axis = random.normal(size=3)
+        axis *= math.sin(angle / 2) / np.linalg.norm(axis)
+        quat = tuple([*axis.tolist(), math.cos(angle / 2)])
+        position = tuple((np.array(pose.position) + offset).tolist())
+        return Pose(position, (Pose((0.0, 0.0, 0.0), quat) @ pose).quat_xyzw)
+
+
+class Delays(ConfigModel):
+    """Delays, rounded to ticks; each is uniform in its range, with the same value for an episode."""
+
+    observation_s: PositiveRange = Field((0.0, 0.0), description="Age of observations [s].")
+    action_s: PositiveRange = Field((0.0, 0.0), description="Time until an action begins to act [s].")
+
+    def drawn(self, random: np.random.Generator, tick_s: float) -> tuple[int, int]:
+        """Returns the delays of observations and actions [ticks]."""
+        observation_s, action_s = (random.uniform(*each) for each in (self.observation_s, self.action_s))
+        return round(observation_s / tick_s), round(action_s / tick_s)
+
+
+class Randomization(ConfigModel):
+    """All that varies from episode to episode."""
+
+    dynamics: ListOf[DynamicsVariation] = Field((), description="Dynamics of bodies and links.")
+    poses: ListOf[PoseVariation] = Field((), description="Start poses of bodies.")
+    joints: ListOf[JointVariation] = Field((), description="Start positions of joints.")
+    cameras: ListOf[CameraVariation] = Field((), description="Poses of cameras.")
+    delays: Delays = Field(Delays(), description="Delays of observations and actions.")
+
+    @classmethod
+    def read(cls, given: str | Mapping[str, Any] | None) -> Randomization:
+        """Returns the variation that a YAML file, or a mapping of its keys, describes; none without one.
+
+        Raises:
+            ConfigError: If something in it is wrong.
+        """
+        if given is None:
+            return cls()
+        if isinstance(given, str):
+            return cls.parse(load_config(given), given)
+        return cls.parse(given, "randomization")
+
+
+class Randomizer:
+    """Varies a world.
+
+    Args:
+        world: The world, before its first tick.
+        config: How.
+        file: Its file, for messages.
+
+    Raises:
+        ConfigError: If something that it names is not in the world, or it cannot be varied in that way.
+    """
+
+    def __init__(self, world: World, config: Randomization, file: str) -> None:
+        self._world, self._config = world, config
+        self._check(file)
+        self._camera_poses = {name: camera.pose for name, camera in world.cameras.items()}
+
+    def apply(self, random: np.random.Generator) -> tuple[int, int]:
+        """Varies the world, which was just reset.
+
+        Returns:
+            Delays of observations and of actions [ticks].
+        """
+        for each in self._in_world():
+            each.apply(self._world, random)
+        for camera in self._config.cameras:
+            pose = self._camera_poses[camera.camera]
+            assert pose is not None
+            self._world.put(f"{camera.camera}/pose", camera.drawn(pose, random))
+        return self._config.delays.drawn(random, self._world.clock.dt_s)
+
+    def _in_world(self) -> Sequence[DynamicsVariation | PoseVariation | JointVariation]:
+        return (*self._config.dynamics, *self._config.poses, *self._config.joints)
+
+    def _check(self, file: str) -> None:
+        """Tries each variation once, and then resets the world."""
+        problems = list(self._problems(file))
+        self._world.reset()
+        if problems:
+            raise ConfigError(problems)
+
+    def _problems(self, file: str) -> Iterator[Problem]:
+        random = np.random.default_rng(0)
+        for section in ("dynamics", "poses", "joints"):
+            for index, each in enumerate(getattr(self._config, section)):
+                key = "robot" if section == "joints" else "object"
+                try:
+                    name = getattr(each, key)
+                    self._world.dynamics(name)
+                    each.apply(self._world, random)
+                except (InterfaceError, ValueError, AttributeError) as error:
+                    yield Problem(file, f"{section}[{index}]", str(error))
+        for index, camera in enumerate(self._config.cameras):
+            known = [name for name, each in self._world.cameras.items() if each.pose is not None]
+            if camera.camera not in known:
+                message = f"expected one of {', '.join(known) or 'none with a pose'}; got '{camera.camera}'"
+                yield Problem(file, f"cameras[{index}].camera", message)

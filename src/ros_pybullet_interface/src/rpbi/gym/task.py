@@ -1,0 +1,122 @@
+"""Base class of tasks."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from gymnasium import spaces
+from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel
+from rpbi.bodies.robots.robot import Robot
+from rpbi.world import World
+
+from .actions import ActionPart
+from .parts import ObservationPart, Parts, joint_part, sensor_parts
+
+
+class WorldTaskConfig(ConfigModel):
+    """Keys of every task."""
+
+    action_ticks: Annotated[int, Field(ge=1, le=10_000)] = Field(40, description="Ticks of the world in an action.")
+    max_actions: Annotated[int, Field(ge=1, le=10_000_000)] = Field(
+        100, description="Actions after which an episode is truncated."
+    )
+
+
+class WorldTask(ABC):
+    """What is to be done in a world: observation, action, reward, end and success.
+
+    A new one is a subclass with a `Config`, `actions`, `reward` and `has_succeeded`; the rest may stay as it is. Bodies
+    are looked up in the world each time, since a reset may make them anew.
+
+    Args:
+        world: The world, before its first tick.
+        config: Its options.
+
+    Raises:
+        ConfigError, UnknownNameError or ValueError: If they do not fit the world.
+    """
+
+    Config: ClassVar[type[WorldTaskConfig]] = WorldTaskConfig
+
+    def __init__(self, world: World, config: Any) -> None:
+        self.world, self.config = world, config
+
+    @property
+    def period_s(self) -> float:
+        """Time of an action [s]."""
+        return float(self.config.action_ticks * self.world.clock.dt_s)
+
+    # --- Spaces
+
+    @abstractmethod
+    def actions(self) -> Sequence[ActionPart]:
+        """Returns the parts of an action, in their order."""
+
+    def parts(self) -> Iterator[ObservationPart]:
+        """Yields the parts of an observation: joints and force-torque sensors of all robots, and what others add."""
+        for name, body in self.world.bodies.items():
+            if isinstance(body, Robot):
+                yield joint_part(self.world, name)
+                yield from sensor_parts(self.world, name)
+
+    @cached_property
+    def _parts(self) -> Parts:
+        return Parts(list(self.parts()))
+
+    @cached_property
+    def _actions(self) -> Sequence[ActionPart]:
+        return self.actions()
+
+    @cached_property
+    def action_space(self) -> spaces.Space[Any]:
+        """Space of actions: by default numbers in [-1, 1], float32."""
+        return spaces.Box(-1.0, 1.0, (sum(part.size for part in self._actions),), np.float32)
+
+    @cached_property
+    def observation_space(self) -> spaces.Space[Any]:
+        """Space of observations, without images: by default that of the parts."""
+        return self._parts.space
+
+    # --- An episode
+
+    def reset(self, random: np.random.Generator) -> None:
+        """Prepares an episode in the world, which was just reset; calls this one last, after bodies were placed.
+
+        Args:
+            random: Source of all that is random.
+        """
+        for part in self._actions:
+            part.reset()
+
+    def act(self, action: Any) -> None:
+        """Acts in the world, by `world.put` and `world.act`, before the ticks of the action."""
+        values = np.minimum(np.maximum(np.asarray(action, np.float64), -1.0), 1.0)
+        begin = 0
+        for part in self._actions:
+            part.apply(values[begin : begin + part.size])
+            begin += part.size
+
+    def after_tick(self) -> None:  # noqa: B027 (most tasks need nothing)
+        """Notes what happened in a tick."""
+
+    def observation(self) -> Any:
+        """Returns the present observation."""
+        return self._parts.read()
+
+    @abstractmethod
+    def reward(self) -> float:
+        """Returns the reward of the last action, in the present state; it is asked once for each action."""
+
+    @abstractmethod
+    def has_succeeded(self) -> bool:
+        """Returns whether the task is done, from the state of the simulation, never from the reward."""
+
+    def has_ended(self) -> bool:
+        """Returns whether the episode is over: by default when the task is done."""
+        return self.has_succeeded()

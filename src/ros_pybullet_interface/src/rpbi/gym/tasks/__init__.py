@@ -1,0 +1,23 @@
+"""The tasks of environments; a new one is a class in a file of its own and a line here."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from custom_ros_tools.plugins.table import PluginTable
+
+if TYPE_CHECKING:
+    from rpbi.gym.task import WorldTask
+
+TASKS: PluginTable[WorldTask] = PluginTable(
+    "task",
+    "rpbi.gym.task:WorldTask",
+    {
+        "reach": "rpbi.gym.tasks.reach:ReachTask",
+        "push": "rpbi.gym.tasks.push:PushTask",
+        "lift": "rpbi.gym.tasks.lift:LiftTask",
+        "wipe": "rpbi.gym.tasks.wipe:WipeTask",
+        "peg": "rpbi.gym.tasks.peg:PegTask",
+    },
+)
+"""All tasks; each is imported when it is looked up, since they need Gymnasium."""

@@ -1,0 +1,56 @@
+"""The common part of tasks in which a hand moves in a box."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from pydantic import Field
+
+from custom_ros_tools.schema import Name, Position, PositiveMetres, Text
+from robot_model.geometry import Vector
+from rpbi.gym.actions import HandAction
+from rpbi.gym.parts import ObservationPart, link_index, robot_of
+from rpbi.gym.task import WorldTask, WorldTaskConfig
+from rpbi.world import World
+
+
+class HandConfig(WorldTaskConfig):
+    """Options of tasks in which a hand moves in a box."""
+
+    robot: Name = Field(description="The robot.")
+    link: Text = Field(description="Its hand: the link that actions move.")
+    low: Position = Field(description="Lower corner of the box that hand and objects stay in, in the world.")
+    high: Position = Field(description="Upper corner.")
+    step: PositiveMetres = Field(0.01, description="Largest way of an action along each axis.")
+
+
+class HandTask(WorldTask):
+    """A task in which the hand of a robot moves in the axes of the world, and keeps its orientation."""
+
+    def __init__(self, world: World, config: HandConfig) -> None:
+        super().__init__(world, config)
+        self._link = link_index(robot_of(world, config.robot), config.link)
+
+    def hand_action(self, axes: str = "xyz") -> HandAction:
+        """Returns ways of the hand along some axes."""
+        config = self.config
+        return HandAction(self.world, config.robot, config.link, axes, config.low, config.high, config.step)
+
+    def parts(self) -> Iterator[ObservationPart]:
+        """Adds the position of the hand [m]."""
+        yield from super().parts()
+        yield ObservationPart("hand", self.config.low, self.config.high, self.hand)
+
+    def hand(self) -> Vector:
+        """Returns where the hand is in the world [m]."""
+        return self.world.bodies[self.config.robot].link_pose(self._link).position
+
+    def position_of(self, name: str) -> Vector:
+        """Returns where the base of a body is [m]."""
+        return self.world.bodies[name].base_pose().position
+
+    def touches(self, name: str) -> Sequence[tuple[str, float]]:
+        """Returns the other body and the normal force [N] of each contact of a body in the last tick."""
+        body = self.world.bodies[name]
+        points = self.world.contacts.sample(body, self.world.clock.tick).points
+        return [(point.other_body, point.normal_force) for point in points]

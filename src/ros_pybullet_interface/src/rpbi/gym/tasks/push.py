@@ -1,0 +1,70 @@
+"""The task `push`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.schema import Name, Position, PositiveMetres
+from rpbi.gym.actions import ActionPart
+from rpbi.gym.parts import ObservationPart, pose_part
+from rpbi.world import World
+
+from .hand import HandConfig, HandTask
+
+
+class PushConfig(HandConfig):
+    """Options of the task `push`."""
+
+    object: Name = Field(description="The body that is pushed.")
+    goal_low: Position = Field(description="Lower corner of the box in which goals are drawn; its height is not used.")
+    goal_high: Position = Field(description="Upper corner.")
+    tolerance: PositiveMetres = Field(0.03, description="Distance of the body from the goal that counts as reached.")
+
+
+class PushTask(HandTask):
+    """Pushes a body over the ground to a random goal."""
+
+    Config = PushConfig
+
+    def __init__(self, world: World, config: PushConfig) -> None:
+        super().__init__(world, config)
+        world.dynamics(config.object)  # which has to be there
+        self.goal: tuple[float, float] = (0.0, 0.0)
+        """The goal of the body in the plane [m]."""
+
+    def actions(self) -> Sequence[ActionPart]:
+        """Returns ways of the hand in the plane; its height stays as it is."""
+        return [self.hand_action("xy")]
+
+    def parts(self) -> Iterator[ObservationPart]:
+        """Adds the pose of the body, and the goal [m]."""
+        yield from super().parts()
+        yield pose_part(self.world, self.config.object, self.config.low, self.config.high)
+        yield ObservationPart("goal", self.config.goal_low[:2], self.config.goal_high[:2], lambda: self.goal)
+
+    def reset(self, random: np.random.Generator) -> None:
+        """Draws a goal."""
+        x, y = random.uniform(self.config.goal_low[:2], self.config.goal_high[:2]).tolist()
+        self.goal = x, y
+        super().reset(random)
+
+    def distance(self) -> float:
+        """Returns the distance of the body from the goal in the plane [m]."""
+        return math.dist(self.goal, self.position_of(self.config.object)[:2])
+
+    def reward(self) -> float:
+        """Returns minus the distance of the body from the goal, and a tenth of that of the hand from the body [m]."""
+        return -self.distance() - 0.1 * math.dist(self.hand(), self.position_of(self.config.object))
+
+    def has_succeeded(self) -> bool:
+        """Returns whether the body is at the goal."""
+        return bool(self.distance() <= self.config.tolerance)
+
+    def has_ended(self) -> bool:
+        """Returns whether the body is at the goal, or out of the hand's box."""
+        position, low, high = self.position_of(self.config.object), self.config.low, self.config.high
+        return self.has_succeeded() or not all(low[i] <= position[i] <= high[i] for i in (0, 1))

@@ -1,0 +1,70 @@
+"""The task `reach`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.schema import Fraction, ListOf, Name, Position, PositiveMetres, Text, Unit
+from robot_model.geometry import Vector, minus
+from rpbi.gym.actions import ActionPart, JointAction
+from rpbi.gym.parts import ObservationPart, link_index, robot_of
+from rpbi.gym.task import WorldTask, WorldTaskConfig
+from rpbi.world import World
+
+
+class ReachConfig(WorldTaskConfig):
+    """Options of the task `reach`."""
+
+    robot: Name = Field(description="The robot.")
+    link: Text = Field(description="The link whose frame has to reach the goal.")
+    joints: ListOf[Text] = Field((), description="Joints that move; all that have motors by default.")
+    speed: Annotated[Fraction, Unit("share of the limits")] = Field(0.5, description="Largest speed of joints.")
+    goal_low: Position = Field(description="Lower corner of the box in which goals are drawn, in the world.")
+    goal_high: Position = Field(description="Upper corner.")
+    tolerance: PositiveMetres = Field(0.03, description="Distance that counts as reached.")
+
+
+class ReachTask(WorldTask):
+    """Moves joints until a link is at a random goal."""
+
+    Config = ReachConfig
+
+    def __init__(self, world: World, config: ReachConfig) -> None:
+        super().__init__(world, config)
+        self._link = link_index(robot_of(world, config.robot), config.link)
+        self.goal: Vector = (0.0, 0.0, 0.0)
+        """The goal in the world [m]."""
+
+    def actions(self) -> Sequence[ActionPart]:
+        """Returns changes of joint targets."""
+        config = self.config
+        return [JointAction(self.world, config.robot, config.joints, config.speed, self.period_s)]
+
+    def parts(self) -> Iterator[ObservationPart]:
+        """Adds the way from the link to the goal [m]."""
+        yield from super().parts()
+        yield ObservationPart("way", (-2.0,) * 3, (2.0,) * 3, lambda: minus(self.goal, self.position()))
+
+    def reset(self, random: np.random.Generator) -> None:
+        """Draws a goal."""
+        x, y, z = random.uniform(self.config.goal_low, self.config.goal_high).tolist()
+        self.goal = x, y, z
+        super().reset(random)
+
+    def position(self) -> Vector:
+        """Returns where the link is [m]."""
+        position: Vector = self.world.bodies[self.config.robot].link_pose(self._link).position
+        return position
+
+    def reward(self) -> float:
+        """Returns minus the distance to the goal [m]."""
+        return -math.dist(self.goal, self.position())
+
+    def has_succeeded(self) -> bool:
+        """Returns whether the link is at the goal."""
+        return bool(math.dist(self.goal, self.position()) <= self.config.tolerance)

@@ -1,0 +1,83 @@
+"""The task `wipe`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.schema import Name, NonNegative, Position, PositiveMetres, Unit
+from rpbi.gym.actions import ActionPart
+from rpbi.gym.parts import LARGEST_FORCE_N, ObservationPart
+from rpbi.world import World
+
+from .hand import HandConfig, HandTask
+
+TICKS = 20
+"""Ticks between two looks at the contacts; the hand moves by a fraction of a cell meanwhile."""
+
+
+class WipeConfig(HandConfig):
+    """Options of the task `wipe`."""
+
+    surface: Name = Field(description="The body that is wiped.")
+    spot_low: Position = Field(description="Lower corner of the rectangle that is to be wiped; its height is not used.")
+    spot_high: Position = Field(description="Upper corner.")
+    cells: Annotated[int, Field(ge=1, le=100)] = Field(4, description="Cells of the rectangle along each of its sides.")
+    radius: PositiveMetres = Field(0.03, description="Distance of a cell's middle from the hand that is wiped.")
+    force: Annotated[NonNegative, Unit("N")] = Field(1.0, description="Least normal force that wipes.")
+
+
+class WipeTask(HandTask):
+    """Wipes a rectangle of a surface: presses on it, and passes over all of its cells."""
+
+    Config = WipeConfig
+
+    def __init__(self, world: World, config: WipeConfig) -> None:
+        super().__init__(world, config)
+        world.dynamics(config.surface)  # which has to be there
+        low, high = np.array(config.spot_low[:2]), np.array(config.spot_high[:2])
+        steps = (np.arange(config.cells) + 0.5) / config.cells
+        x, y = np.meshgrid(*(low + np.outer(steps, high - low)).T)
+        self.cells = np.stack([x.ravel(), y.ravel()], axis=1)
+        """Middles of the cells in the plane [m], shape (n, 2)."""
+        self.is_wiped = np.zeros(len(self.cells), bool)
+        """Whether each cell was wiped in this episode."""
+        self._rewarded = 0.0
+
+    def actions(self) -> Sequence[ActionPart]:
+        """Returns ways of the hand."""
+        return [self.hand_action()]
+
+    def parts(self) -> Iterator[ObservationPart]:
+        """Adds the force on the surface [N], and 1 for each cell that was wiped."""
+        yield from super().parts()
+        yield ObservationPart("force", (0.0,), (LARGEST_FORCE_N,), lambda: (self.force(),))
+        count = len(self.cells)
+        yield ObservationPart("wiped", (0.0,) * count, (1.0,) * count, lambda: self.is_wiped.astype(float).tolist())
+
+    def reset(self, random: np.random.Generator) -> None:
+        """Has all cells dirty."""
+        self.is_wiped[:] = False
+        self._rewarded = 0.0
+        super().reset(random)
+
+    def force(self) -> float:
+        """Returns the normal force of the robot on the surface [N] in the last tick."""
+        return sum(force for other, force in self.touches(self.config.surface) if other == self.config.robot)
+
+    def after_tick(self) -> None:
+        """Wipes the cells around the hand, if it presses."""
+        if self.world.clock.tick % TICKS == 0 and self.force() >= self.config.force:
+            self.is_wiped |= np.linalg.norm(self.cells - self.hand()[:2], axis=1) <= self.config.radius
+
+    def reward(self) -> float:
+        """Returns the share of all cells that were wiped in the last action."""
+        before, self._rewarded = self._rewarded, float(self.is_wiped.mean())
+        return self._rewarded - before
+
+    def has_succeeded(self) -> bool:
+        """Returns whether all cells were wiped."""
+        return bool(self.is_wiped.all())

@@ -1,0 +1,258 @@
+"""Environments in worker processes, as one vector environment of Gymnasium."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from functools import partial
+from multiprocessing.connection import Connection, Pipe
+from multiprocessing.reduction import send_handle
+from typing import Any
+
+import cloudpickle
+import numpy as np
+import numpy.typing as npt
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space, iterate
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.processes.child import start_child
+from rpbi.gym.env import WorldEnv
+
+from .arrays import SharedArrays
+
+ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+"""Variables of workers, so that their libraries start no threads, which would contend for the processors."""
+Info = dict[str, Any]
+Result = tuple[Any, npt.NDArray[np.float64], npt.NDArray[np.bool_], npt.NDArray[np.bool_], Info]
+
+
+class WorldVectorEnv(VectorEnv[Any, Any, Any]):
+    """Environments in processes of their own, several in each; a step of all is one request to each process.
+
+    Processes are started anew, not forked, so scripts need no `if __name__ == "__main__"`, and this process may have
+    threads. Observations come by shared memory.
+
+    Args:
+        makers: A function for each environment, which makes it; those of a script may be lambdas.
+        workers: Number of processes; by default one for each processor, at most one for each environment.
+        autoreset_mode: When an environment whose episode has ended is reset, see docs/gym.md.
+
+    Attributes:
+        workers: Number of processes.
+
+    Raises:
+        InterfaceError: If spaces differ, observations are no boxes, or an environment cannot be made.
+    """
+
+    def __init__(
+        self,
+        makers: Sequence[Callable[[], Any]],
+        workers: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+    ) -> None:
+        if not makers or (workers is not None and workers < 1):
+            raise ValueError(f"expected an environment and a worker at least, got {len(makers)} and {workers}")
+        self.num_envs = len(makers)
+        self.workers = min(workers or os.cpu_count() or 1, self.num_envs)
+        self._mode = AutoresetMode(autoreset_mode)
+        self._shared: SharedArrays | None = None
+        self._parts = [slice(*ends) for ends in _parts(self.num_envs, self.workers)]
+        self._processes = [_Process(index) for index in range(self.workers)]
+        try:
+            self._ask_all("make", [(list(makers[part]), part.start, self._mode) for part in self._parts])
+            self._set_spaces(self._ask_all("spaces"))
+            self._share()
+        except BaseException:
+            self.close_extras()
+            raise
+
+    def reset(self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None) -> tuple[Any, Info]:
+        """Starts episodes.
+
+        Args:
+            seed: A seed for each environment; of a single number, each has it plus its index.
+            options: `reset_mask`, an array of a bool for each environment, resets only some; others go to each.
+
+        Returns:
+            Observations of all, and information of those that were reset.
+
+        Raises:
+            ValueError: If there are more or fewer seeds than environments, or the mask does not fit.
+        """
+        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, (int, np.integer)) else seed
+        seeds = [None] * self.num_envs if seeds is None else list(seeds)
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"expected {self.num_envs} seeds, got {len(seeds)}")
+        rest = dict(options or {})
+        mask = self._mask(rest.pop("reset_mask", None))
+        given = rest if options is not None else None
+        answers = self._ask_all("reset", [(seeds[part], mask[part].tolist(), given) for part in self._parts])
+        infos: Info = {}
+        for index, info in enumerate(each for answer in answers for each in answer):
+            if info is not None:
+                infos = self._add_info(infos, info, index)
+        assert self._shared is not None
+        return self._shared.read(), infos
+
+    def step(self, actions: Any) -> Result:
+        """Takes a step in all environments.
+
+        Args:
+            actions: Shape (n, ...).
+
+        Returns:
+            Observations, rewards, ends, truncations, and information.
+
+        Raises:
+            PluginError: If a task of another package fails.
+            InterfaceError: If a process has ended.
+        """
+        each = list(iterate(self.action_space, actions))
+        answers = self._ask_all("step", [(each[part],) for part in self._parts])
+        infos: Info = {}
+        for index, (info, final) in enumerate(one for answer in answers for one in answer):
+            if final is not None:
+                infos = self._add_info(infos, final, index)
+            infos = self._add_info(infos, info, index)
+        shared = self._shared
+        assert shared is not None
+        ends = shared.terminations.copy(), shared.truncations.copy()
+        return shared.read(), shared.rewards.copy(), *ends, infos
+
+    def render(self) -> tuple[Any, ...]:
+        """Returns an image of each environment."""
+        return self.call("render")
+
+    def call(self, name: str, *arguments: Any, **options: Any) -> tuple[Any, ...]:
+        """Returns an attribute of each environment, or what it returns if it can be called."""
+        answers = self._ask_all("call", [(name, arguments, options)] * self.workers)
+        return tuple(each for answer in answers for each in answer)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Returns an attribute of each environment."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Sets an attribute of each environment, to a value for each in a list, or to one for all."""
+        each = list(values) if isinstance(values, (list, tuple)) else [values] * self.num_envs
+        if len(each) != self.num_envs:
+            raise ValueError(f"expected {self.num_envs} values, got {len(each)}")
+        self._ask_all("set", [(name, each[part]) for part in self._parts])
+
+    def close_extras(self, **_: Any) -> None:
+        """Ends the processes."""
+        for process in self._processes:
+            process.close()
+        if self._shared is not None:
+            self._shared.close()
+            self._shared = None
+
+    def _set_spaces(self, answers: Sequence[Any]) -> None:
+        spaces = [each for answer in answers for each in answer[0]]
+        for index, found in enumerate(spaces):
+            if found != spaces[0]:
+                raise InterfaceError(f"environment {index}: expected the spaces {spaces[0]}, got {found}")
+        self.single_observation_space, self.single_action_space = spaces[0]
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.metadata = {**answers[0][1], "autoreset_mode": self._mode}
+        self.render_mode = answers[0][2]
+
+    def _share(self) -> None:
+        self._shared = SharedArrays(self.single_observation_space, self.num_envs)
+        for process in self._processes:
+            process.send("share", self.single_observation_space, self.num_envs)
+            process.send_file(self._shared.file)
+            process.receive()
+
+    def _mask(self, given: Any) -> npt.NDArray[np.bool_]:
+        if given is None:
+            return np.ones(self.num_envs, np.bool_)
+        mask = np.asarray(given)
+        if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
+            raise ValueError(f"reset_mask: expected {self.num_envs} bools, one true at least, got {given!r}")
+        return mask
+
+    def _ask_all(self, name: str, arguments: Sequence[tuple[Any, ...]] | None = None) -> list[Any]:
+        """Returns the answers of all processes, which work at the same time; raises the first error."""
+        for process, each in zip(self._processes, arguments or [()] * self.workers):
+            process.send(name, *each)
+        answers = [process.answer() for process in self._processes]
+        for is_good, answer in answers:
+            if not is_good:
+                raise answer
+        return [answer for _, answer in answers]
+
+
+class _Process:
+    """A worker process, from this side."""
+
+    def __init__(self, index: int) -> None:
+        self._index = index
+        ours, theirs = Pipe()
+        with theirs:
+            self._process = start_child(
+                [sys.executable, "-P", "-m", "rpbi.gym.vector.worker", str(theirs.fileno())],
+                signal.SIGKILL,
+                pass_fds=[theirs.fileno()],
+                env={**os.environ, **ENVIRONMENT, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+            )
+        self._connection: Connection = ours
+
+    def send(self, name: str, *arguments: Any) -> None:
+        """Sends a request."""
+        text = cloudpickle.dumps((name, arguments))
+        try:
+            self._connection.send_bytes(text)
+        except OSError:
+            pass  # `answer` reports that it has ended
+
+    def send_file(self, file: int) -> None:
+        """Sends a file descriptor."""
+        send_handle(self._connection, file, self._process.pid)
+        os.set_blocking(self._connection.fileno(), True)  # a default time-out of sockets has changed it
+
+    def answer(self) -> tuple[bool, Any]:
+        """Returns whether a request succeeded, and its result or error."""
+        try:
+            is_good, answer = pickle.loads(self._connection.recv_bytes())
+        except (EOFError, OSError) as error:
+            why = str(error) or "it was killed, or its memory has run out"
+            return False, InterfaceError(f"worker {self._index} has ended: {why}")
+        return is_good, answer
+
+    def receive(self) -> Any:
+        """Returns the result of a request, or raises its error."""
+        is_good, answer = self.answer()
+        if not is_good:
+            raise answer
+        return answer
+
+    def close(self) -> None:
+        """Ends the process."""
+        self._connection.close()
+        self._process.kill()
+        self._process.wait()
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+
+
+def _parts(count: int, workers: int) -> list[tuple[int, int]]:
+    """Returns the first and the last environment plus 1 of each worker, as evenly as possible."""
+    ends = [count * each // workers for each in range(workers + 1)]
+    return list(zip(ends, ends[1:]))
+
+
+def make_vector(
+    num_envs: int = 1,
+    *,
+    workers: int | None = None,
+    autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+    **options: Any,
+) -> WorldVectorEnv:
+    """Makes a vector of equal environments, for `gymnasium.make_vec`; the options are those of `WorldEnv`."""
+    return WorldVectorEnv([partial(WorldEnv, **options)] * num_envs, workers, autoreset_mode)

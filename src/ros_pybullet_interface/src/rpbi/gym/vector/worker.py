@@ -1,0 +1,190 @@
+"""Entry point of a process with environments: `python -m rpbi.gym.vector.worker FD`."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from multiprocessing.connection import Connection
+from multiprocessing.reduction import recv_handle
+from typing import Any, NamedTuple
+
+import cloudpickle
+import gymnasium
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode
+
+from custom_ros_tools.errors import InterfaceError
+
+from .arrays import SharedArrays
+
+Info = dict[str, Any]
+
+
+class StepResult(NamedTuple):
+    """What a step led to.
+
+    Attributes:
+        observation: The observation that the next action is for.
+        reward: The reward.
+        terminated: Whether the episode is over.
+        truncated: Whether it was truncated.
+        info: Further information.
+        final: With resets in the same step, the last observation and information of the episode that has ended.
+    """
+
+    observation: Any
+    reward: float
+    terminated: bool
+    truncated: bool
+    info: dict[str, Any]
+    final: dict[str, Any] | None = None
+
+
+class Slot:
+    """An environment that is reset when its episode has ended, by one of Gymnasium's three modes.
+
+    Args:
+        env: The environment.
+        mode: `NEXT_STEP` resets it instead of the next step, whose action is ignored; `SAME_STEP` in the step that ends
+            the episode; `DISABLED` leaves it to the caller.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any], mode: AutoresetMode) -> None:
+        self.env, self._mode = env, mode
+        self._has_ended = False
+
+    def reset(self, seed: int | None, options: dict[str, Any] | None) -> tuple[Any, dict[str, Any]]:
+        """Starts an episode."""
+        self._has_ended = False
+        return self.env.reset(seed=seed, options=options)
+
+    def step(self, action: Any) -> StepResult:
+        """Takes a step, or resets.
+
+        Raises:
+            ValueError: If the episode has ended and nobody has reset it.
+        """
+        if self._has_ended and self._mode is AutoresetMode.DISABLED:
+            raise ValueError("the episode has ended: expected reset(options={'reset_mask': ...}) before the next step")
+        if self._has_ended and self._mode is AutoresetMode.NEXT_STEP:
+            observation, info = self.reset(None, None)
+            return StepResult(observation, 0.0, False, False, info)
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        self._has_ended = terminated or truncated
+        if not self._has_ended or self._mode is not AutoresetMode.SAME_STEP:
+            return StepResult(observation, float(reward), terminated, truncated, info)
+        final = {"final_obs": observation, "final_info": info}
+        observation, info = self.reset(None, None)
+        self._has_ended = False
+        return StepResult(observation, float(reward), terminated, truncated, info, final)
+
+
+class Worker:
+    """The environments of this process, which are some of n.
+
+    Args:
+        makers: Functions that make them.
+        first: Index of the first one among all.
+        mode: When they are reset.
+    """
+
+    def __init__(self, makers: Sequence[Callable[[], Any]], first: int, mode: AutoresetMode) -> None:
+        self._slots = [Slot(make(), mode) for make in makers]
+        self._first = first
+        self._shared: SharedArrays | None = None
+
+    def spaces(self) -> tuple[list[tuple[spaces.Space[Any], spaces.Space[Any]]], dict[str, Any], str | None]:
+        """Returns the spaces of observations and actions of each, metadata, and the way of rendering."""
+        env = self._slots[0].env
+        each = [(slot.env.observation_space, slot.env.action_space) for slot in self._slots]
+        return each, dict(env.metadata), env.render_mode
+
+    def share(self, shared: SharedArrays) -> None:
+        """Has results written to shared memory from now on."""
+        self._shared = shared
+
+    def reset(self, seeds: Sequence[int | None], mask: Sequence[bool], options: Info | None) -> list[Info | None]:
+        """Starts episodes where the mask is true, and returns the information of these."""
+        assert self._shared is not None
+        infos: list[Info | None] = []
+        for index, (slot, seed, is_reset) in enumerate(zip(self._slots, seeds, mask), self._first):
+            info = None
+            if is_reset:
+                observation, info = slot.reset(seed, options)
+                self._shared.write(index, observation)
+                self._shared.terminations[index] = self._shared.truncations[index] = False
+            infos.append(info)
+        return infos
+
+    def step(self, actions: Sequence[Any]) -> list[tuple[Info, Info | None]]:
+        """Takes a step with each, and returns information, with that of an episode that has ended."""
+        shared = self._shared
+        assert shared is not None
+        infos = []
+        for index, (slot, action) in enumerate(zip(self._slots, actions), self._first):
+            found = slot.step(action)
+            shared.write(index, found.observation)
+            shared.rewards[index] = found.reward
+            shared.terminations[index], shared.truncations[index] = found.terminated, found.truncated
+            infos.append((found.info, found.final))
+        return infos
+
+    def call(self, name: str, arguments: tuple[Any, ...], options: Mapping[str, Any]) -> list[Any]:
+        """Returns an attribute of each, or what it returns if it can be called."""
+        found = [slot.env.get_wrapper_attr(name) for slot in self._slots]
+        return [each(*arguments, **options) if callable(each) else each for each in found]
+
+    def set(self, name: str, values: Sequence[Any]) -> None:
+        """Sets an attribute of each."""
+        for slot, value in zip(self._slots, values):
+            slot.env.set_wrapper_attr(name, value)
+
+    def close(self) -> None:
+        """Closes all."""
+        for slot in self._slots:
+            slot.env.close()
+
+
+def main() -> None:
+    """Answers requests until the other end is closed."""
+    connection = Connection(int(sys.argv[1]))
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that uses it
+    worker: Worker | None = None
+    while True:
+        try:
+            request = connection.recv_bytes()
+        except (EOFError, OSError):
+            break
+        try:
+            name, arguments = cloudpickle.loads(request)
+            if name == "make":
+                worker, answer = Worker(*arguments), None
+            elif name == "share":
+                file = recv_handle(connection)
+                os.set_blocking(connection.fileno(), True)  # a default time-out of sockets would have changed it
+                answer = getattr(worker, name)(SharedArrays(arguments[0], arguments[1], file))
+            else:
+                answer = getattr(worker, name)(*arguments)
+            text = pickle.dumps((True, answer), pickle.HIGHEST_PROTOCOL)
+        except Exception as error:
+            text = pickle.dumps((False, as_sent(error)))
+        connection.send_bytes(text)
+    if worker is not None:
+        worker.close()
+
+
+def as_sent(error: Exception) -> Exception:
+    """Returns an error that another process can read: itself, or its words."""
+    try:
+        if str(pickle.loads(pickle.dumps(error))) == str(error):
+            return error
+    except Exception:  # whatever its class does
+        pass
+    return InterfaceError(f"{type(error).__name__}: {error}")
+
+
+if __name__ == "__main__":
+    main()

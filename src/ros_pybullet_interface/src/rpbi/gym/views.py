@@ -1,0 +1,84 @@
+"""Images of a world's cameras, as parts of observations and as frames to look at."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+
+from custom_ros_tools.errors import ConfigError, Problem, UnknownNameError
+from rpbi.images import CameraImages
+from rpbi.world import World
+
+Image = npt.NDArray[Any]
+
+
+class Views:
+    """Draws what cameras of a world see, once somebody asks.
+
+    Args:
+        world: The world.
+        names: Cameras whose images are in observations.
+        mode: Way of rendering: `rgb_array`, `human`, or None.
+        period_s: Time between two renderings in a window [s].
+
+    Attributes:
+        spaces: Space of each image of an observation: `CAMERA/colour`, uint8, shape (height, width, 3), and
+            `CAMERA/depth` [m], float32, shape (height, width).
+
+    Raises:
+        ConfigError: If images are asked for, and no camera has a pose.
+        UnknownNameError: If the world has no such camera.
+    """
+
+    def __init__(self, world: World, names: Sequence[str], mode: str | None, period_s: float) -> None:
+        self._world, self._names, self._mode, self._period_s = world, tuple(names), mode, period_s
+        self._shown_s = 0.0
+        if (names or mode == "rgb_array") and not any(camera.pose for camera in world.cameras.values()):
+            message = "expected a camera with a pose in `poses`, for its images; got none"
+            raise ConfigError([Problem(world.loaded.file, "rgbd_sensor", message)])
+        self._images: CameraImages | None = None
+        self.spaces: dict[str, spaces.Space[Any]] = {}
+        for name in self._names:
+            if name not in world.cameras:
+                raise UnknownNameError("camera", name, list(world.cameras))
+            intrinsics = world.cameras[name].config.intrinsics
+            shape = (intrinsics.height, intrinsics.width)
+            self.spaces[f"{name}/colour"] = spaces.Box(0, 255, (*shape, 3), np.uint8)
+            self.spaces[f"{name}/depth"] = spaces.Box(0.0, float(intrinsics.range[1]), shape, np.float32)
+
+    def read(self) -> dict[str, Image]:
+        """Returns the present images by name."""
+        images: dict[str, Image] = {}
+        for name in self._names:
+            frame = self._drawn(name)
+            images[f"{name}/colour"], images[f"{name}/depth"] = frame.colour, frame.depth
+        return images
+
+    def render(self) -> Image | None:
+        """Returns what the first camera of the world sees, uint8, shape (height, width, 3).
+
+        With a window, it waits until the time since the last call has passed, and returns nothing.
+        """
+        if self._mode == "rgb_array":
+            colour: Image = self._drawn("").colour
+            return colour
+        if self._mode == "human":
+            time.sleep(max(0.0, self._shown_s + self._period_s - time.monotonic()))
+            self._shown_s = time.monotonic()
+        return None
+
+    def close(self) -> None:
+        """Ends the renderer, if there is one."""
+        if self._images is not None:
+            self._images.close()
+            self._images = None
+
+    def _drawn(self, name: str) -> Any:
+        if self._images is None:
+            self._images = CameraImages(self._world)
+        return self._images.frame(name)

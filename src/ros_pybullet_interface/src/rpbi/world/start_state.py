@@ -1,0 +1,125 @@
+"""The start of a world, which it goes back to without loading its bodies again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from pydantic.alias_generators import to_camel
+
+from rpbi.bodies import Body
+from rpbi.bodies.dynamics import LinkDynamics, read_dynamics
+from rpbi.config.pybullet_models import ChangeDynamics
+from rpbi.engine.client import MAXIMAL_COORDINATES, Client
+from rpbi.plugins import is_foreign
+
+from .contents import WorldContents
+from .saved.command_log import MAX_KEPT, CommandLog, WorldCommand
+
+MAX_LOGGED = 1_000
+"""Number of entries of the load log beyond which the world is built anew, so that the log does not grow for ever."""
+APART_M = 1_000.0
+"""Distance of two bodies without contacts, from base to base [m]."""
+NO_TURN = (0.0, 0.0, 0.0, 1.0)
+UNDONE = ("halt", "pause", "move", "stop_motion", "set_joint_state")
+"""Commands that the saved state undoes, whatever their value."""
+_FIELDS = {to_camel(field): field for field in LinkDynamics._fields}
+
+
+class DynamicsChange(NamedTuple):
+    """A change of the dynamics of a link; `link` is empty for the root."""
+
+    name: str
+    link: str
+    change: ChangeDynamics
+
+
+class StartState:
+    """The state that a world starts in, before its first tick.
+
+    PyBullet's `restoreState` leads back to it to the last bit: there are no contacts yet whose history it would lose.
+    It knows neither set points of motors, which robots restart, nor dynamics, which are changed back. Whatever else
+    happened to a world makes it unreachable in this way.
+
+    Args:
+        pb: The client.
+        contents: Content of the world at tick 0.
+    """
+
+    def __init__(self, pb: Client, contents: WorldContents) -> None:
+        self._pb, self._contents = pb, contents
+        self._state_id: int = pb.saveState()
+        self._logged = len(contents.log)
+        self._dynamics = {
+            (body.name, link): read_dynamics(body, link) for body in contents.bodies.values() for link in body.links
+        }
+
+    @staticmethod
+    def suits(contents: WorldContents) -> bool:
+        """Returns whether a world has nothing that keeps a state which PyBullet does not know."""
+        others = (is_foreign(each) or each.is_soft or _is_rigid(each) for each in contents.bodies.values())
+        return not (any(others) or contents.attachments.configs or contents.sensors.keep_state)
+
+    def restore(self, commands: CommandLog) -> bool:
+        """Goes back to the start.
+
+        Args:
+            commands: All commands since then.
+
+        Returns:
+            Whether it could; otherwise the world has to be built anew.
+        """
+        if len(self._contents.log) - self._logged > MAX_LOGGED or commands.count > MAX_KEPT:
+            return False
+        undoing = list(self._undoing(commands))
+        if None in undoing:
+            return False
+        self._end_contacts()
+        self._pb.restoreState(self._state_id)
+        self._contents.contacts.invalidate()
+        for each in filter(None, undoing):
+            self._contents.change_dynamics(*each)
+        return all([body.restart() for body in self._contents.bodies.values()])
+
+    def close(self) -> None:
+        """Has PyBullet forget the state."""
+        self._pb.removeState(self._state_id)
+
+    def _end_contacts(self) -> None:
+        """Takes all bodies apart, so that PyBullet forgets their contacts, which `restoreState` would leave."""
+        for index, body in enumerate(self._contents.bodies.values()):
+            self._pb.resetBasePositionAndOrientation(body.body_id, (0.0, 0.0, APART_M * (index + 1)), NO_TURN)
+        self._pb.performCollisionDetection()
+
+    def _undoing(self, commands: CommandLog) -> Iterator[DynamicsChange | None]:
+        """Yields the changes of dynamics that undo those of commands, None for a command that cannot be undone."""
+        for command in commands.since(0)[1]:
+            if command.what == "dynamics" and not command.tick:  # later ones may have had contacts made anew
+                yield self._undo_dynamics(command.name, command.value)
+            elif not self._is_undone(command):
+                yield None
+
+    def _is_undone(self, command: WorldCommand) -> bool:
+        if command.what == "input":
+            return command.name.endswith("/target") and command.name.count("/") == 1
+        if command.what == "teleport":
+            return self._contents.bodies[command.name].object_tf is None
+        return command.what in UNDONE
+
+    def _undo_dynamics(self, object_name: str, change: ChangeDynamics) -> DynamicsChange | None:
+        name, _, link = object_name.partition("/")
+        at_start = self._dynamics.get((name, link))
+        keys = change.kwargs().keys()
+        if at_start is None or not keys <= _FIELDS.keys():
+            return None
+        values: dict[str, Any] = {key: getattr(at_start, _FIELDS[key]) for key in keys}
+        if "mass" in values:
+            values["localInertiaDiagonal"] = at_start.local_inertia_diagonal
+        if any(value == -1.0 for value in values.values()):  # was never set, and PyBullet cannot unset it
+            return None
+        return DynamicsChange(name, link, ChangeDynamics(**values))
+
+
+def _is_rigid(body: Body) -> bool:
+    """Returns whether the solver of rigid bodies moves a body, which `restoreState` refuses."""
+    return bool(body.dynamics_info(-1)[10] == MAXIMAL_COORDINATES)

@@ -1,0 +1,99 @@
+"""The cross-entropy method, and policies that it can find: linear ones, for environments in a vector."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+class CrossEntropy:
+    """Draws parameters from a normal distribution, and moves it to the best of them.
+
+    Args:
+        size: Number of parameters.
+        deviation: Standard deviation of each at the start.
+        elite: Share of those drawn that count as the best.
+        floor: Smallest standard deviation.
+        random: Source of the parameters.
+        rate: Share of the way to the best that mean and deviation are moved.
+    """
+
+    def __init__(
+        self,
+        size: int,
+        deviation: float,
+        elite: float,
+        floor: float,
+        random: np.random.Generator,
+        rate: float = 0.7,
+    ) -> None:
+        self.mean, self.deviation = np.zeros(size), np.full(size, deviation)
+        self._elite, self._floor, self._random, self._rate = elite, floor, random, rate
+
+    def draw(self, count: int) -> Array:
+        """Returns parameters, shape (count, size)."""
+        return self.mean + self.deviation * self._random.normal(size=(count, len(self.mean)))
+
+    def update(self, parameters: Array, scores: Array) -> None:
+        """Moves the distribution to the parameters with the highest scores, shape (count,)."""
+        best = parameters[np.argsort(scores)[-max(2, round(self._elite * len(scores))) :]]
+        self.mean += self._rate * (best.mean(axis=0) - self.mean)
+        deviation = self.deviation + self._rate * (best.std(axis=0) - self.deviation)
+        self.deviation = np.maximum(deviation, self._floor)
+
+
+class LinearPolicies:
+    """A linear policy for each of n environments: action = tanh(W features), without an offset.
+
+    Args:
+        parameters: The weights W of each, shape (n, features x actions).
+        features: Number of features.
+    """
+
+    def __init__(self, parameters: Array, features: int) -> None:
+        self._weights = parameters.reshape(len(parameters), -1, features)
+
+    def __call__(self, features: Array) -> Array:
+        """Returns actions, shape (n, actions), for features, shape (n, features)."""
+        return np.tanh(np.einsum("naf,nf->na", self._weights, features))
+
+
+class Episodes(NamedTuple):
+    """Results of an episode in each of n environments.
+
+    Attributes:
+        returns: Sums of rewards, shape (n,).
+        successes: Whether each succeeded, shape (n,).
+        actions: Number of actions of all.
+    """
+
+    returns: Array
+    successes: npt.NDArray[np.bool_]
+    actions: int
+
+
+def run_episodes(envs: Any, policies: Any, features: Any, seeds: Sequence[int]) -> Episodes:
+    """Runs an episode in each environment, with a policy for each.
+
+    Args:
+        envs: A vector of n environments.
+        policies: Returns actions of all for features of all.
+        features: Returns features, shape (n, features), of observations of all.
+        seeds: A seed for each.
+    """
+    observations, infos = envs.reset(seed=list(seeds))
+    returns, successes = np.zeros(envs.num_envs), np.zeros(envs.num_envs, bool)
+    runs, count = np.ones(envs.num_envs, bool), 0
+    while runs.any():
+        actions = policies(features(observations)).astype(np.float32)
+        observations, rewards, ends, truncations, infos = envs.step(actions)
+        returns += np.where(runs, rewards, 0.0)
+        successes |= runs & infos["is_success"]
+        count += int(runs.sum())
+        runs &= ~(ends | truncations)
+    return Episodes(returns, successes, count)
