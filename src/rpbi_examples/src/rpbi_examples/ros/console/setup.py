@@ -10,7 +10,6 @@ def setup(*extras: Annotated[str, Argument("[EXTRA ...]", offers="extras")]) -> 
     """Does only what every command does first: installs and builds what is missing.
 
     Args:
-        EXTRA: ik, mpc, tags, data, gym, farm, html, assets or notebook, see docs/installation.md; stays wanted from then
-            on
+        EXTRA: ik, mpc, tags, data, gym, farm, html, assets or notebook, which stays wanted; see docs/installation.md
     """
     print("Ready.", file=sys.stderr)  # `rpbi` has done all of it by now
