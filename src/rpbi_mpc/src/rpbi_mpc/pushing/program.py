@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from custom_ros_tools.errors import MissingDependency
-from custom_ros_tools.schema import ConfigModel, NonNegative, Positive, PositiveMetres, Seconds, Unit
+from custom_ros_tools.schema import ConfigModel, ListOf, NonNegative, Positive, PositiveMetres, Seconds, Unit
 
 from .model import advanced, complementarity, pusher_velocity
 from .slider import SliderConfig
@@ -37,8 +37,8 @@ class WeightsConfig(ConfigModel):
         complementarity: Penalty of inputs that neither stick nor slide [s^2/m^2].
     """
 
-    position: NonNegative = Field(1000.0, description="Weight of the distance from the path [1/m^2].")
-    yaw: NonNegative = Field(1.0, description="Weight of the difference from its direction [1/rad^2].")
+    position: NonNegative = Field(30000.0, description="Weight of the distance from the path [1/m^2].")
+    yaw: NonNegative = Field(10.0, description="Weight of the difference from its direction [1/rad^2].")
     contact: NonNegative = Field(1.0, description="Weight of the pusher's distance from the middle [1/m^2].")
     force: NonNegative = Field(10.0, description="Weight of forces unlike those along the path [s^2/m^2].")
     sliding: NonNegative = Field(10.0, description="Weight of sliding along the face [s^2/m^2].")
@@ -55,8 +55,10 @@ class ProgramConfig(ConfigModel):
         step_s: Time of one [s].
         max_speed: Largest normal speed of the pusher, and of sliding along the face [m/s].
         weights: The cost.
-        solver: `ipopt`, or `fatrop`, an interior-point method for optimal control, several times as fast.
-        max_iterations: Number after which the solver gives up.
+        solvers: Solvers in the order in which they are tried until one converges: `fatrop` (L. Vanroye et al., IROS
+            2023), an interior-point method for optimal control that is several times as fast, and `ipopt` (A. Waechter
+            and L. Biegler, Mathematical Programming 106, 2006), which converges more often.
+        max_iterations: Number after which a solver gives up.
         tolerance: Optimality at which it stops.
     """
 
@@ -64,9 +66,11 @@ class ProgramConfig(ConfigModel):
     step_s: Seconds = Field(0.08, description="Time of one step.")
     max_speed: Annotated[Positive, Unit("m/s")] = Field(0.15, description="Largest speed of the pusher.")
     weights: WeightsConfig = Field(WeightsConfig(), description="The cost.")
-    solver: Literal["ipopt", "fatrop"] = Field("fatrop", description="The solver.")
-    max_iterations: Annotated[int, Field(ge=1)] = Field(60, description="Number after which the solver gives up.")
-    tolerance: Positive = Field(1e-4, description="Optimality at which it stops.")
+    solvers: Annotated[ListOf[Literal["fatrop", "ipopt"]], Field(min_length=1)] = Field(
+        ("fatrop", "ipopt"), description="Solvers, tried in this order until one converges."
+    )
+    max_iterations: Annotated[int, Field(ge=1)] = Field(40, description="Number after which a solver gives up.")
+    tolerance: Positive = Field(1e-3, description="Optimality at which it stops.")
 
 
 class Solved(NamedTuple):
@@ -103,7 +107,7 @@ class PushingProgram:
 
     def __init__(self, slider: SliderConfig, config: ProgramConfig) -> None:
         self._slider, self._config, self._steps = slider, config, config.steps
-        self._solver = self._compiled()
+        self._solvers = self._compiled()
         self._set_bounds()
 
     def solve(
@@ -119,24 +123,25 @@ class PushingProgram:
             guess: States and inputs to start from, see `guess_of`.
         """
         parameters = np.concatenate([state, reference.ravel(), [speed], force])
-        wall, processor = time.perf_counter(), time.process_time()
-        answer = self._solver(
-            x0=guess, p=parameters, lbx=self._lower, ubx=self._upper, lbg=self._lower_g, ubg=self._upper_g
+        wall, processor, iterations = time.perf_counter(), time.process_time(), 0
+        for solver in self._solvers:
+            solved = self._solved(solver, parameters, guess)
+            iterations += solved.iterations
+            if solved.converged:
+                break
+        return solved._replace(
+            iterations=iterations,
+            wall_s=time.perf_counter() - wall,
+            processor_s=time.process_time() - processor,
         )
-        wall, processor = time.perf_counter() - wall, time.process_time() - processor
-        stats = self._solver.stats()
+
+    def _solved(self, solver: Any, parameters: np.ndarray, guess: np.ndarray) -> Solved:
+        answer = solver(x0=guess, p=parameters, lbx=self._lower, ubx=self._upper, lbg=self._lower_g, ubg=self._upper_g)
+        stats = solver.stats()
         states, inputs = self._split(np.asarray(answer["x"]).ravel())
         finite = bool(np.isfinite(states).all() and np.isfinite(inputs).all())
-        return Solved(
-            states,
-            inputs,
-            float(answer["f"]),
-            bool(stats["success"]) and finite,
-            str(stats["return_status"]),
-            int(stats["iter_count"]),
-            wall,
-            processor,
-        )
+        converged, status = bool(stats["success"]) and finite, f"{solver.name()}: {stats['return_status']}"
+        return Solved(states, inputs, float(answer["f"]), converged, status, int(stats["iter_count"]), 0.0, 0.0)
 
     def guess_of(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Returns states, (steps + 1) x 4, and inputs, steps x 4, as a vector of the program."""
@@ -146,8 +151,8 @@ class PushingProgram:
         table = vector[: self._steps * (NX + NU)].reshape(self._steps, NX + NU)
         return np.vstack([table[:, :NX], vector[-NX:]]), table[:, NX:]
 
-    def _compiled(self) -> Any:
-        """Returns the program with variables x0, u0, x1, ... and, for each step, its dynamics and its limits."""
+    def _compiled(self) -> list[Any]:
+        """Returns the program for each solver, with variables x0, u0, x1, ... and, for each step, its dynamics and its limits."""
         states = [casadi.SX.sym(f"x{k}", NX) for k in range(self._steps + 1)]
         inputs = [casadi.SX.sym(f"u{k}", NU) for k in range(self._steps)]
         start = casadi.SX.sym("start", NX)
@@ -169,7 +174,7 @@ class PushingProgram:
             "f": cost,
             "g": casadi.vertcat(*rows),
         }
-        return casadi.nlpsol("pushing", self._config.solver, problem, self._options(equal))
+        return [casadi.nlpsol(name, name, problem, self._options(name, equal)) for name in self._config.solvers]
 
     def _state_cost(self, state: Any, reference: Any) -> Any:
         weights = self._config.weights
@@ -210,10 +215,10 @@ class PushingProgram:
         self._lower_g = np.zeros(len(self._equal))
         self._upper_g = np.where(self._equal, 0.0, np.inf)
 
-    def _options(self, equal: list[bool]) -> dict[str, Any]:
+    def _options(self, solver: str, equal: list[bool]) -> dict[str, Any]:
         config = self._config
         common = {"print_time": False, "error_on_fail": False, "record_time": False}
-        if config.solver == "fatrop":
+        if solver == "fatrop":
             options = {"max_iter": config.max_iterations, "tol": config.tolerance, "print_level": 0}
             return {**common, "structure_detection": "auto", "equality": equal, "fatrop": options}
         options = {

@@ -196,7 +196,7 @@ def shove(plant: PushingWorld, config: PushingConfig, random: np.random.Generato
     if (inside < 0.0).all():
         local = axes.T @ (plant.pusher_position() - middle)
         axis = int(np.argmax(inside))
-        middle = middle + axes[:, axis] * np.copysign(inside[axis], local[axis])
+        middle = middle + axes[:, axis] * np.copysign(inside[axis], -local[axis])
     body = middle - axes @ plant.middle
     world.act(
         "box",
