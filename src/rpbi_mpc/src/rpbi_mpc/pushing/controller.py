@@ -32,7 +32,7 @@ class PushingConfig(ConfigModel):
         estimator: Filter of measurements.
         approach: Motion to the slider.
         gap_rate: Rate at which a gap between pusher and slider is closed while pushing [1/s].
-        max_lag: Distance of the slider from the reference beyond which the reference waits [m].
+        max_lag: Distance along the path by which the reference may be ahead of the slider; then it waits [m].
         settle_s: Time after the end of the path for which the last pose is aimed at [s].
         cycle_s: Time of a cycle, for which a command acts [s].
     """
@@ -44,7 +44,7 @@ class PushingConfig(ConfigModel):
     estimator: EstimatorConfig = Field(EstimatorConfig(), description="Filter of measurements.")
     approach: ApproachConfig = Field(ApproachConfig(), description="Motion of the pusher to the slider.")
     gap_rate: Annotated[NonNegative, Unit("1/s")] = Field(5.0, description="Rate at which a gap is closed in contact.")
-    max_lag: PositiveMetres = Field(0.03, description="Distance beyond which the reference waits for the slider.")
+    max_lag: PositiveMetres = Field(0.03, description="Distance ahead of the slider at which the reference waits.")
     settle_s: Annotated[NonNegative, Unit("s")] = Field(1.0, description="Time at the last pose of the path.")
     cycle_s: Seconds = Field(0.04, description="Time of a cycle.")
     plan_cycles: Annotated[int, Field(ge=1)] = Field(6, description="Commands of a plan, one for each cycle.")
@@ -54,8 +54,8 @@ class PushingConfig(ConfigModel):
 class PushingController(MpcController):
     """Pushes a slider along a path by a round pusher, whose velocity is commanded.
 
-    The time of the path stands still while the pusher is not at the slider, and while the slider is too far from the
-    reference.
+    The time of the path stands still while the pusher is not at the slider, and while the slider is too far behind
+    the reference.
 
     Args:
         config: Slider, pusher, path and cost.
@@ -98,20 +98,20 @@ class PushingController(MpcController):
         gap, contact = gap_and_contact(scene, self.config.slider, self.config.radius)
         self._pushes = is_pushable(gap, contact, self.config.slider, self.config.approach, self._pushes)
         target = self.path.poses(self.path_time_s)[0]
-        error = float(np.hypot(*(scene.slider[:2] - target[:2])))
-        extras = {"gap": gap, "contact": contact, "path_time_s": self.path_time_s, "lag": error}
+        lag = float((target[:2] - scene.slider[:2]) @ rotation(target[2])[:, 0])
+        extras = {"gap": gap, "contact": contact, "path_time_s": self.path_time_s, "lag": lag}
         extras |= dict(zip(("reference_x", "reference_y", "reference_yaw"), map(float, target)))
         if not self._pushes:
             return self._approach(scene, extras)
         plan = self._push(scene, gap, contact, extras)
-        self._go_on(error)
+        self._go_on(lag)
         return plan
 
-    def _go_on(self, error: float) -> None:
-        """Moves the reference on by a cycle, unless the slider is too far from it."""
+    def _go_on(self, lag: float) -> None:
+        """Moves the reference on by a cycle, unless the slider is too far behind it."""
         if self.path_time_s >= self.path.duration_s:
             self._settled_s += self.config.cycle_s
-        elif error <= self.config.max_lag:
+        elif lag <= self.config.max_lag:
             self.path_time_s += self.config.cycle_s
 
     def _approach(self, scene: Scene, extras: dict[str, float]) -> ControlPlan:
