@@ -62,7 +62,7 @@ class ProgramConfig(ConfigModel):
         tolerance: Optimality at which it stops.
     """
 
-    steps: Annotated[int, Field(ge=2, le=200)] = Field(15, description="Number of steps of the horizon.")
+    steps: Annotated[int, Field(ge=2, le=200)] = Field(20, description="Number of steps of the horizon.")
     step_s: Seconds = Field(0.08, description="Time of one step.")
     max_speed: Annotated[Positive, Unit("m/s")] = Field(0.15, description="Largest speed of the pusher.")
     weights: WeightsConfig = Field(WeightsConfig(), description="The cost.")
