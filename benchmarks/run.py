@@ -24,7 +24,7 @@ BENCHMARKS = (
 )
 WHEN_NAMED = (
     *("datasets", "dressing", "forks", "guard_faults", "haptics", "lfd", "live_plot", "passivity", "press"),
-    *("recording", "soak", "streams", "teleop", "verify"),
+    *("pushing", "recording", "soak", "streams", "teleop", "verify"),
 )
 """Those that take too long to run with the others."""
 FIND_RENDERER = """
