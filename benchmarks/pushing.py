@@ -1,8 +1,8 @@
 """How well a box is pushed along paths by model predictive control, and how long the solver takes.
 
-The plant is PyBullet: a ball on two slides, whose velocities are commanded, pushes a box; box and table are in maximal
-coordinates, so Bullet's friction is the same in all directions (docs/physics.md) and no disturbance here. The pose of the
-box is that of the emulated Vicon.
+The plant is PyBullet: a ball on two slides, a robot whose velocities are commanded, pushes a box. Bullet's friction by yaw
+(docs/physics.md) is one of the disturbances: maximal coordinates do not avoid it while a robot touches the box. The pose of
+the box is that of the emulated Vicon.
 """
 
 from __future__ import annotations

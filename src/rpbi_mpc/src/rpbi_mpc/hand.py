@@ -6,6 +6,7 @@ from typing import Annotated
 
 import numpy as np
 from pydantic import Field
+from scipy.spatial.transform import Rotation
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.schema import ConfigModel, ListOf, Text, Unit
@@ -20,12 +21,12 @@ MAX_STEP_RAD = 0.1
 """Largest change of a joint in one of them [rad]; larger ones jump to other postures."""
 DAMPING = 1e-3
 """Damping of the least squares [m^2/rad^2]; more slows down, less shakes near singular postures."""
-POSTURE_RATE = 0.05
-"""Share of the way to the middle of the joints' ranges in a step, as far as the task leaves it free."""
 
 
 class HandConfig(ConfigModel):
-    """A point of an arm that moves at a constant height, with an axis of the hand that points down.
+    """A point of an arm that moves at a constant height and orientation.
+
+    The hand does not turn: a round tip that turns would rub along the face that it pushes.
 
     Attributes:
         urdf: The robot.
@@ -33,6 +34,7 @@ class HandConfig(ConfigModel):
         joints: The joints that move it.
         base: Position of the robot's root link in the world [m].
         height: Height of the point in the world [m].
+        yaw: Angle of the link's axis x about the vertical, from x of the world [rad].
         posture: Positions of the joints from which the first place is looked for [rad].
     """
 
@@ -43,6 +45,7 @@ class HandConfig(ConfigModel):
         (0.0, 0.0, 0.0), description="Position of the root link in the world."
     )
     height: Annotated[float, Unit("m")] = Field(0.02, description="Height of the point in the world.")
+    yaw: Annotated[float, Unit("rad")] = Field(0.0, description="Angle of the link's x about the vertical.")
     posture: ListOf[float] = Field((), description="Positions of the joints to start from; 0 without it.")
 
 
@@ -87,20 +90,25 @@ class PlanarHand:
         goal = np.array([*place, self._config.height])
         q = np.clip(np.array(start, dtype=float), self._robot.limits.lower, self._robot.limits.upper)
         for _ in range(MAX_ITERATIONS):
-            pose = self._pose(q)
-            away, down = goal - self._config.base - pose[:3, 3], np.cross(pose[:3, 2], (0.0, 0.0, -1.0))
-            if pose[2, 2] < 0.0 and np.linalg.norm(away) < TOLERANCE_M and np.linalg.norm(down) < TOLERANCE_RAD:
+            error = self._error(q, goal)
+            if np.linalg.norm(error[:3]) < TOLERANCE_M and np.linalg.norm(error[3:]) < TOLERANCE_RAD:
                 return q
-            q = self._improved(q, np.array([*away, *down[:2]]))
-        raise InterfaceError(
-            f"hand.{self._config.link}: expected a place within reach, got ({goal[0]:.3f}, {goal[1]:.3f}, {goal[2]:.3f}) m"
-        )
+            q = self._improved(q, error)
+        place_text = ", ".join(f"{value:.3f}" for value in goal)
+        raise InterfaceError(f"hand.{self._config.link}: expected a place within reach, got ({place_text}) m")
+
+    def _error(self, q: np.ndarray, goal: np.ndarray) -> np.ndarray:
+        """Returns the way to a place [m], and the rotation to the wanted orientation [rad], in the axes of the root."""
+        pose, cos, sin = self._pose(q), np.cos(self._config.yaw), np.sin(self._config.yaw)
+        wanted = np.array([[cos, sin, 0.0], [sin, -cos, 0.0], [0.0, 0.0, -1.0]])
+        turn = Rotation.from_matrix(wanted @ pose[:3, :3].T).as_rotvec()
+        return np.array([*(goal - self._config.base - pose[:3, 3]), *turn])
 
     def _improved(self, q: np.ndarray, error: np.ndarray) -> np.ndarray:
-        jacobian = self._robot.frames.jacobian(q[None], self._config.link)[0, :5]
-        inverse = jacobian.T @ np.linalg.inv(jacobian @ jacobian.T + DAMPING * np.linalg.norm(error) * np.eye(5))
-        free = POSTURE_RATE * (self.posture - q) * min(1.0, np.linalg.norm(error) / TOLERANCE_M)
-        step = inverse @ error + (np.eye(len(q)) - inverse @ jacobian) @ free
+        """Returns positions that are nearer, by one damped step of least squares."""
+        jacobian = self._robot.frames.jacobian(q[None], self._config.link)[0]
+        damped = jacobian @ jacobian.T + DAMPING * np.linalg.norm(error) * np.eye(6)
+        step = jacobian.T @ np.linalg.solve(damped, error)
         step *= min(1.0, MAX_STEP_RAD / max(float(np.abs(step).max()), 1e-12))
         improved: np.ndarray = np.clip(q + step, self._robot.limits.lower, self._robot.limits.upper)
         return improved

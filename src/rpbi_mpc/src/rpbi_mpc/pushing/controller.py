@@ -35,6 +35,9 @@ class PushingConfig(ConfigModel):
         max_lag: Distance along the path by which the reference may be ahead of the slider; then it waits [m].
         settle_s: Time after the end of the path for which the last pose is aimed at [s].
         cycle_s: Time of a cycle, for which a command acts [s].
+        lag_s: Time from a command until the pusher moves by it, beside the delay of the loop [s].
+        plan_cycles: Number of commands of a plan, one for each cycle.
+        max_command: Largest speed of the pusher [m/s].
     """
 
     slider: SliderConfig = Field(SliderConfig(), description="The slider.")
@@ -47,6 +50,7 @@ class PushingConfig(ConfigModel):
     max_lag: PositiveMetres = Field(0.03, description="Distance ahead of the slider at which the reference waits.")
     settle_s: Annotated[NonNegative, Unit("s")] = Field(1.0, description="Time at the last pose of the path.")
     cycle_s: Seconds = Field(0.04, description="Time of a cycle.")
+    lag_s: Annotated[NonNegative, Unit("s")] = Field(0.0, description="Time until the pusher moves by a command.")
     plan_cycles: Annotated[int, Field(ge=1)] = Field(6, description="Commands of a plan, one for each cycle.")
     max_command: Annotated[Positive, Unit("m/s")] = Field(0.2, description="Largest speed of the pusher.")
 
@@ -86,7 +90,7 @@ class PushingController(MpcController):
         return self._settled_s > self.config.settle_s
 
     def executed(self, time_s: float, command: np.ndarray | None) -> None:
-        self._estimator.executed(time_s, command)
+        self._estimator.executed(time_s + self.config.lag_s, command)
 
     def plan(self, sensed: Sensed, delay_s: float) -> ControlPlan:
         """Returns commands from the scene that is expected when the first one acts.
@@ -94,7 +98,7 @@ class PushingController(MpcController):
         A plan of the approach has commands and no solution; its cost is NaN.
         """
         assert sensed.values is not None
-        scene = self._estimator.update(sensed, sensed.time_s + delay_s)
+        scene = self._estimator.update(sensed, sensed.time_s + delay_s + self.config.lag_s)
         gap, contact = gap_and_contact(scene, self.config.slider, self.config.radius)
         self._pushes = is_pushable(gap, contact, self.config.slider, self.config.approach, self._pushes)
         target = self.path.poses(self.path_time_s)[0]
