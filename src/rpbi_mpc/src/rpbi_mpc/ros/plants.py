@@ -53,6 +53,10 @@ class HandPlant(Plant):
         if age_s > self._config.timeout_s:
             expected = f"expected one at least every {self._config.timeout_s:g} s"
             return Sensed(now_s, None, f"{self._listener.vicon}: no pose for {age_s:.2f} s, {expected}")
+        lead = 0.0 if self._place is None else float(np.hypot(*(self._place - scene.values[3:])))
+        if lead > self._config.max_lead:
+            expected = f"expected at most {self._config.max_lead:g} m"
+            return Sensed(now_s, None, f"{self._listener.joint_states}: the hand is {lead:.3f} m from its target, {expected}")
         return Sensed(now_s, scene.values, age_s=max(age_s, 0.0))
 
     def act(self, command: np.ndarray) -> None:
@@ -74,7 +78,7 @@ class HandPlant(Plant):
         try:
             self._joints, self._place = self._hand.solve(self._joints, place), place
         except InterfaceError as error:
-            rospy.logwarn_throttle(5.0, f"the hand stands: {error}")
+            rospy.logwarn_throttle(60.0, f"the hand stands: {error}")
         return JointState(name=list(self._hand.joint_names), position=self._joints.tolist())
 
     def _begin(self) -> None:
