@@ -1,8 +1,8 @@
 """How well a box is pushed along paths by model predictive control, and how long the solver takes.
 
-The plant is PyBullet: a ball on two slides, a robot whose velocities are commanded, pushes a box. Bullet's friction by yaw
-(docs/physics.md) is one of the disturbances: maximal coordinates do not avoid it while a robot touches the box. The pose of
-the box is that of the emulated Vicon.
+The plant is PyBullet: a ball on two slides, a robot whose velocities are commanded, pushes a box. Bullet's friction by
+yaw (docs/physics.md) is one of the disturbances: maximal coordinates do not avoid it while a robot touches the box. The
+pose of the box is that of the emulated Vicon.
 """
 
 from __future__ import annotations
@@ -62,7 +62,9 @@ def _disturbed(seeds: range, trials: list[Trial]) -> list[Result]:
         done = [run_trial(PushingConfig(path=path), Variation.random(seed)) for seed in seeds]
         trials += done
         errors += (means := [float(trial.errors.mean()) if trial.finished else np.inf for trial in done])
-        results.append(Result("pushing", f"{name}, disturbed: median of mean errors", 1e3 * float(np.median(means)), "mm"))
+        results.append(
+            Result("pushing", f"{name}, disturbed: median of mean errors", 1e3 * float(np.median(means)), "mm")
+        )
         results.append(Result("pushing", f"{name}, disturbed: largest mean error", 1e3 * max(means), "mm"))
     share = float(np.mean(np.array(errors) < DISTURBED_M))
     figure = f"{len(errors)} disturbed: share below {1e3 * DISTURBED_M:g} mm"

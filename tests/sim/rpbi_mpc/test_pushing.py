@@ -29,6 +29,7 @@ def test_box_is_pushed_along_an_s(variation, most_m):
 
 def test_a_controller_with_the_other_sign_would_fail():
     """The bounds above can fail: a box that is pushed straight ahead is far from the S."""
+
     class Straight(PushingController):
         def _commands(self, solved, gap):
             return np.tile([self.path.speed, 0.0], (self.config.plan_cycles, 1))
@@ -87,7 +88,9 @@ def test_shove_moves_and_turns_the_box_but_not_into_the_pusher():
         before = plant.slider_pose()
         shove(plant, config, np.random.default_rng(seed))
         after = plant.slider_pose()
-        assert abs(np.degrees(np.arctan2(*[f(after[2] - before[2]) for f in (np.sin, np.cos)]))) == pytest.approx(30, abs=0.1)
+        assert abs(np.degrees(np.arctan2(*[f(after[2] - before[2]) for f in (np.sin, np.cos)]))) == pytest.approx(
+            30, abs=0.1
+        )
         plant.advance(0.02)
         assert np.hypot(*(plant.slider_pose()[:2] - after[:2])) < 0.002, "thrown by the pusher"
     world.close()

@@ -34,7 +34,9 @@ def test_hand_follows_the_path_of_the_example_at_its_height_with_the_stick_down(
 
 def test_place_out_of_reach_is_an_error_that_names_it(example):
     hand = PlanarHand(HandConfig.parse(example["hand"], EXAMPLE))
-    with pytest.raises(InterfaceError, match=r"hand.RHAND_ball: expected a place within reach, got \(2.000, 0.000, 0.680\)"):
+    with pytest.raises(
+        InterfaceError, match=r"hand.RHAND_ball: expected a place within reach, got \(2.000, 0.000, 0.680\)"
+    ):
         hand.solve(hand.posture, np.array([2.0, 0.0]))
 
 

@@ -61,10 +61,10 @@ class MpcController(ABC):
             delay_s: Time from `sensed.time_s` until the first command acts [s].
         """
 
-    def executed(self, time_s: float, command: np.ndarray | None) -> None:
+    def executed(self, time_s: float, command: np.ndarray | None) -> None:  # noqa: B027 (may stay as it is)
         """Takes note of the command that acts from a time on [s]; None if the plant stands."""
 
-    def reset(self) -> None:
+    def reset(self) -> None:  # noqa: B027 (may stay as it is)
         """Forgets everything of the past; the next plan is that of a new controller."""
 
     @property

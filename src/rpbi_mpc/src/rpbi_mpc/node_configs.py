@@ -7,7 +7,18 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from custom_ros_tools.schema import ConfigModel, Hz, KeyedError, NonNegative, PositiveMetres, Seconds, Switch, Text, TopicName, Unit
+from custom_ros_tools.schema import (
+    ConfigModel,
+    Hz,
+    KeyedError,
+    NonNegative,
+    PositiveMetres,
+    Seconds,
+    Switch,
+    Text,
+    TopicName,
+    Unit,
+)
 from custom_ros_tools.schema.json_schema import explained, json_schema, schema_text
 
 from .hand import HandConfig
@@ -29,10 +40,15 @@ class PlantConfig(ConfigModel):
     vicon: TopicName = Field("vicon/box/box", description="Topic of the pose of the slider's middle.")
     latency_s: Annotated[NonNegative, Unit("s")] = Field(0.03, description="Largest age of a pose that is on time.")
     timeout_s: Seconds = Field(0.2, description="Time without a pose after which the slider is lost.")
-    max_lead: PositiveMetres = Field(0.06, description="Distance of the hand from its target that stops it, for instance "
-                                     "because a guard has halted the robot.")
+    max_lead: PositiveMetres = Field(
+        0.06,
+        description="Distance of the hand from its target that stops it, for instance "
+        "because a guard has halted the robot.",
+    )
     target_hz: Hz = Field(100.0, description="Rate of targets; a whole number of them is in each part of a cycle.")
-    timed: Switch = Field(False, description="Whether time passes by itself, as on hardware; else the world is stepped.")
+    timed: Switch = Field(
+        False, description="Whether time passes by itself, as on hardware; else the world is stepped."
+    )
 
 
 class PushingNodeConfig(ConfigModel):

@@ -126,7 +126,9 @@ class PushingController(MpcController):
             scene = moved(scene, velocity, config.cycle_s, config.slider, config.radius)
             commands.append(velocity)
             states.append(np.array([*scene.slider, 0.0]))
-        return ControlPlan(np.array(commands), np.array(states), config.cycle_s, math.nan, True, "approach", extras=extras)
+        return ControlPlan(
+            np.array(commands), np.array(states), config.cycle_s, math.nan, True, "approach", extras=extras
+        )
 
     def _push(self, scene: Scene, gap: float, contact: float, extras: dict[str, float]) -> ControlPlan:
         reach = self.config.slider.reach

@@ -32,7 +32,9 @@ class EstimatorConfig(ConfigModel):
 
     position: Share = Field(0.4, description="Share of a difference in position that is corrected in a cycle.")
     yaw: Share = Field(0.4, description="Share of a difference in yaw that is corrected in a cycle.")
-    jump: Annotated[float, Field(gt=0.0)] = Field(0.012, description="Distance beyond which a measurement counts alone.")
+    jump: Annotated[float, Field(gt=0.0)] = Field(
+        0.012, description="Distance beyond which a measurement counts alone."
+    )
     jump_rad: Annotated[float, Field(gt=0.0)] = Field(0.15, description="The same for yaw.")
 
 
@@ -69,6 +71,7 @@ class SceneEstimator:
             ahead_s: The time of the scene [s].
         """
         measured_s = sensed.time_s - sensed.age_s
+        assert sensed.values is not None
         measured = Scene.of(sensed.values)
         if self._estimate is None:
             self._estimate = measured

@@ -16,7 +16,6 @@ the plane [m, m, rad], and the place of the pusher along the face at -x, from it
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -26,8 +25,8 @@ from .slider import SliderConfig
 STATE = ("x", "y", "yaw", "contact")
 INPUT = ("normal", "tangential", "left", "right")
 
-Vector = Sequence[Any] | np.ndarray
-"""Numbers or symbols."""
+Vector = Any
+"""A sequence, an array or a CasADi vector of numbers or symbols."""
 
 
 def load_of(contact: Any, normal: Any, tangential: Any, slider: SliderConfig) -> tuple[Any, Any, Any]:

@@ -1,4 +1,4 @@
-"""Motion of slider and round pusher in the plane, in contact or apart: what the model expects of a commanded velocity."""
+"""Motion of slider and round pusher in the plane, in contact or apart, by a velocity of the pusher."""
 
 from __future__ import annotations
 

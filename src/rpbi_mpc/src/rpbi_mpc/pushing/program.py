@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from custom_ros_tools.errors import MissingDependency
-from custom_ros_tools.schema import ConfigModel, ListOf, NonNegative, Positive, PositiveMetres, Seconds, Unit
+from custom_ros_tools.schema import ConfigModel, ListOf, NonNegative, Positive, Seconds, Unit
 
 from .model import advanced, complementarity, pusher_velocity
 from .slider import SliderConfig
@@ -152,7 +152,7 @@ class PushingProgram:
         return np.vstack([table[:, :NX], vector[-NX:]]), table[:, NX:]
 
     def _compiled(self) -> list[Any]:
-        """Returns the program for each solver, with variables x0, u0, x1, ... and, for each step, its dynamics and its limits."""
+        """Returns the program for each solver: variables x0, u0, x1, ..., and rows of dynamics and limits by step."""
         states = [casadi.SX.sym(f"x{k}", NX) for k in range(self._steps + 1)]
         inputs = [casadi.SX.sym(f"u{k}", NU) for k in range(self._steps)]
         start = casadi.SX.sym("start", NX)
@@ -219,9 +219,9 @@ class PushingProgram:
         config = self._config
         common = {"print_time": False, "error_on_fail": False, "record_time": False}
         if solver == "fatrop":
-            options = {"max_iter": config.max_iterations, "tol": config.tolerance, "print_level": 0}
-            return {**common, "structure_detection": "auto", "equality": equal, "fatrop": options}
-        options = {
+            limits = {"max_iter": config.max_iterations, "tol": config.tolerance, "print_level": 0}
+            return {**common, "structure_detection": "auto", "equality": equal, "fatrop": limits}
+        options: dict[str, Any] = {
             "max_iter": config.max_iterations,
             "tol": config.tolerance,
             "print_level": 0,

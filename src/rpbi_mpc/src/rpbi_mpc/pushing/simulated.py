@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +29,8 @@ class PushingWorld(Plant):
 
     def __init__(self, world: World, middle: tuple[float, float] = (0.0, 0.0), timeout_s: float = TIMEOUT_S) -> None:
         self.world, self.middle, self._timeout_s = world, np.array(middle), timeout_s
-        self.box, self.pusher = world.bodies["box"], world.bodies["pusher"]
+        self.box: Any = world.bodies["box"]
+        self.pusher: Any = world.bodies["pusher"]
         self._joints = [joint.name for joint in self.pusher.model.moving][:2]
         self._base = np.array(self.pusher.base_pose().position[:2])
         self._pushers = deque([self.pusher_position()], maxlen=round(1.0 / world.clock.dt_s))
@@ -42,7 +44,9 @@ class PushingWorld(Plant):
         tick, dt_s = self.world.clock.tick, self.world.clock.dt_s
         unseen_s = (tick - self._seen_tick) * dt_s
         if self._newest is None or unseen_s > self._timeout_s:
-            return Sensed(tick * dt_s, None, f"box: no pose for {unseen_s:.2f} s, expected one every {self._timeout_s:g} s")
+            return Sensed(
+                tick * dt_s, None, f"box: no pose for {unseen_s:.2f} s, expected one every {self._timeout_s:g} s"
+            )
         measured_tick, pose = self._newest
         age = tick - measured_tick
         pusher = self._pushers[-1 - min(age, len(self._pushers) - 1)]
@@ -60,7 +64,9 @@ class PushingWorld(Plant):
                 if isinstance(sample, ViconSample):
                     self._see(sample)
             self._pushers.append(self.pusher_position())
-        self.truth.append(np.array([self.world.clock.tick * self.world.clock.dt_s, *self.slider_pose(), *self._pushers[-1]]))
+        self.truth.append(
+            np.array([self.world.clock.tick * self.world.clock.dt_s, *self.slider_pose(), *self._pushers[-1]])
+        )
 
     def pusher_position(self) -> np.ndarray:
         """Returns the true position of the pusher [m]."""

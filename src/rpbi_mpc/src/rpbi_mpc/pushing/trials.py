@@ -55,11 +55,10 @@ class Variation(NamedTuple):
         """Returns a variation by its seed, evenly distributed between the limits above."""
         random = np.random.default_rng(seed)
         table, pusher = 1.0 + random.uniform(-FRICTION, FRICTION, 2)
-        centre = random.uniform(-CENTRE, CENTRE, 2) * SIZE
-        start = random.uniform(-1.0, 1.0, 3) * (0.0, 0.01, 0.1)
-        return cls(
-            seed, float(table), float(pusher), tuple(map(float, centre)), tuple(map(float, start)), noise_m, latency_s
-        )
+        x, y = random.uniform(-CENTRE, CENTRE, 2) * SIZE
+        _, across, turned = random.uniform(-1.0, 1.0, 3) * (0.0, 0.01, 0.1)
+        centre, start = (float(x), float(y)), (0.0, float(across), float(turned))
+        return cls(seed, float(table), float(pusher), centre, start, noise_m, latency_s)
 
 
 class Trial(NamedTuple):
@@ -154,13 +153,13 @@ def run_trial(
     path = PushPath(config.path)
     world = pushing_world(variation, path)
     try:
-        world.pb.changeDynamics(
-            world.bodies["pusher"].body_id, 1, lateralFriction=PUSHER_FRICTION * variation.pusher
-        )
+        world.pb.changeDynamics(world.bodies["pusher"].body_id, 1, lateralFriction=PUSHER_FRICTION * variation.pusher)
         plant = PushingWorld(world, middle=(-variation.centre[0], -variation.centre[1]))
         plant.advance(max(variation.latency_s, 0.0) + 0.04)
         lock_step = LockStep(plant, controller, loop)
-        errors, off_path, shoved = [], [], None
+        errors: list[float] = []
+        off_path: list[float] = []
+        shoved: int | None = None
         while not lock_step.is_over and len(lock_step.cycles) * lock_step.config.period_s < max_s:
             if shove_at_s is not None and shoved is None and world.clock.time_s >= shove_at_s:
                 shove(plant, config, np.random.default_rng((variation.seed, 1)))

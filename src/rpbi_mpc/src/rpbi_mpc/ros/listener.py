@@ -89,7 +89,9 @@ class SceneListener:
         positions = dict(zip(message.name, message.position))
         missing = [name for name in self._hand.joint_names if name not in positions]
         if missing:
-            self._warn(self.joint_states, f"{self.joint_states}: message refused: expected {missing[0]}, got {message.name}")
+            self._warn(
+                self.joint_states, f"{self.joint_states}: message refused: expected {missing[0]}, got {message.name}"
+            )
             return
         joints = np.array([positions[name] for name in self._hand.joint_names])
         with self._changed:

@@ -56,7 +56,9 @@ class HandPlant(Plant):
         lead = 0.0 if self._place is None else float(np.hypot(*(self._place - scene.values[3:])))
         if lead > self._config.max_lead:
             expected = f"expected at most {self._config.max_lead:g} m"
-            return Sensed(now_s, None, f"{self._listener.joint_states}: the hand is {lead:.3f} m from its target, {expected}")
+            return Sensed(
+                now_s, None, f"{self._listener.joint_states}: the hand is {lead:.3f} m from its target, {expected}"
+            )
         return Sensed(now_s, scene.values, age_s=max(age_s, 0.0))
 
     def act(self, command: np.ndarray) -> None:
@@ -87,7 +89,9 @@ class HandPlant(Plant):
         while (joints := self._listener.joints()) is None and time.monotonic() < end_s and not rospy.is_shutdown():
             self._wait_for_joints()
         if joints is None:
-            raise InterfaceError(f"{self._listener.joint_states}: expected joint states within {PATIENCE_S:g} s, got none")
+            raise InterfaceError(
+                f"{self._listener.joint_states}: expected joint states within {PATIENCE_S:g} s, got none"
+            )
         self._place = self._hand.position(joints)[:2]
         self._joints = self._hand.solve(joints, self._place)
 

@@ -8,7 +8,6 @@ from pathlib import Path
 import rospy
 from std_srvs.srv import Trigger, TriggerResponse
 
-from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.parameters import private_config
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from rpbi_mpc.hand import PlanarHand

@@ -114,9 +114,7 @@ def set_target(context: BodyContext, request: SetJointStateRequest) -> Answer:
         ValueError: If a target is refused, with its reason.
     """
     state = request.joint_state
-    target = JointCommand(
-        state.name, state.position, state.velocity, state.effort, state.header.stamp.to_nsec()
-    )
+    target = JointCommand(state.name, state.position, state.velocity, state.effort, state.header.stamp.to_nsec())
     context.ask_body(lambda: context.world.put(f"{context.name}/target", target))
     return Answer(True, f"{', '.join(state.name)}: targets set")
 

@@ -40,8 +40,8 @@ from rpbi.ros.robots.motion import (
     move_to_joint_state,
     set_control_mode,
     set_joint_state,
-    set_target,
     set_motor_gains,
+    set_target,
     stop_motion,
 )
 from rpbi.ros.robots.trajectory_action import open_trajectory_action
