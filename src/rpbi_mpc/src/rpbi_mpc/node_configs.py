@@ -18,6 +18,7 @@ from custom_ros_tools.schema import (
     Text,
     TopicName,
     Unit,
+    optional,
 )
 from custom_ros_tools.schema.json_schema import explained, json_schema, schema_text
 
@@ -40,6 +41,9 @@ class PlantConfig(ConfigModel):
     vicon: TopicName = Field("vicon/box/box", description="Topic of the pose of the slider's middle.")
     latency_s: Annotated[NonNegative, Unit("s")] = Field(0.03, description="Largest age of a pose that is on time.")
     timeout_s: Seconds = Field(0.2, description="Time without a pose after which the slider is lost.")
+    ready: TopicName | None = optional(
+        "Topic whose first message shows that the robot is commanded; only with `timed`."
+    )
     max_lead: PositiveMetres = Field(
         0.06,
         description="Distance of the hand from its target that stops it, for instance "

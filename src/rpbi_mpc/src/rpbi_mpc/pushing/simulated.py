@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -29,8 +29,7 @@ class PushingWorld(Plant):
 
     def __init__(self, world: World, middle: tuple[float, float] = (0.0, 0.0), timeout_s: float = TIMEOUT_S) -> None:
         self.world, self.middle, self._timeout_s = world, np.array(middle), timeout_s
-        self.box: Any = world.bodies["box"]
-        self.pusher: Any = world.bodies["pusher"]
+        self.box, self.pusher = cast(Any, world.bodies["box"]), cast(Any, world.bodies["pusher"])
         self._joints = [joint.name for joint in self.pusher.model.moving][:2]
         self._base = np.array(self.pusher.base_pose().position[:2])
         self._pushers = deque([self.pusher_position()], maxlen=round(1.0 / world.clock.dt_s))

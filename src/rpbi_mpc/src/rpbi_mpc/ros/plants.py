@@ -67,6 +67,10 @@ class HandPlant(Plant):
     def stand(self) -> None:
         self._velocity = np.zeros(2)
 
+    def begin_at_the_robot(self) -> None:
+        """Has the next target begin where the robot is measured, for instance after it was halted."""
+        self._place = None
+
     def advance(self, duration_s: float) -> None:
         step_s = 1.0 / self._config.target_hz
         for _ in range(round(duration_s / step_s)):
@@ -149,6 +153,9 @@ class TimedPlant(HandPlant):
         super().__init__(config, hand)
         self._targets = rospy.Publisher(f"rpbi/{config.robot}/joint_states/target", JointState, queue_size=10)
         self._next_s = time.monotonic()
+        if config.ready:
+            rospy.loginfo(f"waiting for {rospy.resolve_name(config.ready)}, the commands of the robot")
+            rospy.wait_for_message(config.ready, rospy.AnyMsg)
 
     def _now_s(self) -> float:
         return float(rospy.Time.now().to_sec())

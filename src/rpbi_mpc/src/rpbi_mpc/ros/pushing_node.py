@@ -45,8 +45,8 @@ class PushingNode:
         self._status = rospy.Publisher("mpc/status", MpcStatus, queue_size=10, latch=True)
         self._changed = threading.Condition()
         self._running, self._steps, self._said = bool(rospy.get_param("~start_on_init", True)), 0, ""
-        plant: HandPlant = (TimedPlant if config.plant.timed else SteppedPlant)(config.plant, hand)
-        self._loop = LockStep(plant, self._controller, config.loop, (self._show,))
+        self._plant: HandPlant = (TimedPlant if config.plant.timed else SteppedPlant)(config.plant, hand)
+        self._loop = LockStep(self._plant, self._controller, config.loop, (self._show,))
         for name, action in (("start", self._start), ("stop", self._stop), ("step", self._step)):
             rospy.Service(f"mpc/{name}", Trigger, lambda _, action=action: TriggerResponse(*action()))
         self._status.publish(MpcStatus(status="ready", running=self._running))
@@ -83,6 +83,7 @@ class PushingNode:
     def _stop(self) -> Answer:
         with self._changed:
             was_running, self._running = self._running, False
+            self._plant.begin_at_the_robot()
         return was_running, "stopped: the robot stands" if was_running else "the loop is not running"
 
     def _step(self) -> Answer:
