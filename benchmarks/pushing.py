@@ -13,7 +13,7 @@ from result import Result, Target
 from rpbi_mpc.pushing.controller import PushingConfig
 from rpbi_mpc.pushing.paths import PathConfig
 from rpbi_mpc.pushing.program import ProgramConfig
-from rpbi_mpc.pushing.trials import Trial, Variation, run_trial
+from rpbi_mpc.pushing.trials import PushingTrial, Variation, run_trial
 
 PATHS = {
     "line": PathConfig(shape="line", size=0.5),
@@ -33,7 +33,7 @@ SOLVE_S = 0.02
 def run(quick: bool) -> list[Result]:
     """Pushes along line, arc, S and figure eight: nominal, disturbed, and shoved."""
     seeds = range(FIRST_SEED, FIRST_SEED + (QUICK_SEEDS if quick else SEEDS))
-    trials: list[Trial] = []
+    trials: list[PushingTrial] = []
     results = [*_nominal(trials), *_disturbed(seeds, trials), *_shoved(seeds, trials)]
     results += _times("fatrop, then ipopt", trials)
     if not quick:
@@ -43,7 +43,7 @@ def run(quick: bool) -> list[Result]:
     return results
 
 
-def _nominal(trials: list[Trial]) -> list[Result]:
+def _nominal(trials: list[PushingTrial]) -> list[Result]:
     results = []
     for name, path in {**PATHS, "eight": EIGHT}.items():
         trial = run_trial(PushingConfig(path=path), Variation())
@@ -56,7 +56,7 @@ def _nominal(trials: list[Trial]) -> list[Result]:
     return results
 
 
-def _disturbed(seeds: range, trials: list[Trial]) -> list[Result]:
+def _disturbed(seeds: range, trials: list[PushingTrial]) -> list[Result]:
     results, errors = [], []
     for name, path in PATHS.items():
         done = [run_trial(PushingConfig(path=path), Variation.random(seed)) for seed in seeds]
@@ -71,7 +71,7 @@ def _disturbed(seeds: range, trials: list[Trial]) -> list[Result]:
     return [*results, Result("pushing", figure, share, "", None, Target(SHARE, at_least=True))]
 
 
-def _shoved(seeds: range, trials: list[Trial]) -> list[Result]:
+def _shoved(seeds: range, trials: list[PushingTrial]) -> list[Result]:
     times = []
     for path in PATHS.values():
         for seed in seeds:
@@ -92,7 +92,7 @@ def _shoved(seeds: range, trials: list[Trial]) -> list[Result]:
     ]
 
 
-def _times(what: str, trials: list[Trial]) -> list[Result]:
+def _times(what: str, trials: list[PushingTrial]) -> list[Result]:
     """Returns solve times; those of the processor do not depend on what else the machine does."""
     plans = [cycle.plan for trial in trials for cycle in trial.cycles if cycle.plan and cycle.plan.iterations]
     processor, wall = (np.array([getattr(plan, name) for plan in plans]) for name in ("processor_s", "wall_s"))

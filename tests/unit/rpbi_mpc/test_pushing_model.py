@@ -17,7 +17,7 @@ from rpbi_mpc.pushing.model import (
     response,
     twist_of,
 )
-from rpbi_mpc.pushing.motion import Scene, gap_and_contact, moved
+from rpbi_mpc.pushing.motion import PlanarScene, gap_and_contact, moved
 from rpbi_mpc.pushing.paths import PathConfig, PushPath
 from rpbi_mpc.pushing.slider import SliderConfig
 
@@ -86,7 +86,7 @@ def test_complementarity_is_positive_inside_the_cone_when_the_contact_slides():
 
 
 def test_pusher_pushes_after_it_has_closed_the_gap():
-    scene = Scene(np.zeros(3), np.array([-0.05 - 0.01 - 0.01, 0.0]))
+    scene = PlanarScene(np.zeros(3), np.array([-0.05 - 0.01 - 0.01, 0.0]))
     assert gap_and_contact(scene, SLIDER, 0.01) == pytest.approx((0.01, 0.0))
     assert np.allclose(moved(scene, np.array([0.1, 0.0]), 0.09, SLIDER, 0.01).slider, 0.0)
     pushed = moved(scene, np.array([0.1, 0.0]), 0.2, SLIDER, 0.01, steps=20)

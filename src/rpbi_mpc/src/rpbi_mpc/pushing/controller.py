@@ -12,10 +12,17 @@ from custom_ros_tools.schema import ConfigModel, NonNegative, Positive, Positive
 from rpbi_mpc.controller import ControlPlan, MpcController
 from rpbi_mpc.plant import Sensed
 
-from .approach import ApproachConfig, approach_velocity, is_pushable
 from .estimate import EstimatorConfig, SceneEstimator
 from .model import pusher_velocity
-from .motion import Scene, gap_and_contact, moved, rotation
+from .motion import (
+    ApproachConfig,
+    PlanarScene,
+    approach_velocity,
+    gap_and_contact,
+    is_pushable,
+    moved,
+    rotation,
+)
 from .paths import PathConfig, PushPath
 from .program import ProgramConfig, PushingProgram, Solved
 from .slider import SliderConfig
@@ -118,7 +125,7 @@ class PushingController(MpcController):
         elif lag <= self.config.max_lag:
             self.path_time_s += self.config.cycle_s
 
-    def _approach(self, scene: Scene, extras: dict[str, float]) -> ControlPlan:
+    def _approach(self, scene: PlanarScene, extras: dict[str, float]) -> ControlPlan:
         config, commands, states = self.config, [], [np.array([*scene.slider, 0.0])]
         self._guess, self._force = None, np.array([self.path.speed, 0.0])
         for _ in range(config.plan_cycles):
@@ -130,7 +137,7 @@ class PushingController(MpcController):
             np.array(commands), np.array(states), config.cycle_s, math.nan, True, "approach", extras=extras
         )
 
-    def _push(self, scene: Scene, gap: float, contact: float, extras: dict[str, float]) -> ControlPlan:
+    def _push(self, scene: PlanarScene, gap: float, contact: float, extras: dict[str, float]) -> ControlPlan:
         reach = self.config.slider.reach
         state = np.array([*scene.slider, np.clip(contact, -reach, reach)])
         solved = self._solve(state)

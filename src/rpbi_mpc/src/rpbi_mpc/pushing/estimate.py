@@ -11,7 +11,7 @@ from pydantic import Field
 from custom_ros_tools.schema import ConfigModel
 from rpbi_mpc.plant import Sensed
 
-from .motion import Scene, moved
+from .motion import PlanarScene, moved
 from .slider import SliderConfig
 
 KEPT_S = 2.0
@@ -53,7 +53,7 @@ class SceneEstimator:
 
     def reset(self) -> None:
         """Forgets measurements and commands."""
-        self._estimate: Scene | None = None
+        self._estimate: PlanarScene | None = None
         self._time_s = -math.inf
         self._commands: list[tuple[float, np.ndarray]] = []
 
@@ -63,7 +63,7 @@ class SceneEstimator:
         while len(self._commands) > 2 and self._commands[1][0] < time_s - KEPT_S:
             del self._commands[0]
 
-    def update(self, sensed: Sensed, ahead_s: float) -> Scene:
+    def update(self, sensed: Sensed, ahead_s: float) -> PlanarScene:
         """Returns the scene to be expected at a time, with a measurement (x, y, yaw, pusher_x, pusher_y).
 
         Args:
@@ -72,7 +72,7 @@ class SceneEstimator:
         """
         measured_s = sensed.time_s - sensed.age_s
         assert sensed.values is not None
-        measured = Scene.of(sensed.values)
+        measured = PlanarScene.of(sensed.values)
         if self._estimate is None:
             self._estimate = measured
         else:
@@ -80,14 +80,14 @@ class SceneEstimator:
         self._time_s = measured_s
         return self._predicted(self._estimate, measured_s, ahead_s)
 
-    def _corrected(self, expected: Scene, measured: Scene) -> Scene:
+    def _corrected(self, expected: PlanarScene, measured: PlanarScene) -> PlanarScene:
         difference = measured.slider - expected.slider
         difference[2] = math.remainder(difference[2], 2 * math.pi)
         jumps = np.hypot(*difference[:2]) > self._config.jump or abs(difference[2]) > self._config.jump_rad
         gains = np.ones(3) if jumps else np.array([self._config.position, self._config.position, self._config.yaw])
-        return Scene(expected.slider + gains * difference, measured.pusher)
+        return PlanarScene(expected.slider + gains * difference, measured.pusher)
 
-    def _predicted(self, scene: Scene, begin_s: float, end_s: float) -> Scene:
+    def _predicted(self, scene: PlanarScene, begin_s: float, end_s: float) -> PlanarScene:
         """Returns a scene after the commands between two times."""
         edges = [*(time_s for time_s, _ in self._commands), math.inf]
         for (start_s, velocity), stop_s in zip(self._commands, edges[1:]):

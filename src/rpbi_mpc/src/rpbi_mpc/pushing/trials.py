@@ -61,7 +61,7 @@ class Variation(NamedTuple):
         return cls(seed, float(table), float(pusher), centre, start, noise_m, latency_s)
 
 
-class Trial(NamedTuple):
+class PushingTrial(NamedTuple):
     """Result of a trial.
 
     Attributes:
@@ -137,7 +137,7 @@ def run_trial(
     controller: MpcController | None = None,
     recovered_below: float = 0.01,
     max_s: float = 60.0,
-) -> Trial:
+) -> PushingTrial:
     """Pushes along a path in the simulator.
 
     Args:
@@ -169,7 +169,7 @@ def run_trial(
             errors.append(float(np.hypot(*(pose[:2] - path.poses(time_s)[0, :2]))))
             off_path.append(path.distance(pose[:2]))
         recovered_s = math.nan if shoved is None else _recovered(errors[shoved:], recovered_below, lock_step.config)
-        return Trial(
+        return PushingTrial(
             np.array(errors),
             np.array(off_path),
             lock_step.cycles,

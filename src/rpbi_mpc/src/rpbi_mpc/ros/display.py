@@ -54,6 +54,7 @@ class PushingDisplay:
         self._markers.publish(MarkerArray([self._outline(i, *each) for i, each in enumerate(outlines)]))
 
     def _path_message(self, poses: np.ndarray) -> Path:
+        """Returns poses x, y, yaw, N x 3 [m, m, rad], as a path at the height of the display."""
         message = Path()
         message.header.frame_id = FRAME
         message.poses = [self._pose(pose) for pose in poses]
@@ -68,6 +69,7 @@ class PushingDisplay:
         return stamped
 
     def _outline(self, index: int, pose: np.ndarray, colour: ColorRGBA) -> Marker:
+        """Returns the outline of the slider at a pose x, y, yaw [m, m, rad]."""
         marker = Marker(ns="slider", id=index, type=Marker.LINE_STRIP, action=Marker.ADD, color=colour)
         marker.header.frame_id = FRAME
         marker.scale.x = 0.002
