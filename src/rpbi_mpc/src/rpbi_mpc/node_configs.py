@@ -39,7 +39,9 @@ class PlantConfig(ConfigModel):
         "rpbi/nextage/joint_states", description="Topic of the positions of the joints; on hardware, the measured ones."
     )
     vicon: TopicName = Field("vicon/box/box", description="Topic of the pose of the slider's middle.")
-    latency_s: Annotated[NonNegative, Unit("s")] = Field(0.03, description="Largest age of a pose that is on time.")
+    latency_s: Annotated[NonNegative, Unit("s")] = Field(
+        0.02, description="Latency of the tracker; a stepped world waits for such a pose."
+    )
     timeout_s: Seconds = Field(0.2, description="Time without a pose after which the slider is lost.")
     ready: TopicName | None = optional(
         "Topic whose first message shows that the robot is commanded; only with `timed`."

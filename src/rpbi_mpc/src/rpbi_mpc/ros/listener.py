@@ -16,6 +16,8 @@ from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from rpbi_mpc.hand import PlanarHand
 from rpbi_mpc.node_configs import PlantConfig
 
+SLACK_S = 1e-4
+"""Difference of stamps below which they are the same [s]: less than a tick, more than rounding."""
 KEPT = 1000
 """Number of joint states that are kept."""
 
@@ -70,8 +72,8 @@ class SceneListener:
         return SeenScene(stamp_s, np.array([*pose, *self._hand.position(joints)[:2]]))
 
     def _has(self, pose_s: float, joints_s: float) -> bool:
-        has_joints = bool(self._joints) and self._joints[-1][0] >= joints_s
-        return has_joints and self._pose is not None and self._pose[0] >= pose_s
+        has_joints = bool(self._joints) and self._joints[-1][0] >= joints_s - SLACK_S
+        return has_joints and self._pose is not None and self._pose[0] >= pose_s - SLACK_S
 
     def _on_pose(self, message: TransformStamped) -> None:
         place, turn = message.transform.translation, message.transform.rotation
