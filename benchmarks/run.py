@@ -24,7 +24,7 @@ BENCHMARKS = (
 )
 WHEN_NAMED = (
     *("datasets", "dressing", "farm", "forks", "guard_faults", "gym", "haptics", "lfd", "live_plot", "passivity"),
-    *("press", "recording", "soak", "streams", "teleop", "verify"),
+    *("press", "pushing", "recording", "soak", "streams", "teleop", "verify"),
 )
 """Those that take too long to run with the others."""
 FIND_RENDERER = """

@@ -30,6 +30,7 @@ PACKAGES = {
     "keyboard",
     "motion_primitives",
     "operator_node",
+    "rpbi_mpc",
     "ros_pybullet_interface",
     "rpbi_examples",
     "rpbi_utils",

@@ -18,7 +18,7 @@ def bench(
 
     Args:
         NAME: by default all but datasets, dressing, farm, forks, guard_faults, gym, haptics, lfd, live_plot,
-            passivity, press, recording, soak, streams, teleop and verify
+            passivity, press, pushing, recording, soak, streams, teleop and verify
         quick: measures for a shorter time, less exactly
         json: file for the figures
     """

@@ -7,6 +7,7 @@ from .link import SimulatorLink
 from .panel import Panel, named
 from .panels.cameras import CamerasPanel
 from .panels.joints import JointsPanel
+from .panels.mpc import MpcPanel
 from .panels.objects import ObjectsPanel
 from .panels.recording import RecordingPanel
 from .panels.run import RunPanel
@@ -41,7 +42,7 @@ class ControlsWindow(QMainWindow):
         self._link = link
         requests = BackgroundRequests(signals.answered.emit)
         signals.answered.connect(self._on_answer)
-        left: list[Panel] = [RunPanel(link, requests), JointsPanel(link, requests, first)]
+        left: list[Panel] = [RunPanel(link, requests), MpcPanel(link, requests), JointsPanel(link, requests, first)]
         right: list[Panel] = [
             ObjectsPanel(link, requests),
             CamerasPanel(link, requests),
@@ -100,7 +101,7 @@ def _column(panels: list[Panel]) -> QWidget:
     column = QWidget()
     layout = QVBoxLayout(column)
     for panel in panels:
-        layout.addWidget(panel, 0 if isinstance(panel, RunPanel | RecordingPanel) else 1)
+        layout.addWidget(panel, 0 if isinstance(panel, RunPanel | MpcPanel | RecordingPanel) else 1)
     area = QScrollArea()
     area.setWidget(column)
     area.setWidgetResizable(True)

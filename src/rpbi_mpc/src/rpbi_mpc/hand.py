@@ -1,0 +1,119 @@
+"""A hand that moves in a plane: positions of an arm's joints for places of a point of the hand."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+from scipy.spatial.transform import Rotation
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.schema import ConfigModel, ListOf, Text, Unit
+from robot_model.asset_files import find_file
+from robot_model.model import RobotModel
+
+TOLERANCE_M, TOLERANCE_RAD = 1e-4, 1e-3
+"""Distance and angle within which a place is reached [m, rad]."""
+MAX_ITERATIONS = 100
+"""Newton steps after which a place counts as out of reach."""
+MAX_STEP_RAD = 0.1
+"""Largest change of a joint in one of them [rad]; larger ones jump to other postures."""
+DAMPING = 1e-3
+"""Damping of the least squares [m^2/rad^2]; more slows down, less shakes near singular postures."""
+
+
+class HandConfig(ConfigModel):
+    """A point of an arm that moves at a constant height and orientation.
+
+    The hand does not turn: a round tip that turns would rub along the face that it pushes.
+
+    Attributes:
+        urdf: The robot.
+        link: The link of the point, its origin; its axis z points down.
+        joints: The joints that move it.
+        base: Position of the robot's root link in the world [m].
+        height: Height of the point in the world [m].
+        yaw: Angle of the link's axis x about the vertical, from x of the world [rad].
+        posture: Positions of the joints from which the first place is looked for [rad].
+    """
+
+    urdf: Text = Field(description="URDF of the robot, a path or `{package}/path`.")
+    link: Text = Field(description="Link whose origin is moved; its axis z points down.")
+    joints: ListOf[Text] = Field(min_length=3, description="Joints that move it.")
+    base: Annotated[tuple[float, float, float], Field(strict=False), Unit("m")] = Field(
+        (0.0, 0.0, 0.0), description="Position of the root link in the world."
+    )
+    height: Annotated[float, Unit("m")] = Field(0.02, description="Height of the point in the world.")
+    yaw: Annotated[float, Unit("rad")] = Field(0.0, description="Angle of the link's x about the vertical.")
+    posture: ListOf[float] = Field((), description="Positions of the joints to start from; 0 without it.")
+
+
+class PlanarHand:
+    """Inverse kinematics of a hand over a table, by damped least squares (C. Wampler, IEEE SMC 16, 1986).
+
+    The same sequence of places leads to the same positions, on any computer.
+
+    Args:
+        config: Robot, joints and height.
+
+    Raises:
+        ConfigError: If the URDF cannot be read.
+        UnknownNameError: If link or joints are unknown.
+        InterfaceError: If the posture does not have one number for each joint.
+    """
+
+    def __init__(self, config: HandConfig) -> None:
+        self._robot = RobotModel(find_file(config.urdf, "hand"), config.joints)
+        self._robot.check_link(config.link)
+        self._config, self.joint_names = config, tuple(config.joints)
+        posture = config.posture or [0.0] * len(config.joints)
+        if len(posture) != len(config.joints):
+            raise InterfaceError(f"hand.posture: expected {len(config.joints)} numbers, got {len(posture)}")
+        self.posture = np.array(posture, dtype=float)
+
+    def position(self, joints: np.ndarray) -> np.ndarray:
+        """Returns the position of the point in the world, 3 [m]."""
+        position: np.ndarray = self._pose(joints)[:3, 3] + self._config.base
+        return position
+
+    def solve(self, start: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """Returns positions of the joints with the point at a place.
+
+        Args:
+            start: Positions to start from [rad].
+            place: x, y in the world [m], at the height of the configuration.
+
+        Raises:
+            InterfaceError: If the place is out of reach.
+        """
+        goal = np.array([*place, self._config.height])
+        q = np.clip(np.array(start, dtype=float), self._robot.limits.lower, self._robot.limits.upper)
+        for _ in range(MAX_ITERATIONS):
+            error = self._error(q, goal)
+            if np.linalg.norm(error[:3]) < TOLERANCE_M and np.linalg.norm(error[3:]) < TOLERANCE_RAD:
+                return q
+            q = self._improved(q, error)
+        place_text = ", ".join(f"{value:.3f}" for value in goal)
+        raise InterfaceError(f"hand.{self._config.link}: expected a place within reach, got ({place_text}) m")
+
+    def _error(self, q: np.ndarray, goal: np.ndarray) -> np.ndarray:
+        """Returns the way to a place [m], and the rotation to the wanted orientation [rad], in the axes of the root."""
+        pose, cos, sin = self._pose(q), np.cos(self._config.yaw), np.sin(self._config.yaw)
+        wanted = np.array([[cos, sin, 0.0], [sin, -cos, 0.0], [0.0, 0.0, -1.0]])
+        turn = Rotation.from_matrix(wanted @ pose[:3, :3].T).as_rotvec()
+        return np.array([*(goal - self._config.base - pose[:3, 3]), *turn])
+
+    def _improved(self, q: np.ndarray, error: np.ndarray) -> np.ndarray:
+        """Returns positions that are nearer, by one damped step of least squares."""
+        jacobian = self._robot.frames.jacobian(q[None], self._config.link)[0]
+        damped = jacobian @ jacobian.T + DAMPING * np.linalg.norm(error) * np.eye(6)
+        step = jacobian.T @ np.linalg.solve(damped, error)
+        step *= min(1.0, MAX_STEP_RAD / max(float(np.abs(step).max()), 1e-12))
+        improved: np.ndarray = np.clip(q + step, self._robot.limits.lower, self._robot.limits.upper)
+        return improved
+
+    def _pose(self, joints: np.ndarray) -> np.ndarray:
+        frame, in_frame = self._robot.frames.place(self._config.link)
+        pose: np.ndarray = self._robot.frames.at(np.asarray(joints)[None])[0, frame] @ in_frame
+        return pose

@@ -1,0 +1,201 @@
+"""The loop in lock-step: sense, solve, act, step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.schema import ConfigModel, Hz, KeyedError, NonNegative, Unit
+
+from .controller import ControlPlan, MpcController
+from .plant import Plant, Sensed
+
+
+class LoopConfig(ConfigModel):
+    """Times of a loop.
+
+    Attributes:
+        hz: Cycles a second [Hz].
+        delay_s: Time from a measurement until its command acts [s], at most one cycle. It is constant: in simulation
+            however long the solver takes, on hardware as long as the solver is faster.
+        max_missed: Number of cycles without a new plan for which the last one goes on; after that the plant stands, and
+            the loop stops.
+    """
+
+    hz: Hz = Field(25.0, description="Cycles a second.")
+    delay_s: Annotated[NonNegative, Unit("s")] = Field(0.02, description="Time from a measurement to its command.")
+    max_missed: Annotated[int, Field(ge=0)] = Field(5, description="Cycles that the last plan goes on without another.")
+
+    @model_validator(mode="after")
+    def _acts_within_its_cycle(self) -> LoopConfig:
+        if self.delay_s > self.period_s:
+            raise KeyedError("delay_s", f"expected at most the {self.period_s:g} s of a cycle, got {self.delay_s:g}")
+        return self
+
+    @property
+    def period_s(self) -> float:
+        """Time of a cycle [s]."""
+        return 1.0 / self.hz
+
+
+class Status(StrEnum):
+    """What a cycle came to."""
+
+    SOLVED = "solved"
+    LAST_PLAN = "last plan"
+    WAITING = "waiting"
+    STOPPED = "stopped"
+    FINISHED = "finished"
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """One pass of the loop.
+
+    Attributes:
+        index: Its number, from 0.
+        status: What it came to.
+        reason: Why, if it is not `solved`.
+        sensed: The measurement.
+        plan: The new plan; None without a measurement.
+        command: The command that acted; None if the plant stood.
+    """
+
+    index: int
+    status: Status
+    reason: str
+    sensed: Sensed
+    plan: ControlPlan | None
+    command: np.ndarray | None
+
+
+@dataclass
+class _Held:
+    """The last good plan, and the number of cycles since."""
+
+    plan: ControlPlan | None = None
+    age: int = 0
+    reason: str = field(default="")
+
+
+class LockStep:
+    """Senses, solves, acts and steps, one cycle at a time.
+
+    The measurement of a cycle decides the command that acts `delay_s` later. A simulated plant waits for the solver, so
+    the same start leads to the same end on any computer. A timed plant does not wait: a plan that is there after its
+    time is not used.
+
+    Without a new plan the last one goes on, for `max_missed` cycles; then the plant stands and the loop stops. Without
+    a measurement the plant stands, and goes on by itself with the next one.
+
+    Args:
+        plant: The controlled system.
+        controller: The controller.
+        config: Times.
+        observers: Are called with each cycle.
+
+    Raises:
+        InterfaceError: If plan or measurement do not have the numbers that the controller names.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        controller: MpcController,
+        config: LoopConfig | None = None,
+        observers: tuple[Callable[[Cycle], None], ...] = (),
+    ) -> None:
+        self.plant, self.controller = plant, controller
+        self.config = config or LoopConfig()
+        self.cycles: list[Cycle] = []
+        self._observers = observers
+        self._held = _Held()
+        self._stopped = ""
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the loop has stopped, or its task is done."""
+        return bool(self._stopped) or self.controller.is_finished
+
+    def restart(self) -> None:
+        """Goes on after a stop, with no plan and a controller that has forgotten everything."""
+        self._held, self._stopped = _Held(), ""
+        self.controller.reset()
+
+    def run(self, max_s: float = math.inf) -> list[Cycle]:
+        """Runs cycles until the task is done, the loop stops, or a time [s] has passed; returns these cycles."""
+        first = len(self.cycles)
+        while not self.is_over and (len(self.cycles) - first) * self.config.period_s < max_s - 1e-9:
+            self.cycle()
+        self.plant.stand()
+        return self.cycles[first:]
+
+    def cycle(self) -> Cycle:
+        """Runs one cycle, at the end of which a whole period has passed."""
+        sensed = self.plant.sense()
+        plan, status, reason = self._decide(sensed)
+        command = self._command() if status in (Status.SOLVED, Status.LAST_PLAN) else None
+        self.plant.advance(self.config.delay_s)
+        if command is None:
+            self.plant.stand()
+        else:
+            self.plant.act(command)
+        self.controller.executed(sensed.time_s + self.config.delay_s, command)
+        self.plant.advance(self.config.period_s - self.config.delay_s)
+        cycle = Cycle(len(self.cycles), status, reason, sensed, plan, command)
+        self.cycles.append(cycle)
+        for observer in self._observers:
+            observer(cycle)
+        return cycle
+
+    def _decide(self, sensed: Sensed) -> tuple[ControlPlan | None, Status, str]:
+        if self._stopped:
+            return None, Status.STOPPED, self._stopped
+        if sensed.values is None:
+            self._held = _Held()
+            return None, Status.WAITING, sensed.missing
+        self._check("measurement", sensed.values, self.controller.measured_names)
+        plan = self.controller.plan(sensed, self.config.delay_s)
+        if self.controller.is_finished:
+            return plan, Status.FINISHED, "the task is done"
+        fault = self._fault_of(plan)
+        if not fault:
+            self._check("command", plan.commands[0], self.controller.command_names)
+            self._held = _Held(plan)
+            return plan, Status.SOLVED, ""
+        return plan, *self._without(fault)
+
+    def _fault_of(self, plan: ControlPlan) -> str:
+        if not plan.converged:
+            return f"the solver did not converge: {plan.status} after {plan.iterations} iterations"
+        if not (len(plan.commands) and np.isfinite(plan.commands).all()):
+            return f"the plan has a command that is no finite number: {plan.status}"
+        if self.plant.is_timed and plan.wall_s > self.config.delay_s:
+            return f"the solver took {plan.wall_s * 1e3:.1f} ms, expected at most {self.config.delay_s * 1e3:.1f} ms"
+        return ""
+
+    def _without(self, fault: str) -> tuple[Status, str]:
+        """Goes on with the last plan, as long as there is one."""
+        self._held.age += 1
+        last = self._held.plan
+        if last is not None and self._held.age <= min(self.config.max_missed, len(last.commands) - 1):
+            return Status.LAST_PLAN, fault
+        missed = "no plan before it" if last is None else f"{self._held.age} cycles without a new plan"
+        self._stopped = f"{fault}; {missed}"
+        return Status.STOPPED, self._stopped
+
+    def _command(self) -> np.ndarray:
+        assert self._held.plan is not None
+        command: np.ndarray = self._held.plan.commands[self._held.age]
+        return command
+
+    def _check(self, subject: str, numbers: np.ndarray, names: tuple[str, ...]) -> None:
+        if np.shape(numbers) != (len(names),):
+            raise InterfaceError(f"{subject}: expected {len(names)} numbers ({', '.join(names)}), got {numbers}")

@@ -1,0 +1,1 @@
+"""Planar pushing: a point or round pusher moves a slider along a path on a table."""

@@ -1,0 +1,97 @@
+"""Where slider and pusher are, from measurements that are late and noisy, and will be when a command acts."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel
+from rpbi_mpc.plant import Sensed
+
+from .motion import PlanarScene, moved
+from .slider import SliderConfig
+
+KEPT_S = 2.0
+"""Time for which commands are kept [s]; a measurement that is older counts as new."""
+
+Share = Annotated[float, Field(gt=0.0, le=1.0)]
+
+
+class EstimatorConfig(ConfigModel):
+    """Share of the difference between measurement and prediction that is corrected in a cycle.
+
+    Attributes:
+        position: Of the position.
+        yaw: Of the yaw.
+        jump: Distance between measurement and prediction beyond which the measurement counts alone [m].
+        jump_rad: The same for yaw [rad].
+    """
+
+    position: Share = Field(0.4, description="Share of a difference in position that is corrected in a cycle.")
+    yaw: Share = Field(0.4, description="Share of a difference in yaw that is corrected in a cycle.")
+    jump: Annotated[float, Field(gt=0.0)] = Field(
+        0.012, description="Distance beyond which a measurement counts alone."
+    )
+    jump_rad: Annotated[float, Field(gt=0.0)] = Field(0.15, description="The same for yaw.")
+
+
+class SceneEstimator:
+    """Corrects the motion that the model expects by measurements (an observer of fixed gain, D. Luenberger, 1964).
+
+    Args:
+        config: Gains.
+        slider: The slider.
+        radius: Radius of the pusher [m].
+    """
+
+    def __init__(self, config: EstimatorConfig, slider: SliderConfig, radius: float) -> None:
+        self._config, self._slider, self._radius = config, slider, radius
+        self.reset()
+
+    def reset(self) -> None:
+        """Forgets measurements and commands."""
+        self._estimate: PlanarScene | None = None
+        self._time_s = -math.inf
+        self._commands: list[tuple[float, np.ndarray]] = []
+
+    def executed(self, time_s: float, command: np.ndarray | None) -> None:
+        """Takes note of the velocity of the pusher from a time on; None is rest."""
+        self._commands.append((time_s, np.zeros(2) if command is None else np.asarray(command)))
+        while len(self._commands) > 2 and self._commands[1][0] < time_s - KEPT_S:
+            del self._commands[0]
+
+    def update(self, sensed: Sensed, ahead_s: float) -> PlanarScene:
+        """Returns the scene to be expected at a time, with a measurement (x, y, yaw, pusher_x, pusher_y).
+
+        Args:
+            sensed: The measurement, which is complete.
+            ahead_s: The time of the scene [s].
+        """
+        measured_s = sensed.time_s - sensed.age_s
+        assert sensed.values is not None
+        measured = PlanarScene.of(sensed.values)
+        if self._estimate is None:
+            self._estimate = measured
+        else:
+            self._estimate = self._corrected(self._predicted(self._estimate, self._time_s, measured_s), measured)
+        self._time_s = measured_s
+        return self._predicted(self._estimate, measured_s, ahead_s)
+
+    def _corrected(self, expected: PlanarScene, measured: PlanarScene) -> PlanarScene:
+        difference = measured.slider - expected.slider
+        difference[2] = math.remainder(difference[2], 2 * math.pi)
+        jumps = np.hypot(*difference[:2]) > self._config.jump or abs(difference[2]) > self._config.jump_rad
+        gains = np.ones(3) if jumps else np.array([self._config.position, self._config.position, self._config.yaw])
+        return PlanarScene(expected.slider + gains * difference, measured.pusher)
+
+    def _predicted(self, scene: PlanarScene, begin_s: float, end_s: float) -> PlanarScene:
+        """Returns a scene after the commands between two times."""
+        edges = [*(time_s for time_s, _ in self._commands), math.inf]
+        for (start_s, velocity), stop_s in zip(self._commands, edges[1:]):
+            duration_s = min(stop_s, end_s) - max(start_s, begin_s)
+            if duration_s > 1e-9:
+                scene = moved(scene, velocity, duration_s, self._slider, self._radius)
+        return scene

@@ -1,0 +1,122 @@
+"""Quasi-static motion of a slider under the push of one contact, with an ellipsoidal limit surface.
+
+Friction with the table and the force of the pusher are in balance. The limit surface, the set of all loads of a sliding
+body, is approximated by the ellipsoid (fx/f)^2 + (fy/f)^2 + (m/(f c))^2 = 1 with f the largest force and c the
+characteristic length; the twist is normal to it (K. Lynch, H. Maekawa and K. Tanie, IROS 1992). With forces in units of
+the speed that they cause, the twist of the slider in its own frame under the load (fx, fy, m) is (fx, fy, m / c^2).
+
+The contact sticks, or slides to one side of the face at the edge of the friction cone (F. Hogan and A. Rodriguez,
+"Feedback control of the pusher-slider system", WAFR 2016, and "Reactive planar non-prehensile manipulation with hybrid
+model predictive control", IJRR 39, 2020).
+
+All functions take numbers, NumPy arrays or symbols of CasADi. The state is (x, y, yaw, contact): pose of the slider in
+the plane [m, m, rad], and the place of the pusher along the face at -x, from its middle to the left [m]. The input is
+(normal, tangential, left, right): the force [m/s], and the speeds at which the pusher slides along the face [m/s].
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .slider import SliderConfig
+
+STATE = ("x", "y", "yaw", "contact")
+INPUT = ("normal", "tangential", "left", "right")
+
+Vector = Any
+"""A sequence, an array or a CasADi vector of numbers or symbols."""
+
+
+def load_of(contact: Any, normal: Any, tangential: Any, slider: SliderConfig) -> tuple[Any, Any, Any]:
+    """Returns force x, y [m/s] and moment [m^2/s] about the middle of the slider, in its frame."""
+    return normal, tangential, -slider.face * tangential - contact * normal
+
+
+def twist_of(load: Vector, slider: SliderConfig) -> tuple[Any, Any, Any]:
+    """Returns the twist of the slider in its frame [m/s, m/s, rad/s]: the normal of the limit surface at a load."""
+    return load[0], load[1], load[2] / slider.characteristic_length**2
+
+
+def load_for(twist: Vector, slider: SliderConfig) -> tuple[Any, Any, Any]:
+    """Returns the load [m/s, m/s, m^2/s] under which the slider moves with a twist; the inverse of `twist_of`."""
+    return twist[0], twist[1], twist[2] * slider.characteristic_length**2
+
+
+def rates(state: Vector, control: Vector, slider: SliderConfig) -> tuple[Any, Any, Any, Any]:
+    """Returns the derivative of the state by time."""
+    yaw, contact = state[2], state[3]
+    along, across, turning = twist_of(load_of(contact, control[0], control[1], slider), slider)
+    cos, sin = _cos_sin(yaw)
+    return cos * along - sin * across, sin * along + cos * across, turning, control[2] - control[3]
+
+
+def advanced(state: Vector, control: Vector, duration_s: Any, slider: SliderConfig) -> list[Any]:
+    """Returns the state after a time with one input, by the midpoint rule."""
+    middle = [value + duration_s / 2 * rate for value, rate in zip(_items(state), rates(state, control, slider))]
+    return [value + duration_s * rate for value, rate in zip(_items(state), rates(middle, control, slider))]
+
+
+def pusher_velocity(state: Vector, control: Vector, slider: SliderConfig) -> tuple[Any, Any]:
+    """Returns the velocity of the pusher in the frame of the slider's axes [m/s]: that of the contact, and sliding."""
+    contact = state[3]
+    along, across, turning = twist_of(load_of(contact, control[0], control[1], slider), slider)
+    return along - turning * contact, across - turning * slider.face + control[2] - control[3]
+
+
+def complementarity(control: Vector, slider: SliderConfig) -> Any:
+    """Returns how far an input is from sticking or sliding [m^2/s^2]; 0 if it is one of them.
+
+    The contact slides to the left only at the left edge of the friction cone, and to the right only at the right one.
+    Inside of the cone the sum is not negative. It is penalised rather than constrained to 0, in the spirit of the
+    relaxed complementarity of J. Moura, T. Stouraitis and S. Vijayakumar, "Non-prehensile planar manipulation via
+    trajectory optimization with complementarity constraints", ICRA 2022.
+    """
+    normal, tangential, left, right = _items(control)
+    return (slider.friction * normal - tangential) * left + (slider.friction * normal + tangential) * right
+
+
+def response(
+    state: Vector, velocity: Vector, slider: SliderConfig
+) -> tuple[tuple[float, float, float], tuple[float, float], float]:
+    """Returns the motion that a velocity of the pusher at the contact causes.
+
+    The contact sticks if the force that this takes is in the friction cone, which is the case within the motion cone
+    (M. Mason, "Mechanics and planning of manipulator pushing operations", IJRR 5, 1986); otherwise it slides at the
+    edge of the cone. A pusher that moves away leaves the slider alone.
+
+    Args:
+        state: (x, y, yaw, contact).
+        velocity: Velocity of the pusher in the axes of the slider [m/s].
+        slider: The slider.
+
+    Returns:
+        The twist in the frame of the slider [m/s, m/s, rad/s], the force (normal, tangential) [m/s], and the speed at
+        which the pusher slides to the left along the face [m/s].
+    """
+    contact, square = float(state[3]), slider.characteristic_length**2
+    mobility = np.array(  # velocity of the contact by the force at it
+        [
+            [1.0 + contact**2 / square, contact * slider.face / square],
+            [contact * slider.face / square, 1.0 + slider.face**2 / square],
+        ]
+    )
+    wanted = np.asarray(velocity, dtype=float)
+    force = np.linalg.solve(mobility, wanted)
+    if abs(force[1]) > slider.friction * force[0]:
+        edge = np.array([1.0, np.copysign(slider.friction, force[1])])
+        force = max(wanted[0], 0.0) / (mobility[0] @ edge) * edge
+    sliding = float(wanted[1] - mobility[1] @ force) if wanted[0] > 0.0 else float(wanted[1])
+    twist = twist_of(load_of(contact, force[0], force[1], slider), slider)
+    return (float(twist[0]), float(twist[1]), float(twist[2])), (float(force[0]), float(force[1])), sliding
+
+
+def _cos_sin(angle: Any) -> tuple[Any, Any]:
+    """Returns cosine and sine; symbols have them as methods, and warn of NumPy's functions."""
+    return (angle.cos(), angle.sin()) if hasattr(angle, "cos") else (np.cos(angle), np.sin(angle))
+
+
+def _items(vector: Vector) -> list[Any]:
+    """Returns the four entries; vectors of CasADi cannot be iterated over."""
+    return [vector[index] for index in range(4)]

@@ -1,0 +1,136 @@
+"""Motion of slider and round pusher in the plane, in contact or apart, and the way of the pusher to the slider."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel, Positive, PositiveMetres, Unit
+
+from .model import response
+from .slider import SliderConfig
+
+CONTACT_GAP = 1e-6
+"""Distance below which pusher and slider touch [m]."""
+
+
+class PlanarScene(NamedTuple):
+    """Slider and pusher in the plane.
+
+    Attributes:
+        slider: Pose x, y, yaw [m, m, rad] of the slider.
+        pusher: Position x, y of the middle of the pusher [m].
+    """
+
+    slider: np.ndarray
+    pusher: np.ndarray
+
+    @classmethod
+    def of(cls, values: np.ndarray) -> PlanarScene:
+        """Returns the scene of the numbers x, y, yaw, pusher_x, pusher_y."""
+        return cls(np.array(values[:3], dtype=float), np.array(values[3:5], dtype=float))
+
+    @property
+    def values(self) -> np.ndarray:
+        """The numbers x, y, yaw, pusher_x, pusher_y."""
+        return np.concatenate([self.slider, self.pusher])
+
+
+def rotation(yaw: float) -> np.ndarray:
+    """Returns the 2 x 2 matrix from the axes of the slider to those of the table."""
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return np.array([[cos, -sin], [sin, cos]])
+
+
+def pusher_in_slider(scene: PlanarScene) -> np.ndarray:
+    """Returns the position of the pusher in the frame of the slider [m]."""
+    offset: np.ndarray = rotation(scene.slider[2]).T @ (scene.pusher - scene.slider[:2])
+    return offset
+
+
+def gap_and_contact(scene: PlanarScene, slider: SliderConfig, radius: float) -> tuple[float, float]:
+    """Returns the distance between pusher and face, and the place of the pusher along the face [m, m].
+
+    The distance is that of a face without ends, and negative if the pusher is in the slider.
+    """
+    x, y = pusher_in_slider(scene)
+    return -x - slider.face - radius, y
+
+
+def moved(
+    scene: PlanarScene, velocity: np.ndarray, duration_s: float, slider: SliderConfig, radius: float, steps: int = 4
+) -> PlanarScene:
+    """Returns the scene after the pusher has moved at a velocity for a time, by the quasi-static model.
+
+    Args:
+        scene: Before.
+        velocity: Velocity of the pusher in the axes of the table [m/s].
+        duration_s: The time [s].
+        slider: The slider.
+        radius: Radius of the pusher [m].
+        steps: Number of steps of integration.
+    """
+    pose, pusher = scene.slider.copy(), scene.pusher.copy()
+    step_s = duration_s / steps
+    for _ in range(steps):
+        pusher = pusher + step_s * np.asarray(velocity)
+        gap, contact = gap_and_contact(PlanarScene(pose, pusher), slider, radius)
+        if gap >= -CONTACT_GAP or abs(contact) > slider.width / 2 or gap < -slider.length:
+            continue
+        axes = rotation(pose[2])
+        pushed = np.array([-gap / step_s, (axes.T @ np.asarray(velocity))[1]])
+        twist, _, _ = response((*pose, contact), pushed, slider)
+        pose = pose + step_s * np.array([*(axes @ twist[:2]), twist[2]])
+    return PlanarScene(pose, pusher)
+
+
+class ApproachConfig(ConfigModel):
+    """Motion of a pusher that does not touch.
+
+    Attributes:
+        speed: Its speed [m/s].
+        clearance: Distance from the face at which the pusher passes along it [m].
+        gap: Distance from the face below which the pusher counts as touching [m]; while pushing, three times as much.
+        rate: Rate at which it approaches points, which slows it down before them [1/s].
+    """
+
+    speed: Annotated[Positive, Unit("m/s")] = Field(0.1, description="Speed of the pusher.")
+    clearance: PositiveMetres = Field(0.02, description="Distance from the face at which it passes along it.")
+    gap: PositiveMetres = Field(0.004, description="Distance below which it counts as touching.")
+    rate: Annotated[Positive, Unit("1/s")] = Field(5.0, description="Rate at which it approaches points.")
+
+
+def is_pushable(gap: float, contact: float, slider: SliderConfig, config: ApproachConfig, pushes: bool) -> bool:
+    """Returns whether the pusher is where it can push.
+
+    Args:
+        gap: Distance from the face [m], negative inside.
+        contact: Place along the face [m].
+        slider: The slider.
+        config: Distances.
+        pushes: Whether it did so before; then a larger distance is accepted.
+    """
+    slack = 3.0 if pushes else 1.0
+    beside = slider.width / 2 if pushes else slider.reach
+    return -slider.face < gap <= slack * config.gap and abs(contact) <= beside
+
+
+def approach_velocity(scene: PlanarScene, slider: SliderConfig, radius: float, config: ApproachConfig) -> np.ndarray:
+    """Returns the velocity of a pusher on its way to the face, in the axes of the table [m/s].
+
+    A pusher beside the slider moves back first, then along the face at some distance, and then on to the face.
+    """
+    gap, contact = gap_and_contact(scene, slider, radius)
+    beyond = contact - np.clip(contact, -slider.reach / 2, slider.reach / 2)
+    if abs(contact) <= slider.reach:
+        wanted = np.array([max(gap, 0.0) * config.rate + 0.25 * config.speed, -config.rate * beyond])
+    elif gap < config.clearance / 2:
+        wanted = np.array([-config.speed, 0.0])
+    else:
+        wanted = np.array([config.rate * (gap - config.clearance), -config.rate * beyond])
+    speed = float(np.hypot(*wanted))
+    velocity: np.ndarray = rotation(scene.slider[2]) @ (wanted * min(1.0, config.speed / max(speed, 1e-9)))
+    return velocity

@@ -1,0 +1,135 @@
+"""Paths on a table: poses by the distance along them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel, ListOf, Positive, PositiveMetres, Unit
+
+SPACING = 0.0005
+"""Distance of the points by which a path is stored [m]."""
+
+Point = tuple[float, float]
+
+
+class PathConfig(ConfigModel):
+    """A path on the table.
+
+    Attributes:
+        shape: `line`, `arc` (a quarter of a circle to the left), `s` (two arcs, to the left and to the right), `eight`,
+            or `points`.
+        size: Length of the line, radius of the arcs, half the length of the eight [m].
+        angle: Angle of each arc [rad].
+        points: Corners of the path `points` [m], in the frame of its start; they are passed on straight lines.
+        start: Pose of the start [m, m, rad].
+        speed: Speed along the path [m/s].
+    """
+
+    shape: Literal["line", "arc", "s", "eight", "points"] = Field("s", description="Shape of the path.")
+    size: PositiveMetres = Field(0.25, description="Length of a line, radius of arcs, half the length of an eight.")
+    angle: Annotated[Positive, Unit("rad"), Field(le=6.3)] = Field(math.pi / 2, description="Angle of each arc.")
+    points: ListOf[Annotated[tuple[float, float], Field(strict=False), Unit("m")]] = Field(
+        (), description="Corners of the path `points`, in the frame of its start."
+    )
+    start: Annotated[tuple[float, float, float], Field(strict=False), Unit("m, m, rad")] = Field(
+        (0.0, 0.0, 0.0), description="Pose of its start: x, y, yaw."
+    )
+    speed: Annotated[float, Field(gt=0.0, le=0.5), Unit("m/s")] = Field(0.05, description="Speed along it.")
+
+
+class PushPath:
+    """A path that is followed at a constant speed, with yaw along it.
+
+    Args:
+        config: Shape, start and speed.
+
+    Raises:
+        ValueError: If the path `points` has fewer than two different ones.
+    """
+
+    def __init__(self, config: PathConfig) -> None:
+        self.speed = config.speed
+        x, y, yaw = config.start
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        local = _even(SHAPES[config.shape](config))
+        self._points = local @ np.array([[cos, sin], [-sin, cos]]) + (x, y)
+        steps = np.diff(self._points, axis=0)
+        self._distances = np.concatenate([[0.0], np.hypot(*steps.T).cumsum()])
+        directions = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+        directions += 2 * math.pi * round((yaw - directions[0]) / (2 * math.pi))
+        self._yaws = np.concatenate([directions, directions[-1:]])
+
+    @property
+    def length(self) -> float:
+        """Length of the path [m]."""
+        return float(self._distances[-1])
+
+    @property
+    def duration_s(self) -> float:
+        """Time to its end [s]."""
+        return self.length / self.speed
+
+    @property
+    def points(self) -> np.ndarray:
+        """Points half a millimetre apart, N x 2 [m]."""
+        return self._points
+
+    def poses(self, times_s: Any) -> np.ndarray:
+        """Returns where the slider should be, N x 3 [m, m, rad]; at the start before 0, and at the end after it."""
+        along = np.clip(np.atleast_1d(np.asarray(times_s, dtype=float)) * self.speed, 0.0, self.length)
+        columns = (self._points[:, 0], self._points[:, 1], self._yaws)
+        return np.stack([np.interp(along, self._distances, column) for column in columns], axis=1)
+
+    def distance(self, point: Any) -> float:
+        """Returns the distance of a point (x, y) from the path, wherever along it [m]."""
+        return float(np.hypot(*(self._points - np.asarray(point, dtype=float)).T).min())
+
+
+def _even(points: np.ndarray) -> np.ndarray:
+    """Returns points along a path, all as far apart."""
+    distances = np.concatenate([[0.0], np.hypot(*np.diff(points, axis=0).T).cumsum()])
+    if not distances[-1] > 0.0:
+        raise ValueError(f"points: expected at least two different ones, got {len(points)}")
+    even = np.linspace(0.0, distances[-1], max(2, math.ceil(distances[-1] / SPACING) + 1))
+    return np.stack([np.interp(even, distances, column) for column in points.T], axis=1)
+
+
+def _line(config: PathConfig) -> np.ndarray:
+    return np.array([[0.0, 0.0], [config.size, 0.0]])
+
+
+def _arc(config: PathConfig) -> np.ndarray:
+    turned = np.linspace(0.0, config.angle, 2000)
+    return config.size * np.stack([np.sin(turned), 1.0 - np.cos(turned)], axis=1)
+
+
+def _s(config: PathConfig) -> np.ndarray:
+    """Returns an arc, and the same arc turned by half a circle about its end."""
+    first = _arc(config)
+    return np.concatenate([first, (2 * first[-1] - first)[-2::-1]])
+
+
+def _eight(config: PathConfig) -> np.ndarray:
+    """Returns the lemniscate of Bernoulli, from its middle, with the start along x; radii are a third of its size."""
+    turned = np.linspace(-math.pi / 2, 3 * math.pi / 2, 4000)
+    x, y = np.cos(turned), np.sin(turned) * np.cos(turned)
+    return config.size * np.stack([x - y, x + y], axis=1) / (math.sqrt(2) * (1 + np.sin(turned) ** 2))[:, None]
+
+
+def _points(config: PathConfig) -> np.ndarray:
+    return np.array([(0.0, 0.0), *config.points])
+
+
+SHAPES: dict[str, Callable[[PathConfig], np.ndarray]] = {
+    "line": _line,
+    "arc": _arc,
+    "s": _s,
+    "eight": _eight,
+    "points": _points,
+}
+"""Points of each shape, N x 2 [m], from the origin; close enough to each other to be joined by lines."""

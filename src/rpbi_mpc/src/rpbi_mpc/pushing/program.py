@@ -1,0 +1,231 @@
+"""The optimal control problem of pushing, as a nonlinear program of CasADi."""
+
+from __future__ import annotations
+
+import time
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.errors import MissingDependency
+from custom_ros_tools.schema import ConfigModel, ListOf, NonNegative, Positive, Seconds, Unit
+
+from .model import advanced, complementarity, pusher_velocity
+from .slider import SliderConfig
+
+try:
+    import casadi
+except ImportError:
+    raise MissingDependency("casadi", "./rpbi setup mpc") from None
+
+NX, NU = 4, 4
+"""Numbers of a state and of an input, see `model`."""
+
+
+class WeightsConfig(ConfigModel):
+    """Weights of the cost, a sum of squares over the horizon.
+
+    Attributes:
+        position: Distance from the path [1/m^2].
+        yaw: Difference from its direction [1/rad^2].
+        contact: Distance of the pusher from the middle of the face [1/m^2].
+        force: Difference of the normal force from that along the path, and tangential force [s^2/m^2].
+        sliding: Speed of sliding along the face [s^2/m^2].
+        change: Change of the force from the one before to that of the first step [s^2/m^2].
+        final: Factor of the weights of the last state.
+        complementarity: Penalty of inputs that neither stick nor slide [s^2/m^2].
+    """
+
+    position: NonNegative = Field(30000.0, description="Weight of the distance from the path [1/m^2].")
+    yaw: NonNegative = Field(10.0, description="Weight of the difference from its direction [1/rad^2].")
+    contact: NonNegative = Field(1.0, description="Weight of the pusher's distance from the middle [1/m^2].")
+    force: NonNegative = Field(10.0, description="Weight of forces unlike those along the path [s^2/m^2].")
+    sliding: NonNegative = Field(10.0, description="Weight of sliding along the face [s^2/m^2].")
+    change: NonNegative = Field(10.0, description="Weight of a change of the force at the first step [s^2/m^2].")
+    final: NonNegative = Field(5.0, description="Factor of the weights of the last state.")
+    complementarity: Positive = Field(1000.0, description="Penalty of neither sticking nor sliding [s^2/m^2].")
+
+
+class ProgramConfig(ConfigModel):
+    """Horizon, limits and solver.
+
+    Attributes:
+        steps: Number of steps of the horizon.
+        step_s: Time of one [s].
+        max_speed: Largest normal speed of the pusher, and of sliding along the face [m/s].
+        weights: The cost.
+        solvers: Solvers in the order in which they are tried until one converges: `fatrop` (L. Vanroye et al., IROS
+            2023), an interior-point method for optimal control that is several times as fast, and `ipopt` (A. Waechter
+            and L. Biegler, Mathematical Programming 106, 2006), which converges more often.
+        max_iterations: Number after which a solver gives up.
+        tolerance: Optimality at which it stops.
+    """
+
+    steps: Annotated[int, Field(ge=2, le=200)] = Field(20, description="Number of steps of the horizon.")
+    step_s: Seconds = Field(0.08, description="Time of one step.")
+    max_speed: Annotated[Positive, Unit("m/s")] = Field(0.15, description="Largest speed of the pusher.")
+    weights: WeightsConfig = Field(WeightsConfig(), description="The cost.")
+    solvers: Annotated[ListOf[Literal["fatrop", "ipopt"]], Field(min_length=1)] = Field(
+        ("fatrop", "ipopt"), description="Solvers, tried in this order until one converges."
+    )
+    max_iterations: Annotated[int, Field(ge=1)] = Field(40, description="Number after which a solver gives up.")
+    tolerance: Positive = Field(1e-3, description="Optimality at which it stops.")
+
+
+class Solved(NamedTuple):
+    """Result of the program.
+
+    Attributes:
+        states: (steps + 1) x 4.
+        inputs: steps x 4.
+        cost: Value of the cost.
+        converged: Whether it is a solution.
+        status: Text of the solver.
+        iterations: Their number.
+        wall_s: Time by the clock [s].
+        processor_s: Time of the processor [s].
+    """
+
+    states: np.ndarray
+    inputs: np.ndarray
+    cost: float
+    converged: bool
+    status: str
+    iterations: int
+    wall_s: float
+    processor_s: float
+
+
+class PushingProgram:
+    """Inputs that push a slider along a path, over a horizon; compiled once, solved at each cycle.
+
+    Args:
+        slider: The slider.
+        config: Horizon, limits and solver.
+    """
+
+    def __init__(self, slider: SliderConfig, config: ProgramConfig) -> None:
+        self._slider, self._config, self._steps = slider, config, config.steps
+        self._solvers = self._compiled()
+        self._set_bounds()
+
+    def solve(
+        self, state: np.ndarray, reference: np.ndarray, speed: float, force: np.ndarray, guess: np.ndarray
+    ) -> Solved:
+        """Solves the problem from a state.
+
+        Args:
+            state: The first state.
+            reference: Poses to be at, (steps + 1) x 3 [m, m, rad].
+            speed: Normal force along the path [m/s].
+            force: Normal and tangential force before the first step [m/s].
+            guess: States and inputs to start from, see `guess_of`.
+        """
+        parameters = np.concatenate([state, reference.ravel(), [speed], force])
+        wall, processor, iterations = time.perf_counter(), time.thread_time(), 0
+        for solver in self._solvers:
+            solved = self._solved(solver, parameters, guess)
+            iterations += solved.iterations
+            if solved.converged:
+                break
+        return solved._replace(
+            iterations=iterations,
+            wall_s=time.perf_counter() - wall,
+            processor_s=time.thread_time() - processor,
+        )
+
+    def _solved(self, solver: Any, parameters: np.ndarray, guess: np.ndarray) -> Solved:
+        answer = solver(x0=guess, p=parameters, lbx=self._lower, ubx=self._upper, lbg=self._lower_g, ubg=self._upper_g)
+        stats = solver.stats()
+        states, inputs = self._split(np.asarray(answer["x"]).ravel())
+        finite = bool(np.isfinite(states).all() and np.isfinite(inputs).all())
+        converged, status = bool(stats["success"]) and finite, f"{solver.name()}: {stats['return_status']}"
+        return Solved(states, inputs, float(answer["f"]), converged, status, int(stats["iter_count"]), 0.0, 0.0)
+
+    def guess_of(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Returns states, (steps + 1) x 4, and inputs, steps x 4, as a vector of the program."""
+        return np.concatenate([np.hstack([states[:-1], inputs]).ravel(), states[-1]])
+
+    def _split(self, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        table = vector[: self._steps * (NX + NU)].reshape(self._steps, NX + NU)
+        return np.vstack([table[:, :NX], vector[-NX:]]), table[:, NX:]
+
+    def _compiled(self) -> list[Any]:
+        """Returns the program for each solver: variables x0, u0, x1, ..., and rows of dynamics and limits by step."""
+        states = [casadi.SX.sym(f"x{k}", NX) for k in range(self._steps + 1)]
+        inputs = [casadi.SX.sym(f"u{k}", NU) for k in range(self._steps)]
+        start = casadi.SX.sym("start", NX)
+        reference = casadi.SX.sym("reference", 3, self._steps + 1)
+        speed, force = casadi.SX.sym("speed"), casadi.SX.sym("force", 2)
+        cost, rows, equal = 0, [], []
+        for k, (state, control) in enumerate(zip(states, inputs)):
+            after = casadi.vertcat(*advanced(state, control, self._config.step_s, self._slider))
+            cost += self._step_cost(state, control, reference[:, k], speed)
+            cost += self._config.weights.change * casadi.sumsqr(control[:2] - force) if k == 0 else 0
+            rows += [states[k + 1] - after, *([state - start] if k == 0 else []), self._limited(state, control)]
+            equal += [True] * NX * (2 if k == 0 else 1) + [False] * 3
+        cost += self._config.weights.final * self._state_cost(states[-1], reference[:, self._steps])
+        variables = casadi.vertcat(*[each for pair in zip(states, inputs) for each in pair], states[-1])
+        self._equal = np.array(equal)
+        problem = {
+            "x": variables,
+            "p": casadi.vertcat(start, casadi.vec(reference), speed, force),
+            "f": cost,
+            "g": casadi.vertcat(*rows),
+        }
+        return [casadi.nlpsol(name, name, problem, self._options(name, equal)) for name in self._config.solvers]
+
+    def _state_cost(self, state: Any, reference: Any) -> Any:
+        weights = self._config.weights
+        difference = state[:3] - reference
+        return (
+            weights.position * casadi.sumsqr(difference[:2])
+            + weights.yaw * difference[2] ** 2
+            + weights.contact * state[3] ** 2
+        )
+
+    def _step_cost(self, state: Any, control: Any, reference: Any, speed: Any) -> Any:
+        weights = self._config.weights
+        return (
+            self._state_cost(state, reference)
+            + weights.force * ((control[0] - speed) ** 2 + control[1] ** 2)
+            + weights.sliding * casadi.sumsqr(control[2:])
+            + weights.complementarity * complementarity(control, self._slider)
+        )
+
+    def _limited(self, state: Any, control: Any) -> Any:
+        """Returns the rows of a step that are not negative: the friction cone, and the speed of the pusher."""
+        normal, tangential = control[0], control[1]
+        edge = self._slider.friction * normal
+        return casadi.vertcat(
+            edge - tangential,
+            edge + tangential,
+            self._config.max_speed - pusher_velocity(state, control, self._slider)[0],
+        )
+
+    def _set_bounds(self) -> None:
+        fast, reach = self._config.max_speed, self._slider.reach
+        lower, upper = np.array([-np.inf] * 3 + [-reach]), np.array([np.inf] * 3 + [reach])
+        least, most = np.array([0.0, -fast, 0.0, 0.0]), np.array([fast, fast, fast, fast])
+        self._lower = self.guess_of(np.tile(lower, (self._steps + 1, 1)), np.tile(least, (self._steps, 1)))
+        self._upper = self.guess_of(np.tile(upper, (self._steps + 1, 1)), np.tile(most, (self._steps, 1)))
+        free = slice(0, NX)  # the first state is given, wherever the pusher is
+        self._lower[free], self._upper[free] = -np.inf, np.inf
+        self._lower_g = np.zeros(len(self._equal))
+        self._upper_g = np.where(self._equal, 0.0, np.inf)
+
+    def _options(self, solver: str, equal: list[bool]) -> dict[str, Any]:
+        config = self._config
+        common = {"print_time": False, "error_on_fail": False, "record_time": False}
+        if solver == "fatrop":
+            limits = {"max_iter": config.max_iterations, "tol": config.tolerance, "print_level": 0}
+            return {**common, "structure_detection": "auto", "equality": equal, "fatrop": limits}
+        options: dict[str, Any] = {
+            "max_iter": config.max_iterations,
+            "tol": config.tolerance,
+            "print_level": 0,
+            "sb": "yes",
+            "mu_init": 1e-2,
+        }
+        return {**common, "ipopt": options}

@@ -1,0 +1,91 @@
+"""Pushing in a world of the simulator, in this process and without ROS."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any, cast
+
+import numpy as np
+
+from rpbi.samples import ViconSample
+from rpbi.world import World
+from rpbi_mpc.plant import Plant, Sensed
+
+TIMEOUT_S = 0.1
+"""Time without a pose of the slider after which it counts as hidden [s]."""
+
+
+class PushingWorld(Plant):
+    """A slider that Vicon sees, and a pusher on two slides whose velocities are commanded.
+
+    Measurements of the pusher are as late as those of the slider.
+
+    Args:
+        world: The world, with a body `box` that carries a sensor `vicon`, and a robot `pusher` whose first two joints
+            move it along x and y.
+        middle: Position of the middle of the slider in the frame of its body [m].
+        timeout_s: Time without a pose after which the slider counts as hidden [s].
+    """
+
+    def __init__(self, world: World, middle: tuple[float, float] = (0.0, 0.0), timeout_s: float = TIMEOUT_S) -> None:
+        self.world, self.middle, self._timeout_s = world, np.array(middle), timeout_s
+        self.box, self.pusher = cast(Any, world.bodies["box"]), cast(Any, world.bodies["pusher"])
+        self._joints = [joint.name for joint in self.pusher.model.moving][:2]
+        self._base = np.array(self.pusher.base_pose().position[:2])
+        self._pushers = deque([self.pusher_position()], maxlen=round(1.0 / world.clock.dt_s))
+        self._newest: tuple[int, np.ndarray] | None = None
+        self._seen_tick = world.clock.tick
+        self.truth: list[np.ndarray] = []
+        """True scene after each `advance`: time [s], x, y, yaw of the slider, x, y of the pusher."""
+        self.stand()
+
+    def sense(self) -> Sensed:
+        tick, dt_s = self.world.clock.tick, self.world.clock.dt_s
+        unseen_s = (tick - self._seen_tick) * dt_s
+        if self._newest is None or unseen_s > self._timeout_s:
+            return Sensed(
+                tick * dt_s, None, f"box: no pose for {unseen_s:.2f} s, expected one every {self._timeout_s:g} s"
+            )
+        measured_tick, pose = self._newest
+        age = tick - measured_tick
+        pusher = self._pushers[-1 - min(age, len(self._pushers) - 1)]
+        return Sensed(tick * dt_s, np.concatenate([pose, pusher]), age_s=age * dt_s)
+
+    def act(self, command: np.ndarray) -> None:
+        self.world.put("pusher/target", dict(zip(self._joints, map(float, command))))
+
+    def stand(self) -> None:
+        self.act(np.zeros(2))
+
+    def advance(self, duration_s: float) -> None:
+        for _ in range(round(duration_s / self.world.clock.dt_s)):
+            for sample in self.world.step():
+                if isinstance(sample, ViconSample):
+                    self._see(sample)
+            self._pushers.append(self.pusher_position())
+        self.truth.append(
+            np.array([self.world.clock.tick * self.world.clock.dt_s, *self.slider_pose(), *self._pushers[-1]])
+        )
+
+    def pusher_position(self) -> np.ndarray:
+        """Returns the true position of the pusher [m]."""
+        position: np.ndarray = self._base + list(self.pusher.joint_positions().values())[:2]
+        return position
+
+    def slider_pose(self) -> np.ndarray:
+        """Returns the true pose of the slider's middle [m, m, rad]."""
+        pose = self.box.base_pose()
+        return self._in_plane(pose.position, pose.quat_xyzw)
+
+    def _see(self, sample: ViconSample) -> None:
+        tick = self.world.clock.tick - round(sample.age_ns / (self.world.clock.dt_s * 1e9))
+        if self._newest is None or tick > self._newest[0]:
+            self._newest = (tick, self._in_plane(sample.pose.position, sample.pose.quat_xyzw))
+            self._seen_tick = self.world.clock.tick
+
+    def _in_plane(self, position: tuple[float, ...], quat_xyzw: tuple[float, ...]) -> np.ndarray:
+        x, y, z, w = quat_xyzw
+        yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        middle = np.array(position[:2]) + np.array([[cos, -sin], [sin, cos]]) @ self.middle
+        return np.array([*middle, yaw])

@@ -1,0 +1,215 @@
+"""Random trials of pushing in the simulator: with other friction, another centre of mass, noise, delay and shoves."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rpbi.world import World
+from rpbi.world.loading import load_world
+from rpbi_mpc.controller import MpcController
+from rpbi_mpc.loop import Cycle, LockStep, LoopConfig
+
+from .controller import PushingConfig, PushingController
+from .paths import PushPath
+from .simulated import PushingWorld
+
+WORLD = "{rpbi_mpc}/configs/bench/config.yaml"
+FRICTION, CENTRE = 0.3, 0.1
+"""Largest relative error of the coefficients of friction, and of the centre of mass in sizes of the box."""
+SIZE, HEIGHT = (0.1, 0.1), 0.025
+"""Length and width of the box, and the height of its middle [m]."""
+TABLE_FRICTION, PUSHER_FRICTION = 1.0, 0.857
+"""Nominal friction in the files of the world; that of the box, 0.35, is a factor of both."""
+SHOVE_M, SHOVE_RAD = 0.03, math.radians(30.0)
+"""Distance and angle of a shove."""
+LEAST_CLEARANCE = 0.0005
+"""Distance from the pusher that a shoved box keeps [m]."""
+
+
+class Variation(NamedTuple):
+    """Differences of a world from the model of the controller.
+
+    Attributes:
+        seed: Seed of the noise of the tracker.
+        table: Factor of the friction with the table.
+        pusher: Factor of the friction with the pusher.
+        centre: Centre of mass in the frame of the middle [m].
+        start: Pose of the box at the start, relative to that of the path [m, m, rad].
+        noise_m: Standard deviation of measured positions [m]; that of yaw is 5 rad/m times this.
+        latency_s: Age of measurements [s].
+    """
+
+    seed: int = 1
+    table: float = 1.0
+    pusher: float = 1.0
+    centre: tuple[float, float] = (0.0, 0.0)
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    noise_m: float = 0.0
+    latency_s: float = 0.0
+
+    @classmethod
+    def random(cls, seed: int, noise_m: float = 0.002, latency_s: float = 0.02) -> Variation:
+        """Returns a variation by its seed, evenly distributed between the limits above."""
+        random = np.random.default_rng(seed)
+        table, pusher = 1.0 + random.uniform(-FRICTION, FRICTION, 2)
+        x, y = random.uniform(-CENTRE, CENTRE, 2) * SIZE
+        _, across, turned = random.uniform(-1.0, 1.0, 3) * (0.0, 0.01, 0.1)
+        centre, start = (float(x), float(y)), (0.0, float(across), float(turned))
+        return cls(seed, float(table), float(pusher), centre, start, noise_m, latency_s)
+
+
+class PushingTrial(NamedTuple):
+    """Result of a trial.
+
+    Attributes:
+        errors: Distance of the slider's middle from the reference, one for each cycle in which the reference moved [m].
+        off_path: Distance from the path, wherever along it, likewise [m].
+        cycles: The cycles.
+        truth: Time, x, y, yaw, pusher x, pusher y after each half of a cycle.
+        finished: Whether the end of the path was reached.
+        recovered_s: Time from the shove until the error stays below a limit [s]; NaN without a shove, inf if never.
+    """
+
+    errors: np.ndarray
+    off_path: np.ndarray
+    cycles: list[Cycle]
+    truth: np.ndarray
+    finished: bool
+    recovered_s: float = math.nan
+
+
+def pushing_world(variation: Variation, path: PushPath) -> World:
+    """Builds the world of a variation, with the box at the start of a path and the pusher behind it."""
+    x, y, yaw = path.poses(0.0)[0]
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    dx, dy, turned = variation.start
+    middle = np.array([x + cos * dx - sin * dy, y + sin * dx + cos * dy])
+    yaw += turned
+    axes = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+    box = middle + axes @ variation.centre
+    pusher = middle + axes @ (-SIZE[0] / 2 - 0.011, 0.0)
+    return World(load_world(WORLD, overrides=_overrides(variation, box, yaw, pusher)))
+
+
+def _overrides(variation: Variation, box: np.ndarray, yaw: float, pusher: np.ndarray) -> dict[str, Any]:
+    folder = WORLD.rpartition("/")[0]
+    sensor = {
+        "type": "vicon",
+        "name": "box",
+        "hz": 100,
+        "latency_s": variation.latency_s,
+        "noise_m": variation.noise_m,
+        "noise_rad": 5.0 * variation.noise_m,
+        "seed": variation.seed,
+    }
+    offset = [-variation.centre[0], -variation.centre[1], 0.0]
+    return {
+        "collision_objects": [
+            {"file": f"{folder}/table.yaml", "changeDynamics": {"lateralFriction": TABLE_FRICTION * variation.table}}
+        ],
+        "dynamic_objects": [
+            {
+                "file": f"{folder}/box.yaml",
+                "basePosition": [float(box[0]), float(box[1]), HEIGHT],
+                "baseOrientation": [0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)],
+                "createCollisionShape": {"collisionFramePosition": offset},
+                "createVisualShape": {"visualFramePosition": offset},
+                "sensors": [sensor],
+            }
+        ],
+        "robots": [
+            {
+                "file": f"{folder}/pusher.yaml",
+                "loadURDF": {"basePosition": [float(pusher[0]), float(pusher[1]), 0.02]},
+            }
+        ],
+    }
+
+
+def run_trial(
+    config: PushingConfig,
+    variation: Variation,
+    loop: LoopConfig | None = None,
+    shove_at_s: float | None = None,
+    controller: MpcController | None = None,
+    recovered_below: float = 0.01,
+    max_s: float = 60.0,
+) -> PushingTrial:
+    """Pushes along a path in the simulator.
+
+    Args:
+        config: Configuration of the controller.
+        variation: How the world differs from its model.
+        loop: Times of the loop; the default ones without it.
+        shove_at_s: When the box is shoved by 3 cm and 30 degrees [s]; never without it.
+        controller: Another controller; without it, one of the configuration.
+        recovered_below: Error below which the box has recovered [m].
+        max_s: Time after which the trial ends [s].
+    """
+    controller = controller or PushingController(config)
+    path = PushPath(config.path)
+    world = pushing_world(variation, path)
+    try:
+        world.pb.changeDynamics(world.bodies["pusher"].body_id, 1, lateralFriction=PUSHER_FRICTION * variation.pusher)
+        plant = PushingWorld(world, middle=(-variation.centre[0], -variation.centre[1]))
+        plant.advance(max(variation.latency_s, 0.0) + 0.04)
+        lock_step = LockStep(plant, controller, loop)
+        errors: list[float] = []
+        off_path: list[float] = []
+        shoved: int | None = None
+        while not lock_step.is_over and len(lock_step.cycles) * lock_step.config.period_s < max_s:
+            if shove_at_s is not None and shoved is None and world.clock.time_s >= shove_at_s:
+                shove(plant, config, np.random.default_rng((variation.seed, 1)))
+                shoved = len(errors)
+            lock_step.cycle()
+            pose, time_s = plant.slider_pose(), getattr(controller, "path_time_s", 0.0)
+            errors.append(float(np.hypot(*(pose[:2] - path.poses(time_s)[0, :2]))))
+            off_path.append(path.distance(pose[:2]))
+        recovered_s = math.nan if shoved is None else _recovered(errors[shoved:], recovered_below, lock_step.config)
+        return PushingTrial(
+            np.array(errors),
+            np.array(off_path),
+            lock_step.cycles,
+            np.array(plant.truth),
+            controller.is_finished,
+            recovered_s,
+        )
+    finally:
+        world.close()
+
+
+def shove(plant: PushingWorld, config: PushingConfig, random: np.random.Generator) -> None:
+    """Moves the box by 3 cm in a random direction and turns it by 30 degrees to a random side, at once.
+
+    The hand does not give way: a box that would lie in the pusher is put before it.
+    """
+    world, pose = plant.world, plant.slider_pose()
+    direction, side = random.uniform(-math.pi, math.pi), random.choice((-1.0, 1.0))
+    yaw = pose[2] + side * SHOVE_RAD
+    axes = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+    middle = pose[:2] + SHOVE_M * np.array([math.cos(direction), math.sin(direction)])
+    inside = np.abs(axes.T @ (plant.pusher_position() - middle)) - np.array(SIZE) / 2 - config.radius - LEAST_CLEARANCE
+    if (inside < 0.0).all():
+        local = axes.T @ (plant.pusher_position() - middle)
+        axis = int(np.argmax(inside))
+        middle = middle + axes[:, axis] * np.copysign(inside[axis], -local[axis])
+    body = middle - axes @ plant.middle
+    world.act(
+        "box",
+        "teleport",
+        {
+            "position": [float(body[0]), float(body[1]), HEIGHT],
+            "quat_xyzw": [0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)],
+        },
+    )
+
+
+def _recovered(errors: list[float], limit: float, loop: LoopConfig) -> float:
+    """Returns the time after which all errors are below a limit [s]."""
+    above = np.flatnonzero(np.array(errors) > limit)
+    if len(above) == 0:
+        return 0.0
+    return math.inf if above[-1] == len(errors) - 1 else float((above[-1] + 1) * loop.period_s)

@@ -1,0 +1,56 @@
+"""`pushing_mpc.launch`, from the launch file to a box at the end of its path: stepped, and by a real robot."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from ros_system import RosSystem, wait_until
+from std_srvs.srv import Trigger
+
+from rpbi_mpc.msg import MpcStatus
+from rpbi_utils.msg import DriverState
+
+SLOW_S = 120.0
+LINE = ("headless:=true", "path:=line")
+
+
+def summary_of(process, folder) -> dict:
+    wait_until(lambda: process.poll() is not None, "it ends by itself", SLOW_S)
+    assert process.returncode == 0
+    return json.loads((folder / "summary.json").read_text())
+
+
+def test_hand_pushes_the_box_by_single_steps_and_then_to_the_end_of_its_path(ros: RosSystem, tmp_path) -> None:
+    status = ros.listen("mpc/status", MpcStatus)
+    arguments = (*LINE, "start_on_init:=false", f"out:={tmp_path}")
+    process = ros.start(["roslaunch", "rpbi_examples", "pushing_mpc.launch", *arguments])
+    for index in range(3):
+        answer = ros.call("mpc/step", Trigger)
+        assert answer.success and answer.message.startswith(f"cycle {index}: "), answer.message
+    wait_until(lambda: status.messages and status.messages[-1].cycle == 2, "the status of the third cycle")
+    assert not status.messages[-1].running and status.messages[-1].status == "solved"
+    assert not ros.call("mpc/stop", Trigger).success
+    assert ros.call("mpc/start", Trigger).success
+    refused = ros.call("mpc/step", Trigger)
+    assert not refused.success and refused.message == "the loop is running; call mpc/stop first"
+    summary = summary_of(process, tmp_path)
+    assert summary["finished"] and summary["mean_error_mm"] < 5.0, summary
+    assert summary["by_status"]["solved"] > 100
+    assert all((tmp_path / name).stat().st_size > 10_000 for name in ("cycles.csv", "path.png", "cycles.png"))
+
+
+def test_real_robot_behind_the_guard_pushes_the_box_with_the_same_launch_file(ros: RosSystem, tmp_path) -> None:
+    driver = ros.listen("/stand_in/driver_state", DriverState)
+    arguments = (*LINE, "real_robot:=true", f"out:={tmp_path}")
+    summary = summary_of(ros.start(["roslaunch", "rpbi_examples", "pushing_mpc.launch", *arguments]), tmp_path)
+    assert summary["finished"] and summary["mean_error_mm"] < 15.0, summary
+    assert driver.messages[-1].reflexes == 0, driver.messages[-1].message
+
+
+@pytest.mark.parametrize("fault", ["path:=circle", "speed:=-1.0"])
+def test_wrong_arguments_are_errors_with_their_key(ros: RosSystem, fault: str) -> None:
+    process = ros.start(["roslaunch", "rpbi_examples", "pushing_mpc.launch", "headless:=true", fault])
+    wait_until(lambda: process.poll() is not None, "it ends by itself", SLOW_S)
+    expected = "circle" if fault.startswith("path") else "~config: pushing.path.speed: must be > 0 [m/s], got -1"
+    assert expected in ros.output(process)
