@@ -42,7 +42,9 @@ class SamplingConfig(ConfigModel):
     """Options of the controller."""
 
     horizon: Seconds = Field(0.5, description="Time that is looked ahead.")
-    knots: Annotated[int, Field(ge=2)] = Field(4, description="Knots of a plan, between which commands are linear.")
+    knots: Annotated[int, Field(ge=2)] = Field(
+        2, description="Knots of a plan, between which commands are linear; more need more candidates."
+    )
     seed: int = Field(0, description="Seed of the candidates.")
     sampler: str = Field("predictive", description="predictive, cem, mppi, or module:Class of your own.")
     options: dict[str, Any] = Field({}, description="Options of the sampler.")
