@@ -27,6 +27,7 @@ MODULES = {
     "rpbi_utils": "rpbi_utils",
     "episodes": "episodes",
     "motion_primitives": "motion_primitives",
+    "rpbi_mpc": "rpbi_mpc",
     "rpbi_examples": "rpbi_examples",
 }
 """Python module of each package."""
@@ -39,6 +40,7 @@ ALLOWED = {
     "safe_robot": {"custom_ros_tools", "robot_model", "ros_pybullet_interface"},
     "rpbi_utils": {"custom_ros_tools", "robot_model", "ros_pybullet_interface"},
     "motion_primitives": {"custom_ros_tools", "robot_model", "rpbi_utils"},
+    "rpbi_mpc": {"custom_ros_tools", "robot_model", "ros_pybullet_interface"},
     "episodes": {"custom_ros_tools", "robot_model", "ros_pybullet_interface", "rpbi_utils"},
     "rpbi_examples": MODULES.keys() - {"rpbi_examples"},
 }

@@ -105,6 +105,22 @@ def set_joint_state(context: BodyContext, request: SetJointStateRequest) -> Answ
     return Answer(True, f"{', '.join(state.name)} put there")
 
 
+def set_target(context: BodyContext, request: SetJointStateRequest) -> Answer:
+    """Sets targets as the topic `joint_states/target` does; it answers when they count from the next tick on.
+
+    Controllers in lock-step use it, since a message may arrive after the step that is requested next.
+
+    Raises:
+        ValueError: If a target is refused, with its reason.
+    """
+    state = request.joint_state
+    target = JointCommand(
+        state.name, state.position, state.velocity, state.effort, state.header.stamp.to_nsec()
+    )
+    context.ask_body(lambda: context.world.put(f"{context.name}/target", target))
+    return Answer(True, f"{', '.join(state.name)}: targets set")
+
+
 def _move(context: BodyContext, goal: Mapping[int, float], duration_s: float) -> MotionResult:
     """Moves and waits for the end.
 

@@ -40,6 +40,7 @@ from rpbi.ros.robots.motion import (
     move_to_joint_state,
     set_control_mode,
     set_joint_state,
+    set_target,
     set_motor_gains,
     stop_motion,
 )
@@ -125,6 +126,7 @@ BODY_SERVICES = (
     Service("rpbi/{name}/set_motor_gains", SetMotorGains, set_motor_gains, of(Robot)),
     Service("rpbi/{name}/switch_controllers", SwitchControllers, switch_controllers, robots_with_controllers),
     Service("rpbi/{name}/set_gains", SetString, set_gains, controllers),
+    Service("rpbi/{name}/set_target", SetJointState, set_target, of(Robot)),
     Service("rpbi/{name}/stop_motion", Trigger, stop_motion, of(Robot)),
     Service("rpbi/{name}/move_to_joint_state", ResetJointState, move_to_joint_state, of(Robot)),
     Service("rpbi/{name}/move_to_initial_joint_state", ResetJointState, move_to_initial_joint_state, of(Robot)),

@@ -8,6 +8,7 @@ from custom_ros_tools.console.modules import workspace
 WRITERS = (
     "ik_ros.schemas:schema_files",
     "motion_primitives.node_configs:schema_files",
+    "rpbi_mpc.node_configs:schema_files",
     "rpbi_utils.schemas:schema_files",
     "safe_robot.schemas:schema_files",
     "rpbi.ros.reference.write:reference_files",

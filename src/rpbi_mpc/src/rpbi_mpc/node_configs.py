@@ -1,0 +1,64 @@
+"""Parameters of the node, and the schema of the YAML files that have them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from custom_ros_tools.schema import ConfigModel, Hz, KeyedError, NonNegative, Seconds, Switch, Text, TopicName, Unit
+from custom_ros_tools.schema.json_schema import explained, json_schema, schema_text
+
+from .hand import HandConfig
+from .loop import LoopConfig
+from .pushing.controller import PushingConfig
+
+SCHEMA = "pushing_mpc"
+SAME_S = 1e-9
+"""Difference below which two times are the same [s]."""
+
+
+class PlantConfig(ConfigModel):
+    """Topics of slider and robot, and how they are driven."""
+
+    robot: Text = Field("nextage", description="Name of the robot whose targets are set, rpbi/NAME.")
+    joint_states: TopicName = Field(
+        "rpbi/nextage/joint_states", description="Topic of the positions of the joints; on hardware, the measured ones."
+    )
+    vicon: TopicName = Field("vicon/box/box", description="Topic of the pose of the slider's middle.")
+    latency_s: Annotated[NonNegative, Unit("s")] = Field(0.03, description="Largest age of a pose that is on time.")
+    timeout_s: Seconds = Field(0.2, description="Time without a pose after which the slider is lost.")
+    target_hz: Hz = Field(100.0, description="Rate of targets; a whole number of them is in each part of a cycle.")
+    timed: Switch = Field(False, description="Whether time passes by itself, as on hardware; else the world is stepped.")
+
+
+class PushingNodeConfig(ConfigModel):
+    """A slider that the hand of a robot pushes along a path."""
+
+    loop: LoopConfig = Field(LoopConfig(), description="Times of the loop.")
+    pushing: PushingConfig = Field(PushingConfig(), description="Slider, path, cost and solver.")
+    hand: HandConfig = Field(description="The hand that pushes.")
+    plant: PlantConfig = Field(PlantConfig(), description="Topics, and pace.")
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> PushingNodeConfig:
+        if abs(self.pushing.cycle_s - self.loop.period_s) > SAME_S:
+            got = f"got {self.pushing.cycle_s:g}"
+            raise KeyedError("pushing.cycle_s", f"expected the {self.loop.period_s:g} s of a cycle of loop.hz, {got}")
+        for name, part_s in (("delay_s", self.loop.delay_s), ("hz", self.loop.period_s)):
+            targets = part_s * self.plant.target_hz
+            if abs(targets - round(targets)) > 1e-6:
+                got = f"got {targets:g} in {part_s:g} s"
+                raise KeyedError(f"loop.{name}", f"expected a whole number of targets at plant.target_hz, {got}")
+        return self
+
+
+def schema_files(root: Path) -> dict[Path, str]:
+    """Returns the text of each file.
+
+    Args:
+        root: The workspace.
+    """
+    path = root / f"src/rpbi_mpc/schema/{SCHEMA}.schema.json"
+    return {path: schema_text(explained(json_schema(PushingNodeConfig, SCHEMA)))}

@@ -1,0 +1,97 @@
+"""The newest pose of the slider, and positions of the hand at the time of the pose."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import TransformStamped
+from sensor_msgs.msg import JointState
+
+from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
+from rpbi_mpc.hand import PlanarHand
+from rpbi_mpc.node_configs import PlantConfig
+
+KEPT = 1000
+"""Number of joint states that are kept."""
+
+
+class SeenScene(NamedTuple):
+    """Slider and pusher at the time of the newest pose.
+
+    Attributes:
+        stamp_s: Stamp of the pose [s].
+        values: x, y, yaw of the slider, x, y of the pusher.
+    """
+
+    stamp_s: float
+    values: np.ndarray
+
+
+class SceneListener:
+    """Subscribes to Vicon and to the joints of the robot.
+
+    Args:
+        config: Topics.
+        hand: The hand whose joints they are.
+    """
+
+    def __init__(self, config: PlantConfig, hand: PlanarHand) -> None:
+        self._hand = hand
+        self._warn = ThrottledWarning()
+        self._changed = threading.Condition()
+        self._pose: tuple[float, np.ndarray] | None = None
+        self._joints: deque[tuple[float, np.ndarray]] = deque(maxlen=KEPT)
+        self.vicon, self.joint_states = (rospy.resolve_name(name) for name in (config.vicon, config.joint_states))
+        rospy.Subscriber(self.vicon, TransformStamped, self._on_pose, queue_size=100, tcp_nodelay=True)
+        rospy.Subscriber(self.joint_states, JointState, self._on_joints, queue_size=100, tcp_nodelay=True)
+
+    def wait_for(self, pose_s: float, joints_s: float, timeout_s: float) -> None:
+        """Waits until pose and joints are as new as two stamps [s], for at most a time of the wall clock [s]."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._has(pose_s, joints_s), timeout_s)
+
+    def joints(self) -> np.ndarray | None:
+        """Returns the newest positions of the joints [rad]; None before the first."""
+        with self._changed:
+            return self._joints[-1][1] if self._joints else None
+
+    def scene(self) -> SeenScene | None:
+        """Returns the newest pose and the pusher at its time; None before the first."""
+        with self._changed:
+            if self._pose is None or not self._joints:
+                return None
+            stamp_s, pose = self._pose
+            _, joints = min(self._joints, key=lambda each: abs(each[0] - stamp_s))
+        return SeenScene(stamp_s, np.array([*pose, *self._hand.position(joints)[:2]]))
+
+    def _has(self, pose_s: float, joints_s: float) -> bool:
+        has_joints = bool(self._joints) and self._joints[-1][0] >= joints_s
+        return has_joints and self._pose is not None and self._pose[0] >= pose_s
+
+    def _on_pose(self, message: TransformStamped) -> None:
+        place, turn = message.transform.translation, message.transform.rotation
+        yaw = math.atan2(2 * (turn.w * turn.z + turn.x * turn.y), 1 - 2 * (turn.y**2 + turn.z**2))
+        pose = np.array([place.x, place.y, yaw])
+        if not np.isfinite(pose).all():
+            self._warn(self.vicon, f"{self.vicon}: message refused: expected finite numbers, got {pose}")
+            return
+        with self._changed:
+            if self._pose is None or message.header.stamp.to_sec() > self._pose[0]:
+                self._pose = (message.header.stamp.to_sec(), pose)
+            self._changed.notify_all()
+
+    def _on_joints(self, message: JointState) -> None:
+        positions = dict(zip(message.name, message.position))
+        missing = [name for name in self._hand.joint_names if name not in positions]
+        if missing:
+            self._warn(self.joint_states, f"{self.joint_states}: message refused: expected {missing[0]}, got {message.name}")
+            return
+        joints = np.array([positions[name] for name in self._hand.joint_names])
+        with self._changed:
+            self._joints.append((message.header.stamp.to_sec(), joints))
+            self._changed.notify_all()

@@ -1,0 +1,93 @@
+"""Pushing in the simulator: along paths, with a world unlike the model, a shove, a hidden box and a slow computer."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from rpbi_mpc import LockStep
+from rpbi_mpc.pushing.controller import PushingConfig, PushingController
+from rpbi_mpc.pushing.paths import PathConfig, PushPath
+from rpbi_mpc.pushing.program import ProgramConfig
+from rpbi_mpc.pushing.simulated import PushingWorld
+from rpbi_mpc.pushing.trials import Variation, pushing_world, run_trial, shove
+
+LINE, S = PathConfig(shape="line", size=0.2), PathConfig(shape="s", size=0.2, angle=0.7)
+UNLIKE = Variation(
+    seed=901, table=1.3, pusher=0.7, centre=(0.01, -0.01), start=(0.0, 0.008, 0.1), noise_m=0.002, latency_s=0.02
+)
+
+
+@pytest.mark.parametrize(("variation", "most_m"), [(Variation(), 0.005), (UNLIKE, 0.015)], ids=["model", "unlike"])
+def test_box_is_pushed_along_an_s(variation, most_m):
+    trial = run_trial(PushingConfig(path=S), variation)
+    assert trial.finished and trial.errors.mean() < most_m
+    assert trial.truth[-1][1:3] == pytest.approx(PushPath(S).poses(1e9)[0, :2], abs=0.02)
+
+
+def test_a_controller_with_the_other_sign_would_fail():
+    """The bounds above can fail: a box that is pushed straight ahead is far from the S."""
+    class Straight(PushingController):
+        def _commands(self, solved, gap):
+            return np.tile([self.path.speed, 0.0], (self.config.plan_cycles, 1))
+
+    config = PushingConfig(path=S)
+    assert run_trial(config, Variation(), controller=Straight(config), max_s=6.0).errors.mean() > 0.015
+
+
+def test_ipopt_alone_does_it_too():
+    trial = run_trial(PushingConfig(path=LINE, program=ProgramConfig(solvers=("ipopt",))), Variation(), max_s=2.0)
+    assert trial.errors.mean() < 0.005 and all(cycle.status == "solved" for cycle in trial.cycles)
+
+
+def test_a_shoved_box_comes_back():
+    path = PathConfig(shape="line", size=0.35)
+    trial = run_trial(PushingConfig(path=path), Variation(seed=902), shove_at_s=1.0, recovered_below=0.01)
+    assert trial.errors.max() > 0.015 and trial.recovered_s < 5.0 and trial.finished
+
+
+def test_decisions_do_not_depend_on_the_speed_of_the_computer():
+    class Slow(PushingController):
+        def plan(self, sensed, delay_s):
+            time.sleep(0.01)
+            return super().plan(sensed, delay_s)
+
+    config = PushingConfig(path=LINE)
+    quick, slow = (run_trial(config, UNLIKE, controller=kind(config), max_s=1.2) for kind in (PushingController, Slow))
+    assert np.array_equal(quick.truth, slow.truth)
+
+
+def test_robot_stands_while_the_box_is_hidden_and_goes_on_afterwards():
+    config = PushingConfig(path=LINE)
+    world = pushing_world(Variation(), PushPath(LINE))
+    plant = PushingWorld(world)
+    plant.advance(0.05)
+    loop = LockStep(plant, PushingController(config))
+    loop.run(1.0)
+    see, plant._see = plant._see, lambda sample: None
+    hidden = loop.run(1.0)
+    waiting = [each for each in hidden if each.status == "waiting"]
+    assert len(waiting) > 20
+    assert waiting[-1].reason.startswith("box: no pose for 0.") and "expected one every 0.1 s" in waiting[-1].reason
+    stood = plant.slider_pose()
+    loop.run(0.2)
+    assert np.allclose(plant.slider_pose(), stood, atol=1e-4)
+    plant._see = see
+    assert loop.run(1.0)[-1].status == "solved"
+    assert plant.slider_pose()[0] > stood[0] + 0.02
+    world.close()
+
+
+def test_shove_moves_and_turns_the_box_but_not_into_the_pusher():
+    world = pushing_world(Variation(), PushPath(LINE))
+    plant, config = PushingWorld(world), PushingConfig(path=LINE)
+    for seed in range(10):
+        before = plant.slider_pose()
+        shove(plant, config, np.random.default_rng(seed))
+        after = plant.slider_pose()
+        assert abs(np.degrees(np.arctan2(*[f(after[2] - before[2]) for f in (np.sin, np.cos)]))) == pytest.approx(30, abs=0.1)
+        plant.advance(0.02)
+        assert np.hypot(*(plant.slider_pose()[:2] - after[:2])) < 0.002, "thrown by the pusher"
+    world.close()
