@@ -123,7 +123,7 @@ class PushingProgram:
             guess: States and inputs to start from, see `guess_of`.
         """
         parameters = np.concatenate([state, reference.ravel(), [speed], force])
-        wall, processor, iterations = time.perf_counter(), time.process_time(), 0
+        wall, processor, iterations = time.perf_counter(), time.thread_time(), 0
         for solver in self._solvers:
             solved = self._solved(solver, parameters, guess)
             iterations += solved.iterations
@@ -132,7 +132,7 @@ class PushingProgram:
         return solved._replace(
             iterations=iterations,
             wall_s=time.perf_counter() - wall,
-            processor_s=time.process_time() - processor,
+            processor_s=time.thread_time() - processor,
         )
 
     def _solved(self, solver: Any, parameters: np.ndarray, guess: np.ndarray) -> Solved:

@@ -11,7 +11,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.ros.services import call_service, get_srv_handler
+from custom_ros_tools.ros.services import get_srv_handler
 from ros_pybullet_interface.srv import SetJointState, StepN
 from rpbi_mpc.hand import PlanarHand
 from rpbi_mpc.node_configs import PlantConfig
@@ -157,7 +157,7 @@ class TimedPlant(HandPlant):
 
 def _time_step_s(step: rospy.ServiceProxy) -> float:
     """Returns the time of a tick, by the stamps of two."""
-    call_service("rpbi/stop", Trigger)
+    get_srv_handler("rpbi/stop", Trigger)()  # it may stand already
     first, second = step(1), step(1)
     for answer in (first, second):
         if not answer.success:

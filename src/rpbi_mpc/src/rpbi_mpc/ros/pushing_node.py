@@ -64,7 +64,7 @@ class PushingNode:
                 if cycle.status in (Status.FINISHED, Status.STOPPED):
                     self._end()
                     if self._ends:
-                        return
+                        rospy.signal_shutdown("the task is done")
             elif self._loop.plant.is_timed:
                 self._loop.plant.stand()
                 self._loop.plant.advance(IDLE_S)
