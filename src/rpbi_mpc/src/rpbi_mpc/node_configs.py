@@ -1,4 +1,4 @@
-"""Parameters of the node, and the schema of the YAML files that have them."""
+"""Parameters of the nodes, and the schema of the YAML files that have them."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from custom_ros_tools.schema.json_schema import explained, json_schema, schema_t
 from .hand import HandConfig
 from .loop import LoopConfig
 from .pushing.controller import PushingConfig
+from .sampling import InputConfig, SamplingConfig
 
-SCHEMA = "pushing_mpc"
 SAME_S = 1e-9
 """Difference below which two times are the same [s]."""
 
@@ -78,11 +78,29 @@ class PushingNodeConfig(ConfigModel):
         return self
 
 
+class SamplingNodeConfig(ConfigModel):
+    """A robot that is commanded by the best of its predicted futures."""
+
+    loop: LoopConfig = Field(LoopConfig(hz=10.0), description="Times of the loop.")
+    sampling: SamplingConfig = Field(SamplingConfig(), description="Candidates, and the choice among them.")
+    command: InputConfig = Field(description="The targets that are commanded.")
+    cost: Text = Field(
+        description="Cost of a state, summed over all ticks: module:name of a function of the World, or of a class. "
+        "Its package is in trusted_packages of the world."
+    )
+
+
+CONFIGS: dict[str, type[ConfigModel]] = {"pushing_mpc": PushingNodeConfig, "sampling_mpc": SamplingNodeConfig}
+"""Parameters of each node."""
+
+
 def schema_files(root: Path) -> dict[Path, str]:
     """Returns the text of each file.
 
     Args:
         root: The workspace.
     """
-    path = root / f"src/rpbi_mpc/schema/{SCHEMA}.schema.json"
-    return {path: schema_text(explained(json_schema(PushingNodeConfig, SCHEMA)))}
+    return {
+        root / f"src/rpbi_mpc/schema/{name}.schema.json": schema_text(explained(json_schema(config, name)))
+        for name, config in CONFIGS.items()
+    }

@@ -2,33 +2,25 @@
 
 from __future__ import annotations
 
-import threading
 from pathlib import Path
-
-import rospy
-from std_srvs.srv import Trigger, TriggerResponse
 
 from custom_ros_tools.ros.lifecycle.parameters import private_config
 from custom_ros_tools.ros.lifecycle.run_node import run_node
 from rpbi_mpc.hand import PlanarHand
-from rpbi_mpc.loop import Cycle, LockStep, Status
-from rpbi_mpc.msg import MpcStatus
+from rpbi_mpc.loop import Cycle
 from rpbi_mpc.node_configs import PushingNodeConfig
 from rpbi_mpc.pushing.controller import PushingController
 from rpbi_mpc.pushing.report import write_report
 
 from .display import PushingDisplay
+from .loop_node import LoopNode
 from .plants import HandPlant, SteppedPlant, TimedPlant
 
 NODE = "pushing_mpc"
-IDLE_S = 0.04
-"""Time between two commands to a timed plant that stands [s]."""
-
-Answer = tuple[bool, str]
 
 
-class PushingNode:
-    """Runs a loop in the main thread; services and buttons start it, stop it, or have it run one cycle.
+class PushingNode(LoopNode):
+    """Pushes a slider with the hand of a robot.
 
     Raises:
         ConfigError: If the configuration is wrong.
@@ -37,117 +29,21 @@ class PushingNode:
 
     def __init__(self) -> None:
         config = private_config(PushingNodeConfig)
-        self._out = str(rospy.get_param("~out", ""))
-        self._ends = bool(rospy.get_param("~end", False))
-        self._controller = PushingController(config.pushing)
+        self._pushing = PushingController(config.pushing)
         hand = PlanarHand(config.hand)
-        self._display = PushingDisplay(self._controller.path, config.pushing.slider)
-        self._status = rospy.Publisher("mpc/status", MpcStatus, queue_size=10, latch=True)
-        self._changed = threading.Condition()
-        self._running, self._steps, self._said = bool(rospy.get_param("~start_on_init", True)), 0, ""
-        self._plant: HandPlant = (TimedPlant if config.plant.timed else SteppedPlant)(config.plant, hand)
-        self._loop = LockStep(self._plant, self._controller, config.loop, (self._show,))
-        for name, action in (("start", self._start), ("stop", self._stop), ("step", self._step)):
-            rospy.Service(f"mpc/{name}", Trigger, lambda _, action=action: TriggerResponse(*action()))
-        self._status.publish(MpcStatus(status="ready", running=self._running))
+        self._display = PushingDisplay(self._pushing.path, config.pushing.slider)
+        self._hand: HandPlant = (TimedPlant if config.plant.timed else SteppedPlant)(config.plant, hand)
+        super().__init__(self._hand, self._pushing, config.loop)
 
-    def run(self) -> None:
-        """Runs cycles as requested until ROS shuts down, or the task is done and `~end` is true.
+    def show(self, cycle: Cycle) -> None:
+        self._display.show(cycle.plan, cycle.sensed)
 
-        Raises:
-            InterfaceError: If the simulator refuses to be stepped, or no joint states arrive.
-        """
-        while not rospy.is_shutdown():
-            if self._is_due():
-                cycle = self._loop.cycle()
-                if cycle.status in (Status.FINISHED, Status.STOPPED):
-                    self._end()
-                    if self._ends:
-                        rospy.signal_shutdown("the task is done")
-            elif self._loop.plant.is_timed:
-                self._loop.plant.stand()
-                self._loop.plant.advance(IDLE_S)
+    def on_stop(self) -> None:
+        self._hand.begin_at_the_robot()
 
-    # --- Services
-
-    def _start(self) -> Answer:
-        with self._changed:
-            if self._running:
-                return False, "the loop is running"
-            if self._loop.is_over:
-                self._loop.restart()
-            self._running = True
-            self._changed.notify_all()
-        return True, "started"
-
-    def _stop(self) -> Answer:
-        with self._changed:
-            was_running, self._running = self._running, False
-            self._plant.begin_at_the_robot()
-        return was_running, "stopped: the robot stands" if was_running else "the loop is not running"
-
-    def _step(self) -> Answer:
-        """Requests a cycle and waits for its end."""
-        with self._changed:
-            if self._running:
-                return False, "the loop is running; call mpc/stop first"
-            if self._loop.is_over:
-                self._loop.restart()
-            self._steps += 1
-            before = len(self._loop.cycles)
-            self._changed.notify_all()
-        with self._changed:
-            self._changed.wait_for(lambda: len(self._loop.cycles) > before, 10.0)
-        if len(self._loop.cycles) == before:
-            return False, "no cycle within 10 s"
-        cycle = self._loop.cycles[-1]
-        return True, f"cycle {cycle.index}: {cycle.status}{cycle.reason and ': '}{cycle.reason}"
-
-    # --- The loop
-
-    def _is_due(self) -> bool:
-        """Returns whether a cycle is requested; waits a little if none is and the plant is stepped."""
-        with self._changed:
-            if not self._running and not self._steps and not self._loop.plant.is_timed:
-                self._changed.wait(0.1)
-            if not self._running and not self._steps:
-                return False
-            self._steps -= not self._running
-            return True
-
-    def _show(self, cycle: Cycle) -> None:
-        plan = cycle.plan
-        text = f"{cycle.status}{cycle.reason and ': '}{cycle.reason}"
-        if cycle.status != self._said and cycle.status != Status.SOLVED:
-            (rospy.loginfo if cycle.status == Status.FINISHED else rospy.logwarn)(text)
-        elif cycle.status == Status.SOLVED and self._said in (Status.WAITING, Status.LAST_PLAN):
-            rospy.loginfo("solved: the robot goes on")
-        self._said = cycle.status
-        message = MpcStatus(cycle=cycle.index, running=self._running, status=str(cycle.status), reason=cycle.reason)
-        message.header.stamp = rospy.Time.from_sec(cycle.sensed.time_s)
-        message.cost = float("nan") if plan is None else plan.cost
-        if plan is not None:
-            message.iterations, message.solve_time = plan.iterations, plan.wall_s
-            message.processor_time = plan.processor_s
-        self._status.publish(message)
-        self._display.show(plan, cycle.sensed)
-        with self._changed:
-            self._changed.notify_all()
-
-    def _end(self) -> None:
-        """Stands, and writes the report."""
-        with self._changed:
-            self._running = False
-        self._loop.plant.stand()
-        self._loop.plant.advance(self._loop.config.period_s)
-        if not self._out:
-            return
-        try:
-            summary = write_report(Path(self._out), self._loop.cycles, self._controller)
-        except OSError as error:
-            rospy.logerr(f"~out: expected a folder that can be written, got {self._out}: {error.strerror}")
-            return
-        rospy.loginfo(f"report in {self._out}: mean error {summary['mean_error_mm']:.1f} mm")
+    def write_report(self, folder: Path) -> str:
+        summary = write_report(folder, self._loop.cycles, self._pushing)
+        return f"mean error {summary['mean_error_mm']:.1f} mm"
 
 
 def main() -> None:

@@ -1,0 +1,157 @@
+"""A loop in lock-step as a node: services start it, stop it, or have it run one cycle."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import rospy
+from std_srvs.srv import Trigger, TriggerResponse
+
+from rpbi_mpc.controller import MpcController
+from rpbi_mpc.loop import Cycle, LockStep, LoopConfig, Status
+from rpbi_mpc.msg import MpcStatus
+from rpbi_mpc.plant import Plant
+from rpbi_mpc.records import write_records
+
+IDLE_S = 0.04
+"""Time between two commands to a timed plant that stands [s]."""
+
+Answer = tuple[bool, str]
+
+
+class LoopNode:
+    """Runs a loop in the main thread; services and buttons start it, stop it, or have it run one cycle.
+
+    Parameters are `~start_on_init`, `~out`, the folder of its records, and `~end`, whether the node ends with the task.
+
+    Args:
+        plant: The controlled system.
+        controller: The controller.
+        config: Times.
+    """
+
+    def __init__(self, plant: Plant, controller: MpcController, config: LoopConfig) -> None:
+        self._out = str(rospy.get_param("~out", ""))
+        self._ends = bool(rospy.get_param("~end", False))
+        self._controller = controller
+        self._status = rospy.Publisher("mpc/status", MpcStatus, queue_size=10, latch=True)
+        self._changed = threading.Condition()
+        self._running, self._steps, self._said = bool(rospy.get_param("~start_on_init", True)), 0, ""
+        self._loop = LockStep(plant, controller, config, (self._show,))
+        for name, action in (("start", self._start), ("stop", self._stop), ("step", self._step)):
+            rospy.Service(f"mpc/{name}", Trigger, lambda _, action=action: TriggerResponse(*action()))
+        self._status.publish(MpcStatus(status="ready", running=self._running))
+
+    def show(self, cycle: Cycle) -> None:
+        """Shows a cycle, besides its status."""
+
+    def on_stop(self) -> None:
+        """Is called when the loop was stopped by the service."""
+
+    def write_report(self, folder: Path) -> str:
+        """Writes the records of all cycles to a folder, and returns a line on them.
+
+        Raises:
+            OSError: If the folder cannot be written.
+        """
+        summary = write_records(folder, self._loop.cycles, self._controller)
+        return f"{summary['cycles']} cycles"
+
+    def run(self) -> None:
+        """Runs cycles as requested until ROS shuts down, or the task is done and `~end` is true.
+
+        Raises:
+            InterfaceError: If the simulator refuses to be stepped, or no joint states arrive.
+        """
+        while not rospy.is_shutdown():
+            if self._is_due():
+                cycle = self._loop.cycle()
+                if cycle.status in (Status.FINISHED, Status.STOPPED):
+                    self._end()
+                    if self._ends:
+                        rospy.signal_shutdown("the task is done")
+            elif self._loop.plant.is_timed:
+                self._loop.plant.stand()
+                self._loop.plant.advance(IDLE_S)
+
+    # --- Services
+
+    def _start(self) -> Answer:
+        with self._changed:
+            if self._running:
+                return False, "the loop is running"
+            if self._loop.is_over:
+                self._loop.restart()
+            self._running = True
+            self._changed.notify_all()
+        return True, "started"
+
+    def _stop(self) -> Answer:
+        with self._changed:
+            was_running, self._running = self._running, False
+            self.on_stop()
+        return was_running, "stopped: the robot stands" if was_running else "the loop is not running"
+
+    def _step(self) -> Answer:
+        """Requests a cycle and waits for its end."""
+        with self._changed:
+            if self._running:
+                return False, "the loop is running; call mpc/stop first"
+            if self._loop.is_over:
+                self._loop.restart()
+            self._steps += 1
+            before = len(self._loop.cycles)
+            self._changed.notify_all()
+        with self._changed:
+            self._changed.wait_for(lambda: len(self._loop.cycles) > before, 10.0)
+        if len(self._loop.cycles) == before:
+            return False, "no cycle within 10 s"
+        cycle = self._loop.cycles[-1]
+        return True, f"cycle {cycle.index}: {cycle.status}{cycle.reason and ': '}{cycle.reason}"
+
+    # --- The loop
+
+    def _is_due(self) -> bool:
+        """Returns whether a cycle is requested; waits a little if none is and the plant is stepped."""
+        with self._changed:
+            if not self._running and not self._steps and not self._loop.plant.is_timed:
+                self._changed.wait(0.1)
+            if not self._running and not self._steps:
+                return False
+            self._steps -= not self._running
+            return True
+
+    def _show(self, cycle: Cycle) -> None:
+        plan = cycle.plan
+        text = f"{cycle.status}{cycle.reason and ': '}{cycle.reason}"
+        if cycle.status != self._said and cycle.status != Status.SOLVED:
+            (rospy.loginfo if cycle.status == Status.FINISHED else rospy.logwarn)(text)
+        elif cycle.status == Status.SOLVED and self._said in (Status.WAITING, Status.LAST_PLAN):
+            rospy.loginfo("solved: the robot goes on")
+        self._said = cycle.status
+        message = MpcStatus(cycle=cycle.index, running=self._running, status=str(cycle.status), reason=cycle.reason)
+        message.header.stamp = rospy.Time.from_sec(cycle.sensed.time_s)
+        message.cost = float("nan") if plan is None else plan.cost
+        if plan is not None:
+            message.iterations, message.solve_time = plan.iterations, plan.wall_s
+            message.processor_time = plan.processor_s
+        self._status.publish(message)
+        self.show(cycle)
+        with self._changed:
+            self._changed.notify_all()
+
+    def _end(self) -> None:
+        """Stands, and writes the report."""
+        with self._changed:
+            self._running = False
+        self._loop.plant.stand()
+        self._loop.plant.advance(self._loop.config.period_s)
+        if not self._out:
+            return
+        try:
+            text = self.write_report(Path(self._out))
+        except OSError as error:
+            rospy.logerr(f"~out: expected a folder that can be written, got {self._out}: {error.strerror}")
+            return
+        rospy.loginfo(f"report in {self._out}: {text}")

@@ -1,0 +1,8 @@
+"""Model predictive control by sampling: candidates are simulated in forks of the world, and the best one acts."""
+
+from .controller import SamplingConfig as SamplingConfig
+from .controller import SamplingController as SamplingController
+from .samplers import SAMPLERS as SAMPLERS
+from .samplers import Sampler as Sampler
+from .world import ForkedWorld as ForkedWorld
+from .world import InputConfig as InputConfig

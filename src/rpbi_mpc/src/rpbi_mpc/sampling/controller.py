@@ -1,0 +1,138 @@
+"""A controller that simulates candidates from the present state, and takes the best."""
+
+from __future__ import annotations
+
+import time
+from typing import Annotated, Any, Protocol
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel, Seconds
+from rpbi_mpc.controller import ControlPlan, MpcController
+from rpbi_mpc.plant import Sensed
+
+from .samplers import SAMPLERS
+
+
+class Rollouts(Protocol):
+    """Simulates from the present state of a world.
+
+    Attributes:
+        names: Names of the m numbers of a command.
+        lower: Their lower limits.
+        upper: Their upper limits.
+    """
+
+    names: tuple[str, ...]
+    lower: np.ndarray
+    upper: np.ndarray
+
+    def costs(self, commands: np.ndarray, period_s: float, delay_s: float) -> np.ndarray:
+        """Returns the cost of each candidate; inf for one that cannot be simulated.
+
+        Args:
+            commands: Candidates x cycles x m.
+            period_s: Time between two commands [s].
+            delay_s: Time until the first one acts [s].
+        """
+
+
+class SamplingConfig(ConfigModel):
+    """Options of the controller."""
+
+    horizon: Seconds = Field(0.5, description="Time that is looked ahead.")
+    knots: Annotated[int, Field(ge=2)] = Field(
+        2, description="Knots of a plan, between which commands are linear; more need more candidates."
+    )
+    seed: int = Field(0, description="Seed of the candidates.")
+    sampler: str = Field("predictive", description="predictive, cem, mppi, or module:Class of your own.")
+    options: dict[str, Any] = Field({}, description="Options of the sampler.")
+
+
+class SamplingController(MpcController):
+    """Plans by simulation of candidates; see `SAMPLERS` for the ways to choose among them.
+
+    The numbers of chance come from the seed and the cycle alone.
+
+    Args:
+        rollouts: Simulates the candidates.
+        config: Options.
+        hz: Cycles a second, as those of the loop [Hz].
+        start: Command at the start, m numbers.
+
+    Raises:
+        ConfigError: If an option is wrong.
+        UnknownNameError: If there is no such sampler.
+    """
+
+    def __init__(self, rollouts: Rollouts, config: SamplingConfig, hz: float, start: np.ndarray) -> None:
+        self.measured_names = ("time",)
+        self.command_names = rollouts.names
+        self.state_names = ()
+        self._rollouts, self._config, self._period_s = rollouts, config, 1.0 / hz
+        self._cycles = max(round(config.horizon * hz), 1)
+        self._times = np.linspace(0.0, config.horizon, config.knots)
+        sampler = SAMPLERS.find(config.sampler)
+        options = sampler.Config.parse(config.options, "options")
+        self._sampler = sampler(options, (config.knots, len(rollouts.names)))
+        self._span = rollouts.upper - rollouts.lower
+        self._start = np.clip((np.asarray(start, dtype=float) - rollouts.lower) / self._span, 0.0, 1.0)
+        self.reset()
+
+    def reset(self) -> None:
+        self._nominal = np.tile(self._start, (self._config.knots, 1))
+        self._count = 0
+
+    def plan(self, sensed: Sensed, delay_s: float) -> ControlPlan:
+        begin_s, begin_cpu_s = time.perf_counter(), time.process_time()
+        random = np.random.default_rng([self._config.seed, self._count])
+        self._count += 1
+        self._sampler.begin()
+        lost = 0
+        for iteration in range(self._sampler.config.iterations):
+            candidates = self._sampler.draw(self._nominal, random)
+            costs = self._rollouts.costs(self._commands(candidates), self._period_s, delay_s)
+            good = np.isfinite(costs)
+            lost += int((~good).sum())
+            if not good.any():
+                return self._failed(iteration, begin_s, begin_cpu_s)
+            self._nominal = self._sampler.improve(candidates[good], costs[good])
+        plan = self._commands(self._nominal[np.newaxis])[0]
+        self._nominal = self._at(self._nominal, self._times + self._period_s)
+        return ControlPlan(
+            commands=plan,
+            states=np.empty((0, 0)),
+            state_step_s=self._period_s,
+            cost=float(costs[good].min()),
+            converged=True,
+            status="sampled",
+            iterations=self._sampler.config.iterations,
+            wall_s=time.perf_counter() - begin_s,
+            processor_s=time.process_time() - begin_cpu_s,
+            extras={"spread": float(np.ptp(costs[good])), "not_simulated": float(lost)},
+        )
+
+    def _failed(self, iteration: int, begin_s: float, begin_cpu_s: float) -> ControlPlan:
+        return ControlPlan(
+            commands=np.empty((0, len(self.command_names))),
+            states=np.empty((0, 0)),
+            state_step_s=self._period_s,
+            cost=np.inf,
+            converged=False,
+            status="no candidate could be simulated",
+            iterations=iteration + 1,
+            wall_s=time.perf_counter() - begin_s,
+            processor_s=time.process_time() - begin_cpu_s,
+        )
+
+    def _commands(self, plans: np.ndarray) -> np.ndarray:
+        """Returns the commands of plans, plans x cycles x m."""
+        times = np.arange(self._cycles) * self._period_s
+        shares = np.stack([self._at(plan, times) for plan in plans])
+        commands: np.ndarray = self._rollouts.lower + shares * self._span
+        return commands
+
+    def _at(self, plan: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Returns a plan at some times from its start [s], times x m; after its end it stays."""
+        return np.stack([np.interp(times, self._times, column) for column in plan.T], axis=1)

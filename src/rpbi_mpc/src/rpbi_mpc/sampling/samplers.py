@@ -1,0 +1,138 @@
+"""How candidates are drawn around a nominal plan, and how their costs change that plan.
+
+A plan is a matrix of knots, k x m: m numbers of the command at k equidistant times, each as a share of its range from
+0 (lower limit) to 1 (upper limit).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from custom_ros_tools.plugins.table import PluginTable
+from custom_ros_tools.schema import ConfigModel, KeyedError
+
+
+class SamplerConfig(ConfigModel):
+    """Options that all samplers have."""
+
+    candidates: Annotated[int, Field(ge=2)] = Field(16, description="Plans that are simulated in each iteration.")
+    iterations: Annotated[int, Field(ge=1)] = Field(1, description="Times that the plan is improved in a cycle.")
+    noise: Annotated[float, Field(gt=0, le=1)] = Field(
+        0.1, description="Standard deviation of each knot, as a share of the range of its number."
+    )
+
+
+class Sampler(ABC):
+    """Draws candidates around a nominal plan, and improves the plan by their costs.
+
+    Args:
+        config: Its options.
+        shape: Knots and numbers of a plan.
+    """
+
+    Config: type[SamplerConfig] = SamplerConfig
+
+    def __init__(self, config: SamplerConfig, shape: tuple[int, int]) -> None:
+        self.config = config
+        self.shape = shape
+
+    def begin(self) -> None:  # noqa: B027 (only some have something to begin)
+        """Begins a cycle."""
+
+    def draw(self, nominal: np.ndarray, random: np.random.Generator) -> np.ndarray:
+        """Returns candidates within the limits, candidates x k x m; the first one is the nominal plan."""
+        noise = random.standard_normal((self.config.candidates, *self.shape)) * self.deviation
+        noise[0] = 0.0
+        return np.clip(nominal + noise, 0.0, 1.0)
+
+    @property
+    def deviation(self) -> float | np.ndarray:
+        """Standard deviation of the next candidates, a number or k x m."""
+        return self.config.noise
+
+    @abstractmethod
+    def improve(self, candidates: np.ndarray, costs: np.ndarray) -> np.ndarray:
+        """Returns the new nominal plan, k x m, from candidates and their finite costs."""
+
+
+class PredictiveSampler(Sampler):
+    """The best candidate is the plan (Howell et al., Predictive Sampling, arXiv 2212.00541, algorithm 1)."""
+
+    def improve(self, candidates: np.ndarray, costs: np.ndarray) -> np.ndarray:
+        best: np.ndarray = candidates[np.argmin(costs)]
+        return best
+
+
+class CemConfig(SamplerConfig):
+    """Options of the cross-entropy method."""
+
+    iterations: Annotated[int, Field(ge=1)] = Field(3, description="Times that the plan is improved in a cycle.")
+    elites: Annotated[int, Field(ge=1)] = Field(4, description="Best candidates, whose mean is the plan.")
+    least_noise: Annotated[float, Field(gt=0, le=1)] = Field(0.01, description="Least standard deviation.")
+
+    @model_validator(mode="after")
+    def _has_enough_candidates(self) -> CemConfig:
+        if self.elites > self.candidates:
+            raise KeyedError("elites", f"expected at most the {self.candidates} candidates, got {self.elites}")
+        return self
+
+
+class CemSampler(Sampler):
+    """The cross-entropy method: mean and deviation of the best candidates (Rubinstein 1999; Kobilarov 2012)."""
+
+    Config = CemConfig
+    config: CemConfig
+
+    def begin(self) -> None:
+        self._deviation = np.full(self.shape, self.config.noise)
+
+    @property
+    def deviation(self) -> np.ndarray:
+        return self._deviation
+
+    def improve(self, candidates: np.ndarray, costs: np.ndarray) -> np.ndarray:
+        elites = candidates[np.argsort(costs, kind="stable")[: self.config.elites]]
+        self._deviation = np.maximum(elites.std(axis=0), self.config.least_noise)
+        mean: np.ndarray = elites.mean(axis=0)
+        return mean
+
+
+class MppiConfig(SamplerConfig):
+    """Options of MPPI."""
+
+    temperature: Annotated[float, Field(gt=0)] = Field(
+        0.1, description="Cost at which a candidate counts 1/e of the best one, as a share of the spread of all costs."
+    )
+
+
+class MppiSampler(Sampler):
+    """Model predictive path integral control: the mean of all candidates, weighted by exp(-cost / temperature).
+
+    Weights are those of Williams et al., Information-Theoretic MPC, IEEE T-RO 34 (2018), algorithm 2, without the cost
+    of control; the temperature is relative to the spread of the costs, so that it fits any unit.
+    """
+
+    Config = MppiConfig
+    config: MppiConfig
+
+    def improve(self, candidates: np.ndarray, costs: np.ndarray) -> np.ndarray:
+        above = costs - costs.min()
+        weights = np.exp(-above / max(self.config.temperature * above.max(), np.finfo(float).tiny))
+        mean: np.ndarray = np.tensordot(weights / weights.sum(), candidates, 1)
+        return mean
+
+
+SAMPLERS: PluginTable[Sampler] = PluginTable(
+    "sampler",
+    "rpbi_mpc.sampling.samplers:Sampler",
+    {
+        "predictive": "rpbi_mpc.sampling.samplers:PredictiveSampler",
+        "cem": "rpbi_mpc.sampling.samplers:CemSampler",
+        "mppi": "rpbi_mpc.sampling.samplers:MppiSampler",
+    },
+)
+"""Ways to choose among candidates, by name."""
