@@ -18,9 +18,10 @@ def test_blocks_do_what_the_page_says(tmp_path):
     clean = ["env", "-i", "PATH=/usr/local/bin:/usr/bin:/bin", f"HOME={tmp_path}", str(ROOT / ".venv/bin/python")]
     done = subprocess.run([*clean, "script.py"], cwd=tmp_path, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
-    place, counts, pushed = done.stdout.strip().splitlines()[-3:]
+    place, counts, pushed, is_cheaper = done.stdout.strip().splitlines()[-4:]
     assert float(place.strip("[]")) == pytest.approx(0.5, abs=0.02)
     assert counts.startswith("{'solved': 75,")
     finished, error_mm = pushed.split()
     assert finished == "True" and float(error_mm) < 15.0
+    assert is_cheaper == "True", "the last plan costs less than the first"
     assert (tmp_path / "goto/cycles.csv").exists()

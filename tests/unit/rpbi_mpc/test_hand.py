@@ -8,7 +8,7 @@ import yaml
 
 from custom_ros_tools.errors import ConfigError, InterfaceError
 from robot_model.asset_files import find_file
-from rpbi_mpc.hand import HandConfig, PlanarHand
+from rpbi_mpc.hand import PlanarHandConfig, PlanarHand
 from rpbi_mpc.node_configs import PushingNodeConfig
 
 EXAMPLE = "{rpbi_examples}/configs/pushing_mpc/mpc.yaml"
@@ -21,7 +21,7 @@ def example() -> dict:
 
 
 def test_hand_follows_the_path_of_the_example_at_its_height_with_the_stick_down(example):
-    config = HandConfig.parse(example["hand"], EXAMPLE)
+    config = PlanarHandConfig.parse(example["hand"], EXAMPLE)
     hand = PlanarHand(config)
     joints = hand.solve(hand.posture, np.array([0.33, -0.37]))
     for share in np.linspace(0.0, 1.0, 60):
@@ -33,7 +33,7 @@ def test_hand_follows_the_path_of_the_example_at_its_height_with_the_stick_down(
 
 
 def test_place_out_of_reach_is_an_error_that_names_it(example):
-    hand = PlanarHand(HandConfig.parse(example["hand"], EXAMPLE))
+    hand = PlanarHand(PlanarHandConfig.parse(example["hand"], EXAMPLE))
     with pytest.raises(
         InterfaceError, match=r"hand.RHAND_ball: expected a place within reach, got \(2.000, 0.000, 0.680\)"
     ):

@@ -23,7 +23,7 @@ DAMPING = 1e-3
 """Damping of the least squares [m^2/rad^2]; more slows down, less shakes near singular postures."""
 
 
-class HandConfig(ConfigModel):
+class PlanarHandConfig(ConfigModel):
     """A point of an arm that moves at a constant height and orientation.
 
     The hand does not turn: a round tip that turns would rub along the face that it pushes.
@@ -63,7 +63,7 @@ class PlanarHand:
         InterfaceError: If the posture does not have one number for each joint.
     """
 
-    def __init__(self, config: HandConfig) -> None:
+    def __init__(self, config: PlanarHandConfig) -> None:
         self._robot = RobotModel(find_file(config.urdf, "hand"), config.joints)
         self._robot.check_link(config.link)
         self._config, self.joint_names = config, tuple(config.joints)

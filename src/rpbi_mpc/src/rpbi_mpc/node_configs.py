@@ -22,7 +22,7 @@ from custom_ros_tools.schema import (
 )
 from custom_ros_tools.schema.json_schema import explained, json_schema, schema_text
 
-from .hand import HandConfig
+from .hand import PlanarHandConfig
 from .loop import LoopConfig
 from .pushing.controller import PushingConfig
 from .sampling import InputConfig, SamplingConfig
@@ -62,7 +62,7 @@ class PushingNodeConfig(ConfigModel):
 
     loop: LoopConfig = Field(LoopConfig(), description="Times of the loop.")
     pushing: PushingConfig = Field(PushingConfig(), description="Slider, path, cost and solver.")
-    hand: HandConfig = Field(description="The hand that pushes.")
+    hand: PlanarHandConfig = Field(description="The hand that pushes.")
     plant: PlantConfig = Field(PlantConfig(), description="Topics, and pace.")
 
     @model_validator(mode="after")

@@ -117,7 +117,7 @@ class SteppedPlant(HandPlant):
         super().__init__(config, hand)
         self._step = get_srv_handler("rpbi/step_n", StepN, persistent=True)
         self._set_target = get_srv_handler(f"rpbi/{config.robot}/set_target", SetJointState, persistent=True)
-        self._time_step_s = _time_step_s(self._step)
+        self._time_step_s = time_step_s(self._step)
         self._stamp_s = self._step_by(1)
 
     def sense(self) -> Sensed:
@@ -170,8 +170,8 @@ class TimedPlant(HandPlant):
         time.sleep(0.05)
 
 
-def _time_step_s(step: rospy.ServiceProxy) -> float:
-    """Returns the time of a tick, by the stamps of two."""
+def time_step_s(step: rospy.ServiceProxy) -> float:
+    """Stops the world, and returns the time of a tick [s], by the stamps of two."""
     get_srv_handler("rpbi/stop", Trigger)()  # it may stand already
     first, second = step(1), step(1)
     for answer in (first, second):

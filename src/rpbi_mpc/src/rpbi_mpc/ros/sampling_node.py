@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import rospy
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Trigger
 
 from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.lifecycle.parameters import private_config
 from custom_ros_tools.ros.lifecycle.run_node import run_node
-from custom_ros_tools.ros.services import call_service, get_srv_handler
+from custom_ros_tools.ros.services import get_srv_handler
 from ros_pybullet_interface.msg import Candidate
 from ros_pybullet_interface.msg import PlannedInput as PlannedInputMessage
 from ros_pybullet_interface.srv import Predict, SetJointState, StepN
@@ -20,6 +19,7 @@ from rpbi_mpc.sampling import InputConfig, SamplingController
 from rpbi_mpc.sampling.world import planned, whole_ticks
 
 from .loop_node import LoopNode
+from .plants import time_step_s
 
 NODE = "sampling_mpc"
 TARGET = "/target"
@@ -47,9 +47,8 @@ class SteppedSimulator(Plant):
         self._step = get_srv_handler("rpbi/step_n", StepN, persistent=True)
         self._predict = get_srv_handler("rpbi/predict", Predict, persistent=True)
         self._set_target = get_srv_handler(f"rpbi/{robot}/set_target", SetJointState, persistent=True)
-        call_service("rpbi/stop", Trigger)
-        first_s, self._time_s = self._step_by(1), self._step_by(1)
-        self._dt_s = round(self._time_s - first_s, 9)
+        self._dt_s = round(time_step_s(self._step), 9)
+        self._time_s = self._step_by(1)
 
     def sense(self) -> Sensed:
         return Sensed(self._time_s, np.array([self._time_s]))
