@@ -8,7 +8,7 @@ import yaml
 
 from custom_ros_tools.errors import ConfigError, InterfaceError
 from robot_model.asset_files import find_file
-from rpbi_mpc.hand import PlanarHandConfig, PlanarHand
+from rpbi_mpc.hand import PlanarHand, PlanarHandConfig
 from rpbi_mpc.node_configs import PushingNodeConfig
 
 EXAMPLE = "{rpbi_examples}/configs/pushing_mpc/mpc.yaml"
