@@ -32,7 +32,7 @@ def world(tmp_path, monkeypatch) -> Iterator[World]:
 
 def run(world: World, cost: str = "costs:turned", delay_s: float = 0.01) -> LockStep:
     plant = ForkedWorld(world, InputConfig.parse(INPUT, "input"), cost)
-    config = SamplingConfig(horizon=0.4, knots=2, options={"candidates": 8, "noise": 0.2})
+    config = SamplingConfig(horizon=0.4, knots=2, sampler={"type": "predictive", "candidates": 8, "noise": 0.2})
     controller = SamplingController(plant, config, HZ, np.zeros(1))
     loop = LockStep(plant, controller, LoopConfig(hz=HZ, delay_s=delay_s))
     loop.run(1.0)

@@ -58,11 +58,11 @@ def run(rollouts: Bowl, cycles: int = 40, **config) -> tuple[Still, LockStep]:
 
 @pytest.mark.parametrize("sampler", SAMPLERS)
 def test_the_best_command_is_found_and_is_the_same_again(sampler):
-    plant, _ = run(Bowl(), sampler=sampler)
+    plant, _ = run(Bowl(), sampler={"type": sampler})
     assert np.linalg.norm(plant.commands[-1] - BEST) < 0.1 < np.linalg.norm(BEST)
-    again, _ = run(Bowl(), sampler=sampler)
+    again, _ = run(Bowl(), sampler={"type": sampler})
     assert np.array_equal(plant.commands, again.commands)
-    other, _ = run(Bowl(), sampler=sampler, seed=1)
+    other, _ = run(Bowl(), sampler={"type": sampler}, seed=1)
     assert not np.array_equal(plant.commands, other.commands)
 
 
@@ -70,7 +70,7 @@ def test_the_best_command_is_found_and_is_the_same_again(sampler):
 def test_candidates_are_within_the_limits_and_the_first_is_the_plan(sampler):
     bowl = Bowl()
     bowl.lower, bowl.upper = np.array([-0.1, -0.1]), np.array([0.1, 0.1])
-    plant, _ = run(bowl, 3, sampler=sampler, options={"noise": 1.0})
+    plant, _ = run(bowl, 3, sampler={"type": sampler, "noise": 1.0})
     assert all((np.abs(each) <= 0.1 + 1e-12).all() for each in bowl.asked)
     assert np.array_equal(bowl.asked[0][0], np.zeros((5, 2)))
 
@@ -89,10 +89,10 @@ def test_candidates_that_cannot_be_simulated_do_not_count_and_without_any_the_lo
 @pytest.mark.parametrize(
     ("config", "error", "message"),
     [
-        ({"sampler": "cen"}, UnknownNameError, "did you mean 'cem'"),
-        ({"sampler": "cem", "options": {"elites": 99}}, ConfigError, "options: elites: expected at most the 16"),
-        ({"options": {"candidates": 1}}, ConfigError, "options: candidates: must be >= 2"),
-        ({"options": {"temperature": 1.0}}, ConfigError, "options: temperature: unknown key"),
+        ({"sampler": {"type": "cen"}}, UnknownNameError, "did you mean 'cem'"),
+        ({"sampler": {"type": "cem", "elites": 99}}, ConfigError, "sampler: elites: expected at most the 16"),
+        ({"sampler": {"candidates": 1}}, ConfigError, "sampler: candidates: must be >= 2"),
+        ({"sampler": {"temperature": 1.0}}, ConfigError, "sampler: temperature: unknown key"),
     ],
 )
 def test_wrong_options_are_named(config, error, message):

@@ -20,12 +20,12 @@ from custom_ros_tools.schema import (
     Unit,
     optional,
 )
-from custom_ros_tools.schema.json_schema import explained, json_schema, schema_text
+from custom_ros_tools.schema.json_schema import Schema, json_schema, resolved, schema_texts
 
 from .hand import PlanarHandConfig
 from .loop import LoopConfig
 from .pushing.controller import PushingConfig
-from .sampling import InputConfig, SamplingConfig
+from .sampling import SAMPLERS, InputConfig, SamplingConfig
 
 SAME_S = 1e-9
 """Difference below which two times are the same [s]."""
@@ -100,7 +100,17 @@ def schema_files(root: Path) -> dict[Path, str]:
     Args:
         root: The workspace.
     """
-    return {
-        root / f"src/rpbi_mpc/schema/{name}.schema.json": schema_text(explained(json_schema(config, name)))
-        for name, config in CONFIGS.items()
-    }
+    found = {name: json_schema(config, name) for name, config in CONFIGS.items()}
+    sampling = found["sampling_mpc"]
+    resolved(sampling["properties"]["sampling"], sampling)["properties"]["sampler"] = _any_sampler()
+    return schema_texts(root / "src/rpbi_mpc/schema", found)
+
+
+def _any_sampler() -> Schema:
+    """Returns the schema of a sampler of any type."""
+    own_type = {"type": "object", "properties": {"type": {"pattern": r"^[\w.]+:\w+$"}}, "required": ["type"]}
+    known = [
+        {**schema, "properties": {"type": {"enum": [name]}, **schema["properties"]}, "required": ["type"]}
+        for name, schema in SAMPLERS.schemas().items()
+    ]
+    return {"description": "How candidates are drawn and chosen.", "anyOf": [*known, own_type]}

@@ -129,7 +129,7 @@ def test_shipped_files_name_the_schema_of_the_list_that_names_them() -> None:
         for section in sections():
             for entry in main.get(section, ()):
                 file = entry["file"] if isinstance(entry, dict) else entry
-                text = (SRC / file.replace("{rpbi_examples}", "rpbi_examples")).read_text()
+                text = (SRC / re.sub(r"\{(\w+)\}", r"\1", file)).read_text()
                 assert f"/{kind_of(section)}.schema.json" in text.splitlines()[0], f"{file} is one of {section}"
 
 

@@ -20,6 +20,8 @@ from ik_ros.srv import SolveIK
 from ros_pybullet_interface.srv import ResetJointState
 from rpbi_examples.motions import FigureEight
 
+from .joint_targets import wait_until_ready
+
 HOME = {"lwr_arm_1_joint": 0.52, "lwr_arm_3_joint": -1.57, "lwr_arm_5_joint": 1.05}
 """Start of the search [rad]; other joints at 0."""
 APPROACH_S = 5.0
@@ -40,6 +42,7 @@ def _run() -> None:
         raise InterfaceError(f"expected the names of a robot and a solver, got {len(arguments)}")
     robot, solver = arguments
     base, target = rospy.get_param("~base_frame"), rospy.get_param("~target_frame")
+    wait_until_ready()
     in_base = TfInterface.msg_to_matrix(TfInterface().wait_for_tf_msg(base, target))
     if solver == WHOLE_TRAJECTORIES:
         _draw_a_round(robot, in_base)

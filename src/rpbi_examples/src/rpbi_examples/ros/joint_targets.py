@@ -15,8 +15,20 @@ HZ = 50.0
 """Rate of the targets."""
 
 
+def wait_until_ready() -> None:
+    """Waits for a message on the topic that `~ready` names, if it is given.
+
+    With a real robot, these are the commands of its driver. The guard accepts only a first target that is where the
+    robot stands, so the simulated arm has to stand there too until the guard runs.
+    """
+    topic = str(rospy.get_param("~ready", ""))
+    if topic:
+        rospy.loginfo("waiting for %s, the commands of the real robot", topic)
+        rospy.wait_for_message(topic, rospy.AnyMsg)
+
+
 class JointTargets:
-    """Sends targets to all joints of a robot that move, as long as the world runs.
+    """Sends targets to all joints of a robot that move, as long as the world runs; see also `wait_until_ready`.
 
     Attributes:
         positions: Where the joints were at the start [rad or m].
@@ -24,6 +36,7 @@ class JointTargets:
     """
 
     def __init__(self, robot_name: str) -> None:
+        wait_until_ready()
         info: RobotInfoResponse = get_srv_handler(f"rpbi/{robot_name}/robot_info", RobotInfo)()
         joints = [joint for joint in info.joint_info if not joint.is_fixed]
         state = dict(zip(info.current_joint_state.name, info.current_joint_state.position))

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Protocol
 import numpy as np
 from pydantic import Field
 
-from custom_ros_tools.schema import ConfigModel, Seconds
+from custom_ros_tools.schema import ConfigModel, Seconds, Text
 from rpbi_mpc.controller import ControlPlan, MpcController
 from rpbi_mpc.plant import Sensed
 
@@ -46,8 +46,10 @@ class SamplingConfig(ConfigModel):
         2, description="Knots of a plan, between which commands are linear; more need more candidates."
     )
     seed: int = Field(0, description="Seed of the candidates.")
-    sampler: str = Field("predictive", description="predictive, cem, mppi, or module:Class of your own.")
-    options: dict[str, Any] = Field({}, description="Options of the sampler.")
+    sampler: dict[Text, Any] = Field(
+        {"type": "predictive"},
+        description="Its `type`, which is predictive, cem, mppi, or module:Class of your own, and its options.",
+    )
 
 
 class SamplingController(MpcController):
@@ -73,9 +75,9 @@ class SamplingController(MpcController):
         self._rollouts, self._config, self._period_s = rollouts, config, 1.0 / hz
         self._cycles = max(round(config.horizon * hz), 1)
         self._times = np.linspace(0.0, config.horizon, config.knots)
-        sampler = SAMPLERS.find(config.sampler)
-        options = sampler.Config.parse(config.options, "options")
-        self._sampler = sampler(options, (config.knots, len(rollouts.names)))
+        options = dict(config.sampler)
+        sampler = SAMPLERS.find(str(options.pop("type", "predictive")))
+        self._sampler = sampler(sampler.Config.parse(options, "sampler"), (config.knots, len(rollouts.names)))
         self._span = rollouts.upper - rollouts.lower
         self._start = np.clip((np.asarray(start, dtype=float) - rollouts.lower) / self._span, 0.0, 1.0)
         self.reset()

@@ -11,6 +11,7 @@ WRITERS = (
     "rpbi_mpc.node_configs:schema_files",
     "rpbi_utils.schemas:schema_files",
     "safe_robot.schemas:schema_files",
+    "rpbi.gym.schemas:schema_files",
     "rpbi.ros.reference.write:reference_files",
     "custom_ros_tools.console.page:console_files",
     "rpbi_examples.plugins_page:plugin_files",
