@@ -96,6 +96,11 @@ class SceneListener:
             )
             return
         joints = np.array([positions[name] for name in self._hand.joint_names])
+        if not np.isfinite(joints).all():
+            self._warn(
+                self.joint_states, f"{self.joint_states}: message refused: expected finite numbers, got {joints}"
+            )
+            return
         with self._changed:
             self._joints.append((message.header.stamp.to_sec(), joints))
             self._changed.notify_all()
