@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 from xmlrpc.client import ServerProxy
@@ -68,8 +68,9 @@ def count_taken(publisher: rospy.Publisher) -> int:
     master, topic = rosgraph.Master(rospy.get_name()), publisher.resolved_name
     counts = []
     for node in dict(master.getSystemState()[1]).get(topic, []):
-        _, _, (_, subscriptions, *_) = ServerProxy(master.lookupNode(node)).getBusStats(rospy.get_name())
-        counts += [read for name, connections in subscriptions if name == topic for _, _, read, *_ in connections]
+        with suppress(ConnectionRefusedError):  # one that was killed stays registered
+            _, _, (_, subscriptions, *_) = ServerProxy(master.lookupNode(node)).getBusStats(rospy.get_name())
+            counts += [read for name, connections in subscriptions if name == topic for _, _, read, *_ in connections]
     return min(counts, default=0)
 
 

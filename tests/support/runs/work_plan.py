@@ -16,8 +16,15 @@ FIRST = ("ros/ik_ros", "ros/rpbi_examples", "gui", "ros", "unit/safe_robot", "si
 
 QUICK_FOLDERS = ("unit", "sim")
 """Folders whose tests are quick, as those of the top are; elsewhere those with the mark."""
-NOT_QUICK = ("sim/rpbi_examples/test_dressing.py", "unit/safe_robot/test_guard_fuzz.py")
-"""Files in these folders whose tests take longest and draw at random: only the whole run has them."""
+NOT_QUICK = (
+    "sim/ik_ros/test_chain_solvers.py",
+    "sim/rpbi/render/test_render.py",
+    "sim/rpbi/world/test_reset.py",
+    "sim/rpbi/world/test_saved.py",
+    "sim/rpbi_examples/test_dressing.py",
+    "unit/safe_robot/test_guard_fuzz.py",
+)
+"""Files in these folders whose tests take longest: only the whole run has them."""
 
 EXTRA_OF = {
     "pinocchio": "ik",
