@@ -1,4 +1,4 @@
-"""How well a box is pushed along paths by model predictive control, and how long the solver takes.
+"""Accuracy of pushing a box along paths by model predictive control, and time of the solver.
 
 The plant is PyBullet: a ball on two slides, a robot whose velocities are commanded, pushes a box. Bullet's friction by
 yaw (docs/physics.md) is one of the disturbances: maximal coordinates do not avoid it while a robot touches the box. The

@@ -84,8 +84,8 @@ def test_node_with_a_window_publishes_joint_states_and_images_and_ends_on_interr
             "object_tf": {"tf_id": "rpbi/eye"},
         },
     )
-    joint_states.wait_for(50, SLOW_S)
-    images.wait_for(2, SLOW_S)
+    joint_states.wait_for(100, SLOW_S)
+    images.wait_for(5, SLOW_S)
     assert set(np.diff(joint_states.stamps_ns)) == {20_000_000}
     os.killpg(node.pid, signal.SIGINT)
     assert node.wait(SLOW_S) == 0

@@ -12,7 +12,7 @@ from rpbi_examples.costs import GOAL
 from rpbi_mpc.msg import MpcStatus
 
 
-def test_the_arm_brings_the_box_towards_its_mark(ros):
+def test_the_arm_brings_the_box_to_its_mark(ros):
     ros.start(["roslaunch", "rpbi_examples", "sampling_mpc.launch", "headless:=true", "start_on_init:=false"])
     status, frames = ros.listen("mpc/status", MpcStatus), ros.listen_to_tf()
     assert ros.call("mpc/step", Trigger).message == "cycle 0: solved"
@@ -24,6 +24,6 @@ def test_the_arm_brings_the_box_towards_its_mark(ros):
     wait_until(lambda: frames.can_transform("rpbi/world", "rpbi/box", rospy.Time(0)), "there is a box")
     assert distance() > 0.25
     assert ros.call("mpc/start", Trigger).success
-    wait_until(lambda: distance() < 0.15, "the box has come half of its way")
+    wait_until(lambda: distance() < 0.1, "the box is near its mark")
     assert {each.status for each in status.messages} <= {"ready", "solved"}
     assert ros.call("mpc/stop", Trigger).success

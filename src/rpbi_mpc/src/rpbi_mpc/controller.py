@@ -1,4 +1,4 @@
-"""What a controller is: measurements in, plans out."""
+"""The interface of controllers: measurements in, plans out."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class LoopConfig(ConfigModel):
 
 
 class Status(StrEnum):
-    """What a cycle came to."""
+    """Outcome of a cycle."""
 
     SOLVED = "solved"
     LAST_PLAN = "last plan"
@@ -61,7 +61,7 @@ class Cycle:
 
     Attributes:
         index: Its number, from 0.
-        status: What it came to.
+        status: Its outcome.
         reason: Why, if it is not `solved`.
         sensed: The measurement.
         plan: The new plan; None without a measurement.

@@ -29,7 +29,7 @@ class WorldTaskConfig(ConfigModel):
 
 
 class WorldTask(ABC):
-    """What is to be done in a world: observation, action, reward, end and success.
+    """A task in a world: observation, action, reward, end and success.
 
     A new one is a subclass with a `Config`, `actions`, `reward` and `has_succeeded`; the rest may stay as it is. Bodies
     are looked up in the world each time, since a reset may make them anew.

@@ -21,7 +21,7 @@ FRAME = "rpbi/world"
 SPACING = 0.005
 """Distance of the points of the path in RViz [m]."""
 SHOWN_EVERY = 4
-"""Of the predicted poses, each so many is shown as an outline."""
+"""Number of predicted poses from one outline to the next."""
 PLAN, REFERENCE, SEEN = ColorRGBA(0.1, 0.55, 0.9, 0.9), ColorRGBA(0.2, 0.7, 0.3, 0.9), ColorRGBA(0.93, 0.53, 0.14, 0.9)
 
 

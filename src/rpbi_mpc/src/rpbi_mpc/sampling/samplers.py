@@ -1,4 +1,4 @@
-"""How candidates are drawn around a nominal plan, and how their costs change that plan.
+"""Samplers: they draw candidates around a nominal plan, and improve the plan by their costs.
 
 A plan is a matrix of knots, k x m: m numbers of the command at k equidistant times, each as a share of its range from
 0 (lower limit) to 1 (upper limit).

@@ -24,7 +24,7 @@ Info = dict[str, Any]
 
 
 class StepResult(NamedTuple):
-    """What a step led to.
+    """Outcome of a step.
 
     Attributes:
         observation: The observation that the next action is for.
