@@ -255,8 +255,12 @@ def _unconnected(node: str, topics: Collection[str]) -> tuple[list[str], list[st
     silent = []
     for publisher, published in wanted.items():
         try:
-            connected = _receivers(master.lookupNode(publisher), node)
-        except (ConnectionRefusedError, rosgraph.MasterError):  # it ended without a word, or just now
+            uri = master.lookupNode(publisher)  # outside of the next try: a master that refuses is no publisher's end
+        except rosgraph.MasterError:  # it has just ended
+            continue
+        try:
+            connected = _receivers(uri, node)
+        except ConnectionRefusedError:  # it ended without a word
             continue
         silent += [f"{publisher} ({topic})" for topic in published if topic not in connected]
     return [], silent
@@ -283,7 +287,6 @@ def _sent(uri: str, node: str) -> dict[str, int]:
         answer = proxy.getBusStats(_CALLER)
     except MASTER_FAILURES:
         return {}
-    publishers = answer[2][0] if len(answer) > 2 and answer[2] else []  # nodes in C++ leave empty lists out
     chosen = {each[0] for each in connections if each[1] == node and each[2] == _OUTBOUND}
     if isinstance(answer[0], list):  # roscpp: without code and message, and with the count behind two sizes
         publishers = [(topic, {each[0]: each[3] for each in sent}) for topic, sent in answer[0]]
