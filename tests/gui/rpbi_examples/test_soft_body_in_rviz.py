@@ -14,7 +14,7 @@ from scipy import ndimage
 CONFIG_FILE = Path(__file__).resolve().parents[3] / "src/rpbi_examples/rviz/soft_body.rviz"
 TORUS = (242, 115, 92)
 ARROW = (217, 26, 26)
-SLOW_S = 300.0
+SLOW_S = 120.0
 
 
 @pytest.fixture(scope="module")

@@ -65,6 +65,12 @@ def find_view(screen: Screen) -> Window | None:
     return max(views, key=lambda window: window.width * window.height) if is_open and views else None
 
 
+def _draws(screen: Screen) -> bool:
+    """Returns whether RViz has drawn something in its view, such as the grid."""
+    view = find_view(screen)
+    return view is not None and len(np.unique(screen.grab(view).reshape(-1, 3), axis=0)) > 1
+
+
 def launch_with_rviz(system: RosSystem, screen: Screen, *arguments: str) -> subprocess.Popen:
     """Launches an example as a user with a screen does, and waits until RViz is open; see `start_with_rviz`."""
     return start_with_rviz(system, screen, "roslaunch", "rpbi_examples", *arguments, "headless:=false")
@@ -77,10 +83,10 @@ def start_rviz(system: RosSystem, screen: Screen, config: dict[str, Any], name: 
 
 
 def start_with_rviz(system: RosSystem, screen: Screen, *command: str) -> subprocess.Popen:
-    """Starts RViz, or what starts it, and waits until it is open.
+    """Starts RViz, or what starts it, and waits until it draws.
 
     Debian's RViz sometimes, once in some fifty times on a busy machine, crashes while it starts (`free(): invalid next
-    size`, exit code -6), or, seen once, never opens. Then it is started again; nothing else is tried twice.
+    size`, exit code -6), or, seen once, never opens or draws. Then it is started again; nothing else is tried twice.
     """
     failures = []
     for _ in range(ATTEMPTS):
@@ -89,10 +95,10 @@ def start_with_rviz(system: RosSystem, screen: Screen, *command: str) -> subproc
             said = wait_until(
                 lambda process=process: (
                     CRASH.search(system.output(process))
-                    or (find_view(screen) and "open")
+                    or (_draws(screen) and "open")
                     or (process.poll() is not None and ("over" if process.poll() not in CRASH_CODES else process))
                 ),
-                "RViz is open",
+                "RViz draws",
                 OPEN_S,
                 every_s=0.5,
             )
