@@ -24,6 +24,8 @@ from custom_ros_tools.tf import TfInterface
 from operator_node.msg import HapticState
 from rpbi_examples.press_report import Press, PressSample
 
+from .joint_targets import wait_until_ready
+
 SENSOR = "rpbi/kuka_lwr/force_torque_sensor_mount/ft_sensor"
 WORLD, TOOL, TARGET = "rpbi/world", "rpbi/kuka_lwr/end_effector_ball", "rpbi/target"
 SAMPLE_HZ = 100.0
@@ -73,6 +75,7 @@ class Watch:
             get_srv_handler(
                 "robot_safety/start_subscriber", Trigger
             )  # otherwise the press is over before it subscribes
+        wait_until_ready()
         for toggle in ("ik/setup/kdl/toggle", "ik/solver/kdl/toggle", "haptics/toggle"):
             call_service(toggle, SetBool, True)
         rospy.loginfo("the handle moves the arm up and down; press it on the box")
