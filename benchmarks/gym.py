@@ -10,6 +10,8 @@ import statistics
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
 import gymnasium
@@ -29,6 +31,8 @@ ENVS = 8
 VECTOR_STEPS, QUICK_VECTOR_STEPS = 100, 15
 RESETS = 20
 WORKER_GAIN = 1.8
+PANDA_GYM = "PandaReach-v3"
+"""Has 20 ticks of 2 ms an action; `pip install panda-gym==3.0.7` in .venv adds it."""
 
 Call = tuple[tuple[Any, ...], dict[str, Any]]
 
@@ -144,22 +148,35 @@ def _resets(name: str) -> Iterator[Result]:
 
 
 def _workers(name: str, steps: int, rounds: int) -> Iterator[Result]:
-    """Compares two workers with one, in turns."""
-    speeds: dict[int, list[float]] = {1: [], 2: []}
-    envs = {workers: gymnasium.make_vec(name, num_envs=ENVS, workers=workers) for workers in speeds}
+    """Compares two workers with one, in turns; and two processes of panda-gym, where it is installed."""
+    ours = {f"{count} workers": gymnasium.make_vec(name, num_envs=ENVS, workers=count) for count in (1, 2)}
+    theirs = {}
+    if find_spec("panda_gym"):
+        import_module("panda_gym")
+        theirs = {f"{count} panda-gym": gymnasium.make_vec(PANDA_GYM, count, "async") for count in (1, 2)}
+    speeds = _speeds(ours | theirs, steps, rounds)
+    target = Target(WORKER_GAIN, at_least=True, of_floor=True)
+    figure = f"{ENVS} x {name}, two workers beside one: actions a second"
+    yield Result("gym", figure, speeds["2 workers"], "1/s", speeds["1 workers"], target)
+    if theirs:
+        figure = f"{PANDA_GYM} of panda-gym, two processes beside one: actions a second"
+        yield Result("gym", figure, speeds["2 panda-gym"], "1/s", speeds["1 panda-gym"])
+
+
+def _speeds(envs: dict[str, Any], steps: int, rounds: int) -> dict[str, float]:
+    """Returns the actions a second of vectors, in turns, and closes them."""
+    speeds: dict[str, list[float]] = {name: [] for name in envs}
     for each in envs.values():
         each.reset(seed=0)
     for _ in range(rounds):
-        for workers, each in envs.items():
+        for name, each in envs.items():
             begin_s = time.perf_counter()
             for _ in range(steps):
                 each.step(each.action_space.sample())
-            speeds[workers].append(ENVS * steps / (time.perf_counter() - begin_s))
+            speeds[name].append(each.num_envs * steps / (time.perf_counter() - begin_s))
     for each in envs.values():
         each.close()
-    one, two = (statistics.median(speeds[workers]) for workers in (1, 2))
-    target = Target(WORKER_GAIN, at_least=True, of_floor=True)
-    yield Result("gym", f"{ENVS} x {name}, two workers beside one: actions a second", two, "1/s", one, target)
+    return {name: statistics.median(found) for name, found in speeds.items()}
 
 
 def _made(name: str, **options: Any) -> WorldEnv:

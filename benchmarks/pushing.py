@@ -10,9 +10,11 @@ from __future__ import annotations
 import numpy as np
 from result import Result, Target
 
-from rpbi_mpc.pushing.controller import PushingConfig
-from rpbi_mpc.pushing.paths import PathConfig
+from rpbi_mpc.pushing.controller import PushingConfig, PushingController
+from rpbi_mpc.pushing.planar.paths import PathConfig
 from rpbi_mpc.pushing.program import ProgramConfig
+from rpbi_mpc.pushing.sampling_planner import PushSamplingConfig, SamplingPlanner
+from rpbi_mpc.pushing.simulated import PushingWorld
 from rpbi_mpc.pushing.trials import PushingTrial, Variation, run_trial
 
 PATHS = {
@@ -22,7 +24,7 @@ PATHS = {
 }
 EIGHT = PathConfig(shape="eight", size=0.3)
 SEEDS, QUICK_SEEDS = 30, 2
-FIRST_SEED = 7000
+FIRST_SEED = 11000
 """Seeds from here on were not used for tuning, which used 1001 to 1020."""
 NOMINAL_M, DISTURBED_M, SHARE = 0.005, 0.015, 0.95
 RECOVERED_M, RECOVERED_S, SHOVE_AT_S = 0.015, 5.0, 3.0
@@ -39,7 +41,7 @@ def run(quick: bool) -> list[Result]:
     if not quick:
         ipopt = ProgramConfig(solvers=("ipopt",))
         trials = [run_trial(PushingConfig(path=path, program=ipopt), Variation()) for path in PATHS.values()]
-        results += _times("ipopt alone", trials)
+        results += [*_times("ipopt alone", trials), *_sampled()]
     return results
 
 
@@ -90,6 +92,24 @@ def _shoved(seeds: range, trials: list[PushingTrial]) -> list[Result]:
         Result("pushing", f"{what}: back within {RECOVERED_S:g} s", share, "", None, Target(SHARE, at_least=True)),
         Result("pushing", f"{what}: median time", float(np.median(times)), "s"),
     ]
+
+
+def _sampled() -> list[Result]:
+    """Pushes by sampling in forks of the world, whose model is the plant itself."""
+    results = []
+    for name, path in PATHS.items():
+        config = PushingConfig(path=path)
+
+        def make(plant: PushingWorld, config: PushingConfig = config) -> PushingController:
+            return PushingController(config, SamplingPlanner(plant, config, PushSamplingConfig()))
+
+        trial = run_trial(config, Variation(), make_controller=make)
+        error = 1e3 * float(trial.errors.mean()) if trial.finished else float("inf")
+        results.append(Result("pushing", f"{name}, nominal, by sampling: mean error", error, "mm"))
+        plans = [cycle.plan for cycle in trial.cycles if cycle.plan and cycle.plan.iterations]
+        mean_s = float(np.mean([plan.wall_s for plan in plans]))
+        results.append(Result("pushing", f"{name}, by sampling: plan, wall clock, mean", 1e3 * mean_s, "ms"))
+    return results
 
 
 def _times(what: str, trials: list[PushingTrial]) -> list[Result]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 
 import pytest
 from ros_system import RosSystem, wait_until
@@ -48,9 +49,27 @@ def test_real_robot_behind_the_guard_pushes_the_box_with_the_same_launch_file(ro
     assert driver.messages[-1].reflexes == 0, driver.messages[-1].message
 
 
-@pytest.mark.parametrize("fault", ["path:=circle", "speed:=-1.0"])
-def test_wrong_arguments_are_errors_with_their_key(ros: RosSystem, fault: str) -> None:
-    process = ros.start(["roslaunch", "rpbi_examples", "pushing_mpc.launch", "headless:=true", fault])
+def test_pushes_are_tried_in_forks_of_the_world(ros: RosSystem) -> None:
+    status = ros.listen("mpc/status", MpcStatus)
+    arguments = (*LINE, "start_on_init:=false", "controller:=sampling")
+    ros.start(["roslaunch", "rpbi_examples", "pushing_mpc.launch", *arguments])
+    for _ in range(30):
+        assert ros.call("mpc/step", Trigger).message.endswith((": solved", "no pose yet, expected one"))
+        if status.messages and math.isfinite(status.messages[-1].cost) and status.messages[-1].iterations:
+            break  # the hand was on its way to the box before
+    assert 0.0 < status.messages[-1].cost < 100.0 and status.messages[-1].processor_time > 0.0
+
+
+WRONG = {
+    "path:=circle": "circle",
+    "speed:=-1.0": "~config: pushing.path.speed: must be > 0 [m/s], got -1",
+    "controller:=sampling real_robot:=true": "~config: controller: expected program with plant.timed",
+}
+"""Arguments, and what the message has."""
+
+
+@pytest.mark.parametrize("arguments", WRONG)
+def test_wrong_arguments_are_errors_with_their_key(ros: RosSystem, arguments: str) -> None:
+    process = ros.start(["roslaunch", "rpbi_examples", "pushing_mpc.launch", "headless:=true", *arguments.split()])
     wait_until(lambda: process.poll() is not None, "it ends by itself", SLOW_S)
-    expected = "circle" if fault.startswith("path") else "~config: pushing.path.speed: must be > 0 [m/s], got -1"
-    assert expected in ros.output(process)
+    assert WRONG[arguments] in ros.output(process)

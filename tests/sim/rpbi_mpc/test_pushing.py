@@ -9,8 +9,10 @@ import pytest
 
 from rpbi_mpc import LockStep
 from rpbi_mpc.pushing.controller import PushingConfig, PushingController
-from rpbi_mpc.pushing.paths import PathConfig, PushPath
+from rpbi_mpc.pushing.planar.paths import PathConfig, PushPath
+from rpbi_mpc.pushing.planner import ProgramPlanner
 from rpbi_mpc.pushing.program import ProgramConfig
+from rpbi_mpc.pushing.sampling_planner import PushSamplingConfig, SamplingPlanner
 from rpbi_mpc.pushing.simulated import PushingWorld
 from rpbi_mpc.pushing.trials import Variation, pushing_world, run_trial, shove
 
@@ -30,17 +32,33 @@ def test_box_is_pushed_along_an_s(variation, most_m):
 def test_a_controller_with_the_other_sign_would_fail():
     """The bounds above can fail: a box that is pushed straight ahead is far from the S."""
 
-    class Straight(PushingController):
+    class Straight(ProgramPlanner):
         def _commands(self, solved, gap):
-            return np.tile([self.path.speed, 0.0], (self.config.plan_cycles, 1))
+            return np.tile([S.speed, 0.0], (6, 1))
 
     config = PushingConfig(path=S)
-    assert run_trial(config, Variation(), controller=Straight(config), max_s=6.0).errors.mean() > 0.015
+    straight = PushingController(config, Straight(config))
+    assert run_trial(config, Variation(), make_controller=lambda _: straight, max_s=6.0).errors.mean() > 0.015
 
 
 def test_ipopt_alone_does_it_too():
     trial = run_trial(PushingConfig(path=LINE, program=ProgramConfig(solvers=("ipopt",))), Variation(), max_s=2.0)
     assert trial.errors.mean() < 0.005 and all(cycle.status == "solved" for cycle in trial.cycles)
+
+
+def test_the_best_of_simulated_pushes_follows_a_line_and_is_what_then_happens():
+    config = PushingConfig(path=LINE)
+    sampling = PushSamplingConfig(horizon=0.6, seed=903)
+
+    def make_controller(plant):
+        return PushingController(config, SamplingPlanner(plant, config, sampling))
+
+    trial = run_trial(config, Variation(seed=903, start=(0.0, 0.005, 0.05)), make_controller=make_controller, max_s=1.4)
+    sampled = [cycle for cycle in trial.cycles if cycle.plan and cycle.plan.status == "sampled"][:-1]
+    assert trial.errors.mean() < 0.01 and trial.truth[-1][1] > 0.03 and len(sampled) > 20
+    happened = [trial.truth[2 * cycle.index + 3, 1:4] for cycle in sampled]
+    predicted = [cycle.plan.states[1, :3] for cycle in sampled]
+    assert np.allclose(predicted, happened, atol=1e-9), "what the first command does, until the next one acts"
 
 
 def test_a_shoved_box_comes_back():
@@ -56,7 +74,10 @@ def test_decisions_do_not_depend_on_the_speed_of_the_computer():
             return super().plan(sensed, delay_s)
 
     config = PushingConfig(path=LINE)
-    quick, slow = (run_trial(config, UNLIKE, controller=kind(config), max_s=1.2) for kind in (PushingController, Slow))
+    quick, slow = (
+        run_trial(config, UNLIKE, make_controller=lambda _, kind=kind: kind(config), max_s=1.2)
+        for kind in (PushingController, Slow)
+    )
     assert np.array_equal(quick.truth, slow.truth)
 
 

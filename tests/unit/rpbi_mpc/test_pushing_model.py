@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from custom_ros_tools.errors import ConfigError
-from rpbi_mpc.pushing.model import (
+from rpbi_mpc.pushing.planar.model import (
     advanced,
     complementarity,
     load_for,
@@ -17,9 +17,9 @@ from rpbi_mpc.pushing.model import (
     response,
     twist_of,
 )
-from rpbi_mpc.pushing.motion import PlanarScene, gap_and_contact, moved
-from rpbi_mpc.pushing.paths import PathConfig, PushPath
-from rpbi_mpc.pushing.slider import SliderConfig
+from rpbi_mpc.pushing.planar.motion import PlanarScene, gap_and_contact, moved
+from rpbi_mpc.pushing.planar.paths import PathConfig, PushPath
+from rpbi_mpc.pushing.planar.slider import SliderConfig
 
 SLIDER = SliderConfig(length=0.1, width=0.08, friction=0.3, support="uniform")
 

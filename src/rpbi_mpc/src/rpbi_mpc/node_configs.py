@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -24,7 +24,8 @@ from custom_ros_tools.schema.json_schema import Schema, json_schema, resolved, s
 
 from .hand import PlanarHandConfig
 from .loop import LoopConfig
-from .pushing.controller import PushingConfig
+from .pushing.config import PushingConfig
+from .pushing.sampling_planner import PushSamplingConfig
 from .sampling import SAMPLERS, InputConfig, SamplingConfig
 
 SAME_S = 1e-9
@@ -38,6 +39,7 @@ class PlantConfig(ConfigModel):
     joint_states: TopicName = Field(
         "rpbi/nextage/joint_states", description="Topic of the positions of the joints; on hardware, the measured ones."
     )
+    slider: Text = Field("box", description="Name of the slider in the world, for predictions.")
     vicon: TopicName = Field("vicon/box/box", description="Topic of the pose of the slider's middle.")
     latency_s: Annotated[NonNegative, Unit("s")] = Field(
         0.02, description="Latency of the tracker; a stepped world waits for such a pose."
@@ -61,7 +63,11 @@ class PushingNodeConfig(ConfigModel):
     """A slider that the hand of a robot pushes along a path."""
 
     loop: LoopConfig = Field(LoopConfig(), description="Times of the loop.")
+    controller: Literal["program", "sampling"] = Field(
+        "program", description="What plans: a nonlinear program, or sampling in forks of a stepped world."
+    )
     pushing: PushingConfig = Field(PushingConfig(), description="Slider, path, cost and solver.")
+    sampling: PushSamplingConfig = Field(PushSamplingConfig(), description="Candidates of the controller `sampling`.")
     hand: PlanarHandConfig = Field(description="The hand that pushes.")
     plant: PlantConfig = Field(PlantConfig(), description="Topics, and pace.")
 
@@ -70,6 +76,9 @@ class PushingNodeConfig(ConfigModel):
         if abs(self.pushing.cycle_s - self.loop.period_s) > SAME_S:
             got = f"got {self.pushing.cycle_s:g}"
             raise KeyedError("pushing.cycle_s", f"expected the {self.loop.period_s:g} s of a cycle of loop.hz, {got}")
+        if self.controller == "sampling" and self.plant.timed:
+            expected = "expected program with plant.timed: time would pass while sampling simulates"
+            raise KeyedError("controller", expected)
         for name, part_s in (("delay_s", self.loop.delay_s), ("hz", self.loop.period_s)):
             targets = part_s * self.plant.target_hz
             if abs(targets - round(targets)) > 1e-6:
@@ -101,8 +110,8 @@ def schema_files(root: Path) -> dict[Path, str]:
         root: The workspace.
     """
     found = {name: json_schema(config, name) for name, config in CONFIGS.items()}
-    sampling = found["sampling_mpc"]
-    resolved(sampling["properties"]["sampling"], sampling)["properties"]["sampler"] = _any_sampler()
+    for schema in found.values():
+        resolved(schema["properties"]["sampling"], schema)["properties"]["sampler"] = _any_sampler()
     return schema_texts(root / "src/rpbi_mpc/schema", found)
 
 

@@ -91,7 +91,10 @@ def _serve(connection: Connection, requests: dict[str, Callable[..., Any]]) -> N
             answer = pickle.dumps((True, requests[name](*arguments)))
         except Exception as error:
             answer = pickle.dumps((False, _words(error)))
-        connection.send_bytes(answer)
+        try:
+            connection.send_bytes(answer)
+        except OSError:  # nobody waits for it any more
+            return
 
 
 def _words(error: Exception) -> str:

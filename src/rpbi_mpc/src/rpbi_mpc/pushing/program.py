@@ -11,8 +11,8 @@ from pydantic import Field
 from custom_ros_tools.errors import MissingDependency
 from custom_ros_tools.schema import ConfigModel, ListOf, NonNegative, Positive, Seconds, Unit
 
-from .model import advanced, complementarity, pusher_velocity
-from .slider import SliderConfig
+from .planar.model import advanced, complementarity, pusher_velocity
+from .planar.slider import SliderConfig
 
 try:
     import casadi

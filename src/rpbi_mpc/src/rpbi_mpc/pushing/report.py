@@ -13,8 +13,8 @@ from rpbi_mpc.loop import Cycle
 from rpbi_mpc.records import summary_of, table_of
 
 from .controller import PushingController
-from .motion import rotation
-from .slider import SliderConfig
+from .planar.motion import rotation
+from .planar.slider import SliderConfig
 
 if TYPE_CHECKING:
     import pandas

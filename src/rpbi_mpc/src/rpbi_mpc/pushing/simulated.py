@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
+from collections.abc import Sequence
 from typing import Any, cast
 
 import numpy as np
 
 from rpbi.samples import ViconSample
 from rpbi.world import World
+from rpbi.world.forks.prediction import PlannedInput, Prediction
 from rpbi_mpc.plant import Plant, Sensed
+
+from .planar.motion import rotation, yaw_of
 
 TIMEOUT_S = 0.1
 """Time without a pose of the slider after which it counts as hidden [s]."""
@@ -52,7 +57,10 @@ class PushingWorld(Plant):
         return Sensed(tick * dt_s, np.concatenate([pose, pusher]), age_s=age * dt_s)
 
     def act(self, command: np.ndarray) -> None:
-        self.world.put("pusher/target", dict(zip(self._joints, map(float, command))))
+        self.world.put(*self._target(command))
+
+    def _target(self, command: np.ndarray) -> tuple[str, dict[str, float]]:
+        return "pusher/target", dict(zip(self._joints, map(float, command)))
 
     def stand(self) -> None:
         self.act(np.zeros(2))
@@ -66,6 +74,26 @@ class PushingWorld(Plant):
         self.truth.append(
             np.array([self.world.clock.tick * self.world.clock.dt_s, *self.slider_pose(), *self._pushers[-1]])
         )
+
+    def scenes(self, velocities: np.ndarray, period_s: float, delay_s: float) -> np.ndarray:
+        """Returns the scene after each command of each candidate, see `PushRollouts`."""
+        dt_s = self.world.clock.dt_s
+        period, delay, cycles = round(period_s / dt_s), round(delay_s / dt_s), velocities.shape[1]
+        starts = delay + period * np.arange(cycles)
+        candidates = [
+            [PlannedInput(int(start), *self._target(velocity)) for start, velocity in zip(starts, each)]
+            for each in velocities
+        ]
+        every = math.gcd(period, delay)
+        found = self.world.predict(candidates, delay + cycles * period, watch=("box", "pusher"), every=every)
+        rows = (starts + period) // every - 1
+        return np.stack([self._scenes(each, rows) for each in found])
+
+    def _scenes(self, prediction: Prediction, rows: np.ndarray) -> np.ndarray:
+        if prediction.fault:
+            return np.full((len(rows), 5), np.nan)
+        poses = np.array([self._in_plane(pose[:3], pose[3:]) for pose in prediction.poses["box"][rows]])
+        return np.hstack([poses, self._base + prediction.joints["pusher"][rows, :2]])
 
     def pusher_position(self) -> np.ndarray:
         """Returns the true position of the pusher [m]."""
@@ -83,9 +111,7 @@ class PushingWorld(Plant):
             self._newest = (tick, self._in_plane(sample.pose.position, sample.pose.quat_xyzw))
             self._seen_tick = self.world.clock.tick
 
-    def _in_plane(self, position: tuple[float, ...], quat_xyzw: tuple[float, ...]) -> np.ndarray:
-        x, y, z, w = quat_xyzw
-        yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-        cos, sin = np.cos(yaw), np.sin(yaw)
-        middle = np.array(position[:2]) + np.array([[cos, -sin], [sin, cos]]) @ self.middle
+    def _in_plane(self, position: Sequence[float], quat_xyzw: Sequence[float]) -> np.ndarray:
+        yaw = yaw_of(quat_xyzw)
+        middle = np.array(position[:2]) + rotation(yaw) @ self.middle
         return np.array([*middle, yaw])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,8 +13,9 @@ from rpbi.world.loading import load_world
 from rpbi_mpc.controller import MpcController
 from rpbi_mpc.loop import Cycle, LockStep, LoopConfig
 
-from .controller import PushingConfig, PushingController
-from .paths import PushPath
+from .config import PushingConfig
+from .controller import PushingController
+from .planar.paths import PushPath
 from .simulated import PushingWorld
 
 WORLD = "{rpbi_mpc}/configs/bench/config.yaml"
@@ -134,7 +136,7 @@ def run_trial(
     variation: Variation,
     loop: LoopConfig | None = None,
     shove_at_s: float | None = None,
-    controller: MpcController | None = None,
+    make_controller: Callable[[PushingWorld], MpcController] | None = None,
     recovered_below: float = 0.01,
     max_s: float = 60.0,
 ) -> PushingTrial:
@@ -145,17 +147,17 @@ def run_trial(
         variation: How the world differs from its model.
         loop: Times of the loop; the default ones without it.
         shove_at_s: When the box is shoved by 3 cm and 30 degrees [s]; never without it.
-        controller: Another controller; without it, one of the configuration.
+        make_controller: Makes another controller for the plant; without it, one of the configuration.
         recovered_below: Error below which the box has recovered [m].
         max_s: Time after which the trial ends [s].
     """
-    controller = controller or PushingController(config)
     path = PushPath(config.path)
     world = pushing_world(variation, path)
     try:
         world.pb.changeDynamics(world.bodies["pusher"].body_id, 1, lateralFriction=PUSHER_FRICTION * variation.pusher)
         plant = PushingWorld(world, middle=(-variation.centre[0], -variation.centre[1]))
         plant.advance(max(variation.latency_s, 0.0) + 0.04)
+        controller = PushingController(config) if make_controller is None else make_controller(plant)
         lock_step = LockStep(plant, controller, loop)
         errors: list[float] = []
         off_path: list[float] = []

@@ -13,9 +13,9 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from rpbi_mpc.controller import ControlPlan
 from rpbi_mpc.plant import Sensed
-from rpbi_mpc.pushing.motion import rotation
-from rpbi_mpc.pushing.paths import PushPath
-from rpbi_mpc.pushing.slider import SliderConfig
+from rpbi_mpc.pushing.planar.motion import rotation
+from rpbi_mpc.pushing.planar.paths import PushPath
+from rpbi_mpc.pushing.planar.slider import SliderConfig
 
 FRAME = "rpbi/world"
 SPACING = 0.005

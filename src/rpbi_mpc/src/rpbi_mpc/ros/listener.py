@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from collections import deque
 from typing import NamedTuple
@@ -15,6 +14,7 @@ from sensor_msgs.msg import JointState
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
 from rpbi_mpc.hand import PlanarHand
 from rpbi_mpc.node_configs import PlantConfig
+from rpbi_mpc.pushing.planar.motion import yaw_of
 
 SLACK_S = 1e-4
 """Difference of stamps below which they are the same [s]: less than a tick, more than rounding."""
@@ -77,8 +77,7 @@ class SceneListener:
 
     def _on_pose(self, message: TransformStamped) -> None:
         place, turn = message.transform.translation, message.transform.rotation
-        yaw = math.atan2(2 * (turn.w * turn.z + turn.x * turn.y), 1 - 2 * (turn.y**2 + turn.z**2))
-        pose = np.array([place.x, place.y, yaw])
+        pose = np.array([place.x, place.y, yaw_of((turn.x, turn.y, turn.z, turn.w))])
         if not np.isfinite(pose).all():
             self._warn(self.vicon, f"{self.vicon}: message refused: expected finite numbers, got {pose}")
             return

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
 import time
 from abc import abstractmethod
 
 import numpy as np
 import rospy
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Trigger
 
 from custom_ros_tools.errors import InterfaceError
-from custom_ros_tools.ros.services import get_srv_handler
-from ros_pybullet_interface.srv import SetJointState, StepN
+from ros_pybullet_interface.msg import PredictedBody
+from rpbi.world.forks.prediction import PlannedInput
 from rpbi_mpc.hand import PlanarHand
 from rpbi_mpc.node_configs import PlantConfig
 from rpbi_mpc.plant import Plant, Sensed
+from rpbi_mpc.pushing.planar.motion import yaw_of
 
 from .listener import SceneListener
+from .simulator import SteppedSimulator
 
 PATIENCE_S = 30.0
 """Longest wait for the first joint states [s]."""
@@ -115,32 +118,76 @@ class SteppedPlant(HandPlant):
 
     def __init__(self, config: PlantConfig, hand: PlanarHand) -> None:
         super().__init__(config, hand)
-        self._step = get_srv_handler("rpbi/step_n", StepN, persistent=True)
-        self._set_target = get_srv_handler(f"rpbi/{config.robot}/set_target", SetJointState, persistent=True)
-        self._time_step_s = time_step_s(self._step)
-        self._stamp_s = self._step_by(1)
+        self._simulator = SteppedSimulator(config.robot)
 
     def sense(self) -> Sensed:
-        self._listener.wait_for(self._stamp_s - self._config.latency_s, self._stamp_s, ARRIVAL_S)
+        now_s = self._simulator.time_s
+        self._listener.wait_for(now_s - self._config.latency_s, now_s, ARRIVAL_S)
         return super().sense()
 
+    def scenes(self, velocities: np.ndarray, period_s: float, delay_s: float) -> np.ndarray:
+        """Returns the scene after each command of each candidate, see `PushRollouts`.
+
+        A candidate whose hand gets out of reach cannot be simulated.
+        """
+        dt_s, robot, slider = self._simulator.dt_s, self._config.robot, self._config.slider
+        period, delay, cycles = round(period_s / dt_s), round(delay_s / dt_s), velocities.shape[1]
+        durations_s = np.array([delay_s, *[period_s] * cycles])
+        found = np.full((len(velocities), cycles, 5), np.nan)
+        candidates = {}
+        for index, each in enumerate(velocities):
+            with contextlib.suppress(InterfaceError):
+                candidates[index] = self._targets(np.vstack([self._velocity, each]), durations_s)
+        if candidates:
+            every = math.gcd(period, delay)
+            rows = (delay + period * np.arange(1, cycles + 1)) // every - 1
+            ticks = delay + period * cycles
+            predictions = self._simulator.predict(list(candidates.values()), ticks, (slider, robot), every)
+            for index, prediction in zip(candidates, predictions):
+                if not prediction.fault:
+                    bodies = {body.name: body for body in prediction.bodies}
+                    found[index] = [self._scene(bodies[slider], bodies[robot], row) for row in rows]
+        return found
+
+    def _targets(self, velocities: np.ndarray, durations_s: np.ndarray) -> list[PlannedInput]:
+        """Returns targets of the joints for velocities of the hand, one after the other.
+
+        Inverse kinematics is solved at the end of each; joints are linear in between.
+
+        Raises:
+            InterfaceError: If a place is out of reach.
+        """
+        if self._place is None:
+            self._begin()
+        place, joints, targets, start_s = self._place, self._joints, [], 0.0
+        for velocity, duration_s in zip(velocities, durations_s):
+            place = place + duration_s * velocity
+            before, joints = joints, self._hand.solve(joints, place)
+            steps = round(duration_s * self._config.target_hz)
+            for step in range(steps):
+                tick = round((start_s + step / self._config.target_hz) / self._simulator.dt_s)
+                positions = before + (step + 1) / steps * (joints - before)
+                named = dict(zip(self._hand.joint_names, positions.tolist()))
+                targets.append(PlannedInput(tick, f"{self._config.robot}/target", named))
+            start_s += duration_s
+        return targets
+
+    def _scene(self, slider: PredictedBody, robot: PredictedBody, row: int) -> list[float]:
+        pose, count = slider.poses[row], len(robot.joint_names)
+        joints = dict(zip(robot.joint_names, robot.joints[row * count : (row + 1) * count]))
+        x, y, _ = self._hand.position(np.array([joints[name] for name in self._hand.joint_names]))
+        turn = pose.orientation
+        return [pose.position.x, pose.position.y, yaw_of((turn.x, turn.y, turn.z, turn.w)), x, y]
+
     def _now_s(self) -> float:
-        return self._stamp_s
+        return self._simulator.time_s
 
     def _pass(self, step_s: float, target: JointState) -> None:
-        answer = self._set_target(target)
-        if not answer.success:
-            raise InterfaceError(f"rpbi/{self._config.robot}/set_target: {answer.message}")
-        self._stamp_s = self._step_by(round(step_s / self._time_step_s))
-
-    def _step_by(self, ticks: int) -> float:
-        answer = self._step(ticks)
-        if not answer.success:
-            raise InterfaceError(f"rpbi/step_n: {answer.message}")
-        return float(answer.stamp.to_sec())
+        self._simulator.set_target(target)
+        self._simulator.step(round(step_s / self._simulator.dt_s))
 
     def _wait_for_joints(self) -> None:
-        self._step_by(1)
+        self._simulator.step(1)
         time.sleep(0.05)
 
 
@@ -168,13 +215,3 @@ class TimedPlant(HandPlant):
 
     def _wait_for_joints(self) -> None:
         time.sleep(0.05)
-
-
-def time_step_s(step: rospy.ServiceProxy) -> float:
-    """Stops the world, and returns the time of a tick [s], by the stamps of two."""
-    get_srv_handler("rpbi/stop", Trigger)()  # it may stand already
-    first, second = step(1), step(1)
-    for answer in (first, second):
-        if not answer.success:
-            raise InterfaceError(f"rpbi/step_n: {answer.message}")
-    return float((second.stamp - first.stamp).to_sec())

@@ -11,6 +11,7 @@ from rpbi_mpc.loop import Cycle
 from rpbi_mpc.node_configs import PushingNodeConfig
 from rpbi_mpc.pushing.controller import PushingController
 from rpbi_mpc.pushing.report import write_report
+from rpbi_mpc.pushing.sampling_planner import SamplingPlanner
 
 from .display import PushingDisplay
 from .loop_node import LoopNode
@@ -29,10 +30,15 @@ class PushingNode(LoopNode):
 
     def __init__(self) -> None:
         config = private_config(PushingNodeConfig)
-        self._pushing = PushingController(config.pushing)
-        hand = PlanarHand(config.hand)
+        hand, planner = PlanarHand(config.hand), None
+        if config.plant.timed:
+            self._hand: HandPlant = TimedPlant(config.plant, hand)
+        else:
+            self._hand = stepped = SteppedPlant(config.plant, hand)
+            if config.controller == "sampling":
+                planner = SamplingPlanner(stepped, config.pushing, config.sampling)
+        self._pushing = PushingController(config.pushing, planner)
         self._display = PushingDisplay(self._pushing.path, config.pushing.slider)
-        self._hand: HandPlant = (TimedPlant if config.plant.timed else SteppedPlant)(config.plant, hand)
         super().__init__(self._hand, self._pushing, config.loop)
 
     def show(self, cycle: Cycle) -> None:

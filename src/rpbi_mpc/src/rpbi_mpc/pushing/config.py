@@ -1,0 +1,49 @@
+"""The options of pushing."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from custom_ros_tools.schema import ConfigModel, NonNegative, Positive, PositiveMetres, Seconds, Unit
+
+from .planar.estimate import EstimatorConfig
+from .planar.motion import ApproachConfig
+from .planar.paths import PathConfig
+from .planar.slider import SliderConfig
+from .program import ProgramConfig
+
+
+class PushingConfig(ConfigModel):
+    """A slider, a pusher and a path.
+
+    Attributes:
+        slider: The slider.
+        radius: Radius of the pusher [m].
+        path: The path.
+        program: Horizon, cost and solver.
+        estimator: Filter of measurements.
+        approach: Motion to the slider.
+        gap_rate: Rate at which a gap between pusher and slider is closed while pushing [1/s].
+        max_lag: Distance along the path by which the reference may be ahead of the slider; then it waits [m].
+        settle_s: Time after the end of the path for which the last pose is aimed at [s].
+        cycle_s: Time of a cycle, for which a command acts [s].
+        lag_s: Time from a command until the pusher moves by it, beside the delay of the loop [s].
+        plan_cycles: Number of commands of a plan, one for each cycle.
+        max_command: Largest speed of the pusher [m/s].
+    """
+
+    slider: SliderConfig = Field(SliderConfig(), description="The slider.")
+    radius: PositiveMetres = Field(0.01, description="Radius of the pusher.")
+    path: PathConfig = Field(PathConfig(), description="The path.")
+    program: ProgramConfig = Field(ProgramConfig(), description="Horizon, cost and solver.")
+    estimator: EstimatorConfig = Field(EstimatorConfig(), description="Filter of measurements.")
+    approach: ApproachConfig = Field(ApproachConfig(), description="Motion of the pusher to the slider.")
+    gap_rate: Annotated[NonNegative, Unit("1/s")] = Field(5.0, description="Rate at which a gap is closed in contact.")
+    max_lag: PositiveMetres = Field(0.03, description="Distance ahead of the slider at which the reference waits.")
+    settle_s: Annotated[NonNegative, Unit("s")] = Field(1.0, description="Time at the last pose of the path.")
+    cycle_s: Seconds = Field(0.04, description="Time of a cycle.")
+    lag_s: Annotated[NonNegative, Unit("s")] = Field(0.0, description="Time until the pusher moves by a command.")
+    plan_cycles: Annotated[int, Field(ge=1)] = Field(6, description="Commands of a plan, one for each cycle.")
+    max_command: Annotated[Positive, Unit("m/s")] = Field(0.2, description="Largest speed of the pusher.")

@@ -1,0 +1,128 @@
+"""How to push, once the pusher is at the slider: the interface of planners, and the one by a nonlinear program."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from typing import NamedTuple
+
+import numpy as np
+
+from rpbi_mpc.controller import ControlPlan
+
+from .config import PushingConfig
+from .planar.model import pusher_velocity
+from .planar.motion import PlanarScene, rotation
+from .planar.paths import PushPath
+from .program import PushingProgram, Solved
+
+
+class PushSituation(NamedTuple):
+    """What a planner starts from.
+
+    Attributes:
+        scene: The scene that is expected when the first command acts.
+        gap: Distance between pusher and face in it [m], negative inside.
+        contact: Place of the pusher along the face [m].
+        delay_s: Time from now until then [s].
+        path: The path.
+        path_time_s: Time along the path then [s].
+    """
+
+    scene: PlanarScene
+    gap: float
+    contact: float
+    delay_s: float
+    path: PushPath
+    path_time_s: float
+
+    def reference(self, times_s: np.ndarray) -> np.ndarray:
+        """Returns where the slider should be at times after the first command [s], N x 3 [m, m, rad].
+
+        Yaw is that of the slider plus less than half a turn.
+        """
+        poses = self.path.poses(self.path_time_s + times_s)
+        poses[:, 2] += 2 * math.pi * round((self.scene.slider[2] - poses[0, 2]) / (2 * math.pi))
+        return poses
+
+    @property
+    def speed(self) -> float:
+        """Speed along the path [m/s]; 0 at its end."""
+        return self.path.speed if self.path_time_s < self.path.duration_s else 0.0
+
+
+class PushPlanner(ABC):
+    """Plans velocities of a pusher that is at the slider."""
+
+    @abstractmethod
+    def plan(self, situation: PushSituation) -> ControlPlan:
+        """Returns velocities of the pusher in the axes of the table, and states (x, y, yaw, contact)."""
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Forgets the last plan."""
+
+
+class ProgramPlanner(PushPlanner):
+    """Solves `PushingProgram` at each cycle, started from the last solution.
+
+    Args:
+        config: Slider, pusher, path and cost.
+    """
+
+    def __init__(self, config: PushingConfig) -> None:
+        self._config = config
+        self._program = PushingProgram(config.slider, config.program)
+        self.reset()
+
+    def reset(self) -> None:
+        self._guess: np.ndarray | None = None
+        self._force = np.array([self._config.path.speed, 0.0])
+
+    def plan(self, situation: PushSituation) -> ControlPlan:
+        solved = self._solve(situation)
+        if solved.converged:
+            self._force = solved.inputs[0, :2]
+            self._guess = self._program.guess_of(solved.states, solved.inputs)
+        else:
+            self._guess = None
+        return ControlPlan(
+            self._commands(solved, max(situation.gap, 0.0)),
+            solved.states,
+            self._config.program.step_s,
+            solved.cost,
+            solved.converged,
+            solved.status,
+            solved.iterations,
+            solved.wall_s,
+            solved.processor_s,
+        )
+
+    def _solve(self, situation: PushSituation) -> Solved:
+        config, reach = self._config.program, self._config.slider.reach
+        state = np.array([*situation.scene.slider, np.clip(situation.contact, -reach, reach)])
+        reference = situation.reference(config.step_s * np.arange(config.steps + 1))
+        guess = self._guess
+        if guess is None:
+            states = np.tile(state, (config.steps + 1, 1))
+            inputs = np.tile([situation.path.speed, 0.0, 0.0, 0.0], (config.steps, 1))
+            guess = self._program.guess_of(states, inputs)
+        return self._program.solve(state, reference, situation.speed, self._force, guess)
+
+    def _commands(self, solved: Solved, gap: float) -> np.ndarray:
+        """Returns velocities of the pusher in the axes of the table, one for each cycle."""
+        config = self._config
+        rows = []
+        for cycle in range(config.plan_cycles):
+            step = min(int(cycle * config.cycle_s / config.program.step_s), len(solved.inputs) - 1)
+            state, control = solved.states[step], solved.inputs[step]
+            velocity = np.array(pusher_velocity(state, control, config.slider), dtype=float)
+            velocity[0] += config.gap_rate * gap * (cycle == 0)
+            rows.append(rotation(state[2]) @ _limited(velocity, config.max_command))
+        return np.array(rows)
+
+
+def _limited(velocity: np.ndarray, most: float) -> np.ndarray:
+    """Returns a velocity in the same direction that is not faster."""
+    speed = float(np.hypot(*velocity))
+    return velocity if speed <= most else velocity * (most / speed)

@@ -1,0 +1,139 @@
+"""Plans of pushing by simulation: candidates are pushed in forks of the world, and the best one acts."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Annotated, Any, Protocol
+
+import numpy as np
+from pydantic import Field
+
+from custom_ros_tools.schema import NonNegative, Positive, Seconds, Text, Unit
+from rpbi_mpc.controller import ControlPlan
+from rpbi_mpc.plant import Sensed
+from rpbi_mpc.sampling.controller import SamplingConfig, SamplingController
+
+from .config import PushingConfig
+from .planar.motion import rotation
+from .planner import PushPlanner, PushSituation
+
+
+class PushRollouts(Protocol):
+    """A plant that simulates pushes from its present state."""
+
+    def scenes(self, velocities: np.ndarray, period_s: float, delay_s: float) -> np.ndarray:
+        """Returns the scene after each command of each candidate, candidates x cycles x 5, as `PlanarScene.values`.
+
+        The scenes of a candidate that cannot be simulated are NaN.
+
+        Args:
+            velocities: Of the pusher in the axes of the table [m/s], candidates x cycles x 2.
+            period_s: Time of a command [s].
+            delay_s: Time until the first one acts [s]; the present one goes on until then.
+        """
+
+
+class PushSamplingConfig(SamplingConfig):
+    """Options of plans by sampling; the cost is that of `pushing.program.weights`, except for yaw.
+
+    Attributes:
+        forward: Largest speed of the pusher towards the face [m/s]; it retreats at a fifth of it.
+        across: Largest speed along the face [m/s].
+        yaw: Weight of the difference from the direction of the path [1/rad^2]: a box has to turn before it can leave
+            a straight line, which is in its cost sooner than the distance from the path.
+    """
+
+    horizon: Seconds = Field(1.2, description="Time that is looked ahead.")
+    knots: Annotated[int, Field(ge=2)] = Field(3, description="Knots of a plan, between which velocities are linear.")
+    sampler: dict[Text, Any] = Field(
+        {"type": "predictive", "candidates": 16, "noise": 0.2},
+        description="Its `type`, which is predictive, cem, mppi, or module:Class of your own, and its options.",
+    )
+    forward: Annotated[Positive, Unit("m/s")] = Field(0.1, description="Largest speed of the pusher towards the face.")
+    across: Annotated[Positive, Unit("m/s")] = Field(0.12, description="Largest speed along the face.")
+    yaw: NonNegative = Field(300.0, description="Weight of the difference from the path's direction [1/rad^2].")
+
+
+RETREAT = 0.2
+"""Largest speed away from the face, as a share of that towards it."""
+
+
+class SamplingPlanner(PushPlanner):
+    """Takes the push that ends best in forks of the world.
+
+    Args:
+        rollouts: Simulates pushes.
+        config: Slider, path and weights.
+        sampling: Candidates, and the choice among them.
+    """
+
+    def __init__(self, rollouts: PushRollouts, config: PushingConfig, sampling: PushSamplingConfig) -> None:
+        self._config = config
+        self._pushes = _ScoredPushes(rollouts, config, sampling)
+        along = np.array([config.path.speed, 0.0])
+        self._controller = SamplingController(self._pushes, sampling, 1.0 / config.cycle_s, along)
+
+    def reset(self) -> None:
+        self._controller.reset()
+
+    def plan(self, situation: PushSituation) -> ControlPlan:
+        self._pushes.situation = situation
+        plan = self._controller.plan(Sensed(0.0, None), situation.delay_s)
+        if not plan.converged:
+            return plan
+        return dataclasses.replace(
+            plan,
+            commands=self._pushes.on_the_table(plan.commands)[: self._config.plan_cycles],
+            states=self._pushes.best_states,
+        )
+
+
+class _ScoredPushes:
+    """Costs of pushes in the axes of the slider, forwards and to the left, as `Rollouts`.
+
+    Attributes:
+        situation: What they start from.
+        best_states: x, y, yaw, contact of the best of the last candidates.
+    """
+
+    names: tuple[str, ...] = ("forward", "across")
+    situation: PushSituation
+
+    def __init__(self, rollouts: PushRollouts, config: PushingConfig, sampling: PushSamplingConfig) -> None:
+        self._rollouts, self._config, self._yaw = rollouts, config, sampling.yaw
+        self.upper = np.array([sampling.forward, sampling.across])
+        self.lower = -self.upper * (RETREAT, 1.0)
+        self.best_states = np.empty((0, 4))
+
+    def on_the_table(self, commands: np.ndarray) -> np.ndarray:
+        """Returns velocities in the axes of the table [m/s]."""
+        turned: np.ndarray = commands @ rotation(self.situation.scene.slider[2]).T
+        return turned
+
+    def costs(self, commands: np.ndarray, period_s: float, delay_s: float) -> np.ndarray:
+        scenes = self._rollouts.scenes(self.on_the_table(commands), period_s, delay_s)
+        gaps, contacts = self._places(scenes)
+        costs = self._costs(scenes, gaps, contacts, period_s)
+        best = int(np.argmin(costs))
+        first = [*self.situation.scene.slider, self.situation.contact]
+        self.best_states = np.vstack([first, np.column_stack([scenes[best, :, :3], contacts[best]])])
+        return costs
+
+    def _places(self, scenes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the distance of the pusher from the face, and its place along it [m], candidates x cycles."""
+        cos, sin = np.cos(scenes[..., 2]), np.sin(scenes[..., 2])
+        dx, dy = np.moveaxis(scenes[..., 3:] - scenes[..., :2], -1, 0)
+        return -(cos * dx + sin * dy) - self._config.slider.face - self._config.radius, cos * dy - sin * dx
+
+    def _costs(self, scenes: np.ndarray, gaps: np.ndarray, contacts: np.ndarray, period_s: float) -> np.ndarray:
+        """Returns the cost of each candidate; inf for one without scenes, or whose pusher leaves the face."""
+        weights, slider = self._config.program.weights, self._config.slider
+        difference = scenes[..., :3] - self.situation.reference(period_s * (1.0 + np.arange(scenes.shape[1])))
+        by_cycle = (
+            weights.position * (np.square(difference[..., :2]).sum(axis=-1) + np.square(gaps))
+            + self._yaw * np.square(difference[..., 2])
+            + weights.contact * np.square(contacts)
+        )
+        by_cycle[:, -1] *= weights.final
+        costs = by_cycle.sum(axis=1) * period_s / self._config.program.step_s
+        return np.where(np.isfinite(costs) & (np.abs(contacts).max(axis=1) <= slider.width / 2), costs, np.inf)

@@ -1,0 +1,89 @@
+"""A simulator that stands still between the steps that are requested, and predicts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import rospy
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.ros.services import get_srv_handler
+from ros_pybullet_interface.msg import Candidate, Prediction
+from ros_pybullet_interface.msg import PlannedInput as PlannedInputMessage
+from ros_pybullet_interface.srv import Predict, SetJointState, StepN
+from rpbi.world.forks.prediction import PlannedInput
+
+
+class SteppedSimulator:
+    """Steps the simulator and sets targets of a robot, by services.
+
+    Args:
+        robot: Name of the robot.
+
+    Attributes:
+        dt_s: Time of a tick [s].
+        time_s: Time of the last tick [s].
+
+    Raises:
+        InterfaceError: If the simulator refuses to be stepped.
+    """
+
+    def __init__(self, robot: str) -> None:
+        self._robot = robot
+        self._step_n = get_srv_handler("rpbi/step_n", StepN, persistent=True)
+        self._predict = get_srv_handler("rpbi/predict", Predict, persistent=True)
+        self._set_target = get_srv_handler(f"rpbi/{robot}/set_target", SetJointState, persistent=True)
+        get_srv_handler("rpbi/stop", Trigger)()  # it may stand already
+        self.step(1)
+        before_s = self.time_s
+        self.step(1)
+        self.dt_s = round(self.time_s - before_s, 9)
+
+    def step(self, ticks: int) -> None:
+        """Advances by ticks.
+
+        Raises:
+            InterfaceError: If the simulator refuses.
+        """
+        answer = self._step_n(ticks)
+        if not answer.success:
+            raise InterfaceError(f"rpbi/step_n: {answer.message}")
+        self.time_s = float(answer.stamp.to_sec())
+
+    def set_target(self, target: JointState) -> None:
+        """Sets targets of joints, which count from the next tick on.
+
+        Raises:
+            InterfaceError: If the simulator refuses.
+        """
+        answer = self._set_target(target)
+        if not answer.success:
+            raise InterfaceError(f"rpbi/{self._robot}/set_target: {answer.message}")
+
+    def predict(
+        self,
+        candidates: Sequence[Sequence[PlannedInput]],
+        ticks: int,
+        watch: Sequence[str] = (),
+        every: int = 0,
+        cost: str = "",
+    ) -> list[Prediction]:
+        """Returns what would happen with each candidate, see `World.predict`.
+
+        Raises:
+            InterfaceError: If the simulator refuses.
+        """
+        messages = [Candidate([_message(each) for each in candidate]) for candidate in candidates]
+        answer = self._predict(candidates=messages, ticks=ticks, watch=watch, every=every, cost=cost)
+        if not answer.success:
+            raise InterfaceError(f"rpbi/predict: {answer.message}")
+        for fault in sorted({each.fault for each in answer.predictions if each.fault}):
+            rospy.logwarn_throttle(5.0, f"not simulated: {fault}")
+        found: list[Prediction] = answer.predictions
+        return found
+
+
+def _message(planned: PlannedInput) -> PlannedInputMessage:
+    return PlannedInputMessage(planned.tick, planned.slot, [*planned.value], [*planned.value.values()])
