@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 import rosgraph
 import rospy
@@ -116,6 +117,22 @@ def test_panda_swings(ros):
     first = states.wait_for(1)[0]
     index = first.name.index("panda_joint4")
     wait_until(lambda: abs(states.messages[-1].position[index] - first.position[index]) > 0.3, "it moves")
+
+
+@pytest.mark.parametrize("robot", ["kinova", "talos", "nextage", "human"])
+def test_joints_of_a_robot_swing_in_turn(ros, robot):
+    launch(ros, f"basic_example_{'human_model' if robot == 'human' else robot}", real_time_factor=4)
+    states = ros.listen(f"/rpbi/{robot}/joint_states", JointState)
+    states.wait_for(1)
+
+    def swung() -> list[int]:
+        """Returns the joints that have swung to one side, in the order in which they did."""
+        positions = np.array([each.position for each in list(states.messages)])
+        away = np.abs(positions - positions[0]) > 0.25
+        return sorted(np.flatnonzero(away.any(axis=0)).tolist(), key=lambda joint: int(away[:, joint].argmax()))
+
+    wait_until(lambda: len(swung()) >= 2, "two joints have swung", every_s=0.5)
+    assert swung()[:2] == sorted(swung()[:2]), "one after the other"
 
 
 @pytest.mark.quick

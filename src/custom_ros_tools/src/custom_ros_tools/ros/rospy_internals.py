@@ -164,6 +164,9 @@ class Subscriptions:
         report = self._reported.get(pair)
         try:
             code, *_ = self._connect_topic(topic, uri)
+        except Exception:
+            if not rospy.core.is_shutdown_requested():  # else its parts are gone
+                raise
         finally:
             with self._lock:
                 self._connecting.discard(pair)
