@@ -5,10 +5,10 @@ The floor publishes, or draws, and does nothing else.
 
 from __future__ import annotations
 
+from bench_worlds import CAMERA, arm_world, write_main
 from loop import publisher_alone
 from result import Result, Target
 from session import CLOUD, COLOUR, DEPTH, JOINT_STATES, Session
-from worlds import CAMERA, arm_world, write_main
 
 HZ = 1000
 LONGEST_CLOUD_MS = 15.0

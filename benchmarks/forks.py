@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bench_worlds import arm_world
 from result import Result, Target
 from session import JOINT_STATES, Session
-from worlds import arm_world
 
 SUPPORT = Path(__file__).resolve().parent.parent / "tests/support"
 sys.path += [str(SUPPORT / each) for each in ("worlds", "robots")]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from bench_worlds import arm_world, write_main
 from result import Result, Target
 from session import JOINT_STATES, Session
-from worlds import arm_world, write_main
 
 HZ = 1000
 JOINT_STATES_HZ = 50

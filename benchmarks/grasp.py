@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import random
 
+from bench_worlds import CONFIGS
 from result import Result, Target
-from worlds import CONFIGS
 
 from rpbi.control.joint_command import JointCommand
 from rpbi.geometry import Pose

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from bench_worlds import CAMERA, arm_world
 from result import Result, Target
 from session import COLOUR, DEPTH, JOINT_STATES, Session
-from worlds import CAMERA, arm_world
 
 HZ = 1000
 TICK_MS = 1e3 / HZ

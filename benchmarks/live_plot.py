@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from bench_worlds import arm_world
 from result import Result, Target
 from session import JOINT_STATES, PROGRAMS, Session
-from worlds import arm_world
 
 HZ = 1000
 FIELDS = tuple(f"{JOINT_STATES}/position[{index}]" for index in range(1, 4))

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import rosbag
+from bench_worlds import CAMERA, crowded_world, write_main
 from loop import publisher_alone
 from result import Result
 from session import COLOUR, DEPTH, JOINT_STATES, Session
-from worlds import CAMERA, crowded_world, write_main
 
 HZ = 1000
 TF_HZ = 50

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from arrivals import Arrivals
+from bench_worlds import arm_world
 from result import Result, Target
 from session import JOINT_STATES, Session
-from worlds import arm_world
 
 
 def run(quick: bool) -> list[Result]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from bench_worlds import crowded_world
 from loop import publisher_alone
 from result import Result, Target
 from session import Session
-from worlds import crowded_world
 
 HZ = 1000
 TF_HZ = 50

@@ -11,9 +11,9 @@ import time
 from pathlib import Path
 
 import rosbag
+from bench_worlds import CAMERA, arm_world
 from result import Result, Target
 from session import COLOUR, DEPTH, JOINT_STATES, Session
-from worlds import CAMERA, arm_world
 
 from episodes import EpisodeFolder
 from episodes.folder import BAG

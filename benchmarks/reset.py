@@ -7,9 +7,9 @@ import subprocess
 import sys
 
 import yaml
+from bench_worlds import CONFIGS
 from result import Result, Target
 from session import JOINT_STATES, PROGRAMS, Session
-from worlds import CONFIGS
 
 RESETS, QUICK_RESETS = 1000, 50
 TARGET_MS = 200.0

@@ -5,9 +5,9 @@ It takes an hour, so it runs only when it is named; `--quick` takes a minute.
 
 from __future__ import annotations
 
+from bench_worlds import CAMERA, crowded_world
 from result import Result, Target
 from session import Session
-from worlds import CAMERA, crowded_world
 
 HZ = 1000
 STATUS_HZ = 50.0

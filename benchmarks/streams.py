@@ -19,10 +19,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
+from bench_worlds import write_main
 from programs.swing import JOINT, position, velocity
 from result import Result, Target
 from session import Session
-from worlds import write_main
 
 from rpbi.control.joint_command import JointCommand
 from rpbi.world import World

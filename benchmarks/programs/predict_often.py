@@ -27,7 +27,8 @@ def main() -> None:
     while time.monotonic() < end_s:
         goals = random.uniform((-0.5, 0.3, -1.8), (0.5, 0.9, -1.0), (count, 3)).tolist()
         begin_s = time.monotonic()
-        answer = predict([Candidate([PlannedInput(0, "kuka_lwr/target", JOINTS, goal)]) for goal in goals], ticks=ticks)
+        candidates = [Candidate([PlannedInput(0, "kuka_lwr/target", JOINTS, goal)]) for goal in goals]
+        answer = predict(candidates=candidates, ticks=ticks)
         durations.append(time.monotonic() - begin_s)
         assert answer.success and not any(each.fault for each in answer.predictions), answer
     print(f"result: {json.dumps(durations)}")

@@ -15,8 +15,8 @@ from rpbi.world import World
 
 from .hand import HandConfig, HandTask
 
-TICKS = 20
-"""Ticks between two looks at the contacts; the hand moves by a fraction of a cell meanwhile."""
+TICKS = 40
+"""Ticks between two looks at the contacts; the hand moves by at most half a cell meanwhile."""
 
 
 class WipeConfig(HandConfig):
