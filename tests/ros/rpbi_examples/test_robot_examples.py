@@ -111,14 +111,6 @@ def test_panda_works_the_ros_way(ros, position):
         )
 
 
-def test_panda_swings(ros):
-    launch(ros, "basic_example_panda", real_time_factor=4)
-    states = ros.listen("/rpbi/panda/joint_states", JointState)
-    first = states.wait_for(1)[0]
-    index = first.name.index("panda_joint4")
-    wait_until(lambda: abs(states.messages[-1].position[index] - first.position[index]) > 0.3, "it moves")
-
-
 @pytest.mark.parametrize("robot", ["kinova", "talos", "nextage", "human"])
 def test_joints_of_a_robot_swing_in_turn(ros, robot):
     launch(ros, f"basic_example_{'human_model' if robot == 'human' else robot}", real_time_factor=4)
