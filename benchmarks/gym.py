@@ -32,7 +32,7 @@ VECTOR_STEPS, QUICK_VECTOR_STEPS = 100, 15
 RESETS = 20
 WORKER_GAIN = 1.8
 PANDA_GYM = "PandaReach-v3"
-"""Has 20 ticks of 2 ms an action; `pip install panda-gym==3.0.7` in .venv adds it."""
+"""Has 20 ticks of 2 ms an action; `.venv/bin/pip install --no-deps panda-gym==3.0.7` adds it."""
 
 Call = tuple[tuple[Any, ...], dict[str, Any]]
 

@@ -57,7 +57,7 @@ def test_pushes_are_tried_in_forks_of_the_world(ros: RosSystem) -> None:
         assert ros.call("mpc/step", Trigger).message.endswith((": solved", "no pose yet, expected one"))
         if status.messages and math.isfinite(status.messages[-1].cost) and status.messages[-1].iterations:
             break  # the hand was on its way to the box before
-    assert 0.0 < status.messages[-1].cost < 100.0 and status.messages[-1].processor_time > 0.0
+    assert 0.0 < status.messages[-1].cost < 100.0 and status.messages[-1].iterations == 1, "the program needs more"
 
 
 WRONG = {

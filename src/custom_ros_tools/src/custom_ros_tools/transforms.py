@@ -5,6 +5,7 @@ Quaternions are x, y, z, w. Roll, pitch and yaw rotate about the fixed x, y and 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -82,6 +83,12 @@ def rpy_of(quat_xyzw: ArrayLike) -> Array:
         ValueError: If it has not four finite numbers or is zero.
     """
     return np.asarray(Rotation.from_quat(unit_quat(quat_xyzw)).as_euler("xyz"))
+
+
+def yaw_of(quat_xyzw: Sequence[float] | Array) -> float:
+    """Returns the yaw [rad] of a unit quaternion x, y, z, w: the direction of the x axis about the vertical."""
+    x, y, z, w = quat_xyzw
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 def matrix_of(position: ArrayLike, quat_xyzw: ArrayLike) -> Array:

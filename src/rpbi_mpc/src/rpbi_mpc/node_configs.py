@@ -64,7 +64,7 @@ class PushingNodeConfig(ConfigModel):
 
     loop: LoopConfig = Field(LoopConfig(), description="Times of the loop.")
     controller: Literal["program", "sampling"] = Field(
-        "program", description="What plans: a nonlinear program, or sampling in forks of a stepped world."
+        "program", description="Planner: a nonlinear program, or sampling in forks of a stepped world."
     )
     pushing: PushingConfig = Field(PushingConfig(), description="Slider, path, cost and solver.")
     sampling: PushSamplingConfig = Field(PushSamplingConfig(), description="Candidates of the controller `sampling`.")

@@ -1,4 +1,4 @@
-"""How to push, once the pusher is at the slider: the interface of planners, and the one by a nonlinear program."""
+"""Planners of pushing: their interface, and the one that solves a nonlinear program."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .program import PushingProgram, Solved
 
 
 class PushSituation(NamedTuple):
-    """What a planner starts from.
+    """Scene, path and time from which a planner starts.
 
     Attributes:
         scene: The scene that is expected when the first command acts.

@@ -10,11 +10,10 @@ from pydantic import Field
 
 from custom_ros_tools.schema import NonNegative, Positive, Seconds, Text, Unit
 from rpbi_mpc.controller import ControlPlan
-from rpbi_mpc.plant import Sensed
 from rpbi_mpc.sampling.controller import SamplingConfig, SamplingController
 
 from .config import PushingConfig
-from .planar.motion import rotation
+from .planar.motion import PlanarScene, gap_and_contact, rotation
 from .planner import PushPlanner, PushSituation
 
 
@@ -27,7 +26,7 @@ class PushRollouts(Protocol):
         The scenes of a candidate that cannot be simulated are NaN.
 
         Args:
-            velocities: Of the pusher in the axes of the table [m/s], candidates x cycles x 2.
+            velocities: Velocities of the pusher in the axes of the table [m/s], candidates x cycles x 2.
             period_s: Time of a command [s].
             delay_s: Time until the first one acts [s]; the present one goes on until then.
         """
@@ -39,8 +38,8 @@ class PushSamplingConfig(SamplingConfig):
     Attributes:
         forward: Largest speed of the pusher towards the face [m/s]; it retreats at a fifth of it.
         across: Largest speed along the face [m/s].
-        yaw: Weight of the difference from the direction of the path [1/rad^2]: a box has to turn before it can leave
-            a straight line, which is in its cost sooner than the distance from the path.
+        yaw: Weight of the difference from the direction of the path [1/rad^2]. A box turns before it leaves a straight
+            line. Within the horizon, turning hardly reduces the distance from the path, so it has a weight of its own.
     """
 
     horizon: Seconds = Field(1.2, description="Time that is looked ahead.")
@@ -78,7 +77,7 @@ class SamplingPlanner(PushPlanner):
 
     def plan(self, situation: PushSituation) -> ControlPlan:
         self._pushes.situation = situation
-        plan = self._controller.plan(Sensed(0.0, None), situation.delay_s)
+        plan = self._controller.sample(situation.delay_s)
         if not plan.converged:
             return plan
         return dataclasses.replace(
@@ -92,7 +91,7 @@ class _ScoredPushes:
     """Costs of pushes in the axes of the slider, forwards and to the left, as `Rollouts`.
 
     Attributes:
-        situation: What they start from.
+        situation: Scene, path and time from which they start.
         best_states: x, y, yaw, contact of the best of the last candidates.
     """
 
@@ -121,9 +120,10 @@ class _ScoredPushes:
 
     def _places(self, scenes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Returns the distance of the pusher from the face, and its place along it [m], candidates x cycles."""
-        cos, sin = np.cos(scenes[..., 2]), np.sin(scenes[..., 2])
-        dx, dy = np.moveaxis(scenes[..., 3:] - scenes[..., :2], -1, 0)
-        return -(cos * dx + sin * dy) - self._config.slider.face - self._config.radius, cos * dy - sin * dx
+        slider, radius = self._config.slider, self._config.radius
+        places = np.array([gap_and_contact(PlanarScene.of(each), slider, radius) for each in scenes.reshape(-1, 5)])
+        gaps, contacts = places.T.reshape(2, *scenes.shape[:2])
+        return gaps, contacts
 
     def _costs(self, scenes: np.ndarray, gaps: np.ndarray, contacts: np.ndarray, period_s: float) -> np.ndarray:
         """Returns the cost of each candidate; inf for one without scenes, or whose pusher leaves the face."""

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Sequence
 from typing import Any, cast
 
 import numpy as np
 
+from custom_ros_tools.transforms import yaw_of
 from rpbi.samples import ViconSample
 from rpbi.world import World
 from rpbi.world.forks.prediction import PlannedInput, Prediction
 from rpbi_mpc.plant import Plant, Sensed
+from rpbi_mpc.sampling.world import RolloutTicks
 
-from .planar.motion import rotation, yaw_of
+from .planar.motion import rotation
 
 TIMEOUT_S = 0.1
 """Time without a pose of the slider after which it counts as hidden [s]."""
@@ -77,17 +78,13 @@ class PushingWorld(Plant):
 
     def scenes(self, velocities: np.ndarray, period_s: float, delay_s: float) -> np.ndarray:
         """Returns the scene after each command of each candidate, see `PushRollouts`."""
-        dt_s = self.world.clock.dt_s
-        period, delay, cycles = round(period_s / dt_s), round(delay_s / dt_s), velocities.shape[1]
-        starts = delay + period * np.arange(cycles)
+        ticks = RolloutTicks.of(velocities.shape[1], period_s, delay_s, self.world.clock.dt_s)
         candidates = [
-            [PlannedInput(int(start), *self._target(velocity)) for start, velocity in zip(starts, each)]
+            [PlannedInput(int(start), *self._target(velocity)) for start, velocity in zip(ticks.starts, each)]
             for each in velocities
         ]
-        every = math.gcd(period, delay)
-        found = self.world.predict(candidates, delay + cycles * period, watch=("box", "pusher"), every=every)
-        rows = (starts + period) // every - 1
-        return np.stack([self._scenes(each, rows) for each in found])
+        found = self.world.predict(candidates, ticks.total, watch=("box", "pusher"), every=ticks.every)
+        return np.stack([self._scenes(each, ticks.rows) for each in found])
 
     def _scenes(self, prediction: Prediction, rows: np.ndarray) -> np.ndarray:
         if prediction.fault:

@@ -12,9 +12,9 @@ from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import JointState
 
 from custom_ros_tools.ros.lifecycle.wall_time import ThrottledWarning
+from custom_ros_tools.transforms import yaw_of
 from rpbi_mpc.hand import PlanarHand
 from rpbi_mpc.node_configs import PlantConfig
-from rpbi_mpc.pushing.planar.motion import yaw_of
 
 SLACK_S = 1e-4
 """Difference of stamps below which they are the same [s]: less than a tick, more than rounding."""

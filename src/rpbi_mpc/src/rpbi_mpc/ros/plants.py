@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import time
 from abc import abstractmethod
 
@@ -12,12 +11,13 @@ import rospy
 from sensor_msgs.msg import JointState
 
 from custom_ros_tools.errors import InterfaceError
+from custom_ros_tools.transforms import yaw_of
 from ros_pybullet_interface.msg import PredictedBody
 from rpbi.world.forks.prediction import PlannedInput
 from rpbi_mpc.hand import PlanarHand
 from rpbi_mpc.node_configs import PlantConfig
 from rpbi_mpc.plant import Plant, Sensed
-from rpbi_mpc.pushing.planar.motion import yaw_of
+from rpbi_mpc.sampling.world import RolloutTicks
 
 from .listener import SceneListener
 from .simulator import SteppedSimulator
@@ -130,8 +130,8 @@ class SteppedPlant(HandPlant):
 
         A candidate whose hand gets out of reach cannot be simulated.
         """
-        dt_s, robot, slider = self._simulator.dt_s, self._config.robot, self._config.slider
-        period, delay, cycles = round(period_s / dt_s), round(delay_s / dt_s), velocities.shape[1]
+        robot, slider, cycles = self._config.robot, self._config.slider, velocities.shape[1]
+        ticks = RolloutTicks.of(cycles, period_s, delay_s, self._simulator.dt_s)
         durations_s = np.array([delay_s, *[period_s] * cycles])
         found = np.full((len(velocities), cycles, 5), np.nan)
         candidates = {}
@@ -139,14 +139,12 @@ class SteppedPlant(HandPlant):
             with contextlib.suppress(InterfaceError):
                 candidates[index] = self._targets(np.vstack([self._velocity, each]), durations_s)
         if candidates:
-            every = math.gcd(period, delay)
-            rows = (delay + period * np.arange(1, cycles + 1)) // every - 1
-            ticks = delay + period * cycles
-            predictions = self._simulator.predict(list(candidates.values()), ticks, (slider, robot), every)
+            chosen = list(candidates.values())
+            predictions = self._simulator.predict(chosen, ticks.total, (slider, robot), ticks.every)
             for index, prediction in zip(candidates, predictions):
                 if not prediction.fault:
                     bodies = {body.name: body for body in prediction.bodies}
-                    found[index] = [self._scene(bodies[slider], bodies[robot], row) for row in rows]
+                    found[index] = [self._scene(bodies[slider], bodies[robot], row) for row in ticks.rows]
         return found
 
     def _targets(self, velocities: np.ndarray, durations_s: np.ndarray) -> list[PlannedInput]:

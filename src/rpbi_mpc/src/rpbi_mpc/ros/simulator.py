@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import rospy
 from sensor_msgs.msg import JointState
@@ -47,9 +48,7 @@ class SteppedSimulator:
         Raises:
             InterfaceError: If the simulator refuses.
         """
-        answer = self._step_n(ticks)
-        if not answer.success:
-            raise InterfaceError(f"rpbi/step_n: {answer.message}")
+        answer = _accepted("rpbi/step_n", self._step_n(ticks))
         self.time_s = float(answer.stamp.to_sec())
 
     def set_target(self, target: JointState) -> None:
@@ -58,9 +57,7 @@ class SteppedSimulator:
         Raises:
             InterfaceError: If the simulator refuses.
         """
-        answer = self._set_target(target)
-        if not answer.success:
-            raise InterfaceError(f"rpbi/{self._robot}/set_target: {answer.message}")
+        _accepted(f"rpbi/{self._robot}/set_target", self._set_target(target))
 
     def predict(
         self,
@@ -77,12 +74,22 @@ class SteppedSimulator:
         """
         messages = [Candidate([_message(each) for each in candidate]) for candidate in candidates]
         answer = self._predict(candidates=messages, ticks=ticks, watch=watch, every=every, cost=cost)
-        if not answer.success:
-            raise InterfaceError(f"rpbi/predict: {answer.message}")
+        _accepted("rpbi/predict", answer)
         for fault in sorted({each.fault for each in answer.predictions if each.fault}):
             rospy.logwarn_throttle(5.0, f"not simulated: {fault}")
         found: list[Prediction] = answer.predictions
         return found
+
+
+def _accepted(service: str, answer: Any) -> Any:
+    """Returns the answer of a service.
+
+    Raises:
+        InterfaceError: If it is a refusal.
+    """
+    if not answer.success:
+        raise InterfaceError(f"{service}: {answer.message}")
+    return answer
 
 
 def _message(planned: PlannedInput) -> PlannedInputMessage:

@@ -87,6 +87,10 @@ class SamplingController(MpcController):
         self._count = 0
 
     def plan(self, sensed: Sensed, delay_s: float) -> ControlPlan:
+        return self.sample(delay_s)
+
+    def sample(self, delay_s: float) -> ControlPlan:
+        """Returns a plan from the present state of the simulation, whose first command acts after a delay [s]."""
         begin_s, begin_cpu_s = time.perf_counter(), time.process_time()
         random = np.random.default_rng([self._config.seed, self._count])
         self._count += 1

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -57,6 +59,33 @@ def whole_ticks(duration_s: float, dt_s: float) -> int:
     if abs(ticks * dt_s - duration_s) > 1e-9:
         raise InterfaceError(f"expected a whole number of ticks of {dt_s:g} s, got {duration_s:g} s")
     return ticks
+
+
+class RolloutTicks(NamedTuple):
+    """Ticks of a prediction in which commands act one after the other.
+
+    Attributes:
+        starts: First tick of each command, n.
+        total: Number of ticks.
+        every: Ticks between two rows of the prediction.
+        rows: Row at the end of each command, n.
+    """
+
+    starts: np.ndarray
+    total: int
+    every: int
+    rows: np.ndarray
+
+    @classmethod
+    def of(cls, commands: int, period_s: float, delay_s: float, dt_s: float) -> RolloutTicks:
+        """Returns the ticks of some commands of a period [s], the first of which acts after a delay [s].
+
+        Raises:
+            InterfaceError: If period or delay is no whole number of ticks.
+        """
+        period, delay = whole_ticks(period_s, dt_s), whole_ticks(delay_s, dt_s)
+        starts, every = delay + period * np.arange(commands), math.gcd(period, delay)
+        return cls(starts, delay + period * commands, every, (starts + period) // every - 1)
 
 
 class ForkedWorld(Plant):

@@ -17,7 +17,7 @@ from custom_ros_tools.errors import InterfaceError
 from custom_ros_tools.ros.services import call_service, get_srv_handler
 from custom_ros_tools.ros.tf_interface import TfInterface
 from custom_ros_tools.ros.transform_messages import as_pose, transform_message
-from custom_ros_tools.transforms import Array, pose_of
+from custom_ros_tools.transforms import Array, pose_of, yaw_of
 from ik_ros.msg import IKProblem
 from ik_ros.srv import SolveIK, SolveIKResponse
 from ros_pybullet_interface.srv import ResetJointState
@@ -165,9 +165,3 @@ def planar(message: TransformStamped) -> PlanarPose:
     """Returns the pose of a transform on the floor."""
     place, quat = TfInterface.msg_to_pos_quat(message)
     return PlanarPose(float(place[0]), float(place[1]), yaw_of(quat))
-
-
-def yaw_of(quat_xyzw: Array) -> float:
-    """Returns the direction of the x axis about the vertical [rad]."""
-    x, y, z, w = quat_xyzw
-    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

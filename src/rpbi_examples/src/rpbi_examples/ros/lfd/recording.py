@@ -10,13 +10,14 @@ from cob_srvs.srv import SetString
 from std_srvs.srv import Trigger
 
 from custom_ros_tools.ros.services import call_service
+from custom_ros_tools.transforms import yaw_of
 from episodes import EpisodeFolder
 from episodes.folder import BAG
 from rpbi_examples.lfd.report import BoxError, Run
 from rpbi_examples.lfd.skill import PushPlan
 from rpbi_utils import bag_to_dataframes, transforms_between
 
-from .arm import ORIGIN, TIP, yaw_of
+from .arm import ORIGIN, TIP
 from .box import FRAME, NAME
 
 CONTACTS, SIGNAL = f"/rpbi/{NAME}/contacts", "/operator_node/signal"

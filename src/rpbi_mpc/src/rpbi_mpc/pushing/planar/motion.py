@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -38,12 +37,6 @@ class PlanarScene(NamedTuple):
     def values(self) -> np.ndarray:
         """The numbers x, y, yaw, pusher_x, pusher_y."""
         return np.concatenate([self.slider, self.pusher])
-
-
-def yaw_of(quat_xyzw: Sequence[float]) -> float:
-    """Returns the angle about the vertical [rad] of an orientation without tilt."""
-    x, y, z, w = quat_xyzw
-    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
 def rotation(yaw: float) -> np.ndarray:
