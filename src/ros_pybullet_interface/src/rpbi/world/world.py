@@ -515,6 +515,16 @@ class World:
                 "the state is of another world, or one of its files has changed: build that world by World.from_state"
             )
 
+    def prepare_forks(self) -> None:
+        """Starts the process from which `fork` and `predict` fork, so that their first call need not wait for it.
+
+        Raises:
+            InterfaceError: If the state cannot be saved.
+        """
+        self.apply_inputs()
+        if self._shadow is None:
+            self._shadow = Shadow(self.save())
+
     def fork(self, count: int = 1) -> list[Fork]:
         """Returns worlds in processes of their own that go on from the present state, to the last bit.
 
@@ -562,10 +572,8 @@ class World:
 
     def _followed(self) -> Shadow:
         """Returns the process that follows this world, at the present state."""
-        self.apply_inputs()
-        if self._shadow is None:
-            self._shadow = Shadow(self.save())
-            return self._shadow
+        self.prepare_forks()
+        assert self._shadow is not None
         try:
             new = self.commands.records(self._shadow.commands)
             self._shadow.follow(new, self.clock.tick, self.state_hash())

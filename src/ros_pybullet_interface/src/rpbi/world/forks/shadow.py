@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from multiprocessing.connection import Connection, Pipe
 from multiprocessing.reduction import send_handle
 from typing import Any
@@ -36,12 +37,26 @@ class Remote:
             if handle is not None:
                 send_handle(self._connection, handle, 0)
                 os.set_blocking(self._connection.fileno(), True)  # a default time-out of sockets has changed it
+        except OSError as error:
+            raise self._ended(error) from None
+        return self.answer()
+
+    def answer(self) -> Any:
+        """Returns the answer to a request that was sent.
+
+        Raises:
+            InterfaceError: If the other end refuses, or has ended.
+        """
+        try:
             is_good, answer = self._connection.recv()
         except (EOFError, OSError) as error:
-            raise InterfaceError(f"{self._subject} has ended: {error or 'its memory may have run out'}") from None
+            raise self._ended(error) from None
         if not is_good:
             raise InterfaceError(f"{self._subject}: {answer}")
         return answer
+
+    def _ended(self, error: Exception) -> InterfaceError:
+        return InterfaceError(f"{self._subject} has ended: {error or 'its memory may have run out'}")
 
     def close(self) -> None:
         """Ends the other end."""
@@ -81,12 +96,11 @@ class Fork(Remote):
 class Shadow:
     """The process; it has neither ROS nor a window nor a second thread, and may therefore fork.
 
+    It starts while this one goes on; the first call waits until it has come to the state.
+
     Args:
         state: Present state of the world.
         niceness: How much less of the processors it gets than this process, from 0 to 19.
-
-    Raises:
-        InterfaceError: If the world does not come to the same state there.
     """
 
     def __init__(self, state: WorldState, niceness: int = 0) -> None:
@@ -103,20 +117,21 @@ class Shadow:
         self._remote = Remote(ours, "the process that follows the world")
         self.commands = len(state.commands)
         """Number of commands that it knows."""
-        try:
+        self._is_starting = True
+        with suppress(OSError):  # the first call reports that it has ended
             ours.send(state)
-            self._remote.ask("follow", (), state.tick, state.state_hash)
-        except BaseException:
-            self.close()
-            raise
+            ours.send(("follow", ((), state.tick, state.state_hash)))
 
     def follow(self, commands: Iterable[RecordedCommand], tick: int, state_hash: str) -> None:
-        """Brings it to the present tick of the world.
+        """Brings it to the present tick of the world, before it forks or predicts.
 
         Raises:
             InterfaceError: If its state then has another hash.
         """
         new = tuple(commands)
+        if self._is_starting:
+            self._remote.answer()
+            self._is_starting = False
         self._remote.ask("follow", new, tick, state_hash)
         self.commands += len(new)
 
